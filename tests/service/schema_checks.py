@@ -35,7 +35,13 @@ SETTINGS = {
     # Pixels of all pictures together.
     "frames",
     # Settings of a reconstruction that need or exclude another; the lower speed comes first.
-    *("attenuation.focusing", "decomposition", "sart.speed_range_mps", "speed_bounds_mps"),
+    *(
+        "attenuation.focusing",
+        "decomposition",
+        "opening_angle_deg",
+        "sart.speed_range_mps",
+        "speed_bounds_mps",
+    ),
     # Settings that only some simulations have, or have in a narrower range; what is too large in all.
     *CONDITIONS,
     *("coupling_mps", "elements", "nodes", "snr"),

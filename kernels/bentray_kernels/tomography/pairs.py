@@ -9,10 +9,9 @@ import numpy as np
 from ..acquisition import Dataset
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
+from .decomposition import distinct_heights, with_decomposition
+from .directivity import within_opening
 from .settings import Settings
-
-# Elements whose heights differ by less than this, m, belong to one ring.
-SAME_HEIGHT_M = 1e-5
 
 
 @dataclass(frozen=True)
@@ -52,9 +51,7 @@ def heights(dataset: Dataset) -> Floats | None:
         raise InvalidInput(
             "slice/z_m", f"{dataset.slices} slices of an array in space", "slices of an array in a plane"
         )
-    z = np.sort(dataset.element_position_m[:, 2])
-    first = np.concatenate(([True], np.diff(z) > SAME_HEIGHT_M))
-    return np.asarray(z[first])
+    return distinct_heights(dataset.element_position_m)
 
 
 def count(dataset: Dataset, settings: Settings) -> int:
@@ -64,7 +61,7 @@ def count(dataset: Dataset, settings: Settings) -> int:
         InvalidInput: as ``heights``, and for a volume with a single height.
     """
     z = heights(dataset)
-    if settings.decomposition == "slices":
+    if with_decomposition(dataset.element_position_m, settings).decomposition == "slices":
         return 1 if z is None else len(z)
     if z is None or len(z) == 1:
         raise InvalidInput("decomposition", "'volume'", "slices, for the scan has one height only")
@@ -75,11 +72,12 @@ def of(dataset: Dataset, settings: Settings, index: int) -> Pairs:
     """The pairs of one problem; ``index`` counts from 0.
 
     Raises:
-        InvalidInput: for a problem without a travel time, and as ``count``.
+        InvalidInput: for a problem without a travel time, as ``count``, and as ``within_opening``.
     """
     if not 0 <= index < count(dataset, settings):
         raise InvalidInput("slice", index, f"0 to {count(dataset, settings) - 1}")
     plane = dataset.element_position_m.shape[1] == 2
+    settings = with_decomposition(dataset.element_position_m, settings)
     if settings.decomposition == "slices":
         pairs = _slice(dataset, settings, index) if plane else _ring(dataset, settings, index)
     elif plane:
@@ -137,6 +135,10 @@ def _between(dataset: Dataset, settings: Settings, tx: Ints, rx: Ints, members: 
     if ratio is not None:
         usable = tx[:, None] != rx[None, :]
         ratio = np.where(usable if dataset.valid is None else usable & dataset.valid, ratio, np.nan)
+    if settings.opening_angle_deg is not None:
+        inside = within_opening(dataset, settings.opening_angle_deg)
+        delta = np.where(inside, delta, np.nan)
+        ratio = None if ratio is None else np.where(inside, ratio, np.nan)
     sent, received = np.isin(tx, members), np.isin(rx, members)
     if len(members) < len(dataset.element_position_m):
         tx, rx = tx[sent], rx[received]

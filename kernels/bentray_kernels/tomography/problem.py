@@ -8,15 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..acquisition import Dataset
+from ..acquisition.array_hull import POSITION, check_extent, inside_array
 from ..arrays import Flags, Floats, Ints
 from ..errors import InvalidInput
 from . import pairs
-from .array_region import POSITION, RIM_NODES, check_extent, inside_array
 from .roi import inside
 from .settings import Settings
 
 # Water kept around the outermost transducer, nodes, as a margin for wave front and gradient.
 MARGIN_NODES = 3
+
+# Nodes nearer to the array than this are water and stay so.
+RIM_NODES = 2
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
@@ -16,6 +17,8 @@ from ..arrays import Floats
 from ..errors import InvalidInput
 from ..task_graph import ThreadPool, run
 from . import pairs
+from .decomposition import with_decomposition
+from .geometry_summary import geometry_summary
 from .grid_schedule import stages
 from .image_grid import automatic_nodes
 from .model_selection.held_out import Part, part_of
@@ -104,7 +107,8 @@ def run_reconstruction(
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it, and errors of ``run_graphs``.
     """
-    settings = with_nodes(dataset, settings)
+    requested = settings
+    settings = with_nodes(dataset, with_decomposition(dataset.element_position_m, settings))
     count = pairs.count(dataset, settings)
     trials: tuple[Trial, ...] = ()
     before = 0
@@ -118,6 +122,9 @@ def run_reconstruction(
     graphs = [ReconstructionGraph(scan, index) for index in range(count)]
     run_graphs(graphs, before, after)
     rays = _assembled(dataset, settings, scan.problem(0), graphs, trials)
+    summary = geometry_summary(dataset, requested, settings, scan.problem(count // 2))
+    if summary:
+        rays = replace(rays, provenance={**rays.provenance, "geometry": summary})
     if waves is None:
         return rays
     done = before + sum(graph.total for graph in graphs)

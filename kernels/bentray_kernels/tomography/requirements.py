@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from ..acquisition.array_hull import check_extent
 from ..acquisition.dataset import Dataset
 from ..errors import InvalidInput
 from . import pairs
+from .decomposition import with_decomposition
+from .directivity import check_normals
 from .settings import Settings
 
 
@@ -31,7 +34,11 @@ def check_scan(dataset: Dataset, settings: Settings, samples: int) -> None:
         raise InvalidInput("waveform/object", "no traces", "traces to read amplitudes from")
     if settings.method == "waveform":
         check_waveform(settings, samples, dataset.slices, in_space=dataset.element_position_m.shape[1] != 2)
+    if settings.opening_angle_deg is not None:
+        check_normals(known=dataset.element_normal is not None)
     pairs.count(dataset, settings)
+    flat = with_decomposition(dataset.element_position_m, settings).decomposition == "slices"
+    check_extent(dataset.element_position_m[:, :2] if flat else dataset.element_position_m)
 
 
 def check_waveform(settings: Settings, samples: int, slices: int, *, in_space: bool) -> None:

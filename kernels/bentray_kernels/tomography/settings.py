@@ -158,8 +158,17 @@ class Settings:
             "Eikonal solver for curved rays. deviation: SART on slices; accurate replaces it elsewhere.",
         )
     )
-    decomposition: Literal["slices", "volume"] = setting(
-        "slices", "slices: each height of the ring by itself; volume: all heights together, in 3-D."
+    decomposition: Literal["slices", "volume"] | None = setting(
+        None,
+        "slices: each height of the ring by itself; volume: all heights together, in 3-D.",
+        unset="volume for elements in 3-D with fewer than 8 at each height, else slices",
+    )
+    opening_angle_deg: float | None = setting(
+        None,
+        "Full opening angle of the elements about their directions (geometry/element_normal), degrees: pairs "
+        "whose path leaves this cone at either end are left out.",
+        Range(0.0, 180.0, above=True, unit="degrees"),
+        unset="every direction",
     )
     nodes: int | None = setting(
         None,

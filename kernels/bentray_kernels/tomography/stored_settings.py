@@ -25,7 +25,7 @@ REMOVED = ("huber_s", "speed_update", "wave_misfit", "wave_variation")
 # Removed values, by setting, and what replaces them.
 INSTEAD = {"rays": {"adjoint": "curved"}, "amplitudes": {"centroid": "spectrum"}}
 # Where no value was stored.
-EARLIER_DEFAULTS = MappingProxyType({"method": "sart", "nodes": 128})
+EARLIER_DEFAULTS = MappingProxyType({"method": "sart", "nodes": 128, "decomposition": "slices"})
 # Where 0 meant what None means now.
 ZERO_IS_NONE = ("emitters", "minutes", "stop_rms_s")
 

@@ -95,7 +95,8 @@ def quality(
         title = f"{source.name}: {found.report['verdict']}"
         print_table(title, ("check", "found", "elements", "done"), lines)
         usable = f"{found.report['usable_pairs']} of {found.report['pairs']} pairs usable"
-        print_lines([usable, *summary["outputs"].values()])
+        excluded = [f"not checked: {name}, {why}" for name, why in found.report["not_checked"].items()]
+        print_lines([usable, *excluded, *summary["outputs"].values()])
     if found.picked is None:
         refused = next(f for f in found.report["findings"] if f["action"] == "refused")
         raise WorkFailed(f"{refused['check']}: {refused['found']}; accepted: {refused['accepted']}")

@@ -233,7 +233,7 @@ def field_links(field_id: str) -> dict[str, str]:
 
 
 def _describe(result: Reconstruction) -> Plain:
-    notes = [result.provenance.get("water"), advice_of(result) if result.trials else None]
+    notes = [*map(result.provenance.get, ("water", "geometry")), advice_of(result) if result.trials else None]
     advice = " ".join(filter(None, notes))
     return {
         "axes": ",".join("xyz"[: result.speed.ndim]),

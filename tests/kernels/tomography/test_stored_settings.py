@@ -64,7 +64,7 @@ def test_settings_of_today_come_back():
 
 
 def test_the_defaults_of_the_flat_record_are_those_of_its_time():
-    assert from_stored(FLAT) == from_stored({}) == Settings(method="sart", nodes=128)
+    assert from_stored(FLAT) == from_stored({}) == Settings(method="sart", nodes=128, decomposition="slices")
 
 
 def test_every_name_of_the_flat_record_has_its_place():
@@ -96,7 +96,7 @@ def test_every_name_of_the_flat_record_has_its_place():
     ],
 )
 def test_the_flat_record_is_mapped(old, new):
-    expected = Settings.of(**{"method": "sart", "nodes": 128, **new})
+    expected = Settings.of(**{"method": "sart", "nodes": 128, "decomposition": "slices", **new})
     assert from_stored(old) == expected
     assert from_stored({**FLAT, **old}) == expected
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import WIDTH_M
+from bentray_kernels.tomography.directivity import check_normals
 from bentray_kernels.tomography.model_selection.selection import CANDIDATES, final_settings
 from bentray_kernels.tomography.requirements import check_waveform
 from bentray_kernels.tomography.settings import MIN_NODES, Settings
@@ -88,9 +89,14 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
 
     Raises:
         InvalidInput: for a resource that no connected worker has, for a task that none can run (``nodes``
-            with the bytes found and accepted), and for an array without width, stored by earlier versions.
+            with the bytes found and accepted), for an opening angle without directions of the elements, and
+            for an array without width, stored by earlier versions.
     """
     _check_extent(scan)
+    if settings.opening_angle_deg is not None:
+        check_normals(known=scan.normals)
+    if settings.decomposition is None:
+        settings = settings.changed(decomposition=scan.decomposition)
     if settings.nodes is None:
         settings = settings.changed(nodes=scan.nodes)
     lane: Lane = "opencl" if resource_of(settings) == "opencl" else "recon"

@@ -13,6 +13,7 @@ from ...errors import InvalidInput
 from ...picker_names import DEFAULT_PICKER
 from ..dataset import Dataset
 from ..picking.first_arrivals import pick
+from .array_shape import COVERAGE, find_limited_angle, inapplicable
 from .contradictions import find_contradictions
 from .correction import apply, stacked
 from .dead import find_dead
@@ -94,7 +95,10 @@ def examine_slices(
     other = (dataset.tx[:, None] != dataset.rx[None, :]).sum() * dataset.slices
     usable = 0 if picked is None else int(np.isfinite(picked.differential_tof()).sum())
     name = "" if dataset.picked else picker
-    return Examined(Report(tuple(findings), checked, int(other), usable, name), picked)
+    findings += find_limited_angle(dataset)
+    excluded = inapplicable(dataset, checked)
+    done = (*(name for name in checked if name not in excluded), COVERAGE)
+    return Examined(Report(tuple(findings), done, int(other), usable, name, excluded), picked)
 
 
 def _times_read(dataset: Dataset) -> int:

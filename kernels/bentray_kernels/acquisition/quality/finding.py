@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -81,6 +81,7 @@ class Report:
         pairs: number of pairs of different elements, over all slices.
         usable: number of pairs with valid times.
         picker: method of the times, empty where they came with the scan.
+        not_checked: reasons why a check does not apply to the array, by its name.
     """
 
     findings: tuple[Finding, ...]
@@ -88,6 +89,7 @@ class Report:
     pairs: int
     usable: int
     picker: str = ""
+    not_checked: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def refusal(self) -> Finding | None:
@@ -102,6 +104,7 @@ class Report:
             "usable_pairs": self.usable,
             "picker": self.picker,
             "checked": list(self.checked),
+            "not_checked": dict(self.not_checked),
             "findings": [finding.to_dict() for finding in self.findings],
         }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Flags, Floats
+from ..array_hull import depth_inside
 from ..dataset import Dataset
 from .finding import Finding
 
@@ -28,7 +29,7 @@ BESIDE = (4.0, 6.0)
 # Fewest chords through a place.
 MIN_PAIRS = 12
 
-# Places outside this part of the array's radius are crossed by few chords.
+# Places outside this part of the array, from its middle to its faces, are crossed by few chords.
 REACH = 0.85
 
 # Pairs that are compared, drawn evenly.
@@ -93,9 +94,8 @@ def _places(dataset: Dataset) -> tuple[Floats, Floats]:
     low, high = position.min(axis=0), position.max(axis=0)
     axes = [np.linspace(a, b, PLACES) for a, b in zip(low, high, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    centre = 0.5 * (low + high)
-    radius = np.linalg.norm(position - centre, axis=1).min()
-    inside = grid[np.linalg.norm(grid - centre, axis=1) <= REACH * radius]
+    depth = depth_inside(position, grid)
+    inside = grid[depth >= (1.0 - REACH) * depth.max()]
     return np.asarray(inside), np.asarray((high - low) / (PLACES - 1))
 
 

@@ -116,4 +116,5 @@ def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
         speed_bounds_mps=settings.speed_bounds_mps,
         seed=settings.seed,
         roi=settings.roi,
+        opening_angle_deg=settings.opening_angle_deg,
     )

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...acquisition import Dataset, Waveform
+from ...acquisition.array_hull import inside_array
 from ...arrays import Flags, Ints
 from ...errors import InvalidInput
 from ...wave.points import REACH
 from ...wave.time_blocks import Poll, no_poll
+from ..directivity import within_opening
 from ..roi import inside
 from .band_grid import Extent
 from .source_calibration import WaterShots, with_calibrated_source, with_normalised_amplitudes
@@ -49,10 +51,10 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, poll: Poll
     extent = Extent.of(band, reach, float(samples[-1] - samples[0]), settings.speed_bounds_mps[1])
     nodes = extent.nodes
     axis = spacing * (np.arange(nodes) - 0.5 * (nodes - 1))
-    nearest = float(np.linalg.norm(flat - centre, axis=1).min()) - REACH * spacing
     origin = centre + axis[0]
     place = (float(origin[0]), float(origin[1]))
-    region = np.hypot(axis[:, None], axis[None, :]) <= nearest
+    elements = flat[np.union1d(dataset.tx, dataset.rx)]
+    region = inside_array(elements, (nodes, nodes), spacing, place, REACH)
     if settings.roi:
         region &= inside(dataset, region.shape, spacing, place)
     if not region.any():
@@ -66,6 +68,8 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, poll: Poll
     use &= np.isfinite(gain) & np.isfinite(water_gain)
     if dataset.valid is not None:
         use &= dataset.valid
+    if settings.opening_angle_deg is not None:
+        use &= within_opening(dataset, settings.opening_angle_deg)
     used, held = _draw_emitters(np.flatnonzero(use.any(axis=1)), settings, number)
     traces, use = _without_dead_traces(recorded, use, np.concatenate((used, held)))
     used, held = (some[use[some].any(axis=1)] for some in (used, held))

@@ -115,6 +115,7 @@ class WaveSettings:
         held_out: number of emitters used only for validation.
         seed: of the draw of emitters.
         roi: whether only the dataset's region of interest may change (``mask/roi``).
+        opening_angle_deg: pairs outside this angle are left out, see ``directivity``; None: no pair is.
         estimates_source: whether the source is estimated anew in each band from the traces of the object.
     """
 
@@ -128,6 +129,7 @@ class WaveSettings:
     held_out: int = ranged(4, Range(0, 65_536))
     seed: int = ranged(0, SEED)
     roi: bool = False
+    opening_angle_deg: float | None = None
     estimates_source: bool = False
 
     def __post_init__(self) -> None:

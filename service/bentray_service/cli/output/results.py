@@ -49,15 +49,14 @@ def write_results(
 def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
     """Print the summary table, the choice of ``auto`` and the paths; or all metrics as JSON.
 
-    An assumption about the water comes first, since it offsets all speeds.
+    What offsets all speeds or blurs the image comes first: an assumption about the water, and the geometry.
     """
     from .figures import summary
 
     if as_json:
         print_json(found)
         return
-    if "water" in found["provenance"]:
-        print_lines([found["provenance"]["water"]])
+    print_lines(found["provenance"][name] for name in ("water", "geometry") if name in found["provenance"])
     print_table(title, ("figure", "value"), summary(found))
     if found["candidates"]:
         print_table("", ("candidate", "held-out misfit", ""), found["candidates"], {"held-out misfit"})

@@ -35,4 +35,7 @@ class QualityRecord(BaseModel):
     usable_pairs: int = Field(description="Pairs used for a reconstruction; 0 for a refused scan.")
     picker: str = Field(description="Picker of first arrivals; empty for scans with travel times.")
     checked: list[str] = Field(description="Names of the applicable checks.")
+    not_checked: dict[str, str] = Field(
+        {}, description="Checks that do not apply to the array, and the reason of each."
+    )
     findings: list[FindingRecord]

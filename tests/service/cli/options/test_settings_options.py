@@ -22,6 +22,7 @@ CHOICES = [
     (["--rays", "straight"], "rays", "straight"),
     (["--eikonal", "fsm"], "eikonal", "fsm"),
     (["--decomposition", "volume"], "decomposition", "volume"),
+    (["--opening-angle", "60"], "opening_angle_deg", 60.0),
     (["--nodes", "64"], "nodes", 64),
     (["--side", "0.25"], "side_m", 0.25),
     (["--iterations", "7"], "iterations", 7),

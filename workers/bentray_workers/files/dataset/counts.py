@@ -10,6 +10,7 @@ import numpy as np
 
 from bentray_kernels.acquisition.element_pitch import element_pitch
 from bentray_kernels.arrays import Floats, Ints
+from bentray_kernels.tomography.decomposition import automatic_decomposition
 from bentray_kernels.tomography.image_grid import automatic_nodes
 
 # These load compiled kernels, which takes seconds: the reader of an upload starts without them.
@@ -70,6 +71,8 @@ class Summary:
         traces: for a full-waveform refinement; None without traces of the object.
         period: whether the centre frequency is known, so that times are examined.
         nodes: along each side of an image, at most, where the settings leave them open.
+        decomposition: where the settings leave it open.
+        normals: whether the directions of the elements are known.
     """
 
     emitters: int
@@ -84,6 +87,8 @@ class Summary:
     traces: Traces | None = None
     period: bool = False
     nodes: int = 128
+    decomposition: str = "slices"
+    normals: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,6 +109,8 @@ class DatasetCounts:
         water_mps: speed of sound in water.
         water_shot: whether there are traces of the water alone; older records do not state it.
         pitch_m: median distance of neighbouring elements, m; 0: not stated, in older records.
+        decomposition: where the settings leave it open.
+        normals: whether the directions of the elements are known.
     """
 
     emissions: int
@@ -123,6 +130,8 @@ class DatasetCounts:
     water_mps: float
     water_shot: bool = True
     pitch_m: float = 0.0
+    decomposition: str = "slices"
+    normals: bool = False
 
     @classmethod
     def of(cls, dataset: Dataset) -> DatasetCounts:
@@ -140,6 +149,7 @@ class DatasetCounts:
             frequency_hz=dataset.center_frequency_hz,
             water_mps=float(dataset.water_speed_mps),
             water_shot=len(both) == 2,
+            normals=dataset.element_normal is not None,
         )
 
     def summary(self, settings: Settings) -> Summary:
@@ -165,12 +175,16 @@ class DatasetCounts:
             traces=self._traces() if self.water_shot or estimated else None,
             period=self.frequency_hz is not None,
             nodes=self._nodes(settings),
+            decomposition=self.decomposition,
+            normals=self.normals,
         )
 
     def _nodes(self, settings: Settings) -> int:
         wavelength = self.water_mps / self.frequency_hz if self.frequency_hz else None
         # The noise of the times, unknown here, may allow fewer.
         pitch = self.pitch_m or math.pi * self.width_m / self.elements
+        if settings.decomposition is None:
+            settings = settings.changed(decomposition=self.decomposition)
         return automatic_nodes(settings, self.width_m, pitch, wavelength)
 
     def to_dict(self) -> dict[str, Any]:
@@ -211,4 +225,5 @@ def array_counts(position: Floats, tx: Ints, rx: Ints, heights: Floats | None) -
         "height_m": float(np.ptp(z)),
         "width_m": float(np.ptp(position[:, :2], axis=0).max()),
         "pitch_m": element_pitch(position),
+        "decomposition": automatic_decomposition(position),
     }

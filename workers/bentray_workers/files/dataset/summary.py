@@ -58,6 +58,7 @@ def counts_in(path: Path) -> DatasetCounts:
             # The speed hardly affects sizes.
             water_mps=1500.0 if water is None else water,
             water_shot=_bytes(reader, "waveform/water") > 0,
+            normals=reader.has("geometry/element_normal"),
         )
 
 

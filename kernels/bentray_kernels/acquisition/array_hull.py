@@ -1,4 +1,4 @@
-"""Region of the image that may change: the convex hull of the array without a rim at its elements."""
+"""Convex hull of an array: the nodes and places inside it, farther than a rim from its faces and elements."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ from ..arrays import Flags, Floats
 from ..errors import InvalidInput
 
 POSITION = "geometry/element_position_m"
-
-# Nodes nearer to the array than this are water and stay so.
-RIM_NODES = 2
 
 # An array narrower than this part of its length is a line, or a plane in 3-D.
 FLAT = 1e-6
@@ -51,7 +48,7 @@ def inside_array(
     shape: tuple[int, ...],
     spacing: float,
     origin: tuple[float, ...] | Floats,
-    rim_nodes: float = RIM_NODES,
+    rim_nodes: float,
 ) -> Flags:
     """Nodes inside the convex hull of the elements, farther than the rim from its faces and from elements.
 
@@ -85,6 +82,23 @@ def inside_array(
     region = (lines[-1] >= low[..., None]) & (lines[-1] <= high[..., None])
     _clear_near(region, place, rim_nodes)
     return np.asarray(region)
+
+
+def depth_inside(position_m: Floats, places_m: Floats) -> Floats:
+    """Distance of places from the nearest face of the hull of the elements, (places,), m; < 0 outside.
+
+    Args:
+        position_m: (elements, ndim), m.
+        places_m: (places, ndim), m.
+
+    Raises:
+        InvalidInput: as ``check_extent``.
+    """
+    from scipy.spatial import ConvexHull
+
+    check_extent(position_m)
+    faces = np.unique(np.round(ConvexHull(position_m).equations, 9), axis=0)
+    return np.asarray(-(places_m @ faces[:, :-1].T + faces[:, -1]).max(axis=1))
 
 
 def _faces(place: Floats, rim_nodes: float) -> Floats:

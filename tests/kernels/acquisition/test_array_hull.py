@@ -1,12 +1,13 @@
-"""The region that may change is the hull of the array, without a rim at its faces and elements."""
+"""Nodes inside the hull of an array, without a rim at its faces and elements."""
 
 import numpy as np
 import pytest
 
+from bentray_kernels.acquisition.array_hull import check_extent, depth_inside, inside_array
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography.array_region import RIM_NODES, check_extent, inside_array
 
+RIM_NODES = 2
 SPACING, NODES = 0.002, 48
 ORIGIN = (-0.5 * SPACING * (NODES - 1),) * 2
 AXIS = ORIGIN[0] + SPACING * np.arange(NODES)
@@ -14,7 +15,7 @@ X, Y = np.meshgrid(AXIS, AXIS, indexing="ij")
 
 
 def region(position):
-    return inside_array(np.asarray(position), (NODES, NODES), SPACING, ORIGIN)
+    return inside_array(np.asarray(position), (NODES, NODES), SPACING, ORIGIN, RIM_NODES)
 
 
 def lines(gap=0.06, length=0.05, elements=16):
@@ -52,7 +53,7 @@ def test_a_missing_quarter_is_cut_off_along_its_chord():
 def test_stacked_rings_keep_the_nodes_above_and_below_them():
     ring, heights = Ring(32, 0.04).positions(), (-0.01, 0.0, 0.01)
     stack = np.concatenate([np.column_stack((ring, np.full(32, z))) for z in heights])
-    found = inside_array(stack, (NODES, NODES, 18), SPACING, (*ORIGIN, -0.017))
+    found = inside_array(stack, (NODES, NODES, 18), SPACING, (*ORIGIN, -0.017), RIM_NODES)
     assert np.array_equal(found, np.repeat(region(ring)[:, :, None], 18, axis=2))
 
 
@@ -60,7 +61,7 @@ def test_planes_of_elements_above_each_other_are_limits():
     grid = np.stack(np.meshgrid(*[np.linspace(-0.03, 0.03, 9)] * 2), axis=-1).reshape(-1, 2)
     planes = np.concatenate([np.column_stack((grid, np.full(81, z))) for z in (-0.02, 0.02)])
     z = -0.026 + SPACING * np.arange(27)
-    found = inside_array(planes, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.026))
+    found = inside_array(planes, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.026), RIM_NODES)
     kept = z[found.any(axis=(0, 1))]
     assert kept.min() == pytest.approx(-0.016)
     assert kept.max() == pytest.approx(0.016)
@@ -73,7 +74,7 @@ def test_a_bowl_holds_what_lies_between_its_elements():
     bowl = np.concatenate(
         [np.column_stack((r * np.cos(turn), r * np.sin(turn), 0 * turn + z)) for r, z in rings]
     )
-    found = inside_array(bowl, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.046))
+    found = inside_array(bowl, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.046), RIM_NODES)
     z = -0.046 + SPACING * np.arange(27)
     radius = np.sqrt(X[..., None] ** 2 + Y[..., None] ** 2 + np.minimum(z, 0.0) ** 2)
     assert radius[found & (z <= 0.0)].max() <= 0.04 - RIM_NODES * SPACING
@@ -93,3 +94,8 @@ def test_elements_without_extent_are_refused(position, words):
     with pytest.raises(InvalidInput, match=f"{words}.*several sides of the object") as refusal:
         check_extent(position)
     assert refusal.value.field == "geometry/element_position_m"
+
+
+def test_depth_is_the_distance_from_the_nearest_face():
+    places = np.array([[0.0, 0.0], [0.02, 0.01], [0.0, 0.03]])
+    assert depth_inside(lines(), places) == pytest.approx([0.025, 0.01, -0.005])
