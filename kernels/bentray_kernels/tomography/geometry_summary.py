@@ -44,7 +44,7 @@ def _sentences(dataset: Dataset, requested: Settings, settings: Settings, proble
         )
     if settings.opening_angle_deg is not None:
         outside = ~within_opening(dataset, settings.opening_angle_deg)
-        outside &= dataset.tx[:, None] != dataset.rx
+        outside = outside[dataset.tx[:, None] != dataset.rx]
         yield (
             f"{outside.sum()} of {outside.size} pairs ({100.0 * outside.mean():.0f} %) are outside the "
             f"opening angle of {settings.opening_angle_deg:g}° and left out."
@@ -58,7 +58,8 @@ def _sentences(dataset: Dataset, requested: Settings, settings: Settings, proble
             f"({100.0 * leaving.mean():.0f} %) leave {where}, outside which all is taken to be water: "
             "an object there changes the image inside."
         )
-    elements = np.unique(np.concatenate((start, end)), axis=0)
+    received = problem.receivers.reshape(-1, problem.receivers.shape[-1])
+    elements = np.unique(np.concatenate((problem.emitters, received)), axis=0)
     coverage = angular_coverage(elements, start, end)
     if coverage is not None and coverage.limited:
         yield str(coverage)

@@ -109,7 +109,7 @@ def test_the_image_inside_the_hull_is_better_than_water(name, most, words):
     result, problem = image(name), Problem.of(scan(name), image(name).settings)
     true, place = truth(problem)
     depth = depth_inside(scan(name).element_position_m, place.reshape(-1, place.shape[-1]))
-    inside = depth.reshape(true.shape) >= RIM_NODES * problem.spacing
+    inside = depth.reshape(true.shape) >= RIM_NODES * problem.spacing - 1e-9
     if name != "bowl":
         # The rim of an element inside is the rest.
         assert (problem.region != inside).sum() <= (13 if name == "inside" else 0)
@@ -124,7 +124,8 @@ def test_the_image_inside_the_hull_is_better_than_water(name, most, words):
 @pytest.mark.parametrize("name", list(cases()))
 def test_the_quality_report_names_a_limited_angle_and_what_does_not_apply(name):
     report = examine(scan(name)).report
-    assert [f.check for f in report.findings] == ["angular coverage"] * (name in ("lines", "arc", "quarter"))
+    assert ("angular coverage" in {f.check for f in report.findings}) == (name in ("lines", "arc", "quarter"))
+    assert report.usable > 0.98 * report.pairs
     apart = name in ("lines", "apart")
     assert ("no elements both emit and receive" in report.not_checked.values()) == apart
     assert set(report.not_checked) | set(report.checked) == {*OF_TIMES, "angular coverage"}
@@ -137,16 +138,12 @@ def test_pairs_outside_the_opening_angle_are_left_out():
     apart = np.abs(np.subtract.outer(np.arange(48), np.arange(48)))
     wide = np.minimum(apart, 48 - apart) >= 12
     assert np.array_equal(np.isfinite(Problem.of(dataset, settings).delta_tof), wide)
-    result = reconstruct(dataset, settings)
-    assert (
-        f"{48 * 23} of 2304 pairs (48 %) are outside the opening angle of 90°"
-        in result.provenance["geometry"]
-    )
-    problem = Problem.of(dataset, settings)
+    result, problem = reconstruct(dataset, settings), Problem.of(dataset, settings)
+    words = "1056 of 2256 pairs (47 %) are outside the opening angle of 90°"
+    assert words in result.provenance["geometry"]
     true, _ = truth(problem)
-    assert rmse(result.speed, true, problem.region) < 0.2 * rmse(
-        np.full_like(true, WATER), true, problem.region
-    )
+    water = np.full_like(true, WATER)
+    assert rmse(result.speed, true, problem.region) < 0.2 * rmse(water, true, problem.region)
 
 
 @pytest.mark.parametrize(
@@ -182,7 +179,7 @@ def test_elements_on_one_line_are_refused(settings):
     everyone = np.arange(24)
     dataset = Dataset(line, everyone, everyone, WATER, delta_tof_s=np.zeros((24, 24)), array_type="free")
     for refused in (lambda: check_scan(dataset, settings, 0), lambda: reconstruct(dataset, settings)):
-        with pytest.raises(InvalidInput, match="all elements on one line.*several sides of the object"):
+        with pytest.raises(InvalidInput, match=r"all elements on one line.*several sides of the object"):
             refused()
 
 
