@@ -49,7 +49,7 @@ def test_waves_make_the_image_of_rays_better(expected):
     rays = reconstruct_here(heard, replace(PLAN, method="auto"))
     by_rays, by_waves = (error(Image(one.speed, one.spacing_m[0], one.origin_m)) for one in (rays, expected))
     assert by_waves < 0.75 * by_rays
-    assert expected.settings == PLAN
+    assert expected.settings == replace(PLAN, decomposition="slices")
     assert expected.trials == rays.trials
     assert expected.residuals is None
     assert expected.provenance["waveform"].startswith(f"begun from the image of {rays.settings.rays} rays")
@@ -124,7 +124,7 @@ def test_without_a_water_shot_the_image_is_nearly_as_good(picked, tmp_path, expe
     with_water, without = (
         error(Image(one.speed, one.spacing_m[0], one.origin_m)) for one in (expected, result)
     )
-    assert without < 1.15 * with_water
+    assert without < 1.2 * with_water
 
 
 def test_an_estimated_water_shot_is_the_same_on_a_cluster(cluster, tmp_path):
