@@ -1,4 +1,4 @@
-"""What tests share: their order, profiles of hypothesis, drawn figures, an OpenCL device, PostgreSQL."""
+"""Shared fixtures: test order, hypothesis profiles, drawn figures, an OpenCL device, PostgreSQL."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where processes listen, and which web pages they show there: for tests that nothing is published."""
+"""Listening sockets of processes and web pages on them: for tests that nothing is published."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The OpenCL device of this machine, as tests ask for it."""
+"""Fixture: the OpenCL device of this machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The repository itself: import rules, first lines, lock files, and nothing of anybody's machine in it."""
+"""The repository itself: import rules, first lines, lock files, and no paths of one machine."""
 
 from __future__ import annotations
 

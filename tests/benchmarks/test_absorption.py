@@ -1,4 +1,4 @@
-"""Absorption in proportion to the frequency: as theory has it, stable, and none where none is asked."""
+"""Absorption proportional to frequency: agreement with theory, stability, and the lossless case."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""k-Wave beside our simulator on a tiny grid, with nothing fetched; left out where it is not installed."""
+"""k-Wave against our simulator on a tiny grid, without network access; skipped where it is not installed."""
 
 from __future__ import annotations
 

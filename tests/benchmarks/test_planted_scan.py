@@ -1,4 +1,4 @@
-"""Planted faults change what they say and nothing else."""
+"""Planted faults change only the values they name."""
 
 import numpy as np
 import pytest

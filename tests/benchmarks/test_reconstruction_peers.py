@@ -1,4 +1,4 @@
-"""Rows of R6: their ratios, and what becomes of those that cannot be measured."""
+"""Rows of R6: their ratios, and rows without a value where a peer is missing."""
 
 from __future__ import annotations
 

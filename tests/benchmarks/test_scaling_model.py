@@ -1,4 +1,4 @@
-"""The growth of one scheduler: costs are found again from runs made of them, limits are where they say."""
+"""Scaling model of one scheduler: fitted costs equal those of synthetic runs, and limits follow."""
 
 from __future__ import annotations
 

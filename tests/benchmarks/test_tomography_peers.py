@@ -1,4 +1,4 @@
-"""Peers of the tomography: those that are installed find a disc, the others are named with the reason."""
+"""Tomography peers: installed ones recover a disc, missing ones are named with the reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What peers are given."""
+"""Input of the peers: pairs, elements, grid and starting speed."""
 
 from __future__ import annotations
 

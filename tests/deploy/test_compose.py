@@ -1,4 +1,4 @@
-"""docker-compose.yml: valid, published as little as said, locked down, pinned; and the scripts beside it."""
+"""docker-compose.yml: valid, only the service published, locked down, pinned; and its scripts."""
 
 from __future__ import annotations
 

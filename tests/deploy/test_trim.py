@@ -1,4 +1,4 @@
-"""deploy/trim.sh: what it takes from the image's libraries, and what it leaves as it is."""
+"""deploy/trim.sh: which files of the image's libraries are removed, and that the rest still loads."""
 
 from __future__ import annotations
 

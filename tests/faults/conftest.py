@@ -1,4 +1,4 @@
-"""What the tests of faults share: a scan, and a machine of parts that can be killed."""
+"""Fixtures of the fault tests: a scan, and a deployment whose parts can be killed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a service holds at one moment: memory, descriptors, threads, rows and files; and how that rises."""
+"""Resource use of a service at one moment (memory, descriptors, threads, rows, files), and its growth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A tenant who does what the service is for, and looks at every answer."""
+"""A tenant who uses the service normally and checks every answer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Connections that ask for nothing, hardly anything or far too much, from an address of their own."""
+"""Hostile connections from an address of their own: idle, slow or oversize."""
 
 from __future__ import annotations
 

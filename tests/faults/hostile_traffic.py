@@ -1,4 +1,4 @@
-"""A tenant, and callers who are none, who ask for too much, for what is others', or for nonsense."""
+"""Hostile requests: oversize, malformed, unauthenticated, or for objects of other tenants."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a service answered to all that was asked of it: how often, and which ids it named to whom."""
+"""Record of all responses of a service: counts by status, and which ids each tenant received."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A checkpoint that the disk has damaged is not believed; the one before it is."""
+"""A checkpoint damaged on disk is rejected, and the previous one is used."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The cable between the service and its workers is cut for a while: jobs go on, with the same bits."""
+"""Network loss between the service and its workers: jobs continue with the same bits."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""A disk that is full in the middle of a job: the job waits, and goes on once there is room."""
+"""A disk that fills up during a job: the job waits and continues once there is space."""
 
 import sqlite3
 

@@ -1,4 +1,4 @@
-"""Mixed hostile and honest traffic for a long time: honest work is done, nobody waits long, nothing grows."""
+"""Mixed hostile and honest traffic for a long time: honest jobs finish, waits and resources stay bounded."""
 
 from __future__ import annotations
 

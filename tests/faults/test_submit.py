@@ -1,4 +1,4 @@
-"""`bentray submit` while its service is killed and started again: it waits, says so and fetches the image."""
+"""`bentray submit` while its service is killed and restarted: it waits, reports it and fetches the image."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SIGKILL of the service amid an upload, and amid reading one: nothing that came is lost."""
+"""SIGKILL of the service during an upload and during ingestion: received bytes are kept."""
 
 import hashlib
 import os

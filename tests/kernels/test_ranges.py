@@ -1,4 +1,4 @@
-"""Ranges: every number is in or out, whatever its size; a refusal fits on a line."""
+"""Ranges: acceptance of every number whatever its size; error messages fit on one line."""
 
 import json
 import math

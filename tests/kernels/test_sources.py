@@ -1,4 +1,4 @@
-"""Digests change with the code that a module imports, at any distance, and with nothing else."""
+"""Source digests change with the code that a module imports, directly or not, and with nothing else."""
 
 import shutil
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The committed openapi.json is what the service says of itself."""
+"""The committed openapi.json equals the schema of the service."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Turns on workers: between tenants, of long and short tasks, by memory; and what is refused."""
+"""The picture queue: fairness between tenants, cost, memory, and rejected requests."""
 
 import asyncio
 from contextlib import suppress

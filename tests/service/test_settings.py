@@ -1,4 +1,4 @@
-"""Settings: read from the environment, refused in words."""
+"""Settings: read from the environment, rejected with a message."""
 
 from pathlib import Path
 

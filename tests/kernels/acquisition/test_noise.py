@@ -1,4 +1,4 @@
-"""Noise has the strength asked for, where it is asked for, and repeats."""
+"""Noise has the requested strength, and is repeatable."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the suites of all Eikonal methods run over: the methods by name, in 2-D and 3-D."""
+"""Fixtures of the suites over all Eikonal methods: the methods by name, in 2-D and 3-D."""
 
 import pytest
 

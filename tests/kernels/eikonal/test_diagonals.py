@@ -1,4 +1,4 @@
-"""Grids stored by diagonals: nothing is lost on the way there, flipped, and back."""
+"""Grids stored by diagonals: lossless conversion, flips and scaling."""
 
 import numpy as np
 import pytest

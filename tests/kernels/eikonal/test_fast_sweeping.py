@@ -1,4 +1,4 @@
-"""Sweeping: nodes that wait are all updated, and working arrays used again change nothing."""
+"""Fast sweeping: every active node is updated, and reused working arrays keep the result."""
 
 import numpy as np
 import pytest

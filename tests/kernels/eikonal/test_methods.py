@@ -1,4 +1,4 @@
-"""What every Eikonal method must do; a new method inherits the suite by its name in the registry."""
+"""Requirements on every Eikonal method; a new method inherits the suite by its name in the registry."""
 
 import numpy as np
 import pytest

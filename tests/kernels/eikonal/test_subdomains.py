@@ -1,4 +1,4 @@
-"""Blocks that trade faces find what the whole grid finds."""
+"""Subdomains that exchange faces give the same times as the whole grid."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""ACCC as a range says of every iso-value what equation 18 says of one."""
+"""ACCC over a range of iso-values equals equation 18 for each of them."""
 
 from __future__ import annotations
 

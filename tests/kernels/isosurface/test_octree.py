@@ -1,4 +1,4 @@
-"""The octree: a node knows of every iso-value below it, and of none that is not there."""
+"""The octree: each node covers exactly the iso-values of its cells."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cuts part the faces, and nothing else."""
+"""Opening a mesh along cuts: only the cut edges are separated."""
 
 import numpy as np
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""What the tests of this folder share: the open device by a short name, and devices that are not there."""
+"""Fixtures of this folder: the opened OpenCL device, and simulated devices."""
 
 from __future__ import annotations
 

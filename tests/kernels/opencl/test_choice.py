@@ -1,4 +1,4 @@
-"""The choice: the first device that passes; where none does, one warning that says why."""
+"""Device choice: the first device that passes its self-test; otherwise one warning with the reason."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""Our linker makes libraries that the process can load, and says what it cannot link."""
+"""Our linker makes loadable libraries and reports objects that it cannot link."""
 
 import ctypes
 import platform

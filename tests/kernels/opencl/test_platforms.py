@@ -1,4 +1,4 @@
-"""Intel's runtime is added to the loader's list where its package is installed, and nothing else changes."""
+"""Intel's OpenCL runtime is added to the loader's list only where its package is installed."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The trial finds what is wrong with a device, and nothing on one that is right."""
+"""The self-test finds the faults of a wrong device and none of a right one."""
 
 import json
 

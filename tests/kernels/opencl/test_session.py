@@ -1,4 +1,4 @@
-"""An open device builds our programs once and computes what they say."""
+"""An open OpenCL device builds each program once."""
 
 from importlib import resources
 

@@ -1,4 +1,4 @@
-"""Verdicts on devices that pass, lie, abort and hang; and what is remembered of them."""
+"""Verdicts on devices that pass, return wrong values, abort or hang; and the cache of verdicts."""
 
 from dataclasses import replace
 

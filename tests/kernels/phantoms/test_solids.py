@@ -1,4 +1,4 @@
-"""Solids are where their attributes say."""
+"""Solids lie where their attributes place them."""
 
 import numpy as np
 import pytest

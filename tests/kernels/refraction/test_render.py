@@ -1,4 +1,4 @@
-"""Pictures: maps in metres, supersampling nearer to the truth, threads that change nothing, refusals."""
+"""Refraction pictures: maps in metres, supersampling, independence of threads, rejected settings."""
 
 from __future__ import annotations
 

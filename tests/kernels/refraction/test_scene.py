@@ -1,4 +1,4 @@
-"""Scenes: what is refused, by name, and what the octree's box holds."""
+"""Scenes: rejected input, and the box of the octree."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every filter must do, on every engine that reads it; an engine's tests inherit the class."""
+"""Requirements on every filter; the tests of each engine inherit the class."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The innermost functions: what a kernel gets from them on the grid and off it, and what they refuse."""
+"""The innermost sampling functions: values on and off the grid, and rejected input."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The smoothing that fits the noise: what is left over, and how the noise is found."""
+"""Smoothing that fits the noise: the residual, and the estimated noise level."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Attenuation: line integrals give it back, gaps and water count as they should, nothing is below 0."""
+"""Attenuation: recovered from line integrals; gaps and water count, no value is negative."""
 
 from dataclasses import replace
 

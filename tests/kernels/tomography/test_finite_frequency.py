@@ -1,4 +1,4 @@
-"""Wide rays: their image and its adjoint, thin ones as before, and what they mend in wide times."""
+"""Finite-frequency rays: forward blur and adjoint, the thin limit, and the gain on wide times."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What every method of reconstruction must do; a new one inherits the suite by its name in the settings."""
+"""Requirements on every reconstruction method; a new one inherits the suite by its name in the settings."""
 
 from dataclasses import replace
 

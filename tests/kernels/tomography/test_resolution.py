@@ -1,4 +1,4 @@
-"""The resolution check: a board comes back where rays cross, and not where they do not pass."""
+"""The resolution check: a checkerboard is recovered where rays cross and vanishes where none pass."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Elements between nodes: waves are read exactly enough, and nothing outside is accepted."""
+"""Elements between nodes: interpolation error of waves, and rejected positions."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Strips of time steps: all steps once, the bits of one piece, and an end as soon as nobody waits."""
+"""Blocks of time steps: every step once, the bits of one run, and prompt cancellation."""
 
 from __future__ import annotations
 

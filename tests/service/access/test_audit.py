@@ -1,4 +1,4 @@
-"""The audit: who read what, of every caller that was let in; what is torn is passed over, never hidden."""
+"""The audit log: reads of every authenticated caller; truncated lines are skipped with a warning."""
 
 import json
 import logging

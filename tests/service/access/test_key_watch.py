@@ -1,4 +1,4 @@
-"""What is under way for a key ends with the key, also where another process revokes it."""
+"""Revoking a key ends its open requests, also when another process revokes it."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""What a tenant may store, over HTTP: reserved before anything is received, made or run."""
+"""Storage quota over HTTP: reserved before anything is received, made or run."""
 
 import gzip
 import io

@@ -1,4 +1,4 @@
-"""The door: open on loopback until the first key; then keys, and what a trusted proxy says."""
+"""Sign-in: open on loopback until the first key; then keys, and users named by a trusted proxy."""
 
 import pytest
 from starlette.datastructures import Headers

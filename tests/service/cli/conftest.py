@@ -1,4 +1,4 @@
-"""What the tests of the command line share: a way to run it, and a small scan."""
+"""Fixtures of the command line: a runner and a small scan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every command has help that teaches, and asking for it loads nothing heavy."""
+"""Every command has a full help text, and showing it imports no heavy module."""
 
 from __future__ import annotations
 

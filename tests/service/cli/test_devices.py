@@ -1,4 +1,4 @@
-"""`bentray devices` says what there is, what is refused and why, and what is used."""
+"""`bentray devices` lists devices, rejected ones with the reason, and the one in use."""
 
 from __future__ import annotations
 

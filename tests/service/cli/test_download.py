@@ -1,4 +1,4 @@
-"""`bentray download`: scans and volumes by their ids, in the format of the file's name; bad input is told."""
+"""`bentray download`: scans and volumes by id, in the format of the file name; invalid input."""
 
 from __future__ import annotations
 

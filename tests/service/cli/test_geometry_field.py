@@ -1,4 +1,4 @@
-"""`bentray geometry-field`: a mesh in, a field and three pictures out, used again and gone on from."""
+"""`bentray geometry-field`: a mesh in, a field and three pictures out, reused and resumed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`bentray quality`: the report, the page and what goes on; a scan of no use fails with a reason."""
+"""`bentray quality`: report, page and exit codes; an unusable scan fails with a reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`bentray reproduce`: the same bits from a result's own record, and a difference told by its place."""
+"""`bentray reproduce`: the same bits from a result's own record; differences are located."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`bentray serve`: says where it is and who can reach it, and refuses in one line what cannot work."""
+"""`bentray serve`: prints its address and reachability, and rejects bad settings in one line."""
 
 from __future__ import annotations
 

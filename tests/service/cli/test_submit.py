@@ -1,4 +1,4 @@
-"""`bentray submit`: against a stand-in for the client here, against the real service in the demo's test."""
+"""`bentray submit` against a stand-in of the client (against a real service: ``test_demo``)."""
 
 from __future__ import annotations
 

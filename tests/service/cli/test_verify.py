@@ -1,4 +1,4 @@
-"""`bentray verify`: names what is damaged, gives checksums to what has none, removes what no row knows."""
+"""`bentray verify`: names damaged files, adds missing checksums, removes orphans."""
 
 from __future__ import annotations
 

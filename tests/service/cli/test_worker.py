@@ -1,4 +1,4 @@
-"""`bentray worker`: joins a scheduler, does real work, comes back, and leaves when it is told to."""
+"""`bentray worker`: joins a scheduler, works, reconnects, and stops on a signal."""
 
 from __future__ import annotations
 

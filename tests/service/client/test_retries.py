@@ -1,4 +1,4 @@
-"""Patience: what is safe to repeat is repeated while the service is away, and only that, and not for ever."""
+"""Retries of the client: only idempotent requests, bounded, while the service is away."""
 
 from __future__ import annotations
 

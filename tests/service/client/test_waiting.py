@@ -1,4 +1,4 @@
-"""Waiting: by events while they come, by looking where they do not."""
+"""Waiting for jobs: by events, and by polling without them."""
 
 import json
 

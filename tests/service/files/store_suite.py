@@ -1,4 +1,4 @@
-"""What every store has to do; the tests of each inherit it."""
+"""Requirements on every file store; the tests of each store inherit it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What changed on the disk is refused by name, or taken from another copy; never read as it lies there."""
+"""Checked store: damaged files are rejected by name or replaced from another copy."""
 
 import os
 

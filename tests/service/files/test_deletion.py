@@ -1,4 +1,4 @@
-"""Deleting: nothing of it is left on the disk or in the database, and nothing else goes."""
+"""Deletion: files and rows of an object and of its results are removed, and no others."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""Modes: nobody but the service's user reads what it stores; older folders are closed at the start."""
+"""File modes: stored files are private to the service's user; older folders are closed at start."""
 
 from __future__ import annotations
 

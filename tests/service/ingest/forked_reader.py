@@ -1,4 +1,4 @@
-"""Reads many files as the ingest process does, under its limits, but forks for each instead of starting anew.
+"""Reads many files under the limits of the ingest process, but forks for each instead of starting anew.
 
 ``python forked_reader.py MEMORY SECONDS FILES.json`` takes a list of [what, path, given] and prints a line of
 JSON for each file: the answer, how the fork ended, its seconds and the most memory that it held.

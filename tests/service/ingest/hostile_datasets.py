@@ -1,4 +1,4 @@
-"""Scans that are built to harm: each spoils a sound file, and names what it is to be refused for."""
+"""Hostile scans: each spoils one field of a valid file and names the expected error."""
 
 from __future__ import annotations
 

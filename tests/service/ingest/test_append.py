@@ -1,4 +1,4 @@
-"""Appending a piece: what came stays, with a checksum all of it or nothing, and one writer at a time."""
+"""Appending to an upload: bytes are kept, checksums are all or nothing, one writer at a time."""
 
 import asyncio
 import base64

@@ -1,4 +1,4 @@
-"""The queue of uploads to read: whoever comes beside a busy tenant begins at once, and who leaves is gone."""
+"""The fair queue of uploads: a second tenant starts at once, and cancelled uploads leave the queue."""
 
 import threading
 

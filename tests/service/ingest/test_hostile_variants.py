@@ -1,4 +1,4 @@
-"""Each damaged file is refused by the name of a field, at little cost, without repeating what it says."""
+"""Every damaged file is rejected by field, cheaply, without echoing its content."""
 
 from __future__ import annotations
 

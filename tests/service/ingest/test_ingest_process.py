@@ -1,4 +1,4 @@
-"""The ingest process: what it says of a file."""
+"""The ingest process: its verdict on a file."""
 
 import errno
 import subprocess

@@ -1,4 +1,4 @@
-"""Reading uploads that came in pieces: in turn, over a full disk, and over whatever goes wrong."""
+"""Ingestion of chunked uploads: in order, on a full disk, and after errors."""
 
 import threading
 import time

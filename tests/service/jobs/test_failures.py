@@ -1,4 +1,4 @@
-"""Why a job failed: known causes in words, unknown ones under a number."""
+"""Why a job failed: known causes as messages, unknown ones under an incident number."""
 
 import errno
 import logging

@@ -1,4 +1,4 @@
-"""A job with ``method`` waveform over HTTP: to the bits of one process, gone on from after it was torn."""
+"""A job with ``method`` waveform over HTTP: the bits of one process, also after interruptions."""
 
 from __future__ import annotations
 

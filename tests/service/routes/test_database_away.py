@@ -1,4 +1,4 @@
-"""While the database is away every answer is a 503 that says when to try again, and then it goes on."""
+"""While the database is away every response is 503 with Retry-After, and then requests succeed again."""
 
 import time
 from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""/v1/datasets: what is taken, and every way of being refused."""
+"""/v1/datasets: accepted and rejected uploads."""
 
 import hashlib
 

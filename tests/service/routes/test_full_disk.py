@@ -1,4 +1,4 @@
-"""A full disk: every write is a 507 or a line, whatever little room is left, and nothing of it stays."""
+"""A full disk: every write is answered 507 and leaves no partial file."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""/health: it tells the truth."""
+"""/health: reported state of the service, its workers and its database."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""Hostile files over HTTP: a problem each, the same process afterwards, and nothing left of them."""
+"""Hostile files over HTTP: one problem response each, the same process, no files left."""
 
 import os
 from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""/v1/jobs: what is taken, and every way of being refused."""
+"""/v1/jobs: accepted and rejected requests."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields

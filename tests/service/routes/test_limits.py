@@ -1,4 +1,4 @@
-"""What is larger than any scan is refused before it is read; plans are made without opening a file."""
+"""Limits over HTTP: oversize input is rejected before it is read; plans are made without opening a file."""
 
 import math
 import tracemalloc

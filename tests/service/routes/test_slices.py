@@ -1,4 +1,4 @@
-"""/v1/volumes/{id}/slice.png: across any axis, of any size, refused before a worker is asked."""
+"""/v1/volumes/{id}/slice.png: any axis and size; invalid requests are rejected before rendering."""
 
 import io
 

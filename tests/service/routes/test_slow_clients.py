@@ -1,4 +1,4 @@
-"""Clients that drip: they are broken off with 408, keep nobody else waiting, and hold nothing open."""
+"""Slow clients: disconnected with 408, and no other client waits."""
 
 import json
 import socket

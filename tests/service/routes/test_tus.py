@@ -1,4 +1,4 @@
-"""/v1/uploads: tus 1.0 in every point, and what becomes of what was sent."""
+"""/v1/uploads: every part of tus 1.0, and the fate of received bytes."""
 
 import base64
 import hashlib

@@ -1,4 +1,4 @@
-"""/v1/volumes/{id}/data: every format, and downloads that break off and go on."""
+"""/v1/volumes/{id}/data: every format, and resumed downloads."""
 
 import io
 import multiprocessing

@@ -1,4 +1,4 @@
-"""The rows of geometry fields: one a content, whichever jobs asked for it."""
+"""The rows of geometry fields: one per content, whichever jobs requested it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Jobs of a tenant: listed newest first, asked for once under a key, called off, closed to others."""
+"""Jobs of a tenant: newest first, idempotency keys, cancellation, isolation."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""Observed time outlives services, stands still without one, and runs no faster for several."""
+"""Observed time: persistent, paused without a service, and not faster with several."""
 
 import pytest
 

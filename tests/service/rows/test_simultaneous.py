@@ -1,4 +1,4 @@
-"""Many at once, on every database: one job a key, one end a job, and nobody is told anything else."""
+"""Simultaneous writes on every database: one job per key and one end per job."""
 
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor

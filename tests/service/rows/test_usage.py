@@ -1,4 +1,4 @@
-"""What tenants store and reserve, on every database: many at once never go beyond what is allowed."""
+"""Storage use and reservations on every database: simultaneous requests stay within the quota."""
 
 import asyncio
 import time

@@ -1,4 +1,4 @@
-"""Errors: every one is problem+json, and a surprise tells the log more than the client."""
+"""Errors: every one is problem+json; unexpected ones are logged in full."""
 
 import logging
 import re

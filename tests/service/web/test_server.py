@@ -1,4 +1,4 @@
-"""The server ends in time whatever its requests do."""
+"""The server shuts down in bounded time whatever its requests do."""
 
 from __future__ import annotations
 

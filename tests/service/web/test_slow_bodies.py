@@ -1,4 +1,4 @@
-"""Bodies that hardly come: the reader is told, and nobody else is hurried."""
+"""Slow request bodies: the reader gets an error, and no other request is affected."""
 
 import asyncio
 

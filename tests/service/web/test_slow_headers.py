@@ -1,4 +1,4 @@
-"""The head of a request comes in time and is short; what is being answered goes on; nothing slips past it."""
+"""Request headers: bounded in time and size; running responses continue; no request smuggling."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""The page / in a real browser: upload, start, watch, fail in words."""
+"""The page / in a real browser: upload, start, progress, error messages."""
 
 import io
 import re

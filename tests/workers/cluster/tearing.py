@@ -1,4 +1,4 @@
-"""Runs that are torn again and again, each going on from where the one before was."""
+"""Runs that are interrupted again and again, each resuming the previous one."""
 
 from bentray_workers.reconstruction.reconstruction_run import RECONSTRUCTING
 

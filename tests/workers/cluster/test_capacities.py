@@ -1,4 +1,4 @@
-"""What workers offer, and OpenCL only where a device passed."""
+"""Capacities of workers: memory, resources, and OpenCL only where a device passed its self-test."""
 
 import pytest
 

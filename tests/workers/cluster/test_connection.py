@@ -1,4 +1,4 @@
-"""The cluster provider: an embedded cluster, a given scheduler, and what is refused."""
+"""The cluster connection: an embedded cluster, a given scheduler, and rejected addresses."""
 
 import os
 import socket

@@ -1,4 +1,4 @@
-"""What a worker keeps: never more than its memory allows, and little while it works for a job."""
+"""The worker's memory cache: bounded by memory, and smaller while a job runs."""
 
 import pytest
 

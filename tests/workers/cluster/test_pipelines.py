@@ -1,4 +1,4 @@
-"""All pipelines by one loop: the bits of this process on a cluster, and whatever worker dies."""
+"""All pipelines by one loop: the same bits on a cluster as in this process, also after worker deaths."""
 
 import os
 import signal

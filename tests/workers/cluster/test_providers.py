@@ -1,4 +1,4 @@
-"""The providers: what each asks of its library, which is imported only if it is chosen; what is refused."""
+"""The providers: the calls to each library, imported only if chosen; rejected settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scheduler of ours, its streams and its workers keep nothing of tasks that are done."""
+"""Scheduler, streams and workers keep no state of finished tasks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Supervision: workers are replaced whatever ended them, also while their successors start."""
+"""Supervision: workers are replaced whatever ended them, also while replacements start."""
 
 from __future__ import annotations
 

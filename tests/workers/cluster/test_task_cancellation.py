@@ -1,4 +1,4 @@
-"""Long kernels end when nobody waits for their task any more, and never outside of a worker."""
+"""Cancellation: long kernels end when their task is abandoned, and never outside a worker."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""TLS folders: what the script makes is taken, encrypts, and keeps out whoever has no certificate."""
+"""TLS folders: those of the script are accepted, encrypt traffic, and reject other clients."""
 
 from __future__ import annotations
 

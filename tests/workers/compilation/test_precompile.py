@@ -1,4 +1,4 @@
-"""What an image compiles ahead: jobs on other scans compile nothing more, and who compiles says so."""
+"""Precompilation: jobs on other scans compile nothing more, and compilation is logged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Atomic files: the old content or the new, and nothing left lying about."""
+"""Atomic files: the old content or the new, and no temporary files left."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bounds of foreign files: what they declare is judged first, and no more than that is read."""
+"""Bounds on foreign files: declared sizes are checked first, and never exceeded."""
 
 import io
 

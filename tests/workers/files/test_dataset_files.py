@@ -1,4 +1,4 @@
-"""Dataset files: what is written comes back, and every wrong field is named."""
+"""Dataset files: round trip, and errors that name each invalid field."""
 
 from __future__ import annotations
 

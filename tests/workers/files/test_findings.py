@@ -1,4 +1,4 @@
-"""Findings as a file: what is read is what was written, bit for bit of every pair."""
+"""Findings as a file: round trip, bit for bit of every pair."""
 
 from __future__ import annotations
 

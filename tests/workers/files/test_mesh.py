@@ -1,4 +1,4 @@
-"""Mesh files: read back exactly, named by content, refused in words."""
+"""Mesh files: exact round trip, names by content, rejected files."""
 
 import h5py
 import numpy as np

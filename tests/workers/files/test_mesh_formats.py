@@ -1,4 +1,4 @@
-"""Foreign meshes: every format is read, what is hostile or broken is refused in words."""
+"""Foreign meshes: every format is read; hostile or damaged files are rejected."""
 
 import base64
 import io

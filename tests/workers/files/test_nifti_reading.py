@@ -1,4 +1,4 @@
-"""NIfTI: values, scale and units come out as they went in, packed or not; damage is refused."""
+"""NIfTI: round trip of values, scale and units, compressed or not; damage is rejected."""
 
 import gzip
 from contextlib import suppress

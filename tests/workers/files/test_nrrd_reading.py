@@ -1,4 +1,4 @@
-"""NRRD: shapes, units and packed values come out as they went in; no file but this one is ever opened."""
+"""NRRD: round trip of shapes, units and compressed values; no other file is ever opened."""
 
 import bz2
 import gzip

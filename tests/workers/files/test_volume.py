@@ -1,4 +1,4 @@
-"""Volumes as files: what is written is read, what is no volume is refused."""
+"""Volumes as files: round trip, and rejected input."""
 
 import h5py
 import numpy as np

@@ -1,4 +1,4 @@
-"""A volume that is deleted while it is exported is a refusal in words, not a failure of the service."""
+"""A volume deleted during its export is a client error, not a failure of the service."""
 
 from pathlib import Path
 

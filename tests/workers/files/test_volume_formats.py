@@ -1,4 +1,4 @@
-"""Foreign volumes: NumPy, raw bytes and our own files are read; what is hostile is refused in words."""
+"""Foreign volumes: NumPy, raw bytes and our own files are read; hostile files are rejected."""
 
 import io
 import pickle

@@ -1,4 +1,4 @@
-"""Foreign scans become canonical files with the same numbers; what is wrong in them is named."""
+"""Foreign scans become canonical files with the same numbers; invalid values are named."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Outputs of k-Wave in a zip with their geometry: the traces come through, and what is wrong is named."""
+"""k-Wave outputs in a zip with their geometry: traces are preserved, and invalid values are named."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The same scan in another unit is refused in the same words, whatever the format of its file."""
+"""A scan in another unit is rejected with the same message whatever the file format."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The words of the pictures: stages as they are made, iterations of all of them."""
+"""Captions of pictures: stages and iterations."""
 
 from __future__ import annotations
 

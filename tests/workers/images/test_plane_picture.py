@@ -1,4 +1,4 @@
-"""Slices drawn: the size that was asked for, the bars, and the image alone."""
+"""Pictures of slices: requested size, scale and colour bars, and the bare image."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""The quality page: its panels, what it says, and that a scan without traces or times has one too."""
+"""The quality page: its panels and text, also for scans without traces or times."""
 
 from __future__ import annotations
 

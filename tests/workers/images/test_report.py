@@ -1,4 +1,4 @@
-"""The report: its panels, the middle slice, the errors and what is said where there are none."""
+"""The report: its panels, the middle slice, errors, and captions without a truth."""
 
 from __future__ import annotations
 

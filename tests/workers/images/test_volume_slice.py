@@ -1,4 +1,4 @@
-"""Slices of uploaded volumes: the right one, with its place, and refusals in words."""
+"""Slices of uploaded volumes: index, position, and rejected requests."""
 
 import numpy as np
 import pytest

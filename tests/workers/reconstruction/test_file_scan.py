@@ -1,4 +1,4 @@
-"""Scans as tasks know them: a look at waves ends when the folder of its job has gone."""
+"""Scans read by tasks: a wave comparison ends when its job has been deleted."""
 
 from __future__ import annotations
 

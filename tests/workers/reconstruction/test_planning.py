@@ -1,4 +1,4 @@
-"""Plans: what they count is what calls really take, and what no worker can hold is refused."""
+"""Memory plans: what tasks use; plans larger than any worker are rejected."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What runs is what was planned, for every combination of rays, decomposition and Eikonal solver."""
+"""The executed solver is the planned one, for every combination of rays, decomposition and Eikonal solver."""
 
 from itertools import product
 

@@ -1,4 +1,4 @@
-"""Blocks on a cluster find what the whole grid finds, and say what they cannot take."""
+"""Subdomains on a cluster give the times of the whole grid, and reject invalid input."""
 
 import time
 

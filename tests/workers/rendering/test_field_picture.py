@@ -1,4 +1,4 @@
-"""Pictures of geometry fields: every scene, material and lookup; strips; what a process keeps."""
+"""Pictures of geometry fields: every scene, material and lookup; tiles; cached scenes."""
 
 import io
 from dataclasses import fields

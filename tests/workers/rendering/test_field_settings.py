@@ -1,4 +1,4 @@
-"""Settings of geometry fields: bounded, and part of the name of what they make."""
+"""Settings of geometry fields: ranges, and their part in the field's name."""
 
 from dataclasses import replace
 

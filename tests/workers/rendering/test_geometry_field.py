@@ -1,4 +1,4 @@
-"""Geometry fields by tasks: as the kernels make them, stopped, gone on from, and made once a content."""
+"""Geometry fields by tasks: as the kernels make them, cancelled, resumed, and one per content."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Iso-surfaces as mesh files: the largest piece, bounded in size, refused in words."""
+"""Iso-surfaces as mesh files: the largest piece, bounded in size, rejected input."""
 
 import numpy as np
 import pytest

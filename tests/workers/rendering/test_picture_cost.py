@@ -1,4 +1,4 @@
-"""What pictures are thought to take: never less memory than measured, and refusals that name what fits."""
+"""Estimated cost of pictures: at least the measured memory, and rejections that name what fits."""
 
 from __future__ import annotations
 

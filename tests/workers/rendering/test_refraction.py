@@ -1,4 +1,4 @@
-"""Pictures through volumes: straight where nothing refracts, the same in strips and on a cluster."""
+"""Pictures through volumes: straight where nothing refracts, the same in tiles and on a cluster."""
 
 import time
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Views: every wrong field is named, what is right survives JSON."""
+"""Views: every invalid field is named, and valid ones survive JSON."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""MemoryCache scenes: made once, made anew when file or filter change, never more than there is room for."""
+"""Scene cache: scenes are reused, rebuilt when file or filter change, and bounded in memory."""
 
 import os
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Simulations as they are asked for: the right scan, the same again from what is stored, and refusals."""
+"""Requests of simulations: the same scan from the stored request, and rejected ones."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Scans by waves in space: the whole breast on the grid, the ring's own plane as truth, and what is heard."""
+"""3-D wave scans: the whole breast on the grid, the ring's plane as truth, and recorded delays."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Calibration: planted positions, delays and speed come back, with deviations that tell the truth."""
+"""Calibration: planted positions, delays and speed are recovered, with correct standard deviations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Times of the water pulses: they are those of the elements as they are, not as they were drawn."""
+"""Travel times of water shots follow the true element positions, not the nominal ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every picker: known delays come back, sigma tells the noise, and what cannot be picked is NaN."""
+"""Every picker: known delays are recovered, sigma equals the error, and invalid traces are NaN."""
 
 from __future__ import annotations
 

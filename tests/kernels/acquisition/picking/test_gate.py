@@ -1,4 +1,4 @@
-"""The gate about a pulse: where it lies, its frequencies, what it says of noise, what it leaves out."""
+"""Gating of a pulse: position, power spectrum, noise power, and excluded traces."""
 
 from __future__ import annotations
 

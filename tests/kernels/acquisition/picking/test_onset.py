@@ -1,4 +1,4 @@
-"""Onsets of single traces: where they are, to a fraction of a sample, and when there is none."""
+"""Onsets of single traces: accurate to a fraction of a sample, and missing where there is no pulse."""
 
 from __future__ import annotations
 

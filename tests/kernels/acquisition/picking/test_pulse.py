@@ -1,4 +1,4 @@
-"""The measured pulse, and what is left of it after deconvolution."""
+"""The measured pulse, and traces after deconvolution with it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks that want pulses at known times, and what is no fault; most faults: ``test_planted_faults``."""
+"""Checks that need pulses at known times, and clean scans; most faults: ``test_planted_faults``."""
 
 from __future__ import annotations
 

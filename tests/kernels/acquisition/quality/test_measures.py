@@ -1,4 +1,4 @@
-"""What is asked of traces: the envelope is that of the analytic signal."""
+"""Measures of traces: the envelope is that of the analytic signal."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pixels stand for the right points."""
+"""Rasterisation: each pixel holds the value of its point of the surface."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pictures: optics that are known, energy, transforms, and every way to ask the fields."""
+"""Ray-traced pictures: known optics, energy conservation, transforms, and every lookup of the fields."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows of rays: exact data leave no residual, and their change with the medium is what the rows say."""
+"""Linearised travel times: exact data have zero residual, and the rows equal finite differences."""
 
 from dataclasses import replace
 

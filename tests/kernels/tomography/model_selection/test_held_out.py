@@ -1,4 +1,4 @@
-"""Parts of the pairs: what is held out and what is shown make the whole, both ways alike."""
+"""Held-out pairs: training and held-out parts make up the whole, symmetric in emitter and receiver."""
 
 import numpy as np
 import pytest

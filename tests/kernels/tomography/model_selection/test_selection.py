@@ -1,4 +1,4 @@
-"""Advice: pairs are held out both ways, the better model wins, noise says where to stop."""
+"""Model selection: pairs are held out both ways, the better model wins, noise ends the iterations."""
 
 from dataclasses import replace
 

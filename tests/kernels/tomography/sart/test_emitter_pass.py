@@ -1,4 +1,4 @@
-"""One emitter's pass: nothing left of what the image explains, equation 1, the Gaussian of scipy."""
+"""One emitter's SART contribution: zero for exact data, equation 1, the Gaussian of SciPy."""
 
 import numpy as np
 import pytest

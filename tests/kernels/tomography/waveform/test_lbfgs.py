@@ -1,4 +1,4 @@
-"""L-BFGS: exact for quadratics once every direction was seen, downhill always, forgetful as asked."""
+"""L-BFGS: exact for quadratics, always a descent direction, limited memory."""
 
 import numpy as np
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""Misfits: derivatives against differences, what they are blind to, silent traces, windows."""
+"""Misfits: derivatives against differences, invariances, silent traces, windows."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Preparation: wavelet and water from water shots, the draw of emitters, gains, what is refused."""
+"""Preparation: wavelet and water from water shots, choice of emitters, gains, rejected input."""
 
 from dataclasses import replace
 

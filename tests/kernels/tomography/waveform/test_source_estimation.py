@@ -1,4 +1,4 @@
-"""The source estimated anew from traces of the object."""
+"""Re-estimation of the source from traces of the object."""
 
 from dataclasses import replace
 

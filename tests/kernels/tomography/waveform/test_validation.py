@@ -1,4 +1,4 @@
-"""Validation by waves: images are ranked as the truth ranks them, noise is told apart, a judge goes on."""
+"""Validation by simulated waves: images are ranked as by the truth, and noise is accounted for."""
 
 from dataclasses import replace
 

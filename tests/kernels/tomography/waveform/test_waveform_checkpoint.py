@@ -1,4 +1,4 @@
-"""Refinements cut off anywhere and gone on with from a checkpoint end as if nothing had happened."""
+"""Waveform refinement resumed from any checkpoint gives the bits of an uninterrupted run."""
 
 import functools
 import json

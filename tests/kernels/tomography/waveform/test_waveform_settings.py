@@ -1,4 +1,4 @@
-"""Settings: the default bands rise, and what is wrong is named."""
+"""Settings: default bands ascend, and invalid values are named."""
 
 from dataclasses import fields, replace
 

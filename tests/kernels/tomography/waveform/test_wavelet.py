@@ -1,4 +1,4 @@
-"""The matched wavelet: found again from traces, quiet where nothing was recorded, refused without any."""
+"""The matched wavelet: recovered from traces, zero without signal, rejected without traces."""
 
 import numpy as np
 import pytest

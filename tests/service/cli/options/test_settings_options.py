@@ -1,4 +1,4 @@
-"""The options of a reconstruction give the settings they name, and their help tells the true defaults."""
+"""Options of a reconstruction set the settings of the same name, and their help shows the true defaults."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The live table of a batch: what runs first, never longer than the terminal, and what the columns say."""
+"""The live table of a batch: running entries first, at most as high as the terminal, and its columns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A benchmark row: whether a goal is met follows from the figures and nothing else."""
+"""A benchmark row: whether a goal is met follows from its figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Copying dataset files: what comes out is what went in, however it was stored and however it is cut."""
+"""Copying dataset files: values are preserved for every storage layout and chunking."""
 
 import tempfile
 import tracemalloc

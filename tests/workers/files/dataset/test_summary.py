@@ -1,4 +1,4 @@
-"""A summary tells of a file what the whole dataset would."""
+"""The summary of a file equals that of the whole dataset."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""MATLAB files: what is in them, and that they are the same every time."""
+"""MATLAB files: contents, and identical bytes on every write."""
 
 import numpy as np
 import pytest

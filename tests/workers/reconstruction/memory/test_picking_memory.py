@@ -1,4 +1,4 @@
-"""What examination and picking take: as planned, and far less than the traces that they go through."""
+"""Memory of examination and picking: as planned, and far less than the traces."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What a plan counts for the calls of a refinement is what they really take; it grows with the scan."""
+"""The planned memory of a waveform refinement is what its tasks use; it grows with the scan."""
 
 import json
 import os
