@@ -65,7 +65,7 @@ def check_scheduler(address: str) -> str | None:
 
 def check_worker(address: str) -> str | None:
     """None if a worker of this machine is connected to the scheduler at ``address``, else the reason."""
-    silence = heartbeat.silence_s(address)
+    silence = heartbeat.seconds_since_heartbeat(address)
     if silence is not None and silence <= heartbeat.STALE_S:
         return None
     known = "none so far" if silence is None else f"the last one {silence:.0f} s ago"

@@ -273,12 +273,12 @@ class _Run:
         loop = asyncio.get_running_loop()
         done = asyncio.Event()
 
-        def tell(_: Any) -> None:
+        def show(_: Any) -> None:
             # The event loop is closed after the service has stopped.
             with suppress(RuntimeError):
                 loop.call_soon_threadsafe(done.set)
 
-        future.add_done_callback(tell)
+        future.add_done_callback(show)
         while True:
             try:
                 async with asyncio.timeout(LOOK_S):

@@ -30,7 +30,7 @@ def check_setting_names(settings: Any, kind: type[Any] = Settings, place: str = 
     for name, value in settings.items() if isinstance(settings, Mapping) else ():
         inner = is_dataclass(known.get(name))
         if name not in known or (inner and isinstance(value, bool)):
-            instead = _instead(name) if kind is Settings else ""
+            instead = _replacement(name) if kind is Settings else ""
             accepted = instead or "a known setting: " + ", ".join(known)
             raise InvalidInput(place + str(name), repr(value)[:80], accepted)
         if inner:
@@ -38,7 +38,7 @@ def check_setting_names(settings: Any, kind: type[Any] = Settings, place: str = 
     return settings
 
 
-def _instead(name: str) -> str:
+def _replacement(name: str) -> str:
     """What replaces a setting of the flat record of earlier versions; empty for a name that it had not."""
     if name in REMOVED:
         return "sart.speed_range_mps alone" if name == "speed_update" else "no such setting: it was removed"

@@ -47,5 +47,5 @@ def automatic_nodes(
         noise_s * water_mps / (CONTRAST * math.sqrt(elements)),
     )
     most = MAX_NODES_3D if settings.decomposition == "volume" else MAX_NODES
-    wanted = side / finest if finest > 0.0 else math.inf
-    return max(MIN_NODES, STEP * math.ceil(wanted / STEP)) if wanted < most else most
+    needed = side / finest if finest > 0.0 else math.inf
+    return max(MIN_NODES, STEP * math.ceil(needed / STEP)) if needed < most else most

@@ -64,8 +64,8 @@ app.command(cls=RepeatedSpacing)(render.render)
 app.add_typer(keys.keys, name="keys")
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         from bentray_service import __version__
 
         typer.echo(f"bentray {__version__}")

@@ -51,7 +51,7 @@ def audit(
             "data_dir", f"{settings.data_dir}, without audit log", "the data folder of a service"
         )
 
-    def wanted() -> Iterator[dict[str, Any]]:
+    def matching() -> Iterator[dict[str, Any]]:
         for entry in entries(folder):
             filters = {"tenant": tenant, "who": who}
             if any(value is not None and entry.get(name) != value for name, value in filters.items()):
@@ -61,7 +61,7 @@ def audit(
             if str(entry.get("time", "")) >= first:
                 yield entry
 
-    rows = deque(wanted(), maxlen=last)
+    rows = deque(matching(), maxlen=last)
     if as_json:
         print_json(list(rows))
         return

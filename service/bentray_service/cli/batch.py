@@ -94,7 +94,7 @@ def reconstruct_one(
     from bentray_workers.reconstruction.batch import report_of
     from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
-    folder, asked = output_folder(results / entry.name), _asked(entry.source, settings)
+    folder, request = output_folder(results / entry.name), request_of(entry.source, settings)
 
     def draw() -> bytes:
         drawn = client.submit(
@@ -103,12 +103,12 @@ def reconstruct_one(
         return bytes(drawn.result())
 
     # Checkpoints are only valid for the same request.
-    mark = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:12]
+    mark = hashlib.sha256(json.dumps(request).encode()).hexdigest()[:12]
     work_dir = output_folder(folder / f"work-{mark}")
     try:
         result = reconstruct(client, entry.source, settings, entry.show, stop, work_dir)
         dataset = read_dataset(entry.source, traces=False)
-        write_results(folder, result, dataset, entry.seconds, draw, file=str(entry.source), asked=asked)
+        write_results(folder, result, dataset, entry.seconds, draw, file=str(entry.source), request=request)
     except Cancelled:
         raise
     except Exception:
@@ -117,11 +117,11 @@ def reconstruct_one(
     shutil.rmtree(work_dir, ignore_errors=True)
 
 
-def _asked(source: Path, settings: Settings) -> dict[str, Any]:
+def request_of(source: Path, settings: Settings) -> dict[str, Any]:
     """The request that a result belongs to: file size, modification time and settings."""
     there = source.stat()
-    asked = {"bytes": there.st_size, "mtime_ns": there.st_mtime_ns, "settings": settings.to_dict()}
-    found: dict[str, Any] = json.loads(json.dumps(without_nan(asked)))
+    request = {"bytes": there.st_size, "mtime_ns": there.st_mtime_ns, "settings": settings.to_dict()}
+    found: dict[str, Any] = json.loads(json.dumps(without_nan(request)))
     return found
 
 
@@ -131,7 +131,7 @@ def finished(folder: Path, source: Path, settings: Settings) -> dict[str, Any] |
 
     try:
         found: dict[str, Any] = json.loads((folder / "reconstruction.json").read_text())
-        if found["asked"] != _asked(source, settings) or not (folder / "reconstruction.png").is_file():
+        if found["request"] != request_of(source, settings) or not (folder / "reconstruction.png").is_file():
             return None
         read_reconstruction(folder / "reconstruction.h5")
     except (OSError, ValueError, KeyError, TypeError, RecursionError, InvalidInput):

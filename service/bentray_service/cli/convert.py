@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from .options.paths import check_apart, output_file
-from .options.scan_options import Frequency, Map, SoundSpeed, Temperature, Unit, given_of, input_scan
+from .options.scan_options import Frequency, Map, SoundSpeed, Temperature, Unit, input_scan, scan_metadata
 from .output.terminal import AsJson, print_json, print_lines
 
 
@@ -36,7 +36,7 @@ def convert(
     """
     source, target = input_scan(file), output_file(output, force=force, suffix=".h5")
     check_apart({"output": target}, {"file": source})
-    given = given_of(map, unit, temperature, sound_speed, frequency)
+    given = scan_metadata(map, unit, temperature, sound_speed, frequency)
 
     from bentray_workers.foreign_scans import convert_dataset
 

@@ -71,9 +71,9 @@ def demo(
         with progress_bar("Uploading") as step:
             sent = client.upload(scan, step)
         results, seconds = {}, {}
-        for name, asked in JOBS.items():
+        for name, options in JOBS.items():
             results[name], seconds[name] = _reconstruct(
-                client, sent.id, name, {**asked, "nodes": nodes}, folder
+                client, sent.id, name, {**options, "nodes": nodes}, folder
             )
     assert dataset.truth is not None
     found = {name: figures(result, dataset, seconds[name]) for name, result in results.items()}
@@ -88,12 +88,12 @@ def demo(
 
 
 def _reconstruct(
-    client: Client, dataset: str, name: str, asked: dict[str, Any], folder: Path
+    client: Client, dataset: str, name: str, settings: dict[str, Any], folder: Path
 ) -> tuple[Reconstruction, float]:
     from bentray_workers.files.reconstruction import read_reconstruction
 
     with progress_bar(f"Reconstructing, {name} rays") as step:
-        job = client.wait(client.submit(dataset, asked).id, lambda record: show_job(record, step))
+        job = client.wait(client.submit(dataset, settings).id, lambda record: show_job(record, step))
     path = client.download(job.volume or "", "hdf5", folder / f"{name}.h5")
     return read_reconstruction(path), job.seconds or 0.0
 

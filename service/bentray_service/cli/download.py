@@ -64,8 +64,8 @@ def download(
         raise InvalidInput("output", output, "a name ending in " + ", ".join(formats) + ", or --format")
     target = output_file(output, force=force)
     defaults = {"quantity": "speed", "attenuation": "Np/m"}
-    asked = {"quantity": quantity, "attenuation": attenuation}
-    how = {name: value for name, value in asked.items() if value != defaults[name]}
+    requested = {"quantity": quantity, "attenuation": attenuation}
+    how = {name: value for name, value in requested.items() if value != defaults[name]}
 
     from ..client import Client
 

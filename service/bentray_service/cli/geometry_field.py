@@ -26,7 +26,7 @@ ACCEPTED = "a triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB"
 def geometry_field(
     mesh: Annotated[Path, typer.Argument(help="Triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
-    asked: FieldOptions,
+    options: FieldOptions,
     as_json: AsJson = False,
 ) -> None:
     """Build the geometry field of a mesh and render it into OUTPUT.
@@ -37,7 +37,7 @@ def geometry_field(
     Example:  bentray geometry-field bunny.ply -o bunny --mode refract --up y
     """
     source, folder = input_file(mesh, ACCEPTED), output_folder(output)
-    settings, view = asked.settings(), asked.view()
+    settings, view = options.settings(), options.view()
 
     from bentray_service.rows.ids import field_of
     from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh

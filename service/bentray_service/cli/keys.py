@@ -56,13 +56,13 @@ def create(
     from ..rows.api_key import ApiKey
     from ..rows.tenants import checked_tenant
 
-    asked, whose = checked_scopes(scopes), checked_tenant(tenant)
+    requested, whose = checked_scopes(scopes), checked_tenant(tenant)
     if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
         raise InvalidInput("name", repr(name[:LONGEST_NAME]), f"1 to {LONGEST_NAME} printable characters")
     until = None if expires is None else time.time() + _seconds(expires)
     token = ApiKey.new()
     with _opened(data) as store:
-        row = store.add(token, whose, name, asked, until)
+        row = store.add(token, whose, name, requested, until)
     if as_json:
         print_json({**_shown(row), "key": token.shown()})
     else:

@@ -19,8 +19,8 @@ from .options.scan_options import (
     Temperature,
     Unit,
     dataset_file,
-    given_of,
     input_scan,
+    scan_metadata,
 )
 from .output.exit_codes import WorkFailed
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
@@ -61,7 +61,7 @@ def quality(
     Example:  bentray quality scan.h5 -o report
     """
     source, folder = input_scan(file), output_folder(output)
-    given = given_of(map, unit, temperature, sound_speed, frequency)
+    given = scan_metadata(map, unit, temperature, sound_speed, frequency)
 
     from bentray_workers.files.atomic import write_bytes
     from bentray_workers.files.dataset import write_dataset

@@ -18,10 +18,10 @@ from .options.scan_options import (
     Temperature,
     Unit,
     dataset_file,
-    given_of,
     input_scan,
+    scan_metadata,
 )
-from .options.settings_options import Asked, settings_from, with_settings_options
+from .options.settings_options import SettingsOptions, settings_from, with_settings_options
 from .output.results import show_results, write_results
 from .output.terminal import AsJson, progress_bar, residual_note
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 def reconstruct(
     file: Annotated[Path, typer.Argument(help="Dataset file, or a scan of another program.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
-    asked: Asked,
+    options: SettingsOptions,
     workers: Annotated[
         int | None,
         typer.Option(
@@ -55,7 +55,7 @@ def reconstruct(
     Example:  bentray reconstruct scan.h5 -o result --rays curved --iterations 6
     """
     source, folder = input_scan(file), output_folder(output)
-    settings, given = settings_from(asked), given_of(map, unit, temperature, sound_speed, frequency)
+    settings, given = settings_from(options), scan_metadata(map, unit, temperature, sound_speed, frequency)
 
     from bentray_kernels.tomography.requirements import check_scan
     from bentray_workers.files.dataset import read_dataset

@@ -44,7 +44,7 @@ class SampledPhantom(StrEnum):
 @with_view_options
 def render(
     output: Annotated[Path, typer.Option("--output", "-o", help="Image file to write (PNG).")],
-    asked: ViewOptions,
+    options: ViewOptions,
     file: Annotated[
         Path | None, typer.Argument(help="Volume file; the format is detected from its content.")
     ] = None,
@@ -82,7 +82,7 @@ def render(
         raise InvalidInput("file", found, "one of the two")
     if phantom is not None:
         _refuse({"--shape": shape, "--dtype": dtype, "--spacing": spacing})
-    view, picture = asked.view()
+    view, picture = options.view()
     outputs = {"--output": output, "--map": position_map}
     check_apart(outputs, {"the volume": file, "the backdrop": picture})
     png = output_file(output, force=force, suffix=".png")
@@ -91,7 +91,7 @@ def render(
         raise InvalidInput("--map", placed, "no --map with --mode shaded, which has no backdrop")
 
     from bentray_workers.files.atomic import write_bytes
-    from bentray_workers.files.volume_formats import Given, import_volume
+    from bentray_workers.files.volume_formats import VolumeMetadata, import_volume
     from bentray_workers.images.png import png_of, read_picture
     from bentray_workers.rendering.scene_cache import build_scene, check_size, filter_volume
 
@@ -100,7 +100,7 @@ def render(
         assert phantom is not None
         volume = _sampled(phantom, nodes)
     else:
-        given = Given(spacing_m=tuple(spacing) if spacing else None, shape=shape, dtype=dtype)
+        given = VolumeMetadata(spacing_m=tuple(spacing) if spacing else None, shape=shape, dtype=dtype)
         volume = import_volume(input_file(file, ACCEPTED), given, check_size)
     started = time.perf_counter()
     view = view.within(*volume.range())

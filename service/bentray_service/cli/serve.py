@@ -119,8 +119,10 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
                 here = {"url": url, "pid": os.getpid(), "data": str(settings.data_dir.resolve())}
                 print_lines([json.dumps(here)])
             if self.started:
-                _say(settings, f"Bentray runs at {url} (data in {settings.data_dir}); stop it with Ctrl-C.")
-                _say(settings, _access_note(required=not made.state.parts.sign_in.open()))
+                _announce(
+                    settings, f"Bentray runs at {url} (data in {settings.data_dir}); stop it with Ctrl-C."
+                )
+                _announce(settings, _reachability(required=not made.state.parts.sign_in.open()))
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             made.state.leaving.set()
@@ -160,14 +162,14 @@ class _Starting:
             self.failure = error
 
 
-def _say(settings: ServiceSettings, words: str) -> None:
+def _announce(settings: ServiceSettings, words: str) -> None:
     if settings.log_format == "json":
         log.info(words)
     else:
         remark(words)
 
 
-def _access_note(*, required: bool) -> str:
+def _reachability(*, required: bool) -> str:
     if required:
         return "Authentication by API key or trusted proxy is required."
     return (

@@ -18,10 +18,10 @@ from .options.scan_options import (
     Temperature,
     Unit,
     dataset_file,
-    given_of,
     input_scan,
+    scan_metadata,
 )
-from .options.settings_options import Asked, settings_from, with_settings_options
+from .options.settings_options import SettingsOptions, settings_from, with_settings_options
 from .output.exit_codes import client_errors
 from .output.results import show_results, write_results
 from .output.terminal import AsJson, Step, print_json, print_lines, progress_bar, remark, residual_note
@@ -40,7 +40,7 @@ def submit(
         Path | None,
         typer.Argument(help="Dataset file, or a scan of another program.", show_default="with --batch, none"),
     ] = None,
-    asked: Asked,
+    options: SettingsOptions,
     url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
     output: Annotated[
         Path | None,
@@ -113,9 +113,9 @@ def submit(
         raise InvalidInput(
             "output", f"{output} with --no-wait", "one of the two: there is no result to download yet"
         )
-    settings = settings_from(asked)
+    settings = settings_from(options)
     if file is not None:
-        given = given_of(map, unit, temperature, sound_speed, frequency)
+        given = scan_metadata(map, unit, temperature, sound_speed, frequency)
         source = input_scan(file)
         folder = None if output is None else output_folder(output)
         with dataset_file(source, given, folder or Path(gettempdir())) as scan:

@@ -75,7 +75,7 @@ class AsyncClient(Connection):
         if isinstance(step, PauseStep):
             return await anyio.sleep(step.seconds)
         if isinstance(step, RequestStep):
-            content = None if step.body is None else _awaited(step.body())
+            content = None if step.body is None else _as_async(step.body())
             async with self._respond(step.method, step.path, content=content, **step.options) as response:
                 await response.aread()
                 return response
@@ -114,7 +114,7 @@ class AsyncClient(Connection):
             raise no_answer(self.url, error) from error
 
 
-async def _awaited(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
+async def _as_async(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
     """Read the chunks of a file in a thread."""
     while (chunk := await anyio.to_thread.run_sync(next, chunks, None)) is not None:
         yield chunk

@@ -70,17 +70,17 @@ class Retries:
                 if time.monotonic() + pause > last:
                     raise
                 if not waits:
-                    self._say(f"{error}; retrying for up to {last - begun:.0f} s.")
+                    self._report(f"{error}; retrying for up to {last - begun:.0f} s.")
                 waits = True
                 yield PauseStep(pause)
                 pause = min(2.0 * pause, LONGEST_PAUSE_S)
             else:
                 self._answered |= not isinstance(step, PauseStep)
                 if waits:
-                    self._say("The service answers again.")
+                    self._report("The service answers again.")
                 return result
 
-    def _say(self, line: str) -> None:
+    def _report(self, line: str) -> None:
         if self._on_message is not None:
             self._on_message(line)
 

@@ -37,7 +37,9 @@ def wait_for(
         if broken < STREAMS:
             left = SILENCE_S if deadline is None else deadline - time.monotonic()
             try:
-                if not (yield from _news(f"{place}/events", max(poll_s, min(SILENCE_S, left)), deadline)):
+                if not (
+                    yield from _wait_event(f"{place}/events", max(poll_s, min(SILENCE_S, left)), deadline)
+                ):
                     broken += 1
                 else:
                     broken = 0
@@ -47,7 +49,7 @@ def wait_for(
         yield PauseStep(poll_s)
 
 
-def _news(place: str, seconds: float, deadline: float | None) -> Flow[bool]:
+def _wait_event(place: str, seconds: float, deadline: float | None) -> Flow[bool]:
     """Wait for an event or the deadline; False at the end of the stream."""
     while deadline is None or time.monotonic() <= deadline:
         line = yield EventStep(place, seconds)

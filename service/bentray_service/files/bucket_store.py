@@ -52,7 +52,7 @@ class BucketStore:
         self._lock = threading.Lock()
         self._coming: dict[Path, Future[None]] = {}
         self._asking = threading.Lock()
-        self._asked = -FRESH_S
+        self._probed_at = -FRESH_S
         self._fault: str | None = None
 
     def publish(self, path: Path) -> None:
@@ -103,8 +103,8 @@ class BucketStore:
 
     def fault(self) -> str | None:
         with self._asking:
-            if time.monotonic() - self._asked >= FRESH_S:
-                self._fault, self._asked = self._probe(), time.monotonic()
+            if time.monotonic() - self._probed_at >= FRESH_S:
+                self._fault, self._probed_at = self._probe(), time.monotonic()
             return self._fault
 
     def tidy(self, stop: Callable[[], bool]) -> None:

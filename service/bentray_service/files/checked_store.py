@@ -65,7 +65,7 @@ class CheckedStore:
             if row is None:
                 self._first_seen(tenant, name, place, path)
             elif row["damaged"] is not None or not self._is_sound(path, row):
-                self._mend(path, row)
+                self._restore(path, row)
         except FileNotFoundError as error:
             # A deletion removes the checksum before the file.
             if row is None or self._checksums.get(tenant, name) is None:
@@ -97,7 +97,7 @@ class CheckedStore:
 
     def _is_sound(self, path: Path, row: ChecksumRow) -> bool:
         """Whether the content matches the checksum; read again only after a modification."""
-        with self._alone(path):
+        with self._locked(path):
             known = row["sha256"], stamp_of(path)
             if self._compared.get(path) == known:
                 return True
@@ -112,7 +112,7 @@ class CheckedStore:
         Raises:
             Deleted: when it is being deleted.
         """
-        with self._alone(path):
+        with self._locked(path):
             stamp, digest = stamp_of(path), digest_of(path)
             self._compared[path] = digest.sha256, stamp
         if not self._checksums.record_first_seen(tenant, name, place, digest):
@@ -120,7 +120,7 @@ class CheckedStore:
             raise Deleted(name)
         log.info("stored the first checksum of %s of %s", name, tenant)
 
-    def _mend(self, path: Path, row: ChecksumRow) -> None:
+    def _restore(self, path: Path, row: ChecksumRow) -> None:
         """Replace a damaged item by another copy, if there is one.
 
         Raises:
@@ -143,7 +143,7 @@ class CheckedStore:
         return Damaged(row["id"], found)
 
     @contextmanager
-    def _alone(self, path: Path) -> Iterator[None]:
+    def _locked(self, path: Path) -> Iterator[None]:
         """Only one thread verifies an item."""
         lock = self._comparing.setdefault(path, threading.Lock())
         try:

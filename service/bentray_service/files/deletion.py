@@ -73,7 +73,7 @@ class Deletion:
                 connection.execute(select(volumes.c.id).where(volumes.c.job_id.in_(gone))).scalars()
             )
             gone |= _of(connection, stored.tenant, jobs.c.volume_id.in_(results))
-            self._refuse_unfinished(connection, stored, gone)
+            self._check_finished(connection, stored, gone)
             fields = _fields(connection, stored.tenant, name, gone)
             _forget(connection, stored.tenant, {name, *results}, fields, gone)
             usage.forget(connection, stored.tenant, [name, *results, *fields, *gone])
@@ -86,13 +86,13 @@ class Deletion:
         """The items of all tenants created before a time, s since 1970."""
         for what, tables in _TABLES.items():
             for table in tables:
-                old = _ended_with_nothing(time) if table is jobs else table.c.created < time
+                old = _ended_without_result(time) if table is jobs else table.c.created < time
                 query = select(table.c.tenant, table.c.id).where(old)
                 with self._database.read() as connection:
                     rows = connection.execute(query).all()
                 yield from (StoredItem(Tenant(tenant), what, name) for tenant, name in rows)
 
-    def _refuse_unfinished(self, connection: Connection, stored: StoredItem, gone: Collection[str]) -> None:
+    def _check_finished(self, connection: Connection, stored: StoredItem, gone: Collection[str]) -> None:
         needing = jobs.c.id.in_(gone), jobs.c.state.not_in(ENDED)
         busy = connection.execute(select(jobs.c.id, jobs.c.state).where(*needing)).first()
         if busy is not None:
@@ -121,7 +121,7 @@ def _of_volume(connection: Connection, tenant: Tenant, name: str) -> set[str]:
     return _of(connection, tenant, or_(jobs.c.volume_id == name, jobs.c.id.in_(made_it)))
 
 
-def _ended_with_nothing(time: float) -> ColumnElement[bool]:
+def _ended_without_result(time: float) -> ColumnElement[bool]:
     """Jobs that ended before a time and are not deleted together with a stored item."""
     read = jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id
     made = select(datasets.c.id).where(datasets.c.job_id == jobs.c.id).exists()

@@ -56,7 +56,7 @@ class Orphans:
 
     def found(self) -> list[Path]:
         """All files without a row; some may be new."""
-        lying = list(self._lying())
+        lying = list(self._stored_files())
         # Queried last, so that new files have a row.
         names = self._known.names()
         return [path for path in lying if (path.parts[-3], path.name.partition(".")[0]) not in names]
@@ -113,7 +113,7 @@ class Orphans:
         except (OSError, ValueError, KeyError, TypeError):
             return False
 
-    def _lying(self) -> Iterator[Path]:
+    def _stored_files(self) -> Iterator[Path]:
         for folder in self._files.root.glob("tenants/*/*"):
             if folder.name in self._kinds and folder.is_dir():
                 yield from (path for path in folder.iterdir() if path.suffix != ".partial")

@@ -113,16 +113,16 @@ def convert_upload(
 
 
 def _dataset(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
-    from bentray_workers.foreign_scans import Given, convert_dataset
+    from bentray_workers.foreign_scans import ScanMetadata, convert_dataset
 
-    return record_of(convert_dataset(source, target, on_size=on_size, given=Given.of(**given)))
+    return record_of(convert_dataset(source, target, on_size=on_size, given=ScanMetadata.of(**given)))
 
 
 def _volume(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
     from bentray_workers.files.volume import write_volume
-    from bentray_workers.files.volume_formats import Given, import_volume
+    from bentray_workers.files.volume_formats import VolumeMetadata, import_volume
 
-    volume = import_volume(source, Given(**given))
+    volume = import_volume(source, VolumeMetadata(**given))
     on_size(volume.values.nbytes)
     write_volume(target, volume)
     return volume_summary(volume)

@@ -64,7 +64,7 @@ def ingest(
         memory_bytes: address space of the process.
         seconds: CPU and wall time, plus one second per ``BYTES_PER_S`` bytes of the source.
         scratch: working folder.
-        given: metadata: see ``volume_formats.Given``; for a mesh its title.
+        given: metadata: see ``volume_formats.VolumeMetadata``; for a mesh its title.
         started: called with the process id.
         reserve: called with the maximum size of ``target`` before it is written; an exception ends the
             process.

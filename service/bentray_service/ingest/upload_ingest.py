@@ -131,7 +131,7 @@ class UploadIngest:
             room = Counter({tenant: -count for tenant, count in Counter(self._queued.values()).items()})
         for row in self._uploads.unread():
             tenant = row["tenant"]
-            if row["id"] in queued or room[tenant] + self._queue.share <= 0 or not self._is_here(row):
+            if row["id"] in queued or room[tenant] + self._queue.share <= 0 or not self._is_local(row):
                 continue
             room[tenant] -= 1
             with self._lock:
@@ -152,7 +152,7 @@ class UploadIngest:
         log.warning("ingestion of uploads pauses: %s", error)
         self._put_off = True
 
-    def _is_here(self, row: UploadRow) -> bool:
+    def _is_local(self, row: UploadRow) -> bool:
         """Whether the data is in this data folder, not in that of another service."""
         tenant = row["tenant"]
         path = self._files.of(tenant).upload(row["id"])
@@ -167,7 +167,9 @@ class UploadIngest:
             problem = self._refusal(row, tenant, store, path)
             if problem is not None:
                 if not self._leaving.is_set():
-                    self._uploads.mark_refused(row["id"], problem.model_dump(exclude_none=True), self._keep_s)
+                    self._uploads.mark_rejected(
+                        row["id"], problem.model_dump(exclude_none=True), self._keep_s
+                    )
                     path.unlink(missing_ok=True)
                 return
         self._uploads.mark_done(row["id"], self._keep_s)

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response, status
 from pydantic import Field
 
 from bentray_kernels.limits import FREQUENCY_HZ, SPEED_MPS, TEMPERATURE_C
-from bentray_workers.foreign_scans.given import FIELDS, UNITS
+from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
 
 from ..files.deletion import StoredItem
 from ..web.errors import problems
@@ -18,13 +18,13 @@ from .bodies import Limit, accept_media_types
 from .downloads import download, download_of
 from .models.job_records import DatasetList, DatasetRecord
 from .record_conversion import dataset_record
-from .upload_metadata import scan_given
+from .upload_metadata import scan_metadata
 from .uploads import body_of, receive_upload
 
 HDF5 = "application/x-hdf5"
 MEDIA_TYPES = (HDF5, "application/octet-stream")
 NONE: list[str] = []
-# Only described to FastAPI: the errors of ``Given`` name the accepted values.
+# Only described to FastAPI: the errors of ``ScanMetadata`` name the accepted values.
 PAIR = "^(" + "|".join(FIELDS) + ")=[A-Za-z][A-Za-z0-9_]{0,60}$"
 UNIT = "^(" + "|".join(UNITS) + ")$"
 
@@ -72,7 +72,7 @@ async def upload_dataset(
 
     The parameters state properties that a file of another program lacks.
     """
-    given = scan_given(map, unit, temperature_c, sound_speed_mps, frequency_hz)
+    given = scan_metadata(map, unit, temperature_c, sound_speed_mps, frequency_hz)
     row = await receive_upload(request, service, tenant, service.datasets, given)
     record = dataset_record(row)
     response.headers["Location"] = record.links["self"]

@@ -72,7 +72,7 @@ def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
     if what == "mesh":
         return what, {"title": title}
     if what == "volume":
-        return what, volume_given(
+        return what, volume_metadata(
             title, metadata.get("spacing_m"), metadata.get("shape"), metadata.get("dtype")
         )
     variables, units = (metadata[name].split(",") if metadata.get(name) else [] for name in ("map", "unit"))
@@ -80,20 +80,20 @@ def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
         _number(name, metadata[name]) if metadata.get(name) else None
         for name in ("temperature_c", "sound_speed_mps", "frequency_hz")
     )
-    return what, scan_given(variables, units, temperature_c, sound_speed_mps, frequency_hz)
+    return what, scan_metadata(variables, units, temperature_c, sound_speed_mps, frequency_hz)
 
 
-def scan_given(
+def scan_metadata(
     map: Sequence[str] = (),  # noqa: A002 - the name of the parameter of a request
     unit: Sequence[str] = (),
     temperature_c: float | None = None,
     sound_speed_mps: float | None = None,
     frequency_hz: float | None = None,
 ) -> dict[str, Any]:
-    """What the user states about a scan, as arguments of ``Given.of``; absent values are left out.
+    """What the user states about a scan, as arguments of ``ScanMetadata.of``; absent values are left out.
 
     Raises:
-        InvalidInput: as ``Given.of``.
+        InvalidInput: as ``ScanMetadata.of``.
     """
     given: dict[str, Any] = {
         "map": list(map),
@@ -104,9 +104,9 @@ def scan_given(
     }
     stated = {name: value for name, value in given.items() if value not in ([], None)}
     if stated:
-        from bentray_workers.foreign_scans import Given
+        from bentray_workers.foreign_scans import ScanMetadata
 
-        Given.of(**stated)
+        ScanMetadata.of(**stated)
     return stated
 
 
@@ -116,8 +116,10 @@ def _number(field: str, text: str) -> float:
     return float(text)
 
 
-def volume_given(title: str, spacing_m: str | None, shape: str | None, dtype: str | None) -> dict[str, Any]:
-    """The metadata of a volume as arguments of ``volume_formats.Given``.
+def volume_metadata(
+    title: str, spacing_m: str | None, shape: str | None, dtype: str | None
+) -> dict[str, Any]:
+    """The metadata of a volume as arguments of ``volume_formats.VolumeMetadata``.
 
     Raises:
         InvalidInput: for values that are not numbers or out of range.

@@ -15,7 +15,7 @@ from . import slices, volume_data
 from .bodies import Limit, accept_media_types
 from .models.job_records import VolumeList, VolumeRecord
 from .record_conversion import volume_record
-from .upload_metadata import SHAPE, SPACING, volume_given
+from .upload_metadata import SHAPE, SPACING, volume_metadata
 from .uploads import body_of, receive_upload
 
 MEDIA_TYPES = ("application/octet-stream", "application/x-npy", "application/x-hdf5")
@@ -64,7 +64,7 @@ async def upload_volume(
     ] = None,
 ) -> VolumeRecord:
     """Upload a volume. The format is detected from the content; a separate process validates it."""
-    given = volume_given(title, spacing_m, shape, dtype)
+    given = volume_metadata(title, spacing_m, shape, dtype)
     row = await receive_upload(request, service, tenant, service.volumes, given)
     record = volume_record(row)
     response.headers["Location"] = record.links["self"]

@@ -68,7 +68,7 @@ class Jobs(TenantTable[JobRow]):
         job_id = new_id("job")
         request = json.dumps([kind, settings, dataset_id, volume_id, mesh_id], sort_keys=True)
         digest = hashlib.sha256(request.encode()).hexdigest()
-        with _still_there(dataset_id), self._database.write() as connection:
+        with _dataset_exists(dataset_id), self._database.write() as connection:
             if key is not None and connection.dialect.name != "sqlite":
                 # Write transactions of SQLite are serialised; this lock serialises those of PostgreSQL.
                 lock = int.from_bytes(hashlib.sha256(f"{tenant}/{key}".encode()).digest()[:8], signed=True)
@@ -214,7 +214,7 @@ def _of_key(connection: Connection, tenant: Tenant, key: str) -> JobRow | None:
 
 
 @contextmanager
-def _still_there(dataset_id: str | None) -> Iterator[None]:
+def _dataset_exists(dataset_id: str | None) -> Iterator[None]:
     """Report a dataset that was deleted after the validation of the request as unknown."""
     try:
         yield

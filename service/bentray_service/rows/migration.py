@@ -115,10 +115,10 @@ def _to_4(connection: Connection) -> None:
     connection.execute(text("ALTER TABLE datasets ADD COLUMN counts JSON"))
     for new in (schema.checksums, schema.too_old, schema.storage):
         new.create(connection)
-    _count_what_is_stored(connection)
+    _count_stored_bytes(connection)
 
 
-def _count_what_is_stored(connection: Connection) -> None:
+def _count_stored_bytes(connection: Connection) -> None:
     """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
     # A service that died may have stored the result of an upload.

@@ -108,7 +108,7 @@ class Uploads(TenantTable[UploadRow]):
         """Mark an upload as ingested."""
         self._change(upload_id, state="done", expires=time.time() + keep_s)
 
-    def mark_refused(self, upload_id: str, problem: Plain, keep_s: float) -> None:
+    def mark_rejected(self, upload_id: str, problem: Plain, keep_s: float) -> None:
         """Mark an upload as refused."""
         self._change(upload_id, released=True, state="refused", problem=problem, expires=time.time() + keep_s)
 

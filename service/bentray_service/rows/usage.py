@@ -38,7 +38,7 @@ def usage_of(connection: Connection, tenant: Tenant, besides: str = "") -> Usage
         tenant: owner.
         besides: name of an item to leave out.
     """
-    mine = storage.c.tenant == tenant, storage.c.name != besides, _believed()
+    mine = storage.c.tenant == tenant, storage.c.name != besides, _counted()
     query = select(storage.c.reserved, func.sum(storage.c.bytes)).where(*mine).group_by(storage.c.reserved)
     sizes = {bool(reserved): int(size) for reserved, size in connection.execute(query)}
     return Usage(sizes.get(False, 0), sizes.get(True, 0))
@@ -125,7 +125,7 @@ def renew(connection: Connection, lease: Lease) -> None:
 
 def drop_expired(connection: Connection) -> None:
     """Remove reservations of dead processes."""
-    connection.execute(delete(storage).where(not_(_believed())))
+    connection.execute(delete(storage).where(not_(_counted())))
 
 
 def drop_leased(connection: Connection) -> None:
@@ -145,7 +145,7 @@ def _one(tenant: Tenant, name: str) -> tuple[ColumnElement[bool], ColumnElement[
     return storage.c.tenant == tenant, storage.c.name == name
 
 
-def _believed() -> ColumnElement[bool]:
+def _counted() -> ColumnElement[bool]:
     return or_(storage.c.lease_until.is_(None), storage.c.lease_until >= time.time())
 
 

@@ -68,7 +68,7 @@ class Connections:
         self._trusted = trusted
         # Per address, in order of arrival or of becoming idle.
         self._open: dict[str, dict[CountedConnection, None]] = {}
-        self._silent: dict[str, dict[CountedConnection, None]] = {}
+        self._idle: dict[str, dict[CountedConnection, None]] = {}
         self._spare: dict[CountedConnection, str] = {}
         self._where: dict[CountedConnection, str] = {}
 
@@ -82,38 +82,38 @@ class Connections:
         limited = not within(address, self._trusted)
         if limited and len(self._open.get(group, ())) >= self.limits.of_address:
             log.warning("more than %d connections from one address", self.limits.of_address)
-            full = not self._drop_silent(group)
+            full = not self._close_idle(group)
         elif len(self._where) - len(self._spare) > self.limits.most:
             log.warning("more than %d connections in total", self.limits.most)
-            full = not (self._silent and self._drop_silent(_longest(self._silent)))
+            full = not (self._idle and self._close_idle(_longest(self._idle)))
         else:
             full = False
         if full:
             self._take_spare(one, group)
         else:
             self._open.setdefault(group, {})[one] = None
-            self._silent.setdefault(group, {})[one] = None
+            self._idle.setdefault(group, {})[one] = None
         return full
 
     def busy(self, one: CountedConnection) -> None:
         """A request has started."""
-        _take_out(self._silent, self._where.get(one), one)
+        _take_out(self._idle, self._where.get(one), one)
 
-    def silent(self, one: CountedConnection) -> None:
+    def idle(self, one: CountedConnection) -> None:
         """The connection has become idle."""
         group = self._where.get(one)
         if group is not None and one not in self._spare:
-            self._silent.setdefault(group, {})[one] = None
+            self._idle.setdefault(group, {})[one] = None
 
     def remove(self, one: CountedConnection) -> None:
         """The connection is closed; may be called more than once."""
         group = self._where.pop(one, None)
         self._spare.pop(one, None)
-        _take_out(self._silent, group, one)
+        _take_out(self._idle, group, one)
         _take_out(self._open, group, one)
 
-    def _drop_silent(self, group: str) -> bool:
-        for one in self._silent.get(group, ()):
+    def _close_idle(self, group: str) -> bool:
+        for one in self._idle.get(group, ()):
             self.remove(one)
             one.drop()
             return True

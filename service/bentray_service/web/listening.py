@@ -46,17 +46,17 @@ class Listening(socket.socket):
             if error.errno not in EXHAUSTED:
                 raise
             log.error("cannot accept connections (%s)", error.strerror)
-            self._turn_away()
+            self._reject_connection()
             raise BlockingIOError from error
 
     def close(self) -> None:
         """Stop listening."""
-        self._give_up_kept()
+        self._close_spare()
         super().close()
 
-    def _turn_away(self) -> None:
+    def _reject_connection(self) -> None:
         """Use the spare file descriptor to accept and close one connection."""
-        self._give_up_kept()
+        self._close_spare()
         # The client may have left, or another thread may have used the descriptor.
         with suppress(OSError):
             super().accept()[0].close()
@@ -65,7 +65,7 @@ class Listening(socket.socket):
         except OSError:
             self._kept = None
 
-    def _give_up_kept(self) -> None:
+    def _close_spare(self) -> None:
         if self._kept is not None:
             os.close(self._kept)
             self._kept = None

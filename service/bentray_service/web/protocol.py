@@ -49,12 +49,12 @@ class CountedProtocol(UnreadBodies):
         """Mark the connection as idle, unless another request is waiting."""
         super().on_response_complete()
         if not self.in_progress():
-            self._counted.silent(self)
+            self._counted.idle(self)
 
     def pause_writing(self) -> None:
         """The client reads more slowly than the response is produced."""
         super().pause_writing()
-        self._stuck = self.loop.call_later(ANSWER_S, self._look_again, self._left())
+        self._stuck = self.loop.call_later(ANSWER_S, self._check_progress, self._left())
 
     def resume_writing(self) -> None:
         """The client has read the response so far."""
@@ -66,18 +66,18 @@ class CountedProtocol(UnreadBodies):
     def _left(self) -> int:
         return self.transport.get_write_buffer_size()
 
-    def _look_again(self, before: int) -> None:
+    def _check_progress(self, before: int) -> None:
         left = self._left()
         if before - left < MIN_BYTES:
             self.transport.abort()
         else:
-            self._stuck = self.loop.call_later(ANSWER_S, self._look_again, left)
+            self._stuck = self.loop.call_later(ANSWER_S, self._check_progress, left)
 
     def _start_asgi_task(self, cycle: RequestResponseCycle, app: Any) -> None:
         self._counted.busy(self)
-        super()._start_asgi_task(cycle, self._only_short(app) if self._spare else app)
+        super()._start_asgi_task(cycle, self._limit_bodies(app) if self._spare else app)
 
-    def _only_short(self, app: Any) -> Any:
+    def _limit_bodies(self, app: Any) -> Any:
         most = self._counted.limits
 
         async def answer(scope: Any, receive: Any, send: Any) -> None:

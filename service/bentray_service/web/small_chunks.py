@@ -29,11 +29,11 @@ class MergedChunks(HeaderTimeout):
     _chunks = _came = 0
     # Error of the last body.
     _broken: InvalidInput | None = None
-    _telling: asyncio.TimerHandle | None = None
+    _timer: asyncio.TimerHandle | None = None
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Stop the timer."""
-        self._tell_later_no_more()
+        self._stop_timer()
         super().connection_lost(exc)
 
     def on_headers_complete(self) -> None:
@@ -58,13 +58,13 @@ class MergedChunks(HeaderTimeout):
         if len(cycle.body) > HIGH_WATER_LIMIT:
             self.flow.pause_reading()
         if len(cycle.body) >= ENOUGH_BYTES:
-            self._tell(cycle)
-        elif self._telling is None:
-            self._telling = self.loop.call_later(LATEST_S, self._tell, cycle)
+            self._notify(cycle)
+        elif self._timer is None:
+            self._timer = self.loop.call_later(LATEST_S, self._notify, cycle)
 
     def on_message_complete(self) -> None:
         """The body was received completely."""
-        self._tell_later_no_more()
+        self._stop_timer()
         super().on_message_complete()
 
     def refuse(self, error: InvalidInput) -> None:
@@ -75,11 +75,11 @@ class MergedChunks(HeaderTimeout):
             self.transport.abort()
         else:
             self._ignoring, self._broken = True, error
-            self._tell(self.cycle)
+            self._notify(self.cycle)
 
     def _start_asgi_task(self, cycle: RequestResponseCycle, app: Any) -> None:
         async def receiving(scope: Any, receive: Any, send: Any) -> None:
-            async def receive_or_refuse() -> Any:
+            async def receive_checked() -> Any:
                 message = await receive()
                 if self._broken is None or cycle is not self.cycle or not cycle.more_body:
                     return message
@@ -88,15 +88,15 @@ class MergedChunks(HeaderTimeout):
                 self.transport.abort()
                 return {"type": "http.disconnect"}
 
-            await app(scope, receive_or_refuse, send)
+            await app(scope, receive_checked, send)
 
         super()._start_asgi_task(cycle, receiving)
 
-    def _tell(self, cycle: RequestResponseCycle) -> None:
-        self._tell_later_no_more()
+    def _notify(self, cycle: RequestResponseCycle) -> None:
+        self._stop_timer()
         cycle.message_event.set()
 
-    def _tell_later_no_more(self) -> None:
-        if self._telling is not None:
-            self._telling.cancel()
-            self._telling = None
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None

@@ -55,7 +55,7 @@ def test_a_field_is_made_once(
 
     first = figures()
     before = (out / "image.png").read_bytes()
-    monkeypatch.setattr(geometry_field, "lay_out", None)
+    monkeypatch.setattr(geometry_field, "parameterise_mesh", None)
     second = figures("--scene", "two-mirrors")
     assert (out / "image.png").read_bytes() != before
     assert second["figures"] == first["figures"]
@@ -71,7 +71,7 @@ def test_interrupted_field_is_resumed(
     monkeypatch.setattr(geometry_field, "finish", broken)
     assert bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE).exit_code == 130
     monkeypatch.undo()
-    monkeypatch.setattr(geometry_field, "lay_out", None)
+    monkeypatch.setattr(geometry_field, "parameterise_mesh", None)
     result = bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE)
     assert result.exit_code == 0, result.stderr
     assert not list((tmp_path / "out").glob("*-unfinished"))

@@ -87,8 +87,8 @@ def test_an_option_wins_over_the_environment(monkeypatch: pytest.MonkeyPatch, tm
 
 
 def test_reachability_is_shown() -> None:
-    assert "Only this machine can reach the service" in module._access_note(required=False)
-    assert "Authentication by API key" in module._access_note(required=True)
+    assert "Only this machine can reach the service" in module._reachability(required=False)
+    assert "Authentication by API key" in module._reachability(required=True)
 
 
 def test_remote_access_needs_keys(bentray: Callable[..., Result], tmp_path: Path) -> None:

@@ -136,7 +136,7 @@ def test_an_upload_has_its_room_until_it_is_forgotten_refused_or_stored(database
     forgotten, refused, stored = (uploads.add(LOCAL, "dataset", 20, {}, "", 60.0, 100) for _ in range(3))
     assert quota.of(LOCAL) == Usage(0, 60)
     uploads.remove(forgotten["id"])
-    uploads.mark_refused(refused["id"], {"detail": "no scan"}, 60.0)
+    uploads.mark_rejected(refused["id"], {"detail": "no scan"}, 60.0)
     quota.resize(LOCAL, stored["result_id"], 70)
     Datasets(database).add(LOCAL, stored["result_id"], size=20, sha256="0" * 64, summary=SUMMARY)
     uploads.mark_done(stored["id"], 60.0)

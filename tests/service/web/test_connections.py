@@ -44,7 +44,7 @@ def test_longest_idle_connection_of_an_address_is_closed():
     first, second, third = come(connections, "192.0.2.1", 3)
     connections.busy(first)
     connections.busy(second)
-    connections.silent(first)
+    connections.idle(first)
     assert not connections.add(Fake(), "192.0.2.1")
     assert [one.dropped for one in (first, second, third)] == [False, False, True]
     assert not connections.add(Fake(), "192.0.2.1")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.bounded_reading import LARGEST_BYTES, declared, rejecting_damage, whole
+from bentray_workers.files.bounded_reading import LARGEST_BYTES, declared, whole
+from bentray_workers.files.damage import rejecting_damage
 
 
 class Endless(io.RawIOBase):

@@ -19,7 +19,7 @@ from bentray_workers.files import bounded_reading
 from bentray_workers.files.hdf5_reading import Reader
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.files.volume import Volume, write_volume
-from bentray_workers.files.volume_formats import RAW_TYPES, SPACING_M, Given, import_volume
+from bentray_workers.files.volume_formats import RAW_TYPES, SPACING_M, VolumeMetadata, import_volume
 
 from ...effort import effort
 from .reconstructions import made
@@ -38,9 +38,9 @@ def test_numpy(tmp_path, dtype, order):
 
 def test_explicit_grid_takes_precedence(tmp_path):
     np.save(tmp_path / "v.npy", ramp())
-    one = import_volume(tmp_path / "v.npy", Given("A head", (2e-3,)))
+    one = import_volume(tmp_path / "v.npy", VolumeMetadata("A head", (2e-3,)))
     assert (one.title, one.spacing_m) == ("A head", (2e-3,) * 3)
-    assert import_volume(tmp_path / "v.npy", Given(spacing_m=(1e-3, 2e-3, 3e-3))).spacing_m == (
+    assert import_volume(tmp_path / "v.npy", VolumeMetadata(spacing_m=(1e-3, 2e-3, 3e-3))).spacing_m == (
         1e-3,
         2e-3,
         3e-3,
@@ -51,7 +51,7 @@ def test_explicit_grid_takes_precedence(tmp_path):
 def test_raw_bytes_have_x_first(tmp_path, dtype):
     values = ramp(dtype=RAW_TYPES[dtype])
     (tmp_path / "v").write_bytes(values.tobytes(order="F"))
-    volume = import_volume(tmp_path / "v", Given(shape=(3, 4, 5), dtype=dtype, spacing_m=(1e-3,)))
+    volume = import_volume(tmp_path / "v", VolumeMetadata(shape=(3, 4, 5), dtype=dtype, spacing_m=(1e-3,)))
     np.testing.assert_array_equal(volume.values, values)
 
 
@@ -159,7 +159,7 @@ def test_a_shape_without_use_is_rejected_before_the_values_are_read(tmp_path, mo
     monkeypatch.setattr(Volume, "of", read)
     monkeypatch.setattr(Reader, "array", read)
     for path in sorted(tmp_path.iterdir()):
-        given = Given(shape=(3, 4, 5), dtype="uint8") if path.suffix == ".raw" else None
+        given = VolumeMetadata(shape=(3, 4, 5), dtype="uint8") if path.suffix == ".raw" else None
         with pytest.raises(InvalidInput, match=r"volume: found shape \(3, [34], 5\)"):
             import_volume(path, given, nothing_else)
 
@@ -167,15 +167,15 @@ def test_a_shape_without_use_is_rejected_before_the_values_are_read(tmp_path, mo
 @pytest.mark.parametrize(
     ("given", "field"),
     [
-        (Given(shape=(3, 4, 5)), "dtype"),
-        (Given(dtype="uint8"), "shape"),
-        (Given(shape=(3, 4, 5), dtype="object"), "dtype"),
-        (Given(shape=(3, 4, 4), dtype="uint8"), "file"),
-        (Given(shape=(60,), dtype="uint8"), "shape"),
-        (Given(shape=(-3, -4, 5), dtype="uint8"), "shape"),
-        (Given(shape=(2**40, 2**40, 2), dtype="uint8"), "shape"),
-        (Given(shape=(3, 4, 5), dtype="uint8", spacing_m=(0.0,)), "spacing_m"),
-        (Given(shape=(3, 4, 5), dtype="uint8", spacing_m=(1.0, 1.0)), "spacing_m"),
+        (VolumeMetadata(shape=(3, 4, 5)), "dtype"),
+        (VolumeMetadata(dtype="uint8"), "shape"),
+        (VolumeMetadata(shape=(3, 4, 5), dtype="object"), "dtype"),
+        (VolumeMetadata(shape=(3, 4, 4), dtype="uint8"), "file"),
+        (VolumeMetadata(shape=(60,), dtype="uint8"), "shape"),
+        (VolumeMetadata(shape=(-3, -4, 5), dtype="uint8"), "shape"),
+        (VolumeMetadata(shape=(2**40, 2**40, 2), dtype="uint8"), "shape"),
+        (VolumeMetadata(shape=(3, 4, 5), dtype="uint8", spacing_m=(0.0,)), "spacing_m"),
+        (VolumeMetadata(shape=(3, 4, 5), dtype="uint8", spacing_m=(1.0, 1.0)), "spacing_m"),
     ],
 )
 def test_raw_bytes_need_the_truth(tmp_path, given, field):
@@ -185,7 +185,7 @@ def test_raw_bytes_need_the_truth(tmp_path, given, field):
 
 def test_a_spacing_is_for_files_that_have_none(tmp_path):
     write_volume(tmp_path / "v.h5", Volume.of(ramp(), (1e-3,) * 3))
-    assert refused(tmp_path / "v.h5", Given(spacing_m=(1e-3,))).field == "spacing_m"
+    assert refused(tmp_path / "v.h5", VolumeMetadata(spacing_m=(1e-3,))).field == "spacing_m"
 
 
 def test_hdf5_of_another_kind(tmp_path):

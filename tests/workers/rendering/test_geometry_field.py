@@ -149,7 +149,7 @@ def test_tasks_that_run_again_change_nothing(path, tmp_path, small_batches):
     (tmp_path / "field").rename(tmp_path / "work" / "field")
     files, done = FieldFiles(tmp_path / "work" / "field"), tmp_path / "work" / "done"
     before = [table.read_bytes() for table in (*files.outer, files.inner)]
-    field_tasks.lay_out(path, SMALL, files.layout.parent)
+    field_tasks.parameterise_mesh(path, SMALL, files.layout.parent)
     field_tasks.outer_rows(files.layout.parent, 6, 0, 32, done / "outer-00000.json")
     field_tasks.inner_rows(files.layout.parent, 4, 0, 32, done / "inner-00000.json")
     assert [table.read_bytes() for table in (*files.outer, files.inner)] == before

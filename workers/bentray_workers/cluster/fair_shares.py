@@ -16,7 +16,7 @@ IN_FLIGHT = 2
 # How often the workers are counted, s.
 COUNT_S = 2.0
 # A job without a request for so long has no tasks to submit at present, s.
-ASKED_S = 1.0
+REQUEST_VALID_S = 1.0
 # How long a job without a task in flight waits before it requests again, s.
 TURN_S = 0.2
 
@@ -27,13 +27,13 @@ class Share:
     Attributes:
         tenant, lane: owner of the job, and the resource of its tasks.
         in_flight, ready: tasks that are submitted and not finished; tasks that could be submitted.
-        begun: number of its last task among all tasks; asked: time of its last request, s.
+        begun: number of its last task among all tasks; requested_at: time of its last request, s.
     """
 
     def __init__(self, shares: Shares, tenant: str, lane: str, count: Callable[[], int]) -> None:
         self.tenant, self.lane = tenant, lane
         self.in_flight = self.ready = 0
-        self.begun, self.asked = 0, -ASKED_S
+        self.begun, self.requested_at = 0, -REQUEST_VALID_S
         self._shares = shares
         self._count = count
         self._workers, self._counted = 1, -COUNT_S
@@ -128,7 +128,7 @@ class Shares:
         with self._changed:
             self._account()
             fewer = in_flight < share.in_flight
-            share.in_flight, share.ready, share.asked = in_flight, ready, self.clock()
+            share.in_flight, share.ready, share.requested_at = in_flight, ready, self.clock()
             may = ready > 0 and self._is_next(share, workers)
             if may:
                 share.in_flight += 1
@@ -149,15 +149,15 @@ class Shares:
             if one.lane == share.lane:
                 jobs.setdefault(one.tenant, []).append(one)
         held = {tenant: sum(one.in_flight for one in of_it) for tenant, of_it in jobs.items()}
-        most = self._most(share, jobs, held, workers)
+        most = self._limit(share, jobs, held, workers)
         if held[share.tenant] >= most:
             return False
         if len(jobs) > workers and not self._has_turn(share, jobs, held, workers):
             return False
-        others = [one for one in jobs[share.tenant] if one is not share and self._wants(one)]
+        others = [one for one in jobs[share.tenant] if one is not share and self._has_demand(one)]
         return all((share.in_flight, share.begun) <= (one.in_flight, one.begun) for one in others)
 
-    def _most(self, share: Share, jobs: dict[str, list[Share]], held: dict[str, int], workers: int) -> int:
+    def _limit(self, share: Share, jobs: dict[str, list[Share]], held: dict[str, int], workers: int) -> int:
         """Tasks that the tenant of a job may have in flight."""
         if len(jobs) == 1:
             return IN_FLIGHT * workers
@@ -185,11 +185,11 @@ class Shares:
         return not any(
             self._had[share.lane, tenant] < had
             for tenant, of_it in jobs.items()
-            if tenant != share.tenant and not held[tenant] and any(self._wants(one) for one in of_it)
+            if tenant != share.tenant and not held[tenant] and any(self._has_demand(one) for one in of_it)
         )
 
-    def _wants(self, share: Share) -> bool:
-        return share.ready > 0 and self.clock() - share.asked < ASKED_S
+    def _has_demand(self, share: Share) -> bool:
+        return share.ready > 0 and self.clock() - share.requested_at < REQUEST_VALID_S
 
     def _account(self) -> None:
         now = self.clock()
@@ -198,6 +198,6 @@ class Shares:
         self._updated = now
 
 
-def alone(client: Client, lane: str) -> Share:
+def exclusive_share(client: Client, lane: str) -> Share:
     """The share of a single job: all workers."""
     return Shares().join("", lane, client)

@@ -25,7 +25,7 @@ def file_for(scheduler: str) -> Path:
     return Path(tempfile.gettempdir()) / f"bentray-worker-{os.getuid()}-{name}.alive"
 
 
-def silence_s(scheduler: str) -> float | None:
+def seconds_since_heartbeat(scheduler: str) -> float | None:
     """Time since the last heartbeat, s; None without one, or if its worker is gone."""
     try:
         with file_for(scheduler).open("rb") as file:

@@ -12,7 +12,7 @@ from bentray_kernels.task_graph import POLL_S, Pool, Task, TaskGraph, ThreadPool
 from bentray_kernels.tomography.result import Progress
 
 from .attempts import Attempts
-from .fair_shares import Share, alone
+from .fair_shares import Share, exclusive_share
 from .resources import RECONSTRUCTION
 
 # Where a task may run: keyword arguments ``resources`` and ``workers`` of ``Client.submit``.
@@ -94,7 +94,7 @@ def open_pool(
     if client is None:
         return ThreadPool(threads)
     attempts = Attempts(client, folder, placement)
-    return ClusterPool(attempts, client, share or alone(client, lane), priority)
+    return ClusterPool(attempts, client, share or exclusive_share(client, lane), priority)
 
 
 def run_job(

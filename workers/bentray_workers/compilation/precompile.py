@@ -155,10 +155,10 @@ PARTS: tuple[tuple[Callable[[Path], None], ...], ...] = (
 )
 
 
-def _reconstruct(path: Path, scan: Dataset, wanted: Iterator[dict[str, Any]]) -> None:
+def _reconstruct(path: Path, scan: Dataset, candidates: Iterator[dict[str, Any]]) -> None:
     write_dataset(path, scan)
     quality.quality_report(path, "aic")
-    for settings in wanted:
+    for settings in candidates:
         reconstruct(
             None, path, Settings.of(**{"method": "sart", "nodes": NODES, "iterations": 1, **settings})
         )

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,16 +64,3 @@ def at_end(file: Any, tail: int = 0) -> None:
     if len(file.read(tail + 1)) > tail:
         found = "more data after the values than its header declares"
         raise InvalidInput("file", found, "the values and nothing more")
-
-
-@contextmanager
-def rejecting_damage(field: str, accepted: str) -> Iterator[None]:
-    """Convert exceptions of readers on damaged data to InvalidInput for this field."""
-    try:
-        yield
-    except (InvalidInput, MemoryError):
-        raise
-    except Exception as error:
-        # Readers raise exceptions of any type on a damaged header.
-        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise InvalidInput(field, f"damaged data ({reason[:120]})", accepted) from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
+from .damage import rejecting_damage
 from .hdf5_checks import OTHER_TYPES, TYPES, Limits, check_storage
 
-__all__ = ["SIGNATURE", "Limits", "Reader", "opened", "printable", "rejecting_damage"]
+__all__ = ["SIGNATURE", "Limits", "Reader", "opened", "printable", "rejecting_hdf5_damage"]
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -87,7 +88,7 @@ class Reader:
 
     def names(self) -> tuple[str, ...]:
         """Names in the root group."""
-        with rejecting_damage("file", "a whole HDF5 file"):
+        with rejecting_hdf5_damage("file", "a whole HDF5 file"):
             return tuple(self._file)
 
     def array(self, path: str, kinds: str, accepted: str) -> NDArray[Any] | None:
@@ -105,7 +106,7 @@ class Reader:
         if stored is None:
             return None
         self._read_bytes += stored.size * stored.dtype.itemsize
-        with rejecting_damage(path, accepted):
+        with rejecting_hdf5_damage(path, accepted):
             return np.asarray(stored[()])
 
     def required(self, path: str, kinds: str, accepted: str) -> NDArray[Any]:
@@ -122,7 +123,7 @@ class Reader:
             return None
         if not isinstance(found, h5py.Dataset):
             raise InvalidInput(path, "a group", accepted)
-        with rejecting_damage(path, accepted):
+        with rejecting_hdf5_damage(path, accepted):
             check_storage(path, found, accepted, self._limits, self._read_bytes)
             if found.dtype.kind not in kinds:
                 raise InvalidInput(
@@ -140,7 +141,7 @@ class Reader:
         owner = self._object(path)
         if owner is None:
             return None
-        with rejecting_damage(field, "text or numbers"):
+        with rejecting_hdf5_damage(field, "text or numbers"):
             if not h5py.h5a.exists(owner.id, name.encode()):
                 return None
             attribute = h5py.h5a.open(owner.id, name.encode())
@@ -194,7 +195,7 @@ class Reader:
         walked = ""
         for name in filter(None, path.split("/")):
             walked = f"{walked}/{name}".lstrip("/")
-            with rejecting_damage(walked, "a group or an array of this file"):
+            with rejecting_hdf5_damage(walked, "a group or an array of this file"):
                 if not isinstance(here, h5py.Group):
                     raise InvalidInput(walked.rpartition("/")[0], "an array", "a group")
                 if not here.id.links.exists(name.encode()):
@@ -207,16 +208,9 @@ class Reader:
         return here
 
 
-@contextmanager
-def rejecting_damage(field: str, accepted: str) -> Iterator[None]:
+def rejecting_hdf5_damage(field: str, accepted: str) -> AbstractContextManager[None]:
     """Convert exceptions of HDF5 on damaged data to InvalidInput for this field."""
-    try:
-        yield
-    except InvalidInput:
-        raise
-    except DAMAGE as error:
-        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise InvalidInput(field, f"damaged data ({reason[:120]})", accepted) from None
+    return rejecting_damage(field, accepted, DAMAGE)
 
 
 def printable(text: str) -> str:

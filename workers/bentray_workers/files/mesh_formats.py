@@ -19,7 +19,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.defects import SoundMesh, sound
 
-from .bounded_reading import rejecting_damage
+from .damage import rejecting_damage
 from .gltf_checks import check_gltf
 from .obj_checks import check_obj
 from .off_checks import HEADERS, check_off

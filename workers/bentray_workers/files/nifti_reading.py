@@ -19,9 +19,9 @@ from .bounded_reading import (
     any_shape,
     at_end,
     declared,
-    rejecting_damage,
     whole,
 )
+from .damage import rejecting_damage
 from .volume import Volume
 from .volume_axes import reorient
 

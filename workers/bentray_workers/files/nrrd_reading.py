@@ -12,16 +12,8 @@ from numpy.typing import NDArray
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
-from .bounded_reading import (
-    LONGEST_HEADER,
-    UNITS_M,
-    ShapeCheck,
-    any_shape,
-    at_end,
-    declared,
-    rejecting_damage,
-    whole,
-)
+from .bounded_reading import LONGEST_HEADER, UNITS_M, ShapeCheck, any_shape, at_end, declared, whole
+from .damage import rejecting_damage
 from .volume import Volume
 from .volume_axes import reorient
 
@@ -111,10 +103,10 @@ def _affine(header: Any) -> Floats:
     else:
         affine[:3, :3] = (directions * around).T
     affine[:3, 3] = np.multiply(header.get("space origin", [0.0] * 3), around)
-    return np.diag([*_to_right_front_up(header.get("space")), 1.0]) @ affine
+    return np.diag([*_axis_signs(header.get("space")), 1.0]) @ affine
 
 
-def _to_right_front_up(space: Any) -> tuple[float, float, float]:
+def _axis_signs(space: Any) -> tuple[float, float, float]:
     """Signs of the axes of a space relative to right, front and head.
 
     Spaces without anatomical directions, as ``3D-right-handed``, are unchanged.

@@ -12,7 +12,8 @@ import numpy as np
 
 from bentray_kernels.errors import InvalidInput
 
-from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared, rejecting_damage
+from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared
+from .damage import rejecting_damage
 from .hdf5_reading import SIGNATURE, Limits, opened, printable
 from .nifti_reading import read_nifti
 from .npy_headers import PARSING
@@ -34,7 +35,7 @@ RAW_TYPES = {"uint8": np.dtype("u1"), "int8": np.dtype("i1")} | {
 
 
 @dataclass(frozen=True)
-class Given:
+class VolumeMetadata:
     """Properties given by the user that are not in the file.
 
     Attributes:
@@ -50,7 +51,7 @@ class Given:
     dtype: str | None = None
 
 
-def import_volume(path: Path, given: Given | None = None, check: ShapeCheck = any_shape) -> Volume:
+def import_volume(path: Path, given: VolumeMetadata | None = None, check: ShapeCheck = any_shape) -> Volume:
     """Read a volume in any of the formats.
 
     Axes keep the order of the file, x first; those of NIfTI and anatomical NRRD go to the right, front and
@@ -65,7 +66,7 @@ def import_volume(path: Path, given: Given | None = None, check: ShapeCheck = an
         InvalidInput: from ``check``, for other formats, more than ``LARGEST_BYTES``, values that are not real
             and finite or that float32 cannot distinguish, and uneven slices.
     """
-    given = given or Given()
+    given = given or VolumeMetadata()
     try:
         with path.open("rb") as file:
             start = file.read(540)
@@ -76,7 +77,7 @@ def import_volume(path: Path, given: Given | None = None, check: ShapeCheck = an
     return replace(volume, title=printable(given.title)[:200]) if given.title else volume
 
 
-def _read(path: Path, file: IO[bytes], start: bytes, given: Given, check: ShapeCheck) -> Volume:
+def _read(path: Path, file: IO[bytes], start: bytes, given: VolumeMetadata, check: ShapeCheck) -> Volume:
     if given.shape is not None or given.dtype is not None:
         return _raw(path, given, check)
     if start.startswith(b"\x93NUMPY"):
@@ -98,7 +99,7 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: Given, check: ShapeC
     raise InvalidInput("file", found, ACCEPTED)
 
 
-def _raw(path: Path, given: Given, check: ShapeCheck) -> Volume:
+def _raw(path: Path, given: VolumeMetadata, check: ShapeCheck) -> Volume:
     if given.shape is None or given.dtype is None:
         missing = "shape" if given.shape is None else "dtype"
         raise InvalidInput(missing, "nothing", "both shape and dtype for raw bytes")
@@ -112,7 +113,7 @@ def _raw(path: Path, given: Given, check: ShapeCheck) -> Volume:
     return Volume.of(values, _spacing(given))
 
 
-def _numpy(path: Path, file: IO[bytes], given: Given, check: ShapeCheck) -> Volume:
+def _numpy(path: Path, file: IO[bytes], given: VolumeMetadata, check: ShapeCheck) -> Volume:
     with rejecting_damage("file", "a whole NumPy file of numbers"):
         version = np.lib.format.read_magic(file)
         if version not in {(1, 0), (2, 0)}:
@@ -151,6 +152,6 @@ def _hdf5(path: Path, check: ShapeCheck) -> Volume:
     return Volume.of(result.speed, result.spacing_m, result.origin_m, "Speed of sound, m/s")
 
 
-def _spacing(given: Given) -> tuple[float, ...]:
+def _spacing(given: VolumeMetadata) -> tuple[float, ...]:
     steps = tuple(given.spacing_m or (SPACING_M,))
     return steps * 3 if len(steps) == 1 else steps

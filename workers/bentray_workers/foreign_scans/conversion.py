@@ -14,11 +14,11 @@ from ..files.dataset.read import trace_type
 from ..files.dataset.write import Piece, bytes_of, write_dataset
 from ..files.hdf5_reading import Limits
 from .arrays import Arrays
-from .given import POSITION, Given, GivenArrays
 from .layouts import named_layout
 from .matlab73 import Matlab73
 from .open_scan import OpenScan, open_scan
 from .readers import reader_of
+from .scan_metadata import POSITION, ArraysWithMetadata, ScanMetadata
 from .scan_reader import Layout
 
 # The unit that ``check_plausible`` proposes.
@@ -30,7 +30,7 @@ def convert_dataset(
     target: Path,
     limits: Limits | None = None,
     on_size: Callable[[int], None] = lambda size: None,
-    given: Given | None = None,
+    given: ScanMetadata | None = None,
 ) -> Dataset:
     """Check a scan and write it as a canonical file, with one emission in memory at a time.
 
@@ -51,7 +51,7 @@ def convert_dataset(
         InvalidInput: naming the first missing or wrong field, the value found and the accepted values.
         OSError: where the folder cannot be written to or the disk is full.
     """
-    given = given or Given()
+    given = given or ScanMetadata()
     with open_scan(source, target.parent, limits) as scan:
         if not scan.claims_upload_format() and not (scan.is_upload_format() and not given.variables):
             arrays, layout = _read(scan, given)
@@ -68,7 +68,7 @@ def is_upload_format(path: Path) -> bool:
         return scan.is_upload_format()
 
 
-def _read(scan: OpenScan, given: Given) -> tuple[Arrays, Layout]:
+def _read(scan: OpenScan, given: ScanMetadata) -> tuple[Arrays, Layout]:
     """The arrays of a file and the dataset in them."""
     if POSITION in given.variables:
         # Own variables: no known layout has them.
@@ -81,7 +81,7 @@ def _read(scan: OpenScan, given: Given) -> tuple[Arrays, Layout]:
     else:
         reader = reader_of(scan)
         reads, own = reader.layout, reader.read(scan)
-    arrays: Arrays = GivenArrays(own, given) if given else own
+    arrays: Arrays = ArraysWithMetadata(own, given) if given else own
     try:
         return arrays, reads(arrays)
     except InvalidInput as error:
@@ -92,7 +92,7 @@ def _read(scan: OpenScan, given: Given) -> tuple[Arrays, Layout]:
         raise InvalidInput(error.field, error.value, accepted) from None
 
 
-def _of_matlab(scan: OpenScan, given: Given) -> bool:
+def _of_matlab(scan: OpenScan, given: ScanMetadata) -> bool:
     """Whether MATLAB wrote the variables of an HDF5 file without its header."""
     assert scan.hdf5 is not None
     return any(scan.hdf5.attribute(name, "MATLAB_class") is not None for name in given.variables.values())

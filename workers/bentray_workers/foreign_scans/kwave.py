@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..files.bounded_reading import rejecting_damage as refusing_zip
-from ..files.hdf5_reading import Limits, Reader, opened, rejecting_damage
+from ..files.damage import rejecting_damage
+from ..files.hdf5_reading import Limits, Reader, opened, rejecting_hdf5_damage
 from .arrays import LARGEST_ROW, LARGEST_TOTAL, LARGEST_WHOLE
 from .layouts import named_layout
 from .npz import Npz
@@ -58,7 +58,7 @@ class KWave:
     def __init__(self, archive: zipfile.ZipFile, scratch: Path) -> None:
         self._zip = archive
         self._scratch = scratch
-        with refusing_zip("file", WHOLE):
+        with rejecting_damage("file", WHOLE):
             check_zip(archive, MAX_OUTPUTS)
         names = archive.namelist()
         if GEOMETRY not in names:
@@ -133,7 +133,7 @@ class KWave:
 
     def _bytes(self, name: str, most: int) -> bytes:
         """A member, decompressed up to ``most`` bytes."""
-        with refusing_zip(name, "a whole zip"), self._zip.open(name) as file:
+        with rejecting_damage(name, "a whole zip"), self._zip.open(name) as file:
             data = file.read(most + 1)
         if len(data) > most:
             raise InvalidInput(name, f"more than {most} bytes unpacked", f"at most {most}")
@@ -147,7 +147,7 @@ class KWave:
 def _of(output: str) -> Iterator[None]:
     """Add the name of the output to errors."""
     try:
-        with rejecting_damage(output, "an output of k-Wave"):
+        with rejecting_hdf5_damage(output, "an output of k-Wave"):
             yield
     except InvalidInput as error:
         if error.field.startswith(output):

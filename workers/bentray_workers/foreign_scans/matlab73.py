@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 
 from ..files.dataset.counts import BLOCK_BYTES
-from ..files.hdf5_reading import Reader, rejecting_damage
+from ..files.hdf5_reading import Reader, rejecting_hdf5_damage
 from .arrays import check_row
 
 NUMBERS = "a plain array of real numbers"
@@ -73,6 +73,6 @@ def rows_of(stored: h5py.Dataset, name: str, before: tuple[int, ...] = ()) -> It
     chunk = 1 if stored.chunks is None else stored.chunks[axis]
     block = max(1, min(chunk, BLOCK_BYTES // row_bytes))
     for begin in range(0, count, block):
-        with rejecting_damage(name, NUMBERS):
+        with rejecting_hdf5_damage(name, NUMBERS):
             rows = np.asarray(stored[(*before, slice(begin, begin + block))])
         yield from rows

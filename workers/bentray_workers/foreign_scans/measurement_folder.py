@@ -11,7 +11,7 @@ from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 
-from ..files.bounded_reading import rejecting_damage
+from ..files.damage import rejecting_damage
 from .arrays import LARGEST_ROW
 from .matlab5 import Matlab5
 from .open_scan import OpenScan

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..files.bounded_reading import LONGEST_HEADER, at_end, rejecting_damage
+from ..files.bounded_reading import LONGEST_HEADER, at_end
+from ..files.damage import rejecting_damage
 from ..files.npy_headers import PARSING
 from .arrays import check_declared, check_row
 from .zip_checks import PACKING, check_zip

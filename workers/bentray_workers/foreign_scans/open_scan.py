@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bentray_kernels.errors import InvalidInput
 
-from ..files.bounded_reading import rejecting_damage
+from ..files.damage import rejecting_damage
 from ..files.dataset.format import FORMAT
 from ..files.hdf5_reading import SIGNATURE, Limits, Reader, opened
 from . import matlab5, npz

@@ -34,7 +34,7 @@ def draw_history(
     every: list[float] = []
     for (name, history), colour in zip(histories.items(), cycle(LINES), strict=False):
         begun = 0
-        for number, rms in enumerate(_courses(history)):
+        for number, rms in enumerate(_segments(history)):
             places = begun + np.arange(1, len(rms) + 1)
             # Matplotlib omits labels with an underscore from the legend.
             label = name if number == 0 else f"_{name}"
@@ -51,7 +51,7 @@ def draw_history(
     axes.set_ylabel("residual rms (ns)", labelpad=1)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     _scale(axes, every, margin=bool(stages))
-    _dress(axes)
+    _style_axes(axes)
     if len(histories) > 1:
         legend_below(axes)
 
@@ -62,7 +62,7 @@ def legend_below(axes: Axes, markerscale: float = 1.0) -> None:
     axes.legend(**place, handletextpad=0.4, markerscale=markerscale)
 
 
-def _courses(history: tuple[Iteration, ...]) -> list[list[float]]:
+def _segments(history: tuple[Iteration, ...]) -> list[list[float]]:
     """Of each stage the residual of every iteration, ns; over slices the root mean square."""
     squares: dict[int, dict[int, list[float]]] = {}
     for s in history:
@@ -108,11 +108,11 @@ def draw_profiles(axes: Axes, place_m: Floats, profiles: Mapping[str, Floats], t
     axes.set_xlabel("x (mm)")
     axes.set_ylabel("sound speed (m/s)", labelpad=1)
     axes.margins(x=0.0)
-    _dress(axes)
+    _style_axes(axes)
     legend_below(axes)
 
 
-def _dress(axes: Axes) -> None:
+def _style_axes(axes: Axes) -> None:
     axes.grid(color="#dddddd", linewidth=0.5)
     axes.spines[["top", "right"]].set_visible(False)
     axes.set_box_aspect(1.0)

@@ -58,14 +58,14 @@ def scene_of(shape: Shape, texture: Floats | None, view: FieldView) -> Scene:
     left, right = _material(view, CLAY, texture), _material(view, BLUE, texture)
     if view.scene == "two-mirrors":
         pair = (
-            _standing(shape, view, (-0.6, 0.1), 1.1, 0.0, left),
-            _standing(shape, view, (0.6, -0.1), 1.1, 180.0, right),
+            _upright(shape, view, (-0.6, 0.1), 1.1, 0.0, left),
+            _upright(shape, view, (0.6, -0.1), 1.1, 180.0, right),
         )
         return Scene(pair, landscape(), GROUND)
     ball = Instance(_ball(), placed((0.0, 0.65, 0.75), 1.5), Material(colour=SILVER, mirror=0.9))
     both = (
-        _standing(shape, view, (-0.85, -0.45), 0.85, 0.0, left),
-        _standing(shape, view, (0.85, -0.45), 0.85, 90.0, _material(view, RED, texture)),
+        _upright(shape, view, (-0.85, -0.45), 0.85, 0.0, left),
+        _upright(shape, view, (0.85, -0.45), 0.85, 90.0, _material(view, RED, texture)),
     )
     return Scene((*both, ball), landscape(), GROUND)
 
@@ -104,7 +104,7 @@ def _turned(view: FieldView, centre: tuple[float, float, float], size: float, tu
     return np.column_stack([linear, np.array(centre) - linear @ np.full(3, 0.5)])
 
 
-def _standing(
+def _upright(
     shape: Shape, view: FieldView, at: tuple[float, float], size: float, turn_deg: float, material: Material
 ) -> Instance:
     """The mesh on the ground."""

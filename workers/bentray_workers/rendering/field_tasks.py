@@ -46,7 +46,7 @@ FACE_BYTES = 320
 _SURFACES = MemoryCache(KEPT_BYTES)
 
 
-def lay_out(mesh_path: Path, settings: FieldSettings, folder: Path) -> None:
+def parameterise_mesh(mesh_path: Path, settings: FieldSettings, folder: Path) -> None:
     """Task: chart, geometry image and empty tables; ``FieldFiles.layout`` last.
 
     Raises:

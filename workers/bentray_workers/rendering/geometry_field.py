@@ -17,7 +17,7 @@ from ..cluster.task_pool import JobControl, run_job
 from ..files.atomic import sync
 from ..files.geometry_field_folder import FieldFiles, read_json
 from .field_settings import FieldSettings
-from .field_tasks import TASK_RAYS, finish, inner_rows, lay_out, outer_rows
+from .field_tasks import TASK_RAYS, finish, inner_rows, outer_rows, parameterise_mesh
 from .turntable import PRIORITY
 
 
@@ -47,7 +47,7 @@ class GeometryFieldGraph:
         return self._first
 
     def after(self, task: Task, result: Any) -> list[Task]:
-        if task.function is lay_out:
+        if task.function is parameterise_mesh:
             return self._remaining()
         self.done += 1
         return [self._finish()] if self.done == self.total - 1 else []
@@ -55,7 +55,7 @@ class GeometryFieldGraph:
     def _remaining(self) -> list[Task]:
         """What can run now, by the files that exist."""
         if not self._files.layout.exists():
-            return [Task(lay_out, (self._mesh_path, self._settings, self.folder))]
+            return [Task(parameterise_mesh, (self._mesh_path, self._settings, self.folder))]
         if self._files.figures.exists():
             self.done = self.total = 1
             return []

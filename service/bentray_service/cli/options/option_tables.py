@@ -35,11 +35,11 @@ class Option:
 def with_options(
     options: Mapping[str, Option], collect: Callable[[dict[str, Any]], Any]
 ) -> Callable[[Command], Command]:
-    """A decorator that replaces the parameter ``asked`` of a command by options.
+    """A decorator that replaces the parameter ``options`` of a command by one CLI option per field.
 
     Args:
         options: by field.
-        collect: makes the argument ``asked`` of the values of the given options, by field.
+        collect: converts the values of the CLI options, by field, to the argument ``options``.
     """
 
     def decorate(command: Command) -> Command:
@@ -47,11 +47,11 @@ def with_options(
         def run(**given: Any) -> None:
             # Typer passes an empty list for a repeatable option that is not given.
             values = {name: value for name in options if (value := given.pop(name)) not in (None, [])}
-            command(asked=collect(values), **given)
+            command(options=collect(values), **given)
 
         parameters: list[inspect.Parameter] = []
         for parameter in inspect.signature(command, eval_str=True).parameters.values():
-            if parameter.name == "asked":
+            if parameter.name == "options":
                 parameters += [option.parameter(name) for name, option in options.items()]
             else:
                 parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))

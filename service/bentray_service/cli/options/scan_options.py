@@ -13,7 +13,7 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from bentray_workers.foreign_scans import Given
+    from bentray_workers.foreign_scans import ScanMetadata
 
 ACCEPTED = "the path of a scan, see the documentation of scan files"
 
@@ -43,17 +43,17 @@ Frequency = Annotated[
 ]
 
 
-def given_of(
+def scan_metadata(
     map: Sequence[str] | None,  # noqa: A002 - the name of the option
     unit: Sequence[str] | None,
     temperature: float | None,
     sound_speed: float | None,
     frequency: float | None,
-) -> Given:
+) -> ScanMetadata:
     """The values of the options; raises InvalidInput naming the first invalid one."""
-    from bentray_workers.foreign_scans import Given
+    from bentray_workers.foreign_scans import ScanMetadata
 
-    return Given.of(map or (), unit or (), temperature, sound_speed, frequency)
+    return ScanMetadata.of(map or (), unit or (), temperature, sound_speed, frequency)
 
 
 def input_scan(path: Path) -> Path:
@@ -68,7 +68,7 @@ def input_scan(path: Path) -> Path:
 
 
 @contextmanager
-def dataset_file(source: Path, given: Given, beside: Path) -> Iterator[Path]:
+def dataset_file(source: Path, given: ScanMetadata, beside: Path) -> Iterator[Path]:
     """A dataset file with the scan: the file itself, or a temporary conversion of a foreign one.
 
     Args:

@@ -16,7 +16,7 @@ UNITS = ("_mps", "_m", "_nodes", "_deg")
 
 
 @dataclass(frozen=True)
-class Asked:
+class SettingsOptions:
     """The settings of a command line: values of the options that were given, by the names of ``PLACES``."""
 
     options: dict[str, Any]
@@ -65,11 +65,11 @@ OPTIONS = _options()
 
 
 def with_settings_options(command: Command) -> Command:
-    """The command with the options in place of its parameter ``asked``, which gets the given values."""
-    return with_options(OPTIONS, Asked)(command)
+    """The command with one CLI option per setting in place of its parameter ``options``."""
+    return with_options(OPTIONS, SettingsOptions)(command)
 
 
-def settings_from(asked: Asked) -> Settings:
+def settings_from(options: SettingsOptions) -> Settings:
     """The settings of a command line; an option that is not given takes its default.
 
     Raises:
@@ -77,4 +77,4 @@ def settings_from(asked: Asked) -> Settings:
     """
     from ...settings_request import nested, settings_of
 
-    return settings_of(nested(asked.options))
+    return settings_of(nested(options.options))

@@ -36,13 +36,13 @@ def watching(entries: Sequence[Entry]) -> Iterator[Callable[[], None]]:
         return
     reported = {entry.name for entry in entries if entry.state == "skipped"}
 
-    def tell() -> None:
+    def show() -> None:
         for entry in entries:
             if entry.state in ("succeeded", "failed") and entry.name not in reported:
                 reported.add(entry.name)
                 remark(f"{entry.name} {entry.state} after {entry.seconds:.1f} s {entry.reason}".rstrip())
 
-    yield tell
+    yield show
 
 
 def live_table(entries: Sequence[Entry], height: int) -> Table:

@@ -3,10 +3,23 @@ import { upload } from "./api.js";
 import { at } from "./dom.js";
 
 
-// The elements are prefix-drop, prefix-file, prefix-upload, prefix-name, prefix-bar and prefix-error; a part prefix-own,
-// if any, is opened when a file is refused. Returns a function that sends the last file again.
+// The drop zone replaces the element prefix-place; its data-prompt and data-formats are the texts, data-accept is that of
+// the file input. An element prefix-own, if any, is opened when a file is rejected. Returns a function that sends the
+// last file again.
 export function uploads(prefix, addressOf, mediaType, onStored) {
   const part = (name) => at(`${prefix}-${name}`);
+  const place = part("place");
+  place.outerHTML = `
+    <label id="${prefix}-drop" class="drop" for="${prefix}-file">
+      <input id="${prefix}-file" type="file" accept="${place.dataset.accept || ""}">
+      <strong>${place.dataset.prompt}</strong> or drop it here
+      <small>${place.dataset.formats}</small>
+    </label>
+    <div id="${prefix}-upload" class="upload" hidden>
+      <span id="${prefix}-name"></span>
+      <progress id="${prefix}-bar" max="1" value="0" aria-label="Upload"></progress>
+    </div>
+    <p id="${prefix}-error" class="error" role="alert" hidden></p>`;
 
   let last = null;
 

@@ -12,7 +12,7 @@ from typer.testing import Result
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_service.cli import app
-from bentray_service.cli.options.settings_options import OPTIONS, Asked, settings_from
+from bentray_service.cli.options.settings_options import OPTIONS, SettingsOptions, settings_from
 
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 
@@ -46,11 +46,11 @@ CHOICES = [
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
+def received(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
     """The settings that ``bentray reconstruct`` would have worked with; it then stops."""
     seen: list[Settings] = []
 
-    def stop(given: Asked) -> Settings:
+    def stop(given: SettingsOptions) -> Settings:
         seen.append(settings_from(given))
         raise InvalidInput("stop", "here", "nothing")
 
@@ -61,7 +61,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
 @pytest.mark.parametrize(("words", "name", "value"), CHOICES)
 def test_each_option_sets_its_own_setting_and_no_other(
     bentray: Callable[..., Result],
-    asked: list[Settings],
+    received: list[Settings],
     tmp_path: Path,
     words: list[str],
     name: str,
@@ -71,16 +71,16 @@ def test_each_option_sets_its_own_setting_and_no_other(
     scan.touch()
     bentray("reconstruct", scan, "-o", tmp_path / "out", *words)
     method = {"method": "sart"} if name == "speed_range_mps" else {}
-    assert asked == [Settings.of(**method, **{name: value})]
+    assert received == [Settings.of(**method, **{name: value})]
 
 
 def test_several_are_taken_together(
-    bentray: Callable[..., Result], asked: list[Settings], tmp_path: Path
+    bentray: Callable[..., Result], received: list[Settings], tmp_path: Path
 ) -> None:
     (tmp_path / "scan.h5").touch()
     words = ("--relaxation", 0.2, "--nodes", 64, "--smoothing", 2)
     bentray("reconstruct", tmp_path / "scan.h5", "-o", tmp_path / "out", *words)
-    assert asked == [Settings.of(relaxation=0.2, nodes=64, smoothing_nodes=2.0)]
+    assert received == [Settings.of(relaxation=0.2, nodes=64, smoothing_nodes=2.0)]
 
 
 def test_every_setting_has_its_option() -> None:
@@ -88,7 +88,7 @@ def test_every_setting_has_its_option() -> None:
 
 
 def test_no_options_give_default_settings() -> None:
-    assert settings_from(Asked({})) == Settings()
+    assert settings_from(SettingsOptions({})) == Settings()
 
 
 @pytest.mark.parametrize(

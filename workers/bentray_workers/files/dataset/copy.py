@@ -11,7 +11,7 @@ import h5py
 
 from bentray_kernels.acquisition import Dataset
 
-from ..hdf5_reading import Limits, opened, rejecting_damage
+from ..hdf5_reading import Limits, opened, rejecting_hdf5_damage
 from .read import NUMERIC, TRACES, dataset_of, placeholder_traces, trace_type
 from .write import Piece, bytes_of, write_dataset
 
@@ -49,7 +49,7 @@ def copy_dataset(
             stored = reader.checked(path, NUMERIC, TRACES)
             assert stored is not None
             for where in blocks(stored, chunk):
-                with rejecting_damage(path, TRACES):
+                with rejecting_hdf5_damage(path, TRACES):
                     values = stored[where]
                 yield where, trace_type(path, values)
 

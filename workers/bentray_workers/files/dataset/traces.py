@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.emissions import Emissions
 
-from ..hdf5_reading import Limits, Reader, opened, rejecting_damage
+from ..hdf5_reading import Limits, Reader, opened, rejecting_hdf5_damage
 from .counts import BLOCK_BYTES
 from .read import NUMERIC, TRACES, trace_type
 
@@ -95,7 +95,7 @@ def emissions_in(
     @lru_cache(maxsize=1)
     def rows(number: int) -> NDArray[Any]:
         some = slice(number * block, (number + 1) * block)
-        with rejecting_damage(path, TRACES):
+        with rejecting_hdf5_damage(path, TRACES):
             found = stored[some] if index is None else stored[index, some]
         return trace_type(path, found)
 

@@ -10,7 +10,7 @@ from scipy.io import savemat
 from bentray_kernels.acquisition import speed_from_temperature
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.foreign_scans import Given, convert_dataset
+from bentray_workers.foreign_scans import ScanMetadata, convert_dataset
 
 from .hdf5_scans import write_fields, zea_fields
 from .scans import (
@@ -44,7 +44,7 @@ def archive(path, variables):
 
 
 def converted(tmp_path, **given):
-    convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5", given=Given.of(**given))
+    convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5", given=ScanMetadata.of(**given))
     return read_dataset(tmp_path / "canonical.h5")
 
 
@@ -142,7 +142,7 @@ def test_files_in_the_upload_format_state_everything_themselves(tmp_path):
     savemat(tmp_path / "scan", travel_times(), appendmat=False)
     converted(tmp_path)
     with pytest.raises(InvalidInput, match="files in the upload format state their units"):
-        convert_dataset(tmp_path / "canonical.h5", tmp_path / "again.h5", given=Given.of(unit=["mm"]))
+        convert_dataset(tmp_path / "canonical.h5", tmp_path / "again.h5", given=ScanMetadata.of(unit=["mm"]))
 
 
 def test_links_out_of_the_file_are_not_followed(tmp_path):

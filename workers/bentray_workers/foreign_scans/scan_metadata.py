@@ -65,7 +65,7 @@ INDICES = ("acquisition/tx", "acquisition/rx")
 
 
 @dataclass(frozen=True)
-class Given:
+class ScanMetadata:
     """What the user states about a scan.
 
     Attributes:
@@ -143,7 +143,7 @@ def _factors(units: Iterable[str]) -> dict[str, float]:
     return found
 
 
-class GivenArrays:
+class ArraysWithMetadata:
     """The arrays of a file with what the user states about them; see ``Arrays``.
 
     Args:
@@ -154,7 +154,7 @@ class GivenArrays:
         InvalidInput: for a variable that is not in the file, and water that contradicts that of the file.
     """
 
-    def __init__(self, arrays: Arrays, given: Given) -> None:
+    def __init__(self, arrays: Arrays, given: ScanMetadata) -> None:
         self._arrays = arrays
         self._given = given
         self._present = frozenset(arrays.names())
