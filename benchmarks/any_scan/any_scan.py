@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 
-from . import _default_settings, _without_water_shot
+from . import _any_array, _default_settings, _without_water_shot
 
 # Each measures the rows of one target.
-TARGETS = (_without_water_shot.rows, _default_settings.rows)
+TARGETS = (_without_water_shot.rows, _default_settings.rows, _any_array.rows)
 
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:

@@ -12,8 +12,8 @@ from .settings import Settings
 # Elements whose heights differ by less than this, m, belong to one ring.
 SAME_HEIGHT_M = 1e-5
 
-# Arrays in space with fewer elements at each height, on average, are not stacked rings.
-MIN_PER_HEIGHT = 8
+# A ring has at least so many elements, and no gap as wide as this seen from the middle, degrees.
+MIN_PER_HEIGHT, MAX_GAP_DEG = 8, 60.0
 
 
 def distinct_heights(position_m: Floats) -> Floats:
@@ -34,8 +34,22 @@ def automatic_decomposition(position_m: Floats) -> Literal["slices", "volume"]:
     """
     if position_m.shape[1] == 2:
         return "slices"
-    heights = distinct_heights(position_m).size
-    return "volume" if heights > 1 and len(position_m) < MIN_PER_HEIGHT * heights else "slices"
+    heights = distinct_heights(position_m)
+    if heights.size == 1:
+        return "slices"
+    if len(position_m) < MIN_PER_HEIGHT * heights.size:
+        return "volume"
+    ring = np.searchsorted(heights, position_m[:, 2], side="right") - 1
+    x, y = (position_m[:, :2] - 0.5 * (position_m[:, :2].min(axis=0) + position_m[:, :2].max(axis=0))).T
+    angle = np.degrees(np.arctan2(y, x))
+    gaps = [_widest_gap(angle[ring == k]) for k in range(heights.size)]
+    return "slices" if np.median(gaps) < MAX_GAP_DEG else "volume"
+
+
+def _widest_gap(angle_deg: Floats) -> float:
+    """Widest gap between directions, degrees."""
+    rising = np.sort(angle_deg)
+    return float(np.diff(np.append(rising, rising[0] + 360.0)).max())
 
 
 def with_decomposition(position_m: Floats, settings: Settings) -> Settings:

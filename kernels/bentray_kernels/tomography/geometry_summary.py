@@ -40,7 +40,7 @@ def _sentences(dataset: Dataset, requested: Settings, settings: Settings, proble
         heights = distinct_heights(position).size
         yield (
             f"Reconstructed in 3-D (decomposition: volume), since {len(position)} elements at {heights} "
-            "heights are no rings."
+            "heights are not stacked rings."
         )
     if settings.opening_angle_deg is not None:
         outside = ~within_opening(dataset, settings.opening_angle_deg)

@@ -161,7 +161,7 @@ class Settings:
     decomposition: Literal["slices", "volume"] | None = setting(
         None,
         "slices: each height of the ring by itself; volume: all heights together, in 3-D.",
-        unset="volume for elements in 3-D with fewer than 8 at each height, else slices",
+        unset="volume for elements in 3-D that are not rings at several heights, else slices",
     )
     opening_angle_deg: float | None = setting(
         None,

@@ -149,7 +149,7 @@ def test_pairs_outside_the_opening_angle_are_left_out():
 @pytest.mark.parametrize(
     ("normal", "angle", "field", "words"),
     [
-        (None, 90.0, "geometry/element_normal", "since the setting opening_angle_deg is given"),
+        (None, 90.0, "opening_angle_deg", "directions in the file .geometry/element_normal"),
         (np.zeros((48, 2)), 90.0, "geometry/element_normal", "length > 0"),
         (arc(48, RADIUS).position_m, 90.0, "opening_angle_deg", "directions that point towards the object"),
     ],
@@ -193,4 +193,7 @@ def test_the_decomposition_follows_the_heights_of_the_elements():
         (rings[:8], "slices"),
     ):
         assert with_decomposition(position, settings).decomposition == expected
+    lines = facing_lines(6, 0.08, 0.08).position_m
+    planes = np.concatenate([np.column_stack((lines, np.full(12, z))) for z in (0.0, 0.01)])
+    assert with_decomposition(planes, settings).decomposition == "volume"
     assert with_decomposition(rings[1:], Settings(decomposition="slices")).decomposition == "slices"

@@ -12,7 +12,7 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.pairs import count, heights, of
 
 RING, Z, WATER = Ring(6, 0.05), np.array([-0.004, 0.0, 0.004]), 1500.0
-SLICES, VOLUME = Settings(method="sart"), Settings(method="sart", decomposition="volume")
+SLICES, VOLUME = (Settings(method="sart", decomposition=way) for way in ("slices", "volume"))
 
 
 def moved():

@@ -93,8 +93,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
             for an array without width, stored by earlier versions.
     """
     _check_extent(scan)
-    if settings.opening_angle_deg is not None:
-        check_normals(known=scan.normals)
+    check_normals(settings.opening_angle_deg, known=scan.normals)
     if settings.decomposition is None:
         settings = settings.changed(decomposition=scan.decomposition)
     if settings.nodes is None:

@@ -1,0 +1,202 @@
+"""A3: arrays of other shapes than a ring by default settings, beside straight rays and constants."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from bentray_kernels.acquisition import Dataset, Truth
+from bentray_kernels.acquisition.simulation.array_shapes import arc, bowl, facing_lines
+from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
+from bentray_kernels.arrays import Flags, Floats, Ints
+from bentray_kernels.phantoms import TABLE6_SIDE_M, TABLE7_SIDE_M, table6, table7
+from bentray_kernels.phantoms.table7 import CHEST_M
+from bentray_kernels.tomography import Problem, Reconstruction, Settings, reconstruct, rmse
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.terminal import Step
+from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
+from bentray_workers.images.truth_on_grid import on_grid
+
+from ..shared._small_png import small_png
+
+RESULTS = Path(__file__).parents[1] / "results"
+
+WATER_MPS, RADIUS_M = 1480.0, 0.095
+
+# Elements of a whole ring, of a bowl and along a side of a plane, and nodes of the grids of the simulations.
+ELEMENTS, BOWL, PLANE, FINE_NODES, FINE_NODES_IN_SPACE = 96, 72, 6, 385, 79
+
+# Of images in 3-D, whose automatic grid takes minutes.
+NODES_IN_SPACE = 40
+
+
+class Array(NamedTuple):
+    """An array.
+
+    Attributes:
+        position_m: (elements, 2 or 3), m.
+        tx, rx: elements that emit and receive; None: all.
+        limited: whether its coverage by angle is incomplete, which the result must state.
+    """
+
+    position_m: Floats
+    tx: Ints | None = None
+    rx: Ints | None = None
+    limited: bool = False
+
+
+class Made(NamedTuple):
+    """Images of a scan by straight rays and by default settings, with the truth on their grid.
+
+    Attributes:
+        result: by default settings.
+        truth: at its nodes, m/s.
+        region: nodes inside the hull of the array.
+        errors: rms inside the hull, m/s, by the name of the image.
+        seconds: for the default settings.
+    """
+
+    result: Reconstruction
+    truth: Floats
+    region: Flags
+    errors: Mapping[str, float]
+    seconds: float
+
+
+def arrays(*, quick: bool) -> dict[str, Array]:
+    """The arrays by their names."""
+    count = ELEMENTS // 2 if quick else ELEMENTS
+    ring, per_degree = arc(count, RADIUS_M).position_m, count / 360.0
+    half = count // 2
+    found = {
+        "ring": Array(ring),
+        "arc of 270°": Array(arc(round(270 * per_degree), RADIUS_M, 270.0).position_m, limited=True),
+        "arc of 200°": Array(arc(round(200 * per_degree), RADIUS_M, 200.0).position_m, limited=True),
+        "facing lines": Array(
+            facing_lines(half, 0.18, 0.17).position_m, np.arange(half), np.arange(half, 2 * half), True
+        ),
+        "one element inside": Array(np.vstack((ring, [[0.071, -0.055]]))),
+        "emitters apart": Array(ring, np.arange(0, count, 2), np.arange(1, count, 2)),
+    }
+    if quick:
+        return found
+    # The rim lies at the chest wall, the pole beyond the nipple.
+    upright = bowl(BOWL, 0.095).position_m * (1.0, 1.0, -1.0) + (0.0, 0.0, CHEST_M)
+    side = np.linspace(-0.075, 0.075, PLANE)
+    flat = np.stack(np.meshgrid(side, np.linspace(CHEST_M, 0.035, PLANE)), axis=-1).reshape(-1, 2)
+    planes = np.concatenate([np.insert(flat, 1, y, axis=1) for y in (-0.085, 0.085)])
+    each = PLANE**2
+    found["bowl"] = Array(upright)
+    found["facing planes"] = Array(planes, np.arange(each), np.arange(each, 2 * each), True)
+    return found
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """A3 for each array; the picture of all of them, unless quick."""
+    images = {}
+    chosen = arrays(quick=quick)
+    for number, (name, array) in enumerate(chosen.items()):
+        progress(number, len(chosen), name)
+        images[name] = made(simulated(array))
+        yield array_row(name, array, images[name])
+    stated = sum(
+        ("Limited angle" in images[name].result.provenance.get("geometry", "")) == array.limited
+        for name, array in chosen.items()
+    )
+    detail = "; ".join(
+        f"{name}: {one.result.provenance.get('geometry', 'nothing')}" for name, one in images.items()
+    )
+    yield Row(
+        "A3 arrays that state a limited angle, if they have one", stated, len(chosen), "==", "arrays", detail
+    )
+    if not quick:
+        (RESULTS / "any_scan_arrays.png").write_bytes(picture(images))
+
+
+def simulated(array: Array) -> Dataset:
+    """Eikonal times through the breast of Table 6, in 3-D through that of Table 7, on a finer grid."""
+    position = array.position_m
+    in_space = position.shape[1] == 3
+    side = TABLE7_SIDE_M if in_space else TABLE6_SIDE_M
+    spacing = side / ((FINE_NODES_IN_SPACE if in_space else FINE_NODES) - 1)
+    if in_space:
+        low, high = position[:, 2].min() - 4 * spacing, position[:, 2].max() + 4 * spacing
+        z = np.arange(low, high, spacing)
+        speed, origin = table7(WATER_MPS).speed(FINE_NODES_IN_SPACE, side, z), (-0.5 * side, -0.5 * side, low)
+    else:
+        speed, origin = table6(WATER_MPS).speed(FINE_NODES, side), (-0.5 * side, -0.5 * side)
+    everyone = np.arange(len(position))
+    tx, rx = (everyone if index is None else index for index in (array.tx, array.rx))
+    delta, _ = FineMedium(speed, spacing, WATER_MPS).arrivals(position - np.array(origin), tx)
+    truth = Truth(speed, (spacing,) * len(origin), origin, axes="x,y,z" if in_space else "x,y")
+    return Dataset(position, tx, rx, WATER_MPS, delta_tof_s=delta[:, rx], truth=truth, array_type="free")
+
+
+def made(dataset: Dataset) -> Made:
+    """The images of a scan, and their errors."""
+    truth = dataset.truth
+    assert truth is not None
+    nodes = NODES_IN_SPACE if dataset.element_position_m.shape[1] == 3 else None
+    straight = reconstruct(dataset, Settings.of(method="sart", rays="straight", nodes=nodes))
+    begun = time.perf_counter()
+    result = reconstruct(dataset, Settings(nodes=nodes))
+    seconds = time.perf_counter() - begun
+    region = Problem.of(dataset, result.settings).region
+    true = on_grid(truth.sound_speed_mps, truth, result)
+    # Nodes beside the simulated medium, in which there are elements at most.
+    region = region & np.isfinite(true)
+    flat = {"water alone": WATER_MPS, "best constant": float(true[region].mean())}
+    images = {name: np.full_like(true, speed) for name, speed in flat.items()}
+    images |= {"straight rays": straight.speed, "default": result.speed}
+    errors = {name: rmse(image, true, region) for name, image in images.items()}
+    return Made(result, true, region, errors, seconds)
+
+
+def array_row(name: str, array: Array, one: Made) -> Row:
+    """The error by default settings over that of the better constant."""
+    least = min(one.errors["water alone"], one.errors["best constant"])
+    detail = ", ".join(f"{image} {error:.1f}" for image, error in one.errors.items())
+    detail += f" m/s inside the hull, {one.seconds:.1f} s; {len(array.position_m)} elements, "
+    detail += (
+        f"{' by '.join(map(str, one.result.speed.shape))} nodes; load at the end {os.getloadavg()[0]:.1f}"
+    )
+    return Row(
+        f"A3 {name}: error over that of the best constant",
+        one.errors["default"] / least,
+        1.0,
+        "<",
+        "",
+        detail,
+    )
+
+
+def picture(images: Mapping[str, Made]) -> bytes:
+    """PNG: truth and image of each array; of volumes the plane in the middle of the hull's height."""
+    with drawing():
+        figure = new_figure(2.6 * len(images), 5.6)
+        figure.suptitle(
+            "Truth (above) and image by default settings (below); the line is the hull less its rim"
+        )
+        panels = figure.subplots(2, len(images), squeeze=False)
+        limits = robust_limits([one.truth for one in images.values()])
+        maps = []
+        for column, (name, one) in zip(panels.T, images.items(), strict=True):
+            titles = name, f"{one.errors['default']:.1f} m/s (water {one.errors['water alone']:.1f})"
+            at = ...
+            if one.truth.ndim == 3:
+                heights = np.flatnonzero(one.region.any(axis=(0, 1)))
+                at = (slice(None), slice(None), int(heights[len(heights) // 3]))
+            grid = one.result.spacing_m[:2], one.result.origin_m[:2]
+            for axes, values, title in zip(column, (one.truth, one.result.speed), titles, strict=True):
+                outline = one.region[at]
+                maps.append(
+                    draw_map(axes, values[at], *grid, limits, colormap=SPEED, title=title, outline=outline)
+                )
+        draw_bar(maps, "speed (m/s)")
+        return small_png(to_png(figure))
