@@ -14,8 +14,7 @@ from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.simulation.array_shapes import arc, bowl, facing_lines
 from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
 from bentray_kernels.arrays import Flags, Floats, Ints
-from bentray_kernels.phantoms import TABLE6_SIDE_M, TABLE7_SIDE_M, table6, table7
-from bentray_kernels.phantoms.table7 import CHEST_M
+from bentray_kernels.phantoms import Ellipsoid, Part, VolumePhantom
 from bentray_kernels.tomography import Problem, Reconstruction, Settings, reconstruct, rmse
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
@@ -27,7 +26,22 @@ from ..shared._small_png import small_png
 
 RESULTS = Path(__file__).parents[1] / "results"
 
-WATER_MPS, RADIUS_M = 1480.0, 0.095
+WATER_MPS, RADIUS_M, SIDE_M = 1480.0, 0.095, 0.2
+
+# Fat, gland and two lesions; height of their middle, m.
+MIDDLE_M = -0.04
+PHANTOM = VolumePhantom(
+    WATER_MPS,
+    tuple(
+        Part(Ellipsoid((x, y, MIDDLE_M + z), size, angle), speed, 0.0, name)
+        for name, (x, y, z), size, angle, speed in (
+            ("fat", (0.0, 0.0, 0.0), (0.068, 0.062, 0.036), 0.0, 1445.0),
+            ("gland", (0.004, 0.002, 0.0), (0.050, 0.040, 0.027), 0.6, 1510.0),
+            ("fast lesion", (0.022, 0.012, 0.002), (0.013, 0.010, 0.012), 0.0, 1560.0),
+            ("slow lesion", (-0.018, -0.010, 0.0), (0.009, 0.009, 0.010), 0.0, 1450.0),
+        )
+    ),
+)
 
 # Elements of a whole ring, of a bowl and along a side of a plane, and nodes of the grids of the simulations.
 ELEMENTS, BOWL, PLANE, FINE_NODES, FINE_NODES_IN_SPACE = 96, 72, 6, 385, 79
@@ -86,13 +100,11 @@ def arrays(*, quick: bool) -> dict[str, Array]:
     }
     if quick:
         return found
-    # The rim lies at the chest wall, the pole beyond the nipple.
-    upright = bowl(BOWL, 0.095).position_m * (1.0, 1.0, -1.0) + (0.0, 0.0, CHEST_M)
     side = np.linspace(-0.075, 0.075, PLANE)
-    flat = np.stack(np.meshgrid(side, np.linspace(CHEST_M, 0.035, PLANE)), axis=-1).reshape(-1, 2)
+    flat = np.stack(np.meshgrid(side, np.linspace(-0.085, 0.005, PLANE)), axis=-1).reshape(-1, 2)
     planes = np.concatenate([np.insert(flat, 1, y, axis=1) for y in (-0.085, 0.085)])
     each = PLANE**2
-    found["bowl"] = Array(upright)
+    found["bowl"] = Array(bowl(BOWL, RADIUS_M).position_m)
     found["facing planes"] = Array(planes, np.arange(each), np.arange(each, 2 * each), True)
     return found
 
@@ -120,17 +132,17 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
 
 
 def simulated(array: Array) -> Dataset:
-    """Eikonal times through the breast of Table 6, in 3-D through that of Table 7, on a finer grid."""
+    """Eikonal times through the phantom or its middle slice, on a finer grid."""
     position = array.position_m
     in_space = position.shape[1] == 3
-    side = TABLE7_SIDE_M if in_space else TABLE6_SIDE_M
+    side = SIDE_M
     spacing = side / ((FINE_NODES_IN_SPACE if in_space else FINE_NODES) - 1)
     if in_space:
         low, high = position[:, 2].min() - 4 * spacing, position[:, 2].max() + 4 * spacing
         z = np.arange(low, high, spacing)
-        speed, origin = table7(WATER_MPS).speed(FINE_NODES_IN_SPACE, side, z), (-0.5 * side, -0.5 * side, low)
+        speed, origin = PHANTOM.speed(FINE_NODES_IN_SPACE, side, z), (-0.5 * side, -0.5 * side, low)
     else:
-        speed, origin = table6(WATER_MPS).speed(FINE_NODES, side), (-0.5 * side, -0.5 * side)
+        speed, origin = PHANTOM.at(MIDDLE_M).speed(FINE_NODES, side), (-0.5 * side, -0.5 * side)
     everyone = np.arange(len(position))
     tx, rx = (everyone if index is None else index for index in (array.tx, array.rx))
     delta, _ = FineMedium(speed, spacing, WATER_MPS).arrivals(position - np.array(origin), tx)
@@ -177,21 +189,27 @@ def array_row(name: str, array: Array, one: Made) -> Row:
 
 
 def picture(images: Mapping[str, Made]) -> bytes:
-    """PNG: truth and image of each array; of volumes the plane in the middle of the hull's height."""
+    """PNG: truth and image of each array; of volumes the plane through the middle of the phantom."""
     with drawing():
-        figure = new_figure(2.6 * len(images), 5.6)
+        columns = min(4, len(images))
+        blocks = -(-len(images) // columns)
+        figure = new_figure(3.0 * columns, 5.6 * blocks)
         figure.suptitle(
-            "Truth (above) and image by default settings (below); the line is the hull less its rim"
+            "Truth, and below it the image by default settings; the line is the hull less its rim"
         )
-        panels = figure.subplots(2, len(images), squeeze=False)
+        panels = figure.subplots(2 * blocks, columns, squeeze=False)
+        pairs = [(panels[2 * k, n], panels[2 * k + 1, n]) for k in range(blocks) for n in range(columns)]
+        for above, below in pairs[len(images) :]:
+            above.remove()
+            below.remove()
         limits = robust_limits([one.truth for one in images.values()])
         maps = []
-        for column, (name, one) in zip(panels.T, images.items(), strict=True):
+        for column, (name, one) in zip(pairs, images.items(), strict=False):
             titles = name, f"{one.errors['default']:.1f} m/s (water {one.errors['water alone']:.1f})"
             at = ...
             if one.truth.ndim == 3:
-                heights = np.flatnonzero(one.region.any(axis=(0, 1)))
-                at = (slice(None), slice(None), int(heights[len(heights) // 3]))
+                height = (MIDDLE_M - one.result.origin_m[2]) / one.result.spacing_m[2]
+                at = (slice(None), slice(None), round(height))
             grid = one.result.spacing_m[:2], one.result.origin_m[:2]
             for axes, values, title in zip(column, (one.truth, one.result.speed), titles, strict=True):
                 outline = one.region[at]

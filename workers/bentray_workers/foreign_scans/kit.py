@@ -318,7 +318,7 @@ READER = ScanReader(
     "beside that of the object. The first aperture position is read. A-scans are decoded, reconstructed "
     "at 10 MHz if they are undersampled, divided by their amplification, and compressed with the coded "
     "excitation; time zero is the delay of 2 µs in that script, the centre frequency 2.5 MHz. The scan "
-    "is in space: reconstruct it with `decomposition: volume`.",
+    "is in space, and reconstructed as a volume.",
     variables=(
         Variable("TASttt/TASRotationpp/Emitteree.mat: AScans", "(samples, n) int16", "any", "A-scans"),
         Variable("TASIndices, receiverIndices", "(n,), from 1", "", "receiver of each A-scan"),
