@@ -10,6 +10,8 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -18,7 +20,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import trimesh
 from matplotlib.figure import Figure
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from bentray_kernels import eikonal, rays
 from bentray_kernels.acquisition import Dataset
@@ -43,7 +45,7 @@ MM = 1e3
 
 def fronts() -> Image.Image:
     """Phantom with wave fronts and rays, in water of the speed of its fat and in faster water."""
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.9), layout="constrained")
+    figure, axes = plt.subplots(1, 2, figsize=(8.6, 4.1), layout="constrained", sharey=True)
     nodes, half = 256, TABLE6_SIDE_M / 2
     spacing = TABLE6_SIDE_M / (nodes - 1)
     angle = np.radians(np.linspace(110, 250, 29))
@@ -53,39 +55,44 @@ def fronts() -> Image.Image:
         speed = table6(coupling).speed(nodes, TABLE6_SIDE_M)
         time = eikonal.solve(speed, spacing, source)
         extent = (-half * MM, half * MM, -half * MM, half * MM)
-        shown = ax.imshow(speed.T, origin="lower", extent=extent, cmap="Blues_r", vmin=1350, vmax=1570)
+        look: dict[str, Any] = {"cmap": "Blues_r", "vmin": 1350, "vmax": 1570, "interpolation": "nearest"}
+        shown = ax.imshow(speed.T, origin="lower", extent=extent, **look)
         ax.contour(time.T * 1e6, levels=np.arange(5, 150, 5), extent=extent, colors="white", linewidths=0.6)
         for path in rays.trace(time, spacing, receivers, source):
             ax.plot(*((path - half) * MM).T, color="#d1495b", linewidth=0.9)
         ax.plot(0.092 * MM, 0, "o", color="black", markersize=5)
-        ax.set(title=f"water of {coupling:g} m/s", xlabel="x (mm)", ylabel="y (mm)")
-    figure.colorbar(shown, ax=axes, label="speed of sound (m/s)", shrink=0.85)
+        ax.set(title=f"Wave fronts and rays, water {coupling:g} m/s", xlabel="x (mm)")
+    axes[0].set_ylabel("y (mm)")
+    figure.colorbar(shown, ax=axes, label="sound speed (m/s)", shrink=0.85)
     return _drawn(figure)
 
 
 def coupling() -> Image.Image:
     """Phantom in water of four speeds, with its images by straight and bent rays."""
     waters = (1375.0, 1425.0, 1475.0, 1500.0)
-    figure, axes = plt.subplots(3, 4, figsize=(10, 7.8), layout="constrained")
-    ways = {"straight rays": Settings(rays="straight", nodes=96), "bent rays": Settings(nodes=96)}
+    figure, axes = plt.subplots(3, 4, figsize=(10, 7.2), layout="constrained", sharex=True, sharey=True)
+    bent = Settings(method="sart", rays="curved", nodes=96)
+    ways = {"Straight rays": replace(bent, rays="straight"), "Bent rays": bent}
+    half = TABLE6_SIDE_M / 2 * MM
     for column, water in zip(axes.T, waters, strict=True):
         scan = simulate(SimulationSettings(nodes=96, elements=128, coupling_mps=water), lambda _: None)
         assert scan.truth is not None
-        images = {"truth": scan.truth.sound_speed_mps}
+        images = {"Phantom": scan.truth.sound_speed_mps}
         images |= {name: reconstruct(scan, settings).speed for name, settings in ways.items()}
-        column[0].set_title(f"water {water:g} m/s")
         for ax, (name, image) in zip(column, images.items(), strict=True):
-            shown = ax.imshow(image.T, origin="lower", vmin=1350, vmax=1570)
-            ax.set(xticks=[], yticks=[])
-            if water == waters[0]:
-                ax.set_ylabel(name)
-    figure.colorbar(shown, ax=axes, label="speed of sound (m/s)", shrink=0.6)
+            shown = ax.imshow(image.T, origin="lower", extent=(-half, half) * 2, vmin=1350, vmax=1570)
+            ax.set_title(f"{name}, {water:g} m/s", fontsize="medium")
+        column[-1].set_xlabel("x (mm)")
+    for row in axes:
+        row[0].set_ylabel("y (mm)")
+    figure.suptitle("2-D breast phantom in water of four speeds")
+    figure.colorbar(shown, ax=axes, label="sound speed (m/s)", shrink=0.6)
     return _drawn(figure)
 
 
 def fresnel() -> Image.Image:
     """Width of the first Fresnel zone over the frequency."""
-    figure, ax = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
+    figure, ax = plt.subplots(figsize=(7.6, 3.6), layout="constrained")
     frequency = np.geomspace(0.2e6, 5e6, 200)
     for length, colour in ((0.2, "#1d6996"), (0.1, "#73a5c6")):
         width = np.sqrt(1500.0 / frequency * length)
@@ -93,21 +100,30 @@ def fresnel() -> Image.Image:
     ax.set_xscale("log", base=10)
     ax.set_xticks([0.2, 0.5, 1, 2, 5], ["0.2", "0.5", "1", "2", "5"])
     ax.minorticks_off()
-    ax.set(xlabel="frequency (MHz)", ylabel="width of the zone (mm)", ylim=(0, 40))
+    ax.set(xlabel="frequency (MHz)", ylabel="width (mm)", ylim=(0, 40))
+    ax.set_title("Width of the first Fresnel zone in water of 1500 m/s")
     ax.grid(alpha=0.3)
-    ax.legend(frameon=False)
+    figure.legend(loc="outside right upper", frameon=False)
     return _drawn(figure)
 
 
 def glass() -> Image.Image:
     """Two phantoms as glass and one lit."""
-    views = (
-        ("--phantom", "sphere", "--index", "1.2"),
-        ("--phantom", "two-holes", "--index", "1.3", "--backdrop", "picture"),
-        ("--phantom", "two-holes", "--mode", "shaded"),
-    )
+    views = {
+        "Sphere, refractive index 1.2": ("--phantom", "sphere", "--index", "1.2"),
+        "Ball with two holes, index 1.3": (
+            "--phantom",
+            "two-holes",
+            "--index",
+            "1.3",
+            "--backdrop",
+            "picture",
+        ),
+        "Iso-surface, shaded": ("--phantom", "two-holes", "--mode", "shaded"),
+    }
     with tempfile.TemporaryDirectory() as folder:
-        return _beside([_rendered(Path(folder) / f"{n}.png", *view) for n, view in enumerate(views)])
+        paths = (Path(folder) / f"{number}.png" for number in count())
+        return _titled({title: _rendered(next(paths), *view) for title, view in views.items()})
 
 
 def mesh() -> Image.Image:
@@ -117,41 +133,43 @@ def mesh() -> Image.Image:
         shape = trimesh.creation.torus(1.0, 0.4, major_sections=96, minor_sections=48)
         shape.apply_transform(trimesh.transformations.rotation_matrix(0.6, (1, 0, 0)))
         shape.export(torus)
-        pictures = []
-        for mode in ("refract", "reflect"):
+        pictures = {}
+        for mode, title in {"refract": "Torus of glass", "reflect": "Torus as a mirror"}.items():
             line = ["geometry-field", torus, "-o", made, "--mode", mode, "--rays", 2]
             _run(*line, "--width", 320, "--height", 320)
-            pictures.append(_opened(made / "image.png"))
-        return _beside([*pictures, _opened(made / "geometry-image.png").resize((320, 320))])
+            pictures[title] = _opened(made / "image.png")
+        positions = _opened(made / "geometry-image.png").resize((320, 320))
+        return _titled({**pictures, "Geometry image: (x, y, z) as RGB": positions})
 
 
 def overview() -> Image.Image:
     """The web page beside the truth and the images by straight and bent rays."""
     scan = simulate(SimulationSettings(nodes=128, elements=256, coupling_mps=1375.0), lambda _: None)
     assert scan.truth is not None
-    straight, bent = (reconstruct(scan, Settings(rays=rays)) for rays in ("straight", "curved"))
-    panels = [("Truth", scan.truth.sound_speed_mps)]
+    ways = (Settings(method="sart", rays=rays, nodes=128) for rays in ("straight", "curved"))
+    straight, bent = (reconstruct(scan, settings) for settings in ways)
+    panels = [("Phantom", scan.truth.sound_speed_mps)]
     panels += [
         (f"{name}: {compare(made, scan.truth, scan.roi).rmse_mps:.1f} m/s rms", made.speed)
         for name, made in (("Straight rays", straight), ("Bent rays", bent))
     ]
-    figure, axes = plt.subplots(3, 1, figsize=(3.9, 8.2), layout="constrained", sharex=True)
+    figure, axes = plt.subplots(3, 1, figsize=(4.4, 8.8), layout="constrained", sharex=True)
     half = TABLE6_SIDE_M / 2 * MM
     for ax, (name, image) in zip(axes, panels, strict=True):
         shown = ax.imshow(image.T, origin="lower", extent=(-half, half) * 2, vmin=1375, vmax=1560)
         ax.set_title(name)
-        ax.set_ylabel("y (mm)")
+    figure.supylabel("y (mm)", fontsize="medium")
     axes[-1].set_xlabel("x (mm)")
     figure.colorbar(shown, ax=axes, label="sound speed (m/s)", shrink=0.5)
     images = _drawn(figure).convert("RGB")
-    page = viewer(scan, {}, (900, images.height))
+    page = viewer(scan, {"method": "sart", "nodes": 128}, (900, images.height))
     return _beside([page.convert("RGB"), images])
 
 
 def viewer(
     scan: Dataset | None = None,
-    settings: Mapping[str, Any] = MappingProxyType({"nodes": 96}),
-    size: tuple[int, int] = (1100, 560),
+    settings: Mapping[str, Any] = MappingProxyType({"method": "sart", "nodes": 96}),
+    size: tuple[int, int] = (1100, 780),
 ) -> Image.Image:
     """The web page with one finished job."""
     from playwright.sync_api import sync_playwright
@@ -167,7 +185,7 @@ def viewer(
             page.goto(url)
             page.get_by_text("succeeded").first.wait_for()
             image = page.locator("#jobs img").first
-            image.scroll_into_view_if_needed()
+            page.locator("main").evaluate("one => one.scrollIntoView()")
             page.wait_for_function("one => one.complete && one.naturalWidth > 0", arg=image.element_handle())
             shot = page.screenshot()
             browser.close()
@@ -195,6 +213,17 @@ def _beside(images: list[Image.Image]) -> Image.Image:
     for one in images:
         row.paste(one, (left, 0))
         left += one.width
+    return row
+
+
+def _titled(images: Mapping[str, Image.Image]) -> Image.Image:
+    """Renderings in a row, each below its title, pixel for pixel."""
+    width, height, band = 320, 320, 26
+    row = Image.new("RGB", (width * len(images), height + band), "white")
+    draw = ImageDraw.Draw(row)
+    for k, (title, one) in enumerate(images.items()):
+        row.paste(one, (k * width, band))
+        draw.text((k * width + width / 2, band / 2), title, fill="black", anchor="mm", font_size=16)
     return row
 
 

@@ -33,7 +33,7 @@ class ReconstructionError:
         mae_percent: mean absolute error of the speed inside the breast, per cent of its range (Li 2008, 6.4).
         rmse_of_range: root mean square error of the speed inside the breast, as a fraction of its range.
         whole_image_rmse: as ``rmse_of_range``, over the whole image, as in Li 2008, section 7.3.1.
-        attenuation_rmsee: as ``rmse_of_range``, of the attenuation; NaN without one.
+        attenuation_rmse: as ``rmse_of_range``, of the attenuation; NaN without one.
         seconds: computing time.
         how: summary for the detail of a row.
     """
@@ -42,7 +42,7 @@ class ReconstructionError:
     mae_percent: float
     rmse_of_range: float
     whole_image_rmse: float
-    attenuation_rmsee: float
+    attenuation_rmse: float
     seconds: float
     how: str
 

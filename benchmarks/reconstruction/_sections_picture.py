@@ -15,28 +15,28 @@ from ..shared._small_png import small_png
 
 @dataclass(frozen=True)
 class Panel:
-    """An image, (nx, ny), m/s, and what stands above it."""
+    """An image, (nx, ny), m/s, and its title."""
 
     title: str
     image: np.ndarray
 
 
-def picture(title: str, panels: Sequence[Panel], columns: int) -> bytes:
-    """PNG of all panels, in rows; colours span what the first panel shows."""
+def picture(title: str, panels: Sequence[Panel], columns: int, side_m: float) -> bytes:
+    """PNG of all panels, in rows; colours span the range of the first panel; each image is side_m wide."""
     rows = -(-len(panels) // columns)
     limits = robust_limits([panels[0].image])
     with drawing():
         figure = new_figure(1.9 * columns + 0.9, 2.3 * rows + 0.5)
         figure.suptitle(title)
-        places = figure.subplots(rows, columns, squeeze=False)
+        places = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
         maps = []
         for axes, panel in zip(places.flat, panels, strict=False):
-            maps.append(
-                draw_map(axes, panel.image, (1e-3, 1e-3), (0.0, 0.0), limits, colormap=SPEED, title="")
-            )
+            spacing = (side_m / (len(panel.image) - 1),) * 2
+            origin = (-side_m / 2,) * 2
+            maps.append(draw_map(axes, panel.image, spacing, origin, limits, colormap=SPEED, title=""))
             axes.set_title(panel.title, fontsize=8)
-            axes.set_axis_off()
+            axes.label_outer()
         for axes in list(places.flat)[len(panels) :]:
             axes.set_visible(False)
-        draw_bar(maps, "speed (m/s)")
+        draw_bar(maps, "sound speed (m/s)")
         return small_png(to_png(figure))

@@ -42,7 +42,7 @@ def picture() -> bytes:
     central = ("central difference", Spline.of(line, "central"), "#e08e45", "-")
     with drawing():
         figure = new_figure(9.2, 6.8)
-        figure.suptitle("What the filters let pass")
+        figure.suptitle("Frequency response of the interpolation filters")
         panels = figure.subplots(2, 2)
         draw(panels[0, 0], "Values: interpolators", convolutions + orders, slopes=False)
         draw(panels[0, 1], "Values: smoothing", [orders[1], *smooth, *raw], slopes=False)
