@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from bentray_kernels.acquisition import Dataset, pick
-from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import finite_frequency_candidates
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.cluster.connection import open_cluster
-from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.images.truth_comparison import compare
-from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.files.dataset import read_dataset
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
+from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
 from ._acquisition_picture import picture
 from ._ideal_times import ideal
 
@@ -30,29 +26,13 @@ RESULTS = Path(__file__).parents[1] / "results"
 # A scan simulated by another solver, not in the repository.
 OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 
-# Two cores, as in the target. The fourth band doubles the time and reduces the error by 3 %.
-WORKERS = 2
+# The fourth band doubles the time and reduces the error by 3 %.
 WAVES = {"method": "waveform", "bands": 3}
 RAYS: dict[str, dict[str, Any]] = {
     "straight": {"rays": "straight", "method": "sart"},
     "bent": {"rays": "curved", "method": "sart"},
     "bent, Gauss-Newton": {"rays": "curved", "method": "gauss-newton"},
 }
-
-
-@dataclass(frozen=True)
-class Made:
-    """An image with its error and time.
-
-    Attributes:
-        result: the image.
-        rms: its error, m/s.
-        seconds: wall-clock time, s; includes picking only for FWI.
-    """
-
-    result: Reconstruction
-    rms: float
-    seconds: float
 
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
@@ -100,20 +80,6 @@ def made(name: str, dataset: Dataset, nodes: int, progress: Step) -> dict[str, M
         dataset, Settings.of(nodes=nodes, **{"method": "sart", **WAVES}), progress
     )
     return found
-
-
-def reconstruct_on_workers(dataset: Dataset, settings: Settings, progress: Step) -> Made:
-    """Reconstruct as the service does: from a file, by worker processes."""
-    assert dataset.truth is not None
-    with TemporaryDirectory() as folder, open_cluster(workers=WORKERS) as cluster:
-        path = Path(folder) / "scan.h5"
-        write_dataset(path, dataset)
-        begun = time.perf_counter()
-        result = reconstruction_run.reconstruct(
-            cluster.client, path, settings, lambda now: progress(now.done, now.total, settings.method)
-        )
-        seconds = time.perf_counter() - begun
-    return Made(result, compare(result, dataset.truth, dataset.roi).rmse_mps, seconds)
 
 
 def scan_rows(name: str, images: dict[str, Made]) -> Iterable[Row]:

@@ -20,8 +20,9 @@ from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 
+from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
 from ..shared._small_png import small_png
-from ._without_water_shot import Made, constants, reconstruct
+from ._without_water_shot import constants
 
 RESULTS = Path(__file__).parents[1] / "results"
 
@@ -51,7 +52,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         )
         dataset = simulate(asked, lambda now: progress(now.done, now.total, "simulation"))
         images = {
-            way: reconstruct(dataset, Settings.of(attenuation=False, **changes), progress)
+            way: reconstruct_on_workers(dataset, Settings.of(attenuation=False, **changes), progress)
             for way, changes in WAYS.items()
         }
         default, blurred = images["default"], blurred_error(dataset)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,15 +14,14 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, Settings
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.cluster.connection import open_cluster
-from bentray_workers.files.dataset import read_dataset, write_dataset
+from bentray_workers.files.dataset import read_dataset
 from bentray_workers.images.canvas import drawing, new_figure, to_png
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from bentray_workers.images.truth_comparison import compare
-from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
+from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
 from ..shared._small_png import small_png
 from ._planted_scan import planted, without_water_shot
 
@@ -33,7 +30,6 @@ RESULTS = Path(__file__).parents[1] / "results"
 # A scan simulated by another solver, not in the repository.
 OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 
-WORKERS = 2
 
 # Largest error without the water shot, relative to that with it.
 GOALS = {"auto": 1.05, "waveform": 1.15}
@@ -47,15 +43,6 @@ WAYS: dict[str, dict[str, Any]] = {
 SHOWN = ("straight, none", "bent, none", "waveform, with", "waveform, none")
 
 
-@dataclass(frozen=True)
-class Made:
-    """An image with its error, m/s, and time, s."""
-
-    result: Reconstruction
-    rms: float
-    seconds: float
-
-
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
     """A1 for each scan; the picture of all of them, unless quick."""
     shown: dict[str, tuple[Dataset, dict[str, Made]]] = {}
@@ -66,7 +53,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
                 attenuation=False, **({"nodes": 48, "bands": 2} if quick else {}), **changes
             )
             for shot, scan in (("with", dataset), ("none", without_water_shot(dataset))):
-                images[f"{way}, {shot}"] = reconstruct(scan, settings, progress)
+                images[f"{way}, {shot}"] = reconstruct_on_workers(scan, settings, progress)
         shown[name] = dataset, images
         yield from scan_rows(name, dataset, images)
     if not quick:
@@ -82,20 +69,6 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
     yield f"simulated {1e-3 * asked.frequency_hz:.0f} kHz, planted", planted(made, 1)
     if not quick and OTHERS.exists():
         yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
-
-
-def reconstruct(dataset: Dataset, settings: Settings, progress: Step) -> Made:
-    """Reconstruct as the service does: from a file, by worker processes."""
-    assert dataset.truth is not None
-    with TemporaryDirectory() as folder, open_cluster(workers=WORKERS) as cluster:
-        path = Path(folder) / "scan.h5"
-        write_dataset(path, dataset)
-        begun = time.perf_counter()
-        result = reconstruction_run.reconstruct(
-            cluster.client, path, settings, lambda now: progress(now.done, now.total, settings.method)
-        )
-        seconds = time.perf_counter() - begun
-    return Made(result, compare(result, dataset.truth, dataset.roi).rmse_mps, seconds)
 
 
 def scan_rows(name: str, dataset: Dataset, images: Mapping[str, Made]) -> Iterable[Row]:

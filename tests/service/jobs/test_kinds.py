@@ -24,10 +24,10 @@ from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
-from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.rendering import field_settings, geometry_field
 
 from ..conftest import PATIENCE_S
+from ..stored_volumes import store_volume
 
 SMALL = {"width": 24, "height": 16, "iso": [0.5], "frames": 3}
 
@@ -52,19 +52,7 @@ def serving(tmp_path, workers):
 
 
 def put(http, spacing=(1e-3,) * 3):
-    """A volume as an upload leaves it; its id."""
-    parts = http.app.state.parts
-    volume, volume_id = Volume.of(sampled(TWO_HOLES, 12), spacing), new_id("volume")
-    write_volume(parts.files.of(LOCAL).volume(volume_id), volume)
-    summary = {
-        "title": "a ball",
-        "shape": list(volume.values.shape),
-        "spacing_m": list(spacing),
-        "origin_m": [0.0] * 3,
-        "value_range": list(volume.range()),
-    }
-    parts.volumes.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
-    return volume_id
+    return store_volume(http, sampled(TWO_HOLES, 12), spacing)
 
 
 def ask(http, volume, **settings):

@@ -13,8 +13,9 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.tenants import LOCAL
 from bentray_workers.files.mesh import load_mesh
-from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.rendering import isosurface_mesh
+
+from ..stored_volumes import store_volume
 
 STREAM = {"Content-Type": "application/octet-stream"}
 RING = torus(12, 8)
@@ -141,19 +142,8 @@ def test_other_refusals(http):
 
 
 def volume(http, values=None, spacing=(1e-3,) * 3):
-    """A volume as an upload leaves it; its address."""
-    parts, volume_id = http.app.state.parts, new_id("volume")
-    stored = Volume.of(sampled(ONE_HOLE, 20) if values is None else values, spacing)
-    write_volume(parts.files.of(LOCAL).volume(volume_id), stored)
-    summary = {
-        "title": "a ball",
-        "shape": list(stored.values.shape),
-        "spacing_m": list(spacing),
-        "origin_m": [0.0] * 3,
-        "value_range": list(stored.range()),
-    }
-    parts.volumes.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
-    return f"/v1/volumes/{volume_id}"
+    """The address of a stored volume."""
+    return f"/v1/volumes/{store_volume(http, sampled(ONE_HOLE, 20) if values is None else values, spacing)}"
 
 
 def test_the_surface_of_a_volume(http, cluster):

@@ -14,31 +14,19 @@ from bentray_kernels.tomography.result import Reconstruction
 from bentray_service import pictures
 from bentray_service.app import create_app
 from bentray_service.rows.ids import new_id
-from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.cluster.resources import RECONSTRUCTION
-from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.rendering import refraction, scene_cache, tiles
 from bentray_workers.rendering.refraction_view import RefractionView
+
+from ..stored_volumes import store_volume
 
 SMALL = {"width": 32, "height": 24, "iso": 0.5}
 
 
 def put(http, values=None, spacing=(1e-3,) * 3):
-    """A volume as an upload leaves it, without the process that reads it."""
-    parts = http.app.state.parts
-    volume = Volume.of(sampled(ONE_HOLE, 12) if values is None else values, spacing)
-    volume_id = new_id("volume")
-    write_volume(parts.files.of(LOCAL).volume(volume_id), volume)
-    summary = {
-        "title": "a ball",
-        "shape": list(volume.values.shape),
-        "spacing_m": list(spacing),
-        "origin_m": [0.0] * 3,
-        "value_range": list(volume.range()),
-    }
-    parts.volumes.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
+    volume_id = store_volume(http, values, spacing)
     return http.get(f"/v1/volumes/{volume_id}").json()["links"]["refraction"]
 
 

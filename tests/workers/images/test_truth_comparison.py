@@ -10,35 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_kernels.acquisition import Truth
-from bentray_kernels.tomography import Reconstruction, Settings
 from bentray_workers.images.truth_comparison import NotComparable, compare
 
-WATER = 1500.0
-STEP = 1e-3
-
-
-def image(speed: np.ndarray, origin: tuple[float, ...] = (0.0, 0.0)) -> Reconstruction:
-    return Reconstruction(
-        speed=speed,
-        coverage=np.ones_like(speed),
-        spacing_m=(STEP,) * speed.ndim,
-        origin_m=origin,
-        water_speed_mps=WATER,
-        settings=Settings(method="sart", nodes=16),
-    )
-
-
-def truth(speed: np.ndarray, spacing: float = STEP) -> Truth:
-    axes = ",".join("xyz"[: speed.ndim])
-    return Truth(speed, (spacing,) * speed.ndim, (0.0,) * speed.ndim, axes=axes)
-
-
-def disc(nodes: int = 17) -> np.ndarray:
-    """Water with a square of 1450 and 1550 m/s in it."""
-    speed = np.full((nodes, nodes), WATER)
-    speed[4:9, 4:13], speed[9:13, 4:13] = 1450.0, 1550.0
-    return speed
+from .squares import WATER, disc, image, truth
 
 
 @given(st.floats(-40.0, 40.0))

@@ -12,38 +12,14 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import words
-from bentray_kernels.tomography import Iteration, Reconstruction, Settings, Trial
+from bentray_kernels.tomography import Iteration, Settings, Trial
 from bentray_kernels.tomography.result import residual_counts
 from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_service.cli.output.figures import errors, figures, summary
 from bentray_workers.images.comparison import comparison_png
 from bentray_workers.images.report import report_png
 
-WATER = 1500.0
-STEP = 1e-3
-
-
-def image(speed: np.ndarray, origin: tuple[float, ...] = (0.0, 0.0)) -> Reconstruction:
-    return Reconstruction(
-        speed=speed,
-        coverage=np.ones_like(speed),
-        spacing_m=(STEP,) * speed.ndim,
-        origin_m=origin,
-        water_speed_mps=WATER,
-        settings=Settings(method="sart", nodes=16),
-    )
-
-
-def truth(speed: np.ndarray, spacing: float = STEP) -> Truth:
-    axes = ",".join("xyz"[: speed.ndim])
-    return Truth(speed, (spacing,) * speed.ndim, (0.0,) * speed.ndim, axes=axes)
-
-
-def disc(nodes: int = 17) -> np.ndarray:
-    """Water with a square of 1450 and 1550 m/s in it."""
-    speed = np.full((nodes, nodes), WATER)
-    speed[4:9, 4:13], speed[9:13, 4:13] = 1450.0, 1550.0
-    return speed
+from ....workers.images.squares import WATER, disc, image, truth
 
 
 def test_the_errors_are_those_of_compare_as_plain_values() -> None:

@@ -16,6 +16,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
+from .even_spacing import check_even_spacing
 from .optional_library import import_optional
 
 # UCUM code and meaning of each quantity: name of the image, label, explanation.
@@ -65,9 +66,7 @@ def write_dicom(
     hd = import_optional("highdicom", "export", "DICOM")
     names = [name for name in QUANTITIES if name in images]
     first = images[names[0]]
-    if not np.isfinite(spacing_m).all():
-        found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
-        raise InvalidInput("volume", found, "even spacing for DICOM; hdf5 holds any")
+    check_even_spacing(spacing_m, "DICOM")
     if max(first.shape) > MAX_NODES:
         raise InvalidInput(
             "volume", f"{max(first.shape)} nodes", f"at most {MAX_NODES} along an axis for DICOM"

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bentray_kernels.errors import InvalidInput
-
 from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
+from .even_spacing import check_even_spacing
 
 # Names of the types of volumes.
 ELEMENTS = {"u1": "MET_UCHAR", "u2": "MET_USHORT", "f4": "MET_FLOAT", "f8": "MET_DOUBLE"}
@@ -44,9 +43,7 @@ def write_metaimage(
     Source:
         The tags and their order are those of the MetaIO documentation of ITK.
     """
-    if not np.isfinite(spacing_m).all():
-        found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
-        raise InvalidInput("volume", found, "even spacing for MetaImage; hdf5 holds any")
+    check_even_spacing(spacing_m, "MetaImage")
     ndim = values.ndim
     stored = np.asarray(values, dtype=values.dtype.newbyteorder("<"))
     tags = {

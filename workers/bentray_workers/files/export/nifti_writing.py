@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bentray_kernels.errors import InvalidInput
-
 from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
+from .even_spacing import check_even_spacing
 
 # Largest number of nodes along an axis in the header of NIfTI-1.
 MAX_NODES = 2**15 - 1
@@ -43,9 +42,7 @@ def write_nifti(
     from nibabel.nifti1 import Nifti1Image
     from nibabel.nifti2 import Nifti2Image
 
-    if not np.isfinite(spacing_m).all():
-        found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
-        raise InvalidInput("volume", found, "even spacing for NIfTI; hdf5 holds any")
+    check_even_spacing(spacing_m, "NIfTI")
     affine, ndim = np.eye(4), values.ndim
     affine[range(ndim), range(ndim)] = np.divide(spacing_m, UNITS_M["mm"])
     affine[:ndim, 3] = np.divide(origin_m, UNITS_M["mm"])

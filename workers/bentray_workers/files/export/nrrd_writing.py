@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bentray_kernels.errors import InvalidInput
-
 from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
+from .even_spacing import check_even_spacing
 
 TYPES = {"u1": "uint8", "u2": "uint16", "f4": "float", "f8": "double"}
 
@@ -41,9 +40,7 @@ def write_nrrd(
         "Definition of NRRD File Format", teem.sourceforge.net/nrrd/format.html. The values are written by
         slices, which pynrrd cannot do.
     """
-    if not np.isfinite(spacing_m).all():
-        found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
-        raise InvalidInput("volume", found, "even spacing for NRRD; hdf5 holds any")
+    check_even_spacing(spacing_m, "NRRD")
     stored = np.asarray(values, dtype=values.dtype.newbyteorder("<"))
     ndim = values.ndim
     steps = np.diag(np.divide(spacing_m, UNITS_M["mm"]))

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
 from ..atomic import atomic_replace
+from .even_spacing import check_even_spacing
 from .optional_library import import_optional
 
 VERSION = "0.5"
@@ -51,9 +51,7 @@ def write_ome_zarr(
     Source:
         OME-Zarr 0.5, ngff.openmicroscopy.org/0.5.
     """
-    if not np.isfinite(spacing_m).all():
-        found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
-        raise InvalidInput("volume", found, "even spacing for OME-Zarr; hdf5 holds any")
+    check_even_spacing(spacing_m, "OME-Zarr")
     members = _members(images, _attributes(images, units, spacing_m, origin_m, title))
     if path.suffix == ".zarr":
         _write_folder(path, members)

@@ -11,9 +11,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from bentray_kernels.errors import InvalidInput
-
 from ..atomic import atomic_replace
+from .even_spacing import check_even_spacing
 
 TYPES = {"u1": "UInt8", "u2": "UInt16", "f4": "Float32", "f8": "Float64"}
 SIZE = struct.Struct("<Q")
@@ -41,9 +40,7 @@ def write_vti(
     Source:
         "VTK XML Formats" of the VTK documentation: ``ImageData``, appended data, encoding raw.
     """
-    if not np.isfinite(spacing_m).all():
-        found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
-        raise InvalidInput("volume", found, "even spacing for VTI; hdf5 holds any")
+    check_even_spacing(spacing_m, "VTI")
     shape = (*next(iter(images.values())).shape, 1)[:3]
     extent = " ".join(f"0 {n - 1}" for n in shape)
     # A plane has one layer; its thickness is not shown.
