@@ -9,15 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.files.dataset.counts import Summary, Traces
-from bentray_workers.reconstruction.memory.ray_memory import field_bytes
-from bentray_workers.reconstruction.planning import blocks_of, plan
+from bentray_workers.reconstruction.planning import plan
 
 PROGRAM = Path(__file__).with_name("ray_task_memory.py")
 ROOT = Path(__file__).parents[3]
@@ -183,30 +182,3 @@ def test_more_nodes_and_more_slices_never_take_less(nodes, method, volume, check
     finer = plan(scan, replace(asked, nodes=nodes + 64), [])
     assert all(finer.call_bytes[name] > size for name, size in found.call_bytes.items())
     assert plan(replace(scan, slices=8), asked, []).tasks > found.tasks
-
-
-@given(
-    shape=st.tuples(*[st.integers(100, 700)] * 3),
-    limits=st.lists(st.integers(900, 4000), min_size=1, max_size=9),
-)
-def test_blocks_fit_into_the_workers_that_hold_them(shape, limits):
-    offers = [WorkerCapacity(limit * MIB, BOTH) for limit in limits]
-    least = min(offer.task_bytes for offer in offers)
-    if 24 * math.prod(shape) > len(offers) * least and field_bytes(shape, "fsm") > max(limits) * MIB:
-        with pytest.raises(InvalidInput, match="speed"):
-            blocks_of(shape, offers)
-        return
-    # What hardly fits together may be refused; half of it never is.
-    assume(24 * math.prod(shape) < 0.4 * len(offers) * least)
-    blocks = blocks_of(shape, offers)
-    if math.prod(blocks) == 1:
-        assert field_bytes(shape, "fsm") <= max(offer.task_bytes for offer in offers)
-        return
-    block = [-(-n // b) for n, b in zip(shape, blocks, strict=True)]
-    held = 24 * math.prod(block) * -(-math.prod(blocks) // len(offers))
-    assert held + field_bytes(tuple(block), "fsm") <= least
-
-
-def test_small_fields_stay_whole():
-    assert blocks_of((200, 200, 200), [LARGE]) == (1, 1, 1)
-    assert math.prod(blocks_of((700, 700, 300), [WorkerCapacity(4096 * MIB, BOTH)] * 8)) > 1

@@ -158,32 +158,6 @@ def _check_extent(scan: Summary) -> None:
         raise InvalidInput("slice/z_m", f"slices over {scan.height_m:.4g} m", f"at most {WIDTH_M.most:g} m")
 
 
-def blocks_of(shape: tuple[int, ...], capacities: Sequence[WorkerCapacity]) -> tuple[int, ...]:
-    """Blocks along each axis for ``reconstruction.subdomains.solve``.
-
-    One if a worker can hold the whole field by ``fsm``, else the smallest number that all workers together
-    can hold, cutting the longest sides first.
-
-    Raises:
-        InvalidInput: for a field larger than the memory of all workers.
-    """
-    limits = [one.task_bytes for one in capacities if "recon" in one.resources]
-    if not limits or max(limits) >= field_bytes(shape, "fsm"):
-        return (1,) * len(shape)
-    least, together = min(limits), len(limits)
-    blocks = [1] * len(shape)
-    # A worker holds slowness, times and one earlier copy of each of its blocks, and sweeps one at a time.
-    while True:
-        block = tuple(-(-n // b) for n, b in zip(shape, blocks, strict=True))
-        kept = 3 * REAL * math.prod(block) * -(-math.prod(blocks) // together)
-        if kept + field_bytes(block, "fsm") <= least:
-            return tuple(blocks)
-        if max(block) <= MIN_NODES or 3 * REAL * math.prod(shape) > together * least:
-            taken = 3 * REAL * math.prod(shape) + field_bytes(block, "fsm")
-            raise InvalidInput("speed", f"shape {shape}, {taken} bytes", f"{together * least:.0f} bytes")
-        blocks[block.index(max(block))] += 1
-
-
 def _decomposition(settings: Settings) -> Decomposition:
     if settings.decomposition == "volume":
         return "volume"

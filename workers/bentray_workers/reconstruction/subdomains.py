@@ -2,6 +2,11 @@
 
 For fields larger than the memory of a worker: slowness and times of a block never leave the workers; faces go
 from block to block, and to this process only the information whether they have changed.
+
+The loop is not that of ``cluster.task_pool``: there results come back to this process, tasks run on any
+worker, and a job resumes from its checkpoint. Here results stay on the worker of their block, the next tasks
+are known only when all faces of a round are compared, and Dask computes the blocks of a lost worker from the
+tasks before them again. So there is neither a checkpoint nor cancellation.
 """
 
 from __future__ import annotations
@@ -90,7 +95,7 @@ def solve(
             block is sent with its task, so that blocks of a lost worker are computed again elsewhere.
         spacing: node spacing, m.
         source: (ndim,), m, in the grid; node 0 lies at 0.
-        blocks: along each axis, from 1 to the nodes there; see ``planning.blocks_of`` for a number that fits.
+        blocks: along each axis, from 1 to the nodes there; a worker holds about three arrays of each block.
         tolerance: as for ``eikonal.fast_sweeping``, for every block.
 
     Returns:
