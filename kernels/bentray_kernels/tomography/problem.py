@@ -158,7 +158,8 @@ class Problem:
     def each_pair_once(self) -> Problem:
         """The same problem without reverse pairs, if every element is emitter and receiver: half the rays.
 
-        Pairs measured both ways have their mean. Each emitter keeps the half of the ring that follows it.
+        Pairs measured both ways have their mean. Each emitter keeps the half of the elements that follow it,
+        as if they were in a circle, in an array of any shape.
         """
         members = [np.flatnonzero(self.ring == k) for k in range(len(self.receivers))]
         for k, of_ring in enumerate(members):

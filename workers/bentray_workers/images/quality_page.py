@@ -181,6 +181,8 @@ def _list(axes: Axes, examined: Examined, findings: list[Finding]) -> None:
     if not findings:
         lines.append("No findings by: " + ", ".join(report.checked) + ".")
         lines[-1:] = textwrap.wrap(lines[-1], LETTERS)
+    for name, reason in report.not_checked.items():
+        lines += textwrap.wrap(f"Not checked: {name}, {reason}.", LETTERS, subsequent_indent="   ")
     axes.set_title("Findings")
     axes.set_axis_off()
     axes.text(0.0, 1.0, "\n".join(lines), transform=axes.transAxes, verticalalignment="top", fontsize=8)

@@ -48,7 +48,7 @@ def field_bytes(shape: tuple[int, ...], method: str) -> int:
 def shape_of(scan: Summary, settings: Settings) -> tuple[int, ...]:
     """Shape of an image, as ``Problem.of`` makes it."""
     nodes = settings.grid_nodes
-    if settings.decomposition == "slices":
+    if settings.decomposition != "volume":
         return nodes, nodes
     side = settings.side_m or scan.width_m * (nodes - 1) / (nodes - 1 - 2 * MARGIN_NODES)
     heights = math.ceil(scan.height_m * (nodes - 1) / side) + 1 + 2 * MARGIN_NODES
@@ -68,7 +68,7 @@ def rays_of(scan: Summary, settings: Settings) -> int:
 
 def _entries(settings: Settings, in_space: bool) -> float:
     """Matrix entries per ray."""
-    level = settings.decomposition == "slices" or (settings.rays == "straight" and not in_space)
+    level = settings.decomposition != "volume" or (settings.rays == "straight" and not in_space)
     return settings.grid_nodes * (ENTRIES_LEVEL if level else ENTRIES_IN_SPACE)
 
 
