@@ -8,14 +8,17 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.array_shapes import bowl
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
-from bentray_workers.files.dataset.counts import Summary, Traces
+from bentray_workers.files.dataset.counts import DatasetCounts, Summary, Traces
 from bentray_workers.reconstruction.planning import plan
 
 PROGRAM = Path(__file__).with_name("ray_task_memory.py")
@@ -108,6 +111,22 @@ def test_device_tasks_need_a_worker_with_a_device():
     assert (found.lane, found.workers) == ("opencl", 1)
     assert "OpenCL" in found.why
     assert plan(RING, replace(asked, rays="straight"), [LARGE]).lane == "recon"
+
+
+def test_array_in_space_that_is_no_ring_is_planned_as_a_volume():
+    array = bowl(40, 0.1)
+    every = np.arange(40)
+    scan = Dataset(array.position_m, every, every, 1500.0, delta_tof_s=np.zeros((40, 40)), array_type="free")
+    settings = Settings.of(method="gauss-newton", nodes=48)
+    counts = DatasetCounts.of(scan)
+    found = plan(counts.summary(settings), settings, [])
+    assert found == plan(counts.summary(settings), settings.changed(decomposition="volume"), [])
+    assert found.decomposition == "volume"
+    pointed = settings.changed(opening_angle_deg=90.0)
+    with pytest.raises(InvalidInput, match="geometry/element_normal"):
+        plan(counts.summary(pointed), pointed, [])
+    directed = DatasetCounts.of(replace(scan, element_normal=array.normal))
+    assert plan(directed.summary(pointed), pointed, []) == found
 
 
 @pytest.mark.parametrize(
