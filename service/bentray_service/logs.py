@@ -132,7 +132,7 @@ def configured(form: Literal["text", "json"]) -> Iterator[None]:
     """
     handler = _Stderr()
     handler.setFormatter(TextFormatter() if form == "text" else JsonFormatter())
-    root, own, closed = (logging.getLogger(name) for name in (None, "bentray", CLOSED))
+    root, own, dask, closed = (logging.getLogger(name) for name in (None, "bentray", "distributed", CLOSED))
     known = [logging.getLogger(name) for name in list(logging.Logger.manager.loggerDict)]
     before = [(logger, logger.handlers[:], logger.propagate, logger.level) for logger in (root, *known)]
     for logger, handlers, *_ in before:
@@ -142,6 +142,9 @@ def configured(form: Literal["text", "json"]) -> Iterator[None]:
     root.addHandler(handler)
     if form == "json":
         own.setLevel(logging.INFO)
+    else:
+        # Dask sets its own level, INFO.
+        dask.setLevel(logging.WARNING)
     closed.setLevel(logging.WARNING)
     seldom, provoked = RateLimitFilter(), [logging.getLogger(name) for name in PROVOKED]
     for logger in provoked:

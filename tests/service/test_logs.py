@@ -76,6 +76,13 @@ def test_afterwards_all_is_as_before():
     assert states() == before
 
 
+def test_text_has_warnings_of_dask_only(capsys):
+    with logs.configured("text"):
+        logging.getLogger("distributed.scheduler").info("Register worker")
+        logging.getLogger("distributed.scheduler").warning("Worker lost")
+    assert capsys.readouterr().err.splitlines() == ["Worker lost"]
+
+
 @pytest.mark.parametrize("form", ["text", "json"])
 def test_connections_that_close_at_a_stop_show_no_traceback(form, capsys):
     with logs.configured(form):
