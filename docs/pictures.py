@@ -35,7 +35,7 @@ from bentray_workers.simulation.simulation_run import simulate
 
 # The benchmarks are a namespace package of the checkout.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from benchmarks.shared._small_png import small_png
+from benchmarks.shared._small_png import in_full_colour
 
 FOLDER = Path(__file__).parent / "pictures"
 CHROMIUM = Path("/usr/bin/chromium")
@@ -245,7 +245,7 @@ def main(names: list[str]) -> None:
     for name in names or PICTURES:
         buffer = io.BytesIO()
         PICTURES[name]().save(buffer, "png")
-        (FOLDER / f"{name}.png").write_bytes(small_png(buffer.getvalue()))
+        (FOLDER / f"{name}.png").write_bytes(in_full_colour(buffer.getvalue()))
 
 
 if __name__ == "__main__":

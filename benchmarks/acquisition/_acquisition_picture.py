@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from bentray_kernels.acquisition import PICKERS, Dataset, Waveform, pick
-from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
-from ..shared._small_png import small_png
+from ..shared._small_png import figure_png
 
 SHOWN = ("straight", "bent, finite frequency", "waveform")
 
@@ -59,7 +59,7 @@ def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str
                 grid = (one.result.spacing_m, one.result.origin_m)
                 maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
             draw_bar(maps, "speed (m/s)")
-        return small_png(to_png(figure))
+        return figure_png(figure)
 
 
 def gather(axes: Axes, name: str, dataset: Dataset) -> None:

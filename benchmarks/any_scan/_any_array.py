@@ -18,11 +18,11 @@ from bentray_kernels.phantoms import Ellipsoid, Part, VolumePhantom
 from bentray_kernels.tomography import Problem, Reconstruction, Settings, reconstruct, rmse
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from bentray_workers.images.truth_on_grid import on_grid
 
-from ..shared._small_png import small_png
+from ..shared._small_png import figure_png
 
 RESULTS = Path(__file__).parents[1] / "results"
 
@@ -217,4 +217,4 @@ def picture(images: Mapping[str, Made]) -> bytes:
                     draw_map(axes, values[at], *grid, limits, colormap=SPEED, title=title, outline=outline)
                 )
         draw_bar(maps, "speed (m/s)")
-        return small_png(to_png(figure))
+        return figure_png(figure)

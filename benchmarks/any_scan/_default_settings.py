@@ -15,13 +15,13 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.model_selection.selection import explain_trials
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 
 from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
-from ..shared._small_png import small_png
+from ..shared._small_png import figure_png
 from ._without_water_shot import constants
 
 RESULTS = Path(__file__).parents[1] / "results"
@@ -98,4 +98,4 @@ def picture(dataset: Dataset, images: dict[str, Made]) -> bytes:
             grid = one.result.spacing_m, one.result.origin_m
             maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
         draw_bar(maps, "speed (m/s)")
-        return small_png(to_png(figure))
+        return figure_png(figure)

@@ -15,14 +15,14 @@ from bentray_kernels.tomography import Reconstruction, Settings
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
-from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from bentray_workers.images.truth_comparison import compare
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
-from ..shared._small_png import small_png
+from ..shared._small_png import figure_png
 from ._planted_scan import planted, without_water_shot
 
 RESULTS = Path(__file__).parents[1] / "results"
@@ -114,4 +114,4 @@ def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Made]]]) -> bytes:
                 grid = (one.result.spacing_m, one.result.origin_m)
                 maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
             draw_bar(maps, "speed (m/s)")
-        return small_png(to_png(figure))
+        return figure_png(figure)

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.canvas import drawing, new_figure
 
-from ..shared._small_png import small_png
+from ..shared._small_png import figure_png
 from ._scaling_cluster import Run
 from ._scaling_model import BUSY, Model
 
@@ -62,7 +62,7 @@ def picture(
         for axis in (left.yaxis, right.xaxis, right.yaxis):
             axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
             axis.set_minor_formatter(NullFormatter())
-        return small_png(to_png(figure))
+        return figure_png(figure)
 
 
 def measured(axes: Axes, runs: Sequence[Run]) -> None:

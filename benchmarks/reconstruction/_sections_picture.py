@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
-from ..shared._small_png import small_png
+from ..shared._small_png import figure_png
 
 
 @dataclass(frozen=True)
@@ -39,4 +39,4 @@ def picture(title: str, panels: Sequence[Panel], columns: int, side_m: float) ->
         for axes in list(places.flat)[len(panels) :]:
             axes.set_visible(False)
         draw_bar(maps, "sound speed (m/s)")
-        return small_png(to_png(figure))
+        return figure_png(figure)

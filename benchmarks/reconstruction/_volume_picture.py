@@ -8,10 +8,10 @@ import numpy as np
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
-from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
-from ..shared._small_png import small_png
+from ..shared._small_png import figure_png
 
 
 def picture(truth: Truth, found: Mapping[str, Reconstruction]) -> bytes:
@@ -38,4 +38,4 @@ def picture(truth: Truth, found: Mapping[str, Reconstruction]) -> bytes:
                 axes.set_xlabel(f"{plane[0]} (mm)" if column == 0 else "")
                 axes.set_ylabel(f"{plane[1]} (mm)" if column == 0 else "")
         draw_bar(maps, "speed (m/s)")
-        return small_png(to_png(figure))
+        return figure_png(figure)

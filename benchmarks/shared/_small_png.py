@@ -4,21 +4,34 @@ from __future__ import annotations
 
 import io
 
+from matplotlib.figure import Figure
 from PIL import Image
+
+from bentray_workers.images.canvas import to_png
 
 # Bytes; the repository takes no file of more than 300,000.
 MAX_BYTES = 290_000
 SHRINK = 0.9
 
 
-def small_png(png: bytes) -> bytes:
-    """The picture as it is, or with fewer pixels where it is too large."""
+def figure_png(figure: Figure) -> bytes:
+    """The figure, drawn with fewer pixels where it is too large: resized pictures compress badly."""
+    small = in_full_colour(to_png(figure))
+    longest = float(max(_size(small)))
+    while len(small) > MAX_BYTES:
+        longest *= SHRINK
+        small = in_full_colour(to_png(figure, round(longest)))
+    return small
+
+
+def in_full_colour(png: bytes) -> bytes:
+    """The same pixels as RGB, compressed as far as PNG can."""
     with Image.open(io.BytesIO(png)) as image:
-        shown = image.convert("RGB")
-    while True:
         buffer = io.BytesIO()
-        shown.save(buffer, "png", optimize=True)
-        if buffer.tell() <= MAX_BYTES:
-            return buffer.getvalue()
-        size = round(SHRINK * shown.width), round(SHRINK * shown.height)
-        shown = shown.resize(size, Image.Resampling.LANCZOS)
+        image.convert("RGB").save(buffer, "png", optimize=True)
+    return buffer.getvalue()
+
+
+def _size(png: bytes) -> tuple[int, int]:
+    with Image.open(io.BytesIO(png)) as image:
+        return image.size

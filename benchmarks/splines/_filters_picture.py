@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from bentray_kernels.splines import Spline
-from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.canvas import drawing, new_figure
 
-from ..shared._small_png import small_png
+from ..shared._small_png import figure_png
 
 # A node of 1 on a long line, read so often between two nodes.
 NODES, FINE = 257, 32
@@ -48,7 +48,7 @@ def picture() -> bytes:
         draw(panels[0, 1], "Values: smoothing", [orders[1], *smooth, *raw], slopes=False)
         draw(panels[1, 0], "Slopes: interpolators", [central, *convolutions, *orders], slopes=True)
         draw(panels[1, 1], "Slopes: smoothing", [orders[1], *smooth, *raw], slopes=True)
-        return small_png(to_png(figure))
+        return figure_png(figure)
 
 
 def draw(axes: Axes, title: str, curves: Sequence[Curve], *, slopes: bool) -> None:

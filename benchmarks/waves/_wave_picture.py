@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.canvas import drawing, new_figure
 
-from ..shared._small_png import small_png
+from ..shared._small_png import figure_png
 from ._wave_shots import CENTRE_HZ, WATER_MPS, Shot, delays, misfit
 
 OURS, THEIRS, LEFT, STATED = "#d1495b", "#9db4c0", "#00798c", "#444444"
@@ -37,7 +37,7 @@ def picture(shown: Sequence[tuple[Shot, Pair, Pair]]) -> bytes:
         for axes in panels[-1, :2]:
             axes.set_xlabel("time after the straight way through water (µs)")
         panels[-1][2].set_xlabel("distance (mm)")
-        return small_png(to_png(figure))
+        return figure_png(figure)
 
 
 def across(axes: Axes, title: str, shot: Shot, pair: Pair, times: int, before: int) -> None:
