@@ -1,4 +1,4 @@
-"""How large a scan may be and what its numbers may be: one table, wide around every scanner that exists.
+"""Limits on the size of scans and on their physical quantities, in one table; wider than every known scanner.
 
 The largest ultrasound tomographs have 2,304 elements that move to ten places (23,040 positions, 5.3e8
 pairs), or rings of 2,048 elements at some 60 heights (2.5e8 pairs), and record some 4,000 samples a trace.

@@ -1,4 +1,7 @@
-"""Limits of concurrent uploads and of the rate of new ones, checked before the body is read."""
+"""Limits of concurrent uploads and of the rate of new ones, checked before the body is read.
+
+The largest size of an upload is ``BENTRAY_MAX_UPLOAD_BYTES`` (``settings``), checked in ``receive``.
+"""
 
 from __future__ import annotations
 
