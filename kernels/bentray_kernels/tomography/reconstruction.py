@@ -46,7 +46,7 @@ from .waveform.waveform_settings import WaveSettings
 def reconstruct(
     dataset: Dataset, settings: Settings, progress: Callable[[Progress], None] | None = None
 ) -> Reconstruction:
-    """Reconstruct a dataset in this process.
+    """Reconstruct a dataset in this process, on all its cores.
 
     Args:
         dataset: with travel times, for ``method`` waveform also the traces that they were picked from.
@@ -68,7 +68,7 @@ def reconstruct(
             if progress is not None:
                 progress(progress_of(graphs, before, after))
 
-        run({str(k): graph for k, graph in enumerate(graphs)}, ThreadPool(), report)
+        run({str(k): graph for k, graph in enumerate(graphs)}, ThreadPool(None), report)
 
     def wave_scan(plan: WaveSettings, index: int) -> WaveScan:
         return MemoryWaveScan(dataset, plan, index=index)
