@@ -77,3 +77,9 @@ def test_waveforms_are_named_after_the_rays_that_they_began_with():
         "straight rays  ·  SART  ·  then waveforms  ·  4 iterations in 4 stages  ·  24 by"
     )
     assert stage_names(result) == ("128 nodes", "200 kHz", "450 kHz", "attenuation")
+
+
+def test_a_refined_image_names_the_rays_of_the_chosen_candidate():
+    trial = Trial({"method": "gauss-newton", "rays": "curved", "ray_width_m": 0.003}, 1e-7, 1e-7)
+    refined = replace(made(), settings=Settings(method="waveform"), trials=(trial,))
+    assert "Gauss-Newton  ·  then waveforms" in facts(refined)

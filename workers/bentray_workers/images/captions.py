@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from bentray_kernels.tomography import Reconstruction, Settings
 from bentray_kernels.tomography.solver_choice import solver_of
@@ -54,7 +53,7 @@ def _of_rays(result: Reconstruction) -> Settings:
     """Settings of the ray-based image; after a full-waveform refinement those of the first trial."""
     if result.settings.method != "waveform" or not result.trials:
         return result.settings
-    return replace(result.settings, **result.trials[0].settings)
+    return result.settings.changed(**result.trials[0].settings)
 
 
 def stage_names(result: Reconstruction) -> tuple[str, ...]:

@@ -142,7 +142,12 @@ class Refinement:
 
 
 def predicts_better(graphs: Sequence[RefinementGraph]) -> bool:
-    """Whether refinement has clearly reduced the misfit of held-out emitters, averaged over slices.
+    """Whether refinement has clearly reduced the misfit of held-out emitters."""
+    return misfit_ratio(graphs) < CLEARLY
+
+
+def misfit_ratio(graphs: Sequence[RefinementGraph]) -> float:
+    """Misfit of held-out emitters after refinement over that before, averaged over slices.
 
     A band begins with the image of the previous one, so that the gains of the bands of the speed multiply.
     """
@@ -154,7 +159,7 @@ def predicts_better(graphs: Sequence[RefinementGraph]) -> bool:
         )
         for graph in graphs
     ]
-    return sum(gains) / len(gains) < CLEARLY
+    return sum(gains) / len(gains)
 
 
 def _grid(image: Image) -> tuple[float, tuple[float, float], tuple[int, ...]]:
@@ -170,27 +175,32 @@ def _slices(rays: Reconstruction, values: NDArray[np.float64]) -> list[Image]:
 
 
 def _summary(rays: Reconstruction, plan: WaveSettings, graphs: Sequence[RefinementGraph]) -> str:
-    """One sentence: the initial image, and the held-out misfit of each band."""
-    used = rays.settings
-    text = f"begun from the image of {used.rays} rays ({used.method})"
+    """Bands, initial image and gain, then bands that ended early; the misfits are in the history."""
+    speed = [band for band in plan.bands if band.of != "attenuation"]
+    corners = f"{1e-3 * speed[0].low_hz:.0f} to {1e-3 * speed[-1].high_hz:.0f} kHz"
+    method = {"sart": "SART", "gauss-newton": "Gauss-Newton"}[rays.settings.method]
+    start = f"{'straight' if rays.settings.rays == 'straight' else 'bent'} rays, {method}"
+    ratio = misfit_ratio(graphs)
+    gain = f"{100.0 * (1.0 - ratio):.0f} % better" if ratio < 1.0 else "no better"
+    text = f"full waveform, {corners}, predicts held-out emitters {gain} than its initial image ({start})"
+    if len(speed) < len(plan.bands):
+        text += "; attenuation is experimental"
     for number, band in enumerate(plan.bands):
         ends = [end for end in (graph.ends[number] for graph in graphs) if end.history or not end.skipped]
-        if ends:
-            what = "attenuation (experimental), " if band.of == "attenuation" else ""
-            corners = f"{1e-3 * band.low_hz:.0f} to {1e-3 * band.high_hz:.0f} kHz"
-            text += f"; {what}{corners}: {_band_summary(ends)}"
+        note = _band_note(ends)
+        if note:
+            what = "attenuation, " if band.of == "attenuation" else ""
+            text += f"; {what}{1e-3 * band.low_hz:.0f} to {1e-3 * band.high_hz:.0f} kHz: {note}"
     return text
 
 
-def _band_summary(ends: Sequence[BandEnd]) -> str:
-    """The misfits of a band over all slices that reached it."""
+def _band_note(ends: Sequence[BandEnd]) -> str:
+    """Why a band ended early, over all slices that reached it; empty if it did not."""
     evaluated = [end for end in ends if end.history]
-    if not evaluated:
-        return "passed over, for its water shots could not be simulated"
-    first, last = np.mean([(end.history[0].held, end.held) for end in evaluated], axis=0)
-    text = f"misfit of held-out emitters {first:.2g}, then {last:.2g}"
+    if ends and not evaluated:
+        return "left out, for its water shots could not be simulated"
     skipped = sum(end.skipped for end in evaluated)
-    if skipped:
-        where = f" in {skipped} slices" if len(ends) > 1 else ""
-        text += f", stopped{where} as it rose: cycles were skipped, or noise was fitted"
-    return text
+    if not skipped:
+        return ""
+    where = f" in {skipped} slices" if len(ends) > 1 else ""
+    return f"stopped{where} as the misfit rose: cycles were skipped, or noise was fitted"
