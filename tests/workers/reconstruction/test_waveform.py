@@ -52,8 +52,9 @@ def test_waves_make_the_image_of_rays_better(expected):
     assert expected.settings == replace(PLAN, decomposition="slices")
     assert expected.trials == rays.trials
     assert expected.residuals is None
-    assert expected.provenance["waveform"].startswith("full waveform, 62 to 281 kHz, predicts held-out emitters")
-    assert "% better than its initial image (bent rays, " in expected.provenance["waveform"]
+    stated = expected.provenance["waveform"]
+    assert stated.startswith("full waveform, 62 to 281 kHz, predicts held-out emitters ")
+    assert "% better than its initial image (bent rays, " in stated
     assert expected.speed.shape == expected.coverage.shape != rays.speed.shape
     assert expected.history[: len(rays.history)] == rays.history
     waves = expected.history[len(rays.history) :]
@@ -62,7 +63,7 @@ def test_waves_make_the_image_of_rays_better(expected):
     losses = [sweep for sweep in waves if sweep.of_attenuation]
     assert {(sweep.stage, sweep.band_hz) for sweep in losses} == {(waves[-1].stage, (187500.0, 281250.0))}
     assert {sweep.residual_rms_s for sweep in losses} == {expected.residual_rms_s}
-    assert "attenuation (experimental), 188 to 281 kHz: misfit" in expected.provenance["waveform"]
+    assert "; attenuation is experimental" in stated
     # There is none, nor do the wrong parts of the speed make much of it.
     assert 0.0 <= expected.attenuation.min() <= expected.attenuation.mean() < 0.5
     assert min(sweep.stage for sweep in waves) > max(sweep.stage for sweep in rays.history)

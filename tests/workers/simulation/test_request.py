@@ -67,3 +67,8 @@ def test_rejects_invalid_input(given, field):
     with pytest.raises(InvalidInput) as caught:
         PhantomScan(**given)
     assert caught.value.field == field
+
+
+def test_every_element_of_a_small_ring_emits():
+    assert PhantomScan(waveform=True, elements=32).chosen().emissions == 32
+    assert PhantomScan(waveform=True, elements=96).chosen().emissions == 64

@@ -12,7 +12,7 @@ from bentray_kernels.request_fields import check, setting
 from .plane import SimulationSettings
 from .volume import VolumeSimulationSettings
 from .volume_waves import VolumeWaveSettings
-from .waves import WaveSimulationSettings
+from .waves import EMISSIONS, WaveSimulationSettings
 
 Simulated = SimulationSettings | VolumeSimulationSettings | WaveSimulationSettings
 
@@ -91,7 +91,9 @@ class PhantomScan:
     frequency_hz: float | None = setting(
         None, "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000.", range_of("frequency_hz")
     )
-    emissions: int | None = setting(None, "Waves: elements that send; 64 by default.", range_of("emissions"))
+    emissions: int | None = setting(
+        None, "Waves: elements that send; 64 by default, or all if fewer.", range_of("emissions")
+    )
     side_m: float | None = setting(
         None, "Waves: side of the square with phantom and ring, m; 0.12 by default.", range_of("side_m")
     )
@@ -117,6 +119,8 @@ class PhantomScan:
         }
         if kind is SimulationSettings:
             values["phantom"] = self.phantom
+        if "emissions" in known and self.elements is not None:
+            values.setdefault("emissions", min(EMISSIONS, self.elements))
         for name, value in values.items():
             if name not in known:
                 raise InvalidInput(name, value, f"nothing, unless {CONDITIONS[name]}")

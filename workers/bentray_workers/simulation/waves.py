@@ -41,6 +41,9 @@ FREQUENCY_HZ = Range(1e4, 1e7, unit="Hz")
 # Of the absorbing boundary; wider than that of a refinement.
 EDGE_NODES = 40
 
+# Emitting elements by default, of as many or more.
+EMISSIONS = 64
+
 # Larger grids take too long.
 MAX_NODES = 8192**2
 
@@ -71,7 +74,7 @@ class WaveSimulationSettings:
     frequency_hz: float = ranged(5e5, FREQUENCY_HZ)
     side_m: float = ranged(0.12, Range(1e-3, 1.0, unit="m"))
     elements: int = ranged(128, Range(8, 4096))
-    emissions: int = ranged(64, Range(1, 4096))
+    emissions: int = ranged(EMISSIONS, Range(1, 4096))
     nodes: int = ranged(256, NODES)
     coupling_mps: float = ranged(1500.0, SPEED_MPS)
     snr: float | None = ranged(None, SNR)
