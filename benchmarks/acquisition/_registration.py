@@ -12,6 +12,8 @@ from scipy.optimize import minimize
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
 
+from ..shared._image_error import ErrorOn, ImageError
+
 # Shifts to begin with, and as far as one may go, m.
 SHIFTS_M = np.arange(-4e-3, 4.1e-3, 1e-3)
 
@@ -39,22 +41,13 @@ def registered(image: Reconstruction, truth: Truth, radius_m: float) -> Register
         truth: on its own grid.
         radius_m: m.
     """
-    axes = [
-        low + image.spacing_m[0] * np.arange(n)
-        for low, n in zip(image.origin_m, image.speed.shape, strict=True)
-    ]
-    x, y = np.meshgrid(*axes, indexing="ij")
-    inside = np.hypot(x, y) <= radius_m
-    places, speed = np.stack([x[inside], y[inside]]), image.speed[inside]
+    inside, places = _nodes_within(image, radius_m)
+    speed = image.speed[inside]
     found = []
     for transposed in (False, True):
-        drawn = truth.sound_speed_mps.T if transposed else truth.sound_speed_mps
 
-        def error(shift: NDArray[np.float64], drawn: NDArray[np.float64] = drawn) -> float:
-            at = (places - np.reshape(shift, (2, 1)) - np.reshape(truth.origin_m[:2], (2, 1))) / np.reshape(
-                truth.spacing_m[:2], (2, 1)
-            )
-            true = map_coordinates(drawn, at, order=1, mode="nearest")
+        def error(shift: NDArray[np.float64], transposed: bool = transposed) -> float:
+            true = _read(truth, places, shift, transposed)
             return float(np.sqrt(np.mean((true - speed) ** 2)))
 
         first = min(((a, b) for a in SHIFTS_M for b in SHIFTS_M), key=lambda s: error(np.array(s)))
@@ -67,3 +60,37 @@ def registered(image: Reconstruction, truth: Truth, radius_m: float) -> Register
         )
         found.append(Registered(float(best.fun), (float(best.x[0]), float(best.x[1])), transposed))
     return min(found, key=lambda one: one.rms_mps)
+
+
+def registered_error(found: Registered, truth: Truth, radius_m: float) -> ErrorOn:
+    """Root mean square error, m/s, at a shift of the truth that was found before."""
+
+    def error_on(image: Reconstruction) -> ImageError:
+        inside, places = _nodes_within(image, radius_m)
+        true = np.full(image.speed.shape, np.nan)
+        true[inside] = _read(truth, places, np.array(found.shift_m), found.transposed)
+        return ImageError(true, inside)
+
+    return error_on
+
+
+def _nodes_within(image: Reconstruction, radius_m: float) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Nodes within a radius of the array's centre, and their places, (2, nodes), m."""
+    axes = [
+        low + image.spacing_m[0] * np.arange(n)
+        for low, n in zip(image.origin_m, image.speed.shape, strict=True)
+    ]
+    x, y = np.meshgrid(*axes, indexing="ij")
+    inside = np.hypot(x, y) <= radius_m
+    return inside, np.stack([x[inside], y[inside]])
+
+
+def _read(
+    truth: Truth, places: NDArray[np.float64], shift: NDArray[np.float64], transposed: bool
+) -> NDArray[np.float64]:
+    """The shifted truth at places, m/s."""
+    at = (places - np.reshape(shift, (2, 1)) - np.reshape(truth.origin_m[:2], (2, 1))) / np.reshape(
+        truth.spacing_m[:2], (2, 1)
+    )
+    drawn = truth.sound_speed_mps.T if transposed else truth.sound_speed_mps
+    return np.asarray(map_coordinates(drawn, at, order=1, mode="nearest"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -13,15 +12,17 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.simulation.array_shapes import arc, bowl, facing_lines
 from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
-from bentray_kernels.arrays import Flags, Floats, Ints
+from bentray_kernels.arrays import Floats, Ints
 from bentray_kernels.phantoms import Ellipsoid, Part, VolumePhantom
-from bentray_kernels.tomography import Problem, Reconstruction, Settings, reconstruct, rmse
-from bentray_service.cli.output.benchmark_row import Row
+from bentray_kernels.tomography import Problem, Reconstruction, Settings, reconstruct
+from bentray_service.cli.output.benchmark_row import CONSTANTS, WATER_ALONE, Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from bentray_workers.images.truth_on_grid import on_grid
 
+from ..shared._baselines import Compared, Images
+from ..shared._image_error import ImageError
 from ..shared._small_png import figure_png
 
 RESULTS = Path(__file__).parents[1] / "results"
@@ -66,20 +67,18 @@ class Array(NamedTuple):
 
 
 class Made(NamedTuple):
-    """Images of a scan by straight rays and by default settings, with the truth on their grid.
+    """The image of a scan by default settings, with the truth on its grid.
 
     Attributes:
-        result: by default settings.
-        truth: at its nodes, m/s.
-        region: nodes inside the hull of the array.
-        errors: rms inside the hull, m/s, by the name of the image.
-        seconds: for the default settings.
+        result: the image.
+        error: the truth, and the nodes inside the hull of the array.
+        compared: rms error inside the hull and its baselines, m/s.
+        seconds: wall-clock time.
     """
 
     result: Reconstruction
-    truth: Floats
-    region: Flags
-    errors: Mapping[str, float]
+    error: ImageError
+    compared: Compared
     seconds: float
 
 
@@ -151,41 +150,32 @@ def simulated(array: Array) -> Dataset:
 
 
 def made(dataset: Dataset) -> Made:
-    """The images of a scan, and their errors."""
+    """The image of a scan, its error and its baselines."""
     truth = dataset.truth
     assert truth is not None
     nodes = NODES_IN_SPACE if dataset.element_position_m.shape[1] == 3 else None
-    straight = reconstruct(dataset, Settings.of(method="sart", rays="straight", nodes=nodes))
-    begun = time.perf_counter()
-    result = reconstruct(dataset, Settings(nodes=nodes))
-    seconds = time.perf_counter() - begun
-    region = Problem.of(dataset, result.settings).region
-    true = on_grid(truth.sound_speed_mps, truth, result)
-    # Nodes beside the simulated medium, in which there are elements at most.
-    region = region & np.isfinite(true)
-    flat = {"water alone": WATER_MPS, "best constant": float(true[region].mean())}
-    images = {name: np.full_like(true, speed) for name, speed in flat.items()}
-    images |= {"straight rays": straight.speed, "default": result.speed}
-    errors = {name: rmse(image, true, region) for name, image in images.items()}
-    return Made(result, true, region, errors, seconds)
+
+    def error_on(image: Reconstruction) -> ImageError:
+        true = on_grid(truth.sound_speed_mps, truth, image)
+        # Nodes beside the simulated medium, in which there are elements at most, do not count.
+        return ImageError(true, Problem.of(dataset, image.settings).region & np.isfinite(true))
+
+    images = Images(dataset, reconstruct, Settings(nodes=nodes))
+    result, seconds = images.default()
+    return Made(result, error_on(result), images.compared(result, error_on), seconds)
 
 
 def array_row(name: str, array: Array, one: Made) -> Row:
     """The error by default settings over that of the better constant."""
-    least = min(one.errors["water alone"], one.errors["best constant"])
-    detail = ", ".join(f"{image} {error:.1f}" for image, error in one.errors.items())
-    detail += f" m/s inside the hull, {one.seconds:.1f} s; {len(array.position_m)} elements, "
-    detail += (
-        f"{' by '.join(map(str, one.result.speed.shape))} nodes; load at the end {os.getloadavg()[0]:.1f}"
+    least = min(one.compared.baselines[constant] for constant in CONSTANTS)
+    nodes = " by ".join(map(str, one.result.speed.shape))
+    detail = (
+        f"{one.compared.error:.1f} m/s inside the hull, {one.seconds:.1f} s; {len(array.position_m)} "
+        f"elements, {nodes} nodes; {one.result.settings.rays} {one.result.settings.method}; "
+        f"load at the end {os.getloadavg()[0]:.1f}"
     )
-    return Row(
-        f"A3 {name}: error over that of the best constant",
-        one.errors["default"] / least,
-        1.0,
-        "<",
-        "",
-        detail,
-    )
+    target = f"A3 {name}: error over that of the best constant"
+    return one.compared.row(target, one.compared.error / least, 1.0, "<", "", detail)
 
 
 def picture(images: Mapping[str, Made]) -> bytes:
@@ -202,17 +192,18 @@ def picture(images: Mapping[str, Made]) -> bytes:
         for above, below in pairs[len(images) :]:
             above.remove()
             below.remove()
-        limits = robust_limits([one.truth for one in images.values()])
+        limits = robust_limits([one.error.true for one in images.values()])
         maps = []
         for column, (name, one) in zip(pairs, images.items(), strict=False):
-            titles = name, f"{one.errors['default']:.1f} m/s (water {one.errors['water alone']:.1f})"
+            water = one.compared.baselines[WATER_ALONE]
+            titles = name, f"{one.compared.error:.1f} m/s (water {water:.1f})"
             at = ...
-            if one.truth.ndim == 3:
+            if one.error.true.ndim == 3:
                 height = (MIDDLE_M - one.result.origin_m[2]) / one.result.spacing_m[2]
                 at = (slice(None), slice(None), round(height))
             grid = one.result.spacing_m[:2], one.result.origin_m[:2]
-            for axes, values, title in zip(column, (one.truth, one.result.speed), titles, strict=True):
-                outline = one.region[at]
+            for axes, values, title in zip(column, (one.error.true, one.result.speed), titles, strict=True):
+                outline = one.error.region[at]
                 maps.append(
                     draw_map(axes, values[at], *grid, limits, colormap=SPEED, title=title, outline=outline)
                 )

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, Settings
-from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.benchmark_row import BEST_CONSTANT, WATER_ALONE, Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
-from bentray_workers.images.truth_comparison import compare
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
+from ..shared._baselines import Images
+from ..shared._image_error import object_error
 from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
 from ..shared._small_png import figure_png
 from ._planted_scan import planted, without_water_shot
@@ -55,7 +53,12 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             for shot, scan in (("with", dataset), ("none", without_water_shot(dataset))):
                 images[f"{way}, {shot}"] = reconstruct_on_workers(scan, settings, progress)
         shown[name] = dataset, images
-        yield from scan_rows(name, dataset, images)
+        made = Images(
+            without_water_shot(dataset),
+            lambda scan, settings: reconstruct_on_workers(scan, settings, progress).result,
+            Settings.of(attenuation=False),
+        )
+        yield from scan_rows(name, dataset, images, made)
     if not quick:
         (RESULTS / "any_scan_without_water_shot.png").write_bytes(picture(shown))
 
@@ -71,28 +74,24 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
         yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
 
 
-def scan_rows(name: str, dataset: Dataset, images: Mapping[str, Made]) -> Iterable[Row]:
+def scan_rows(name: str, dataset: Dataset, images: Mapping[str, Made], made: Images) -> Iterable[Row]:
     """The rows of one scan."""
-    detail = ", ".join(
-        f"{way} {error:.1f}" for way, error in constants(dataset, images["straight, with"].result).items()
-    )
-    detail += ", " + ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.0f} s" for way, one in images.items())
+    detail = ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.0f} s" for way, one in images.items())
     detail += f" (m/s; water shot with or none); load at the end {os.getloadavg()[0]:.1f}"
     for way, goal in GOALS.items():
-        ratio = images[f"{way}, none"].rms / images[f"{way}, with"].rms
-        yield Row(f"A1 {name}, {way}: error without over with water shot", ratio, goal, "<=", "", detail)
+        image = images[f"{way}, none"]
+        ratio = image.rms / images[f"{way}, with"].rms
+        target = f"A1 {name}, {way}: error without over with water shot"
+        yield made.compared(image.result, object_error(dataset)).row(target, ratio, goal, "<=", "", detail)
 
 
 def constants(dataset: Dataset, result: Reconstruction) -> dict[str, float]:
     """Errors of the best constant and of water alone on the grid of a result, m/s."""
-    assert dataset.truth is not None
-    errors = {}
-    found = compare(result, dataset.truth, dataset.roi)
-    best = float(np.mean(found.true_speed_mps[found.region]))
-    for name, speed in (("best constant", best), ("water alone", dataset.water_speed_mps)):
-        flat = replace(result, speed=np.full_like(result.speed, speed))
-        errors[name] = compare(flat, dataset.truth, dataset.roi).rmse_mps
-    return errors
+    error = object_error(dataset)(result)
+    return {
+        BEST_CONSTANT: error.of_constant(error.best_constant),
+        WATER_ALONE: error.of_constant(dataset.water_speed_mps),
+    }
 
 
 def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Made]]]) -> bytes:

@@ -149,11 +149,11 @@ def face_rows(n: int) -> Iterable[Row]:
         runs |= {(way, faces): ours[way] for way in ("plane", "nearest uv", "walk")}
         runs["exact", faces] = Ours(lookups.surface).run(*rays)
     ns = {key: 1e9 / BALL_RAYS * least for key, least in alternate(runs, 3 * REPEATS).items()}
-    for way in ("plane", "nearest uv"):
+    for way in ("plane", "nearest uv", "walk"):
         costs = [ns[way, faces] for faces in BALLS]
         listed = "; ".join(
             f"{name} " + ", ".join(f"{ns[name, faces]:.1f}" for faces in BALLS)
-            for name in (way, "walk", "exact")
+            for name in dict.fromkeys((way, "walk", "exact"))
         )
         detail = f"ns a ray of 5, 20 and 100 thousand faces: {listed} (ours)"
         growth = 100.0 * (max(costs) / min(costs) - 1.0)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from bentray_service.cli.output.terminal import Step
-
 from ._phantom_scan import PhantomScan, ReconstructionError
 
 FAT_MPS, WATER_MPS = 1375.0, 1500.0
@@ -22,8 +20,8 @@ BESIDE = {
 }
 THEIRS = {"straight": 25.0, "fixed": 19.0, "FMM data-driven": 10.0, "HAFMM data-driven": 3.0}
 
-# What did best of all that was tried: the phantom has flat parts, which ``edge_mps`` says.
-BEST: dict[str, object] = {
+# The phantom has flat parts, which ``edge_mps`` states; strength and iterations were chosen on it.
+TUNED: dict[str, object] = {
     "method": "gauss-newton",
     "iterations": 12,
     "edge_mps": 7.0,
@@ -31,9 +29,9 @@ BEST: dict[str, object] = {
 }
 
 
-def ladder_step(scan: PhantomScan, name: str, progress: Step) -> ReconstructionError:
-    """One rung of R3, with four sweeps as the dissertation has."""
+def ladder_step(scan: PhantomScan, name: str) -> ReconstructionError:
+    """One rung of R3, with four iterations of SART as the dissertation has."""
     changes: dict[str, object] = {"iterations": 4, **{**LADDER, **BESIDE}[name]}
     if name.endswith("data-driven"):
         changes["speed_range_mps"] = scan.speed_range
-    return scan.run(progress, name, **changes)
+    return scan.run(name, **changes)

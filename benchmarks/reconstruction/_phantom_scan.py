@@ -1,9 +1,9 @@
-"""The phantoms of Tables 6 and 7 as the benchmarks of the reconstruction scan them, and the errors."""
+"""Scans of the phantoms of Tables 6 and 7, errors of their images, and baselines of these errors."""
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,17 +11,13 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE7_SIDE_M, table7
-from bentray_kernels.tomography import (
-    Progress,
-    Reconstruction,
-    Settings,
-    mean_absolute_error,
-    reconstruct,
-    rmse,
-)
+from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.simulation.plane import SimulationSettings, ring_radius
 from bentray_workers.simulation.simulation_run import simulate
+
+from ..shared._baselines import Compared, Images
+from ..shared._image_error import ErrorOn, ImageError, Norm
 
 
 @dataclass(frozen=True)
@@ -46,6 +42,11 @@ class ReconstructionError:
     seconds: float
     how: str
 
+    @property
+    def side_m(self) -> float:
+        """Side of the image, m."""
+        return self.result.spacing_m[0] * (self.result.speed.shape[0] - 1)
+
 
 @dataclass(frozen=True)
 class PhantomScan:
@@ -54,17 +55,19 @@ class PhantomScan:
     Attributes:
         scan: what was simulated.
         dataset: with amplitudes where they were asked for.
+        progress: called while images are reconstructed.
     """
 
     scan: TravelTimeScan
     dataset: Dataset
+    progress: Step
 
     @classmethod
     def of_table6(cls, asked: SimulationSettings, progress: Step) -> PhantomScan:
         """Simulate with the cores of this machine."""
         what = f"simulating, coupling {asked.coupling_mps:g}"
         dataset = simulate(asked, lambda p: progress(p.done, p.total, what))
-        return cls(asked.scan(), dataset)
+        return cls(asked.scan(), dataset, progress)
 
     @classmethod
     def of_table7(
@@ -86,7 +89,7 @@ class PhantomScan:
         dataset = Dataset(
             ring.positions(), everyone, everyone, coupling_mps, delta_tof_s=delta, log_ratio_np=ratio
         )
-        return cls(scan, dataset)
+        return cls(scan, dataset, progress)
 
     @property
     def speed_range(self) -> tuple[float, float]:
@@ -98,33 +101,79 @@ class PhantomScan:
         """True speed at the nodes of a reconstruction, m/s."""
         return self.scan.phantom.speed(self.scan.nodes, self.scan.side_m)
 
-    def run(self, progress: Step, what: str, **changes: object) -> ReconstructionError:
-        """Reconstruct with some settings and compare."""
-        scan, nodes, elements = self.scan, self.scan.nodes, self.scan.ring.elements
-        settings = Settings.of(**{"method": "sart", "nodes": nodes, "side_m": scan.side_m, **changes})
+    @cached_property
+    def images(self) -> Images:
+        """The images of this scan, each reconstructed once."""
 
-        def show(p: Progress) -> None:
-            progress(p.done, p.total, what)
+        def run(dataset: Dataset, settings: Settings) -> Reconstruction:
+            what = f"{settings.rays} {settings.method}"
+            return reconstruct(dataset, settings, lambda p: self.progress(p.done, p.total, what))
 
-        started = time.perf_counter()
-        result = reconstruct(self.dataset, settings, show)
-        seconds = time.perf_counter() - started
-        how = (
-            f"{what}; {result.settings.method}, {nodes}² nodes, {elements} elements, "
-            f"{len(result.history)} sweeps"
+        return Images(self.dataset, run)
+
+    def run(self, what: str, **changes: object) -> ReconstructionError:
+        """Reconstruct with some settings of SART on the grid of the phantom, and compare."""
+        scan = self.scan
+        return self._made(
+            what, Settings.of(**{"method": "sart", "nodes": scan.nodes, "side_m": scan.side_m, **changes})
         )
-        truth, inside = self.truth, scan.phantom.inside(nodes, scan.side_m)
-        low, high = self.speed_range
-        losses = float("nan")
-        if result.attenuation is not None:
-            known = scan.phantom.attenuation(nodes, scan.side_m)
-            losses = rmse(result.attenuation, known, inside) / float(np.ptp(known[inside]))
+
+    def run_default(self) -> ReconstructionError:
+        """Reconstruct with the default settings, and compare."""
+        return self._made("default settings", Settings())
+
+    def _made(self, what: str, settings: Settings) -> ReconstructionError:
+        image = self.images.made(settings)
+        result = image.result
+        how = (
+            f"{what}; {result.settings.rays} {result.settings.method}, {result.speed.shape[0]}² nodes, "
+            f"{self.scan.ring.elements} elements, {len(result.history)} iterations, {image.seconds:.1f} s"
+        )
         return ReconstructionError(
             result,
-            100.0 * mean_absolute_error(result.speed, truth, inside, high - low),
-            rmse(result.speed, truth, inside) / (high - low),
-            rmse(result.speed, truth, np.ones(truth.shape, dtype=bool)) / (high - low),
-            losses,
-            seconds,
-            f"{how}, {seconds:.1f} s",
+            self.mean_absolute(result).of(result),
+            self.rms(result).of(result),
+            self.whole_image_rms(result).of(result),
+            self.attenuation_rms(result).of(result),
+            image.seconds,
+            how,
         )
+
+    def compared(self, found: ReconstructionError, error_on: ErrorOn) -> Compared:
+        """One of the errors below, and those of the baselines."""
+        return self.images.compared(found.result, error_on)
+
+    def mean_absolute(self, image: Reconstruction) -> ImageError:
+        """Mean absolute error of the speed inside the breast, per cent of the phantom's range."""
+        low, high = self.speed_range
+        return self._speed_error(image, 0.01 * (high - low), "mean absolute")
+
+    def rms(self, image: Reconstruction) -> ImageError:
+        """Root mean square error of the speed inside the breast, over the phantom's range."""
+        low, high = self.speed_range
+        return self._speed_error(image, high - low, "rms")
+
+    def whole_image_rms(self, image: Reconstruction) -> ImageError:
+        """As ``rms``, over the whole image."""
+        error = self.rms(image)
+        return replace(error, region=np.ones(error.true.shape, dtype=bool))
+
+    def attenuation_rms(self, image: Reconstruction) -> ImageError:
+        """As ``rms``, of the attenuation and its range inside the breast."""
+        nodes, side = _grid(image)
+        phantom = self.scan.phantom
+        true, inside = phantom.attenuation(nodes, side), phantom.inside(nodes, side)
+        return ImageError(true, inside, float(np.ptp(true[inside])), quantity="attenuation")
+
+    def _speed_error(self, image: Reconstruction, unit: float, norm: Norm) -> ImageError:
+        nodes, side = _grid(image)
+        phantom = self.scan.phantom
+        return ImageError(phantom.speed(nodes, side), phantom.inside(nodes, side), unit, norm)
+
+
+def _grid(image: Reconstruction) -> tuple[int, float]:
+    """Nodes along a side of a square image, and the side, m; centred on 0."""
+    nodes, spacing = image.speed.shape[0], image.spacing_m[0]
+    side = spacing * (nodes - 1)
+    assert np.allclose(image.origin_m[:2], -0.5 * side, rtol=0.0, atol=1e-3 * spacing)
+    return nodes, side

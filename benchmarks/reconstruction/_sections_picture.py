@@ -15,14 +15,15 @@ from ..shared._small_png import figure_png
 
 @dataclass(frozen=True)
 class Panel:
-    """An image, (nx, ny), m/s, and its title."""
+    """An image, (nx, ny), m/s, its title, and its side, m; None: that of the others."""
 
     title: str
     image: np.ndarray
+    side_m: float | None = None
 
 
 def picture(title: str, panels: Sequence[Panel], columns: int, side_m: float) -> bytes:
-    """PNG of all panels, in rows; colours span the range of the first panel; each image is side_m wide."""
+    """PNG of all panels, in rows; colours span the range of the first panel; side_m is the usual side."""
     rows = -(-len(panels) // columns)
     limits = robust_limits([panels[0].image])
     with drawing():
@@ -31,8 +32,9 @@ def picture(title: str, panels: Sequence[Panel], columns: int, side_m: float) ->
         places = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
         maps = []
         for axes, panel in zip(places.flat, panels, strict=False):
-            spacing = (side_m / (len(panel.image) - 1),) * 2
-            origin = (-side_m / 2,) * 2
+            side = panel.side_m or side_m
+            spacing = (side / (len(panel.image) - 1),) * 2
+            origin = (-side / 2,) * 2
             maps.append(draw_map(axes, panel.image, spacing, origin, limits, colormap=SPEED, title=""))
             axes.set_title(panel.title, fontsize=8)
             axes.label_outer()

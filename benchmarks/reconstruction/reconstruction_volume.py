@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import tempfile
-import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Progress, Reconstruction, Settings, rmse
+from bentray_kernels.tomography import Progress, Reconstruction, Settings
 from bentray_kernels.tomography.problem import MARGIN_NODES
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
@@ -22,6 +21,8 @@ from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.volume import VolumeSimulationSettings
 
+from ..shared._baselines import Compared, Images
+from ..shared._image_error import object_error
 from ._volume_picture import picture
 
 PICTURE = Path(__file__).parents[1] / "results" / "reconstruction_volume.png"
@@ -33,6 +34,9 @@ FULL, QUICK = (64, 20, 64), (24, 6, 24)
 
 SNR = 10.0
 
+# Of the progress of a simulation or a reconstruction.
+Show = Callable[[Progress], None]
+
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:
     """Errors inside the breast over the range of the phantom, without noise and with SNR 10."""
@@ -43,7 +47,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     size = f"{nodes}² by {slices}, {elements} elements, times in space on a grid twice as fine"
     with open_cluster(workers=2) as cluster:
 
-        def show(what: str):
+        def show(what: str) -> Show:
             return lambda p: progress(p.done, p.total, what)
 
         clean = simulate(asked, show("simulating in space"), cluster.client)
@@ -52,39 +56,35 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         noise = np.random.default_rng(0).normal(0.0, sigma, delta.shape)
         noisy = replace(clean, delta_tof_s=delta + noise)
         found: dict[str, Reconstruction] = {}
-        errors: dict[str, float] = {}
         for label, dataset in (("exact", clean), (f"SNR {SNR:g}", noisy)):
+            images = Images(dataset, lambda scan, settings, n=label: run(cluster, scan, settings, show(n)))
+            compared: dict[str, Compared] = {}
             for way in ("slices", "volume"):
                 settings = Settings(
                     method="gauss-newton", decomposition=way, nodes=nodes, side_m=asked.scan().side_m
                 )
+                image, seconds = images.made(settings)
                 name = f"{label}, {way}"
-                result, seconds = run(cluster, dataset, settings, show(name))
-                found[name] = inner(result, slices)
-                errors[name] = nrmse(clean, found[name])
-                yield Row(
-                    f"R9 {name}", errors[name], 0.04, "<=", "of range", f"NRMSE, {size}, {seconds:.0f} s"
+                found[name] = inner(image, slices)
+                one = compared[way] = images.compared(image, object_error(clean, relative=True))
+                yield one.row(
+                    f"R9 {name}", one.error, 0.04, "<=", "of range", f"NRMSE, {size}, {seconds:.0f} s"
                 )
-            worse = errors[f"{label}, slices"] - errors[f"{label}, volume"]
-            yield Row(f"R9 slice-wise over 3-D, {label}", worse, 0.003, "<=", "of range", f"NRMSE, {size}")
+            worse = compared["slices"].error - compared["volume"].error
+            target = f"R9 slice-wise over 3-D, {label}"
+            yield compared["slices"].row(target, worse, 0.003, "<=", "of range", f"NRMSE, {size}")
         if not quick:
             PICTURE.parent.mkdir(exist_ok=True)
             write_bytes(PICTURE, picture(clean.truth, found))
         progress(1, 1, "done")
 
 
-def run(cluster: Cluster, dataset: Dataset, settings: Settings, show) -> tuple[Reconstruction, float]:
-    """A reconstruction on both cores, and its seconds."""
+def run(cluster: Cluster, dataset: Dataset, settings: Settings, show: Show) -> Reconstruction:
+    """A reconstruction on both cores."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scan.h5"
         write_dataset(path, dataset)
-        started = time.perf_counter()
-
-        def tell(p: Progress) -> None:
-            show(p)
-
-        result = reconstruct(cluster.client, path, settings, tell, work_dir=Path(folder))
-        return result, time.perf_counter() - started
+        return reconstruct(cluster.client, path, settings, show, work_dir=Path(folder))
 
 
 def inner(result: Reconstruction, slices: int) -> Reconstruction:
@@ -96,9 +96,3 @@ def inner(result: Reconstruction, slices: int) -> Reconstruction:
         speed=result.speed[..., MARGIN_NODES : MARGIN_NODES + slices],
         coverage=result.coverage[..., MARGIN_NODES : MARGIN_NODES + slices],
     )
-
-
-def nrmse(dataset: Dataset, result: Reconstruction) -> float:
-    """Root mean square error inside the breast over the range of what is there."""
-    truth, inside = dataset.truth.sound_speed_mps, dataset.roi
-    return rmse(result.speed, truth, inside) / float(np.ptp(truth[inside]))

@@ -8,6 +8,7 @@ from bentray_kernels.refraction import (
     Backdrop,
     Camera,
     Layers,
+    Plane,
     Scene,
     backdrop_of,
     checkerboard,
@@ -19,6 +20,9 @@ from bentray_kernels.splines import Spline
 NODES, PIXELS = 64, 256
 WIDTH, CAMERA_Z, SCREEN_Z = 64.0, -60.0, 60.0
 INDEX = 1.5
+
+# Along each edge of the photograph behind the ball.
+PHOTOGRAPH_PIXELS = 512
 
 # Of the ball given as a signed distance.
 DISTANCE_RADIUS = 22.0
@@ -64,6 +68,19 @@ def camera() -> Camera:
 def board() -> Backdrop:
     """A checkerboard behind the ball."""
     return backdrop_of([checkerboard((0.0, 0.0, SCREEN_Z), (WIDTH, 0.0, 0.0), (0.0, WIDTH, 0.0), SQUARES)])
+
+
+def photograph() -> Backdrop:
+    """A picture with detail at every scale, as photographs have: random phases, amplitude 1 / frequency."""
+    turns = np.fft.fftfreq(PHOTOGRAPH_PIXELS)
+    frequency = np.hypot(turns[:, None], turns[None, :])
+    frequency[0, 0] = np.inf
+    noise = np.random.default_rng(0).standard_normal((3, PHOTOGRAPH_PIXELS, PHOTOGRAPH_PIXELS))
+    texture = np.fft.ifft2(np.fft.fft2(noise) / frequency).real
+    level = 127.5 + 50.0 * texture / texture.std(axis=(1, 2), keepdims=True)
+    picture = np.clip(level, 0.0, 255.0).astype(np.uint8).transpose(1, 2, 0)
+    edges = (WIDTH, 0.0, 0.0), (0.0, WIDTH, 0.0)
+    return backdrop_of([Plane((0.0, 0.0, SCREEN_Z), *edges, np.ascontiguousarray(picture))])
 
 
 def scene(spline: Spline, iso: float, bound: str = "bernstein") -> Scene:

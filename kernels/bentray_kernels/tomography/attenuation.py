@@ -1,4 +1,7 @@
-"""Phase two: the attenuation, along the rays of the finished speed image (chapter 6.3, chapter 7)."""
+"""Phase two: the attenuation, along the rays of the finished speed image (chapter 6.3, chapter 7).
+
+Experimental: see ``EXPERIMENTAL``.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,10 @@ from .gauss_newton.linear_problem import Linearised, smoothing
 from .gauss_newton.linearisation import Rows, linearise_losses, ray_density
 from .problem import Problem
 from .settings import GaussNewtonSettings, Settings
+
+# In the provenance of every result with an attenuation, until one method beats both on all scans of row R8
+# of the benchmarks.
+EXPERIMENTAL = "experimental: no method was better than both a constant image and straight rays on all scans"
 
 # Number of solutions. Outlier limit and total variation of each follow from the misfit of the one before;
 # total variation needs more, because none of its solutions is iterated to convergence.

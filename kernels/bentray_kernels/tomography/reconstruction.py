@@ -17,6 +17,7 @@ from ..arrays import Floats
 from ..errors import InvalidInput
 from ..task_graph import ThreadPool, run
 from . import pairs
+from .attenuation import EXPERIMENTAL
 from .decomposition import with_decomposition
 from .geometry_summary import geometry_summary
 from .grid_schedule import stages
@@ -214,6 +215,8 @@ def _assembled(
         parts = [graph.value_of(evaluate) for graph in graphs]
         return None if any(part is None for part in parts) else image(parts)
 
+    losses = evaluated(solve_attenuation)
+    caution = {} if losses is None else {"attenuation": EXPERIMENTAL}
     return Reconstruction(
         speed=image([1.0 / graph.state.slowness for graph in graphs]),
         coverage=image([graph.state.coverage for graph in graphs]),
@@ -222,11 +225,11 @@ def _assembled(
         water_speed_mps=dataset.water_speed_mps,
         settings=settings,
         history=progress_of(graphs).history,
-        attenuation=evaluated(solve_attenuation),
+        attenuation=losses,
         recovery=evaluated(check_resolution),
         residuals=np.sum([graph.state.residuals for graph in graphs], axis=0),
         trials=trials,
-        provenance={**provenance(), **recorded(settings.numerics)},
+        provenance={**provenance(), **recorded(settings.numerics), **caution},
     )
 
 

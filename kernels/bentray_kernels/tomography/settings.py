@@ -102,24 +102,24 @@ class PickingSettings:
 
 @dataclass(frozen=True)
 class AttenuationSettings:
-    """Attenuation, reconstructed along the rays of the speed image."""
+    """Attenuation, reconstructed along the rays of the speed image; experimental."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
     enabled: bool = setting(
         True,
-        "Reconstruct the attenuation too, where there are amplitudes; with method waveform from the traces, "
-        "which is experimental.",
+        "Reconstruct the attenuation too (experimental), where there are amplitudes; with method waveform "
+        "from the traces.",
     )
     amplitudes: Literal["recorded", "ratio", "spectrum"] = setting(
         "recorded",
         "recorded: amplitudes of the file; read from the traces, ratio: height of the first pulse relative "
-        "to water, or spectrum: loss of high frequencies relative to low ones (experimental).",
+        "to water, or spectrum: loss of high frequencies relative to low ones.",
     )
     focusing: bool = setting(
         False,
         "Correct amplitudes for focusing by refraction, by the spreading of ray tubes in the speed image; "
-        "needs the frequency of the amplitudes. Experimental.",
+        "needs the frequency of the amplitudes.",
     )
 
     def __post_init__(self) -> None:
@@ -211,7 +211,8 @@ class Settings:
         default=PickingSettings(), metadata={"description": "For scans with traces."}
     )
     attenuation: AttenuationSettings = field(
-        default=AttenuationSettings(), metadata={"description": "For scans with amplitudes or traces."}
+        default=AttenuationSettings(),
+        metadata={"description": "For scans with amplitudes or traces; experimental."},
     )
 
     def __post_init__(self) -> None:

@@ -6,6 +6,7 @@ import importlib
 import json
 import sys
 from collections.abc import Callable, Iterable
+from datetime import date
 from pathlib import Path
 from typing import Annotated
 
@@ -39,7 +40,8 @@ def bench(
     measure = load(name, benchmark_folder())
     with progress_bar(f"Measuring {name}") as step:
         rows = list(measure(quick, step))
-    text = json.dumps(without_nan([row.to_dict() for row in rows]), indent=2, allow_nan=False)
+    measured = {"measured": date.today().isoformat()}
+    text = json.dumps(without_nan([row.to_dict() | measured for row in rows]), indent=2, allow_nan=False)
     write_bytes(json_file, (text + "\n").encode())
     columns = ("target", "value", "", "goal", "unit", "met", "detail")
     print_table(
@@ -86,4 +88,4 @@ def load(name: str, folder: Path) -> Rows:
 
 def _cells(row: Row) -> tuple[str, ...]:
     value = "none" if row.value is None else f"{row.value:.4g}"
-    return row.target, value, row.op, f"{row.goal:.4g}", row.unit, "yes" if row.met else "no", row.detail
+    return row.target, value, row.op, f"{row.goal:.4g}", row.unit, "yes" if row.met else "no", row.explained

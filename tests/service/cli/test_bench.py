@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
+from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,7 @@ def test_the_rows_are_written_and_shown(
         ("E3", None, False),
     ]
     assert rows[1]["detail"] == "eikonalfm is not installed"
+    assert date.fromisoformat(rows[1]["measured"]) <= date.today() + timedelta(days=1)
     assert "eikonalfm is not installed" in result.stdout
     assert result.stdout.splitlines()[-1] == str(file)
 

@@ -22,6 +22,7 @@ def panels(undrawn) -> list[str]:
 
 
 PLAIN = {"attenuation": None, "recovery": None, "residuals": None, "trials": ()}
+ATTENUATION = "Attenuation (experimental)"
 RESIDUALS = "Residuals, 33.3 ns rms"
 
 
@@ -34,10 +35,10 @@ RESIDUALS = "Residuals, 33.3 ns rms"
             {"attenuation": None, "recovery": None},
             ["Reconstruction", "Coverage", "Convergence", RESIDUALS],
         ),
-        ({"recovery": None}, ["Reconstruction", "Coverage", "Attenuation", "Convergence", RESIDUALS]),
+        ({"recovery": None}, ["Reconstruction", "Coverage", ATTENUATION, "Convergence", RESIDUALS]),
         (
             {},
-            ["Reconstruction", "Coverage", "Attenuation", "Resolution check", "Convergence", RESIDUALS],
+            ["Reconstruction", "Coverage", ATTENUATION, "Resolution check", "Convergence", RESIDUALS],
         ),
     ],
 )
@@ -65,7 +66,7 @@ def test_each_image_has_its_own_limits_and_the_resolution_check_those_from_0_to_
     maps = [axes for axes in undrawn[-1].axes if axes.images]
     limits = {axes.get_title(loc="left"): axes.images[0].get_clim() for axes in maps}
     assert limits["Resolution check"] == (0.0, 1.0)
-    assert limits["Attenuation"][1] == pytest.approx(5.0, abs=0.1)
+    assert limits[ATTENUATION][1] == pytest.approx(5.0, abs=0.1)
     assert len(set(limits.values())) == 4
 
 

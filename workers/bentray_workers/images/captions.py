@@ -16,7 +16,7 @@ LABELS = {
 NAMES = {
     "speed": "Sound speed",
     "coverage": "Coverage",
-    "attenuation": "Attenuation",
+    "attenuation": "Attenuation (experimental)",
     "recovery": "Resolution check",
 }
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...acquisition import Dataset
 from .. import pairs
+from ..attenuation import EXPERIMENTAL
 from ..model_selection.selection import CLEARLY
 from ..numerics import recorded
 from ..reconstruction_graph import Run, progress_of
@@ -120,6 +121,7 @@ class Refinement:
         if len(losses) == len(images):
             pairs_of = zip(images, losses, strict=True)
             attenuation = stacked([replace(image, speed=loss) for image, loss in pairs_of])
+        caution = {} if attenuation is None else {"attenuation": EXPERIMENTAL}
         return replace(
             rays,
             speed=stacked(images),
@@ -137,6 +139,7 @@ class Refinement:
                 "ray_numerics": rays.provenance["numerics"],
                 **recorded(self._settings.numerics),
                 "waveform": _summary(rays, self._plan, graphs),
+                **caution,
             },
         )
 

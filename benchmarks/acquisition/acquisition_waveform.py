@@ -1,0 +1,116 @@
+"""R10: full-waveform inversion against straight, bent and ideal rays on simulated wave scans."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bentray_kernels.acquisition import Dataset, pick
+from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_kernels.tomography.model_selection.finite_frequency_candidates import finite_frequency_candidates
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.terminal import Step
+from bentray_workers.files.dataset import read_dataset
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.waves import WaveSimulationSettings
+
+from ..shared._baselines import Images
+from ..shared._image_error import object_error
+from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
+from ._acquisition_picture import picture
+from ._ideal_times import ideal
+
+RESULTS = Path(__file__).parents[1] / "results"
+
+# A scan simulated by another solver, not in the repository.
+OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
+
+RAYS: dict[str, dict[str, Any]] = {
+    "straight": {"rays": "straight", "method": "sart"},
+    "bent": {"rays": "curved", "method": "sart"},
+    "bent, Gauss-Newton": {"rays": "curved", "method": "gauss-newton"},
+}
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """R10 for each scan; the picture of all of them, unless quick."""
+    shown: dict[str, tuple[Dataset, dict[str, Made]]] = {}
+    for name, dataset in scans(quick, progress):
+        scan = WaveScan(dataset, progress)
+        shown[name] = dataset, scan.made
+        yield from scan.rows(name)
+    if not quick:
+        (RESULTS / "acquisition_waveform.png").write_bytes(
+            picture(shown, "wall-clock seconds of two workers")
+        )
+    reason = "stride: the package registry has none of it"
+    yield Row("R10 over stride at equal time", None, 1.0, "<", "", reason)
+
+
+def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
+    """Names and scans, with traces."""
+    small = WaveSimulationSettings(3e5, 0.05, 32, 16, nodes=64, snr=30.0)
+    for asked in (small,) if quick else (WaveSimulationSettings(snr=30.0),):
+        name = f"simulated {1e-3 * asked.frequency_hz:.0f} kHz"
+        yield name, simulate(asked, lambda now, n=name: progress(now.done, now.total, n))
+    if not quick and OTHERS.exists():
+        yield "ring_wave_a 400 kHz", read_dataset(OTHERS)
+
+
+class WaveScan:
+    """The images of one scan by workers: along rays, by default settings, and by FWI."""
+
+    def __init__(self, dataset: Dataset, progress: Step) -> None:
+        """Reconstruct; rays share their picks, ``ideal times`` are exact.
+
+        Args:
+            dataset: with traces and truth.
+            progress: called meanwhile.
+        """
+        picked = pick(dataset)
+        width = finite_frequency_candidates(picked, Settings())[0]["ray_width_m"]
+        wide = {"method": "gauss-newton", "ray_width_m": width}
+        changes = {**RAYS, "bent, finite frequency": wide}
+        self.made = {
+            way: reconstruct_on_workers(replace(picked, waveform=None), Settings.of(**one), progress)
+            for way, one in changes.items()
+        }
+        self.made["ideal times"] = reconstruct_on_workers(
+            replace(picked, delta_tof_s=ideal(dataset), sigma_s=None, waveform=None),
+            Settings.of(**RAYS["bent, Gauss-Newton"]),
+            progress,
+        )
+        images = Images(dataset, lambda of, settings: self._on_workers(of, settings, progress))
+        images.default()
+        self.made["waveform"] = reconstruct_on_workers(dataset, Settings(method="waveform"), progress)
+        self.compared = images.compared(self.made["waveform"].result, object_error(dataset))
+
+    def _on_workers(self, dataset: Dataset, settings: Settings, progress: Step) -> Reconstruction:
+        made = reconstruct_on_workers(dataset, settings, progress)
+        if settings == Settings():
+            self.made["default"] = made
+        return made.result
+
+    def rows(self, name: str) -> Iterable[Row]:
+        """The rows of this scan; ideal times are a yardstick only where they are better than picks."""
+        errors = {way: one.rms for way, one in self.made.items()}
+        useful = errors["ideal times"] < errors["bent, Gauss-Newton"]
+        detail = ", ".join(
+            f"{way} {one.rms:.1f} m/s in {one.seconds:.0f} s" for way, one in self.made.items()
+        )
+        detail += "" if useful else "; ideal times are worse than picks by the same rays"
+        load = f"{os.getloadavg()[0]:.1f}"
+        for target, way, goal in (
+            ("over straight SART", "straight", 0.65),
+            ("over straight SART, then", "straight", 0.5),
+            ("over ideal times", "ideal times", 0.8),
+        ):
+            if way == "straight" or useful:
+                ratio = errors["waveform"] / errors[way]
+                yield self.compared.row(f"R10 {name}, {target}", ratio, goal, "<=", "", detail)
+        took = self.made["waveform"].seconds
+        detail = f"two workers, load at the end {load}"
+        yield self.compared.row(f"R10 {name}, time", took, 300.0, "<=", "s", detail)
