@@ -10,15 +10,15 @@ import numpy as np
 from bentray_kernels.geometry_field.image.geometry_image import GeometryImage
 from bentray_kernels.geometry_field.tables.accurate_lookup import STEPS, find
 from bentray_kernels.geometry_field.tables.agreement import agreement
-from bentray_kernels.geometry_field.tables.cube import samples
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
+from bentray_kernels.geometry_field.tables.reference_field import uv_table
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import Surface, surface_of
 
 from ._field_rays import as_columns, build_outer_field
 from ._linear_lookup import find_linear
 from ._plane_lookup import PlaneTable, find_by_plane, plane_table
-from ._reference_lookup import linear_uv, nearest_uv, uv_table
+from ._reference_lookup import linear_uv, nearest_uv
 
 # Samples along an edge of the cube, as the dissertation has them, and pixels of the geometry image.
 SAMPLES, PIXELS = 24, 512
@@ -39,7 +39,7 @@ class Lookups:
         """Build the field of a chart's mesh, and what the lookups need."""
         surface = surface_of(chart)
         field = build_outer_field(surface, n)
-        table = uv_table(surface, field, np.float32(samples(n)))
+        table = uv_table(surface, field)
         return cls(surface, field, table, agreement(field), plane_table(surface, field))
 
     def runs(self, rays: tuple[np.ndarray, np.ndarray]) -> tuple[dict[str, Callable], dict[str, np.ndarray]]:

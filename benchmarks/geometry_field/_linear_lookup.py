@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from bentray_kernels.arrays import Float32s, Int32s
 from bentray_kernels.compiled import kernel
-from bentray_kernels.float32 import real, whole
 from bentray_kernels.geometry_field.tables.accurate_lookup import NOTHING, TOGETHER, meet
 from bentray_kernels.geometry_field.tables.agreement import AGREE, NONE
 from bentray_kernels.geometry_field.tables.cube import line_of
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
-from bentray_kernels.geometry_field.tables.quadrilinear import Corner, corner_of, lerp4
+from bentray_kernels.geometry_field.tables.quadrilinear import corner_of, lerp4, nearest_of
 from bentray_kernels.meshes.surface import Surface
 
 
@@ -49,17 +48,6 @@ def corners(
         at, ways[0, k], ways[1, k], ways[2, k], ways[3, k] = corner_of(n, s, sx, sy, t, tx, ty)
         first[k] = at if a < b else NOTHING
         near[k], far[k] = a, b
-
-
-@kernel(inline="always")
-def nearest_of(n: int, corner: Corner) -> int:
-    """The entry with the largest weight."""
-    at, a0, a1, a2, a3 = corner
-    half = real(0.5)
-    exit_ = 6 * n * whole(a3 >= half) + whole(a2 >= half)
-    entry = 6 * n * whole(a1 >= half) + whole(a0 >= half)
-    nearest: int = at + entry * (6 * n * n) + exit_
-    return nearest
 
 
 @kernel

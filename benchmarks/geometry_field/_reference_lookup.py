@@ -1,8 +1,4 @@
-"""Reference lookups of the dissertation: (u, v) of the nearest entry, or 4-D linear interpolation.
-
-Section 5.3.4, for comparison: an average of (u, v) is meaningless where the entries lie on both sides of a
-seam or silhouette.
-"""
+"""Reference lookups of the dissertation for many rays: (u, v) of the nearest entry, or 4-D linear."""
 
 from __future__ import annotations
 
@@ -10,45 +6,13 @@ import numpy as np
 
 from bentray_kernels.arrays import Float32s, Ints
 from bentray_kernels.compiled import kernel
-from bentray_kernels.float32 import higher, lower, real
+from bentray_kernels.float32 import real
 from bentray_kernels.geometry_field.tables.accurate_lookup import NOTHING, TOGETHER
 from bentray_kernels.geometry_field.tables.cube import line_of, number_at
-from bentray_kernels.geometry_field.tables.outer_field import OuterField
-from bentray_kernels.geometry_field.tables.quadrilinear import Corner, lerp4
-from bentray_kernels.meshes.face_plane import meet_plane
-from bentray_kernels.meshes.surface import Surface
+from bentray_kernels.geometry_field.tables.quadrilinear import nearest_of
+from bentray_kernels.geometry_field.tables.reference_field import linear_uv_at
 
-from ._linear_lookup import corners, nearest_of
-
-
-def uv_table(surface: Surface, field: OuterField, samples: Float32s) -> Float32s:
-    """The table as published: (6n², 6n², 2) float32 (u, v) by entry and exit, NaN for nothing.
-
-    Args:
-        surface: ``surface_of``.
-        field: its outer field.
-        samples: ``cube.samples(n)``, float32.
-    """
-    table = np.empty((*field.faces.shape, 2), dtype=np.float32)
-    _fill_uv(surface, field, samples, table)
-    return table
-
-
-@kernel
-def _fill_uv(surface: Surface, field: OuterField, samples: Float32s, table: Float32s) -> None:
-    for i in range(len(samples)):
-        for j in range(len(samples)):
-            face = field.faces[i, j]
-            if face < 0:
-                table[i, j] = np.nan
-                continue
-            sx, sy, sz = samples[i, 0], samples[i, 1], samples[i, 2]
-            dx, dy, dz = samples[j, 0] - sx, samples[j, 1] - sy, samples[j, 2] - sz
-            _, first, second, third, _ = meet_plane(surface.triangles, face, sx, sy, sz, dx, dy, dz)
-            for c in range(2):
-                corners = surface.uv[face, 0, c], surface.uv[face, 1, c], surface.uv[face, 2, c]
-                inside = first * corners[0] + second * corners[1] + third * corners[2]
-                table[i, j, c] = lower(higher(inside, real(0.0)), real(1.0))
+from ._linear_lookup import corners
 
 
 def nearest_uv(n: int, table: Float32s, origins: Float32s, directions: Float32s, uv: Float32s) -> None:
@@ -102,29 +66,7 @@ def linear_uv(n: int, table: Float32s, origins: Float32s, directions: Float32s, 
         corners(n, origins, directions, start, first[:rays], ways, near, far)
         for k in range(rays):
             corner = first[k], ways[0, k], ways[1, k], ways[2, k], ways[3, k]
-            nearest = 2 * nearest_of(n, corner)
-            u, v = entries[nearest], entries[nearest + 1]
-            # NaN is not equal to itself.
-            if first[k] != NOTHING and u == u:
-                u, v = lerp4(entries, n, corner, 2, 0), lerp4(entries, n, corner, 2, 1)
-                if u != u:
-                    u, v = _of_those_that_meet(entries, n, corner)
-            else:
-                u, v = real(np.nan), real(np.nan)
+            u, v = real(np.nan), real(np.nan)
+            if first[k] != NOTHING:
+                u, v = linear_uv_at(entries, n, corner, nearest_of(n, corner))
             uv[start + k, 0], uv[start + k, 1] = u, v
-
-
-@kernel
-def _of_those_that_meet(entries: Float32s, n: int, corner: Corner) -> tuple[float, float]:
-    """Mean (u, v) of the entries that meet something, of which there is one."""
-    at, a0, a1, a2, a3 = corner
-    one, u, v, total = real(1.0), real(0.0), real(0.0), real(0.0)
-    for k in range(16):
-        i, j, m, p = k & 1, k >> 1 & 1, k >> 2 & 1, k >> 3
-        weight = (a0 if i else one - a0) * (a1 if j else one - a1)
-        weight *= (a2 if m else one - a2) * (a3 if p else one - a3)
-        place = 2 * (at + (6 * n * j + i) * (6 * n * n) + 6 * n * p + m)
-        if entries[place] == entries[place]:
-            u, v = u + weight * entries[place], v + weight * entries[place + 1]
-            total += weight
-    return u / total, v / total

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from benchmarks.geometry_field._reference_lookup import linear_uv, nearest_uv, uv_table
+from benchmarks.geometry_field._reference_lookup import linear_uv, nearest_uv
 
 from bentray_kernels.geometry_field.tables.cube import samples
+from bentray_kernels.geometry_field.tables.reference_field import uv_table
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import surface_of
 
@@ -20,7 +21,7 @@ def flat_table(levels: int = 4):
     """A ball whose u and v are x and y: without any seam."""
     mesh = turned(octahedron(levels))
     surface = surface_of(Chart(mesh, mesh.corners[..., :2]))
-    return surface, uv_table(surface, field_of(surface, N), np.float32(samples(N)))
+    return surface, uv_table(surface, field_of(surface, N))
 
 
 def looked_up(table, origins, directions, how):
@@ -65,7 +66,7 @@ def test_linear_errs_less_than_nearest_where_there_is_no_seam():
 
 def test_linear_averages_across_a_seam_as_published():
     surface = surface_of(over_the_poles(turned(octahedron(4))))
-    table = uv_table(surface, field_of(surface, N), np.float32(samples(N)))
+    table = uv_table(surface, field_of(surface, N))
     origins, directions = rays_through_the_cube(20000, 7)
     nearest, linear = (looked_up(table, origins, directions, how) for how in (nearest_uv, linear_uv))
     # A value that neither neighbour has: halfway round the ball.

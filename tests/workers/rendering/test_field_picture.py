@@ -115,6 +115,28 @@ def test_a_scene_is_made_once_and_tables_are_not_copied(folder, monkeypatch):
     assert field_cache._WORLDS.held() >= 2 * (6 * 100) ** 2
 
 
+def test_published_tables_are_made_where_a_view_reads_them(folder, monkeypatch):
+    for name in ("_WORLDS", "_SHAPES"):
+        monkeypatch.setattr(field_cache, name, field_cache.MemoryCache(2**30))
+    plain = world_at(folder, FieldView(scene="two-mirrors"))
+    assert plain.uv.size == plain.images.size == 1
+    before = field_cache._SHAPES.held()
+    one, other = (
+        world_at(folder, FieldView(scene=scene, eye="uv-linear")) for scene in ("two-mirrors", "object")
+    )
+    assert one.uv.size == 2 * (6 * 100) ** 2
+    assert one.images.size == 6 * 65**2
+    assert np.shares_memory(one.uv, other.uv)
+    assert field_cache._SHAPES.held() == before + one.uv.nbytes + one.images.nbytes
+
+
+def test_published_lookups_of_a_mesh_are_nearly_exact(folder):
+    exact = drawn(folder, mode="diffuse")
+    off = {name: np.abs(drawn(folder, mode="diffuse", eye=name) - exact).max(axis=2) for name in LOOKUPS}
+    assert (off["uv-linear"] > 16).mean() < 0.2
+    assert (off["accurate"] > 16).mean() < (off["uv-linear"] > 16).mean()
+
+
 def test_oversize_entries_are_not_cached(folder, monkeypatch):
     monkeypatch.setattr(field_cache, "_WORLDS", field_cache.MemoryCache(10))
     view = FieldView(scene="two-mirrors")

@@ -37,8 +37,9 @@ from ..files.mesh import StoredMesh, write_mesh
 from ..files.volume import Volume
 from ..reconstruction import quality_report as quality
 from ..reconstruction.reconstruction_run import reconstruct
-from ..rendering import geometry_field
+from ..rendering import field_picture, geometry_field
 from ..rendering.field_settings import FieldSettings
+from ..rendering.field_view import FieldView
 from ..rendering.refraction import draw_tile
 from ..rendering.refraction_view import RefractionView
 from ..rendering.scene_cache import build_scene, filter_volume
@@ -131,6 +132,7 @@ def compile_field(folder: Path) -> None:
     work.mkdir()
     settings = FieldSettings(samples=4, inner_samples=4, divisions=4, image_size=33)
     geometry_field.build_field(None, mesh, settings, folder / "field", work)
+    field_picture.picture_png(folder / "field", FieldView(lookup="uv-linear", width=4, height=4))
 
 
 def compile_filter(name: str, _folder: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables.inner_field import InnerField
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
+from bentray_kernels.geometry_field.tables.reference_field import ReferenceField, reference_field
 from bentray_kernels.geometry_field.tracing.packed_scene import World, world_of
 from bentray_kernels.geometry_field.tracing.scene import Shape
 from bentray_kernels.meshes.surface import surface_of
@@ -52,15 +54,36 @@ def world_at(folder: Path, view: FieldView) -> World:
     surface_bytes = FACE_BYTES * figures["faces"]
     image_bytes = 24 * figures["image_pixels"] ** 2
     made: Textured = _SHAPES.get(stamp, surface_bytes + image_bytes, lambda: shape_of(files))
+    if view.reads_image:
+        made = _with_reference(files, stamp, made, figures["image_pixels"])
     # Equal entries are marked for each scene, a byte each; a second surface is copied.
     entries = len(made.shape.outer.faces) ** 2 if made.shape.outer else 0
-    appearance = view.scene, view.mode, view.index, view.share, view.up
+    appearance = view.scene, view.mode, view.index, view.share, view.up, view.reads_image
     world: World = _WORLDS.get(
         (stamp, appearance),
         entries + surface_bytes + SCENE_BYTES,
         lambda: world_of(scene_of(made.shape, made.texture, view)),
     )
     return world
+
+
+def _with_reference(files: FieldFiles, stamp: tuple[Path, int], made: Textured, pixels: int) -> Textured:
+    """A shape with the published tables too, made where a view reads them.
+
+    Raises:
+        InvalidInput: for a field with too many samples for them.
+    """
+    outer = made.shape.outer
+    if outer is None:
+        return made
+
+    def make() -> ReferenceField:
+        maps = read_geometry_image(files.image)
+        return reference_field(made.shape.surface, outer, maps.positions, maps.normals, maps.valid)
+
+    size = 8 * len(outer.faces) ** 2 + 24 * pixels**2
+    reference: ReferenceField = _SHAPES.get((*stamp, "reference"), size, make, 2 * size)
+    return made._replace(shape=replace(made.shape, reference=reference))
 
 
 def shape_of(files: FieldFiles) -> Textured:

@@ -10,7 +10,14 @@ from bentray_kernels.ranges import Range
 from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
 
 # Public names, and those of the kernels.
-LOOKUPS = {"nearest": "nearest", "linear": "linear", "accurate": "walk", "exact": "exact"}
+LOOKUPS = {
+    "nearest": "nearest",
+    "linear": "linear",
+    "accurate": "walk",
+    "exact": "exact",
+    "uv-nearest": "uv-nearest",
+    "uv-linear": "uv-linear",
+}
 CHOICES = {
     "scene": ("object", "mirror-ball", "two-mirrors"),
     "mode": ("reflect", "refract", "refract-single", "self", "self-only", "diffuse"),
@@ -42,10 +49,15 @@ class FieldView:
         "dark background; refract: glass; refract-single: glass with a single refraction; diffuse: clay, or "
         "its own colours.",
     )
-    lookup: Literal["nearest", "linear", "accurate", "exact"] = setting(
-        "accurate", "Field lookup of reflected and refracted rays; exact intersects the mesh itself."
+    lookup: Literal["nearest", "linear", "accurate", "exact", "uv-nearest", "uv-linear"] = setting(
+        "accurate",
+        "Field lookup of reflected and refracted rays; exact intersects the mesh itself. uv-nearest and "
+        "uv-linear, as published (Li 2008, chapter 5), look (u, v) up in the field, and position and normal "
+        "in the geometry image: for comparison, with larger errors, and at most 24 samples.",
     )
-    eye: Literal["nearest", "linear", "accurate", "exact"] = setting("exact", "The same for camera rays.")
+    eye: Literal["nearest", "linear", "accurate", "exact", "uv-nearest", "uv-linear"] = setting(
+        "exact", "The same for camera rays."
+    )
     index: float = setting(1.5, "Refractive index of glass.", Range(0.1, 10.0))
     share: float = setting(
         0.85,
@@ -76,6 +88,11 @@ class FieldView:
     def times(self) -> int:
         """Rays along each side of a pixel."""
         return self.rays
+
+    @property
+    def reads_image(self) -> bool:
+        """Whether hits are read from the geometry image."""
+        return self.lookup.startswith("uv-") or self.eye.startswith("uv-")
 
     def plain(self) -> dict[str, Any]:
         """The fields as JSON values."""

@@ -123,6 +123,9 @@ def field_cost(figures: Mapping[str, Any], view: FieldView) -> Cost:
     surface = 2 * FACE_BYTES * int(figures.get("faces", 0)) + 24 * int(figures.get("image_pixels", 0)) ** 2
     # One byte per eight entries of the outer table marks equal entries.
     needed = SCENE_BYTES + tables + tables // 8 + surface
+    if view.reads_image:
+        # As many bytes of (u, v) as of the outer table, and the image, once more while they are made.
+        needed += 2 * (int(figures.get("outer_bytes", 0)) + 24 * int(figures.get("image_pixels", 0)) ** 2)
     return Cost(FLOOR_SECONDS + rays * ray_s, _tile_bytes(view) + needed)
 
 

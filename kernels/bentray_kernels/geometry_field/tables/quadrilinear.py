@@ -28,6 +28,17 @@ def corner_of(n: int, s: int, sx: float, sy: float, t: int, tx: float, ty: float
 
 
 @kernel(inline="always")
+def nearest_of(n: int, corner: Corner) -> int:
+    """The entry with the largest weight."""
+    at, a0, a1, a2, a3 = corner
+    half = real(0.5)
+    exit_ = 6 * n * whole(a3 >= half) + whole(a2 >= half)
+    entry = 6 * n * whole(a1 >= half) + whole(a0 >= half)
+    nearest: int = at + entry * (6 * n * n) + exit_
+    return nearest
+
+
+@kernel(inline="always")
 def _between(x: float, n: int) -> tuple[float, float]:
     """The sample before a coordinate in [0, 1] of a face, and how far to the next one; never over an edge."""
     place = lower(higher(x * real(n) - real(0.5), real(0.0)), real(n - 1))

@@ -18,12 +18,19 @@ def unit(a: Vector) -> Vector:
 
 @kernel(inline="always")
 def normal_at(world: World, k: int, face: int, first: float, second: float) -> Vector:
-    """Unit normal outward, in the world: that of the cube under the inverse transposed transform."""
+    """Unit normal outward, in the world."""
     n = world.surface.normals[face]
     third = 1.0 - first - second
     x = first * n[0, 0] + second * n[1, 0] + third * n[2, 0]
     y = first * n[0, 1] + second * n[1, 1] + third * n[2, 1]
     z = first * n[0, 2] + second * n[1, 2] + third * n[2, 2]
+    return to_world_normal(world, k, (x, y, z))
+
+
+@kernel(inline="always")
+def to_world_normal(world: World, k: int, normal: Vector) -> Vector:
+    """Unit normal in the world of a normal in the unit cube: by the inverse transposed transform."""
+    x, y, z = normal
     m = world.to_local[k]
     return unit(
         (
@@ -35,18 +42,24 @@ def normal_at(world: World, k: int, face: int, first: float, second: float) -> V
 
 
 @kernel(inline="always")
-def shading(world: World, k: int, face: int, first: float, second: float, normal: Vector) -> Vector:
-    """The surface's own colour under the light."""
+def uv_of(world: World, face: int, first: float, second: float) -> tuple[float, float]:
+    """The (u, v) at weights of corners 0 and 1 of a face."""
+    # The corners of one face lie on one side of every cut of the chart.
+    uv, third = world.surface.uv[face], 1.0 - first - second
+    u = first * uv[0, 0] + second * uv[1, 0] + third * uv[2, 0]
+    v = first * uv[0, 1] + second * uv[1, 1] + third * uv[2, 1]
+    return u, v
+
+
+@kernel(inline="always")
+def shading(world: World, k: int, u: float, v: float, normal: Vector) -> Vector:
+    """The surface's own colour at (u, v), under the light."""
     light = world.light
     cosine = max(light[0] * normal[0] + light[1] * normal[1] + light[2] * normal[2], 0.0)
     shown = light[3] + (1.0 - light[3]) * cosine
     texture = world.instances[k, 1]
     if texture < 0:
         return shown * world.looks[k, 0], shown * world.looks[k, 1], shown * world.looks[k, 2]
-    # The corners of one face lie on one side of every cut of the chart.
-    uv, third = world.surface.uv[face], 1.0 - first - second
-    u = first * uv[0, 0] + second * uv[1, 0] + third * uv[2, 0]
-    v = first * uv[0, 1] + second * uv[1, 1] + third * uv[2, 1]
     start, rows, columns = world.textures[texture, 0], world.textures[texture, 1], world.textures[texture, 2]
     i = min(max(int(v * rows), 0), rows - 1)
     j = min(max(int(u * columns), 0), columns - 1)

@@ -13,18 +13,19 @@ from ..tables.agreement import AGREE
 from ..tables.cube import line_of, number_at
 from ..tables.outer_field import boundary_face
 from ..tables.quadrilinear import corner_of, lerp4
-from .packed_scene import World
+from .image_lookup import from_the_image, on_the_image
+from .packed_scene import Hit, World
 
 # Lookup methods: distance of the entry nearest to the ray; the same, averaged where the entries around the
-# ray agree; the plane of its face; a walk from its face; exact intersection without a field.
-NEAREST, LINEAR, PLANE, WALK, EXACT = 0, 1, 2, 3, 4
-WAYS = {"nearest": NEAREST, "linear": LINEAR, "plane": PLANE, "walk": WALK, "exact": EXACT}
+# ray agree; the plane of its face; a walk from its face; exact intersection without a field. As published:
+# the (u, v) of the nearest entry, or averaged over 16, and the geometry image there.
+NEAREST, LINEAR, PLANE, WALK, EXACT, UV_NEAREST, UV_LINEAR = 0, 1, 2, 3, 4, 5, 6
+FACE_WAYS = {"nearest": NEAREST, "linear": LINEAR, "plane": PLANE, "walk": WALK, "exact": EXACT}
+UV_WAYS = {"uv-nearest": UV_NEAREST, "uv-linear": UV_LINEAR}
+WAYS = FACE_WAYS | UV_WAYS
 
 # A ray that leaves the surface meets it again at this distance or later, edges of the unit cube.
 MIN_DISTANCE = 1e-6
-
-# Face, −1 for none; distance in lengths of the direction; weights of corners 0 and 1.
-Hit = tuple[int, float, float, float]
 
 
 @kernel
@@ -38,7 +39,7 @@ def intersect_exactly(
     face, distance, first, second, _ = closest(
         world.surface, waiting, root, origin, direction, begin, np.inf, left
     )
-    return face, distance, first, second
+    return face, distance, first, second, False
 
 
 @kernel(inline="always")
@@ -54,14 +55,21 @@ def from_outside(
         waiting: traversal stack of the exact intersector.
         origin, direction: in the shape's unit cube.
     """
-    none = (-1, np.inf, 0.0, 0.0)
+    none = (-1, np.inf, 0.0, 0.0, False)
     near, far, s, sx, sy, t, tx, ty = line_of(
         origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]
     )
     if not (near < far and far > 0.0):
         return none
     n, start = world.shapes[shape, 1], world.shapes[shape, 2]
-    if way == EXACT or n == 0:
+    if way > EXACT and world.references[shape, 2] > 0:
+        linear = way == UV_LINEAR
+        hit = from_the_image(world, shape, linear, origin, direction, (s, sx, sy), (t, tx, ty))
+        if hit[1] < 0.0:
+            hit = intersect_exactly(world, shape, waiting, origin, direction, -1)
+            hit = on_the_image(world, shape, hit)
+        return hit
+    if way >= EXACT or n == 0:
         return intersect_exactly(world, shape, waiting, origin, direction, -1)
     place = start + number_at(s, sx, sy, n) * (6 * n * n) + number_at(t, tx, ty, n)
     face = world.faces[place] if way != WALK else boundary_face(world.faces[place])
@@ -86,7 +94,7 @@ def from_outside(
     if near + distance < 0.0:
         # The ray starts within the cube, behind what the entry meets first.
         return intersect_exactly(world, shape, waiting, origin, direction, -1)
-    return face, near + distance, first, second
+    return face, near + distance, first, second, False
 
 
 @kernel(inline="always")
@@ -104,11 +112,30 @@ def from_the_surface(
 
     Args:
         world, shape, way, waiting: as in ``from_outside``; any way but "exact" walks from the entry's face,
-            since a ray that starts on the surface has no room for the error of the other ways.
+            since a ray that starts on the surface has no room for the error of the other ways. Those of
+            (u, v) then read the geometry image.
         origin, direction: in the shape's unit cube.
         left: the face that the ray leaves.
         side: 1 for rays outside the body, −1 inside.
     """
+    published = way > EXACT and world.references[shape, 2] > 0
+    known = EXACT if way > EXACT and not published else way
+    hit = _next_face(world, shape, known, waiting, origin, direction, left, side)
+    return on_the_image(world, shape, hit) if published else hit
+
+
+@kernel(inline="always")
+def _next_face(
+    world: World,
+    shape: int,
+    way: int,
+    waiting: Int32s,
+    origin: Vector,
+    direction: Vector,
+    left: int,
+    side: float,
+) -> Hit:
+    """As ``from_the_surface``, by the weights of the corners."""
     n, start = world.shapes[shape, 3], world.shapes[shape, 4]
     if way == EXACT or n == 0:
         return intersect_exactly(world, shape, waiting, origin, direction, left)
@@ -120,11 +147,11 @@ def from_the_surface(
         face, distance, first, second = settle(world.surface, face, side, STEPS, *origin, *direction)
         length = (direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2) ** 0.5
         if face >= 0 and face != left and distance * length > MIN_DISTANCE:
-            return face, distance, first, second
+            return face, distance, first, second, False
     if side < 0.0:
         # A ray inside a body meets it somewhere: the entry was one of a ray that passed a fold.
         return intersect_exactly(world, shape, waiting, origin, direction, left)
-    return -1, np.inf, 0.0, 0.0
+    return -1, np.inf, 0.0, 0.0, False
 
 
 @kernel(inline="always")

@@ -16,6 +16,10 @@ from .scene import Scene, Shape
 # Flags of an instance.
 SEES_ITSELF, SINGLE = 1, 2
 
+# Face, −1 for none; distance in lengths of the direction; weights of corners 0 and 1, or u and v of the
+# geometry image where the last is true.
+Hit = tuple[int, float, float, float, bool]
+
 
 class World(NamedTuple):
     """Faces and nodes are counted through all shapes.
@@ -28,7 +32,11 @@ class World(NamedTuple):
         known: ``tables.agreement.agreement`` of them.
         inner_faces: all inner tables.
         starts: (faces,) row of the inner table in which rays that leave a face are.
+        references: (shapes, 3): place of the first number of the table of (u, v), and of the geometry image;
+            pixels along a side of it, 0 for no reference field.
+        uv, images: all tables of (u, v), and all geometry images.
         to_local: (instances, 3, 4) from m to the unit cube.
+        to_world: (instances, 3, 4) from the unit cube to m.
         instances: (instances, 3): shape; texture, −1 for none; flags.
         looks: (instances, 6): RGB, share mirrored, share refracted, refractive index.
         pictures: all textures.
@@ -45,7 +53,11 @@ class World(NamedTuple):
     known: NDArray[np.uint8]
     inner_faces: Int32s
     starts: Int32s
+    references: Ints
+    uv: Float32s
+    images: Float32s
     to_local: Floats
+    to_world: Floats
     instances: Ints
     looks: Floats
     pictures: Float32s
@@ -61,12 +73,16 @@ def world_of(scene: Scene) -> World:
     first_face = np.cumsum([0] + [len(shape.surface.triangles) for shape in shapes])
     first_node = np.cumsum([0] + [len(shape.surface.nodes) for shape in shapes])
     table, outer, inner = [], 0, 0
+    references, of_uv, of_images = [], 0, 0
     for shape, node in zip(shapes, first_node, strict=False):
         of_outer = (shape.outer.samples, outer) if shape.outer else (0, 0)
         of_inner = (shape.inner.samples, inner) if shape.inner else (0, 0)
         table.append((node, *of_outer, *of_inner))
         outer += shape.outer.faces.size if shape.outer else 0
         inner += shape.inner.faces.size if shape.inner else 0
+        references.append((of_uv, of_images, len(shape.reference.image) if shape.reference else 0))
+        of_uv += shape.reference.uv.size if shape.reference else 0
+        of_images += shape.reference.image.size if shape.reference else 0
     numbers = {id(shape): number for number, shape in enumerate(shapes)}
     textures: list[Any] = []
     instances = []
@@ -100,7 +116,11 @@ def world_of(scene: Scene) -> World:
                 for shape in shapes
             ]
         ),
+        references=np.array(references, dtype=np.int64),
+        uv=_joined([shape.reference.uv for shape in shapes if shape.reference], np.float32),
+        images=_joined([shape.reference.image for shape in shapes if shape.reference], np.float32),
         to_local=np.concatenate([back, -back @ to_world[:, :, 3:]], axis=2),
+        to_world=to_world,
         instances=np.array(instances, dtype=np.int64),
         looks=np.array(
             [

@@ -20,7 +20,8 @@ from ...meshes.intersector import WAITING
 from ...refraction.backdrop import Colours
 from ...refraction.camera import Camera, affine
 from ...refraction.optics import refracted
-from .appearance import ground_at, normal_at, shading, sky_at, unit
+from .appearance import ground_at, normal_at, shading, sky_at, unit, uv_of
+from .image_lookup import image_normal, image_point
 from .lookup_scene import WAYS, from_outside, from_the_surface
 from .packed_scene import SEES_ITSELF, SINGLE, World
 
@@ -41,7 +42,8 @@ class TraceSettings:
     Attributes:
         rows, columns: pixels.
         depth: most surfaces at which a ray continues; the dissertation has 2.
-        way: lookup method: "nearest", "linear", "plane", "walk"; "exact" without fields.
+        way: lookup method: "nearest", "linear", "plane", "walk"; "exact" without fields; "uv-nearest" and
+            "uv-linear" as published, by (u, v) and the geometry image, for shapes with a reference field.
         eye: the same for the first surface.
         threads: number of threads for tiles of rows.
 
@@ -136,7 +138,7 @@ def colour_of(
     own, left, within = NOTHING, -1, NOTHING
     for turn in range(depth + 1):
         lookup = eye if turn == 0 else way
-        met, face, distance, first, second = _nearest(
+        met, face, distance, first, second, on_image = _nearest(
             world, waiting, origin, direction, lookup, own, left, within
         )
         if met == NOTHING:
@@ -149,10 +151,15 @@ def colour_of(
         if met == GROUND:
             local = ground_at(world, point)
             return red + weight * local[0], green + weight * local[1], blue + weight * local[2]
-        normal = normal_at(world, met, face, first, second)
+        if on_image:
+            u, v = first, second
+            point, normal = image_point(world, met, u, v), image_normal(world, met, u, v)
+        else:
+            u, v = uv_of(world, face, first, second)
+            normal = normal_at(world, met, face, first, second)
         mirror, glass = world.looks[met, 3], world.looks[met, 4]
         if within == NOTHING:
-            local = shading(world, met, face, first, second, normal)
+            local = shading(world, met, u, v, normal)
             share = weight * (1.0 - mirror - glass)
             red, green, blue = red + share * local[0], green + share * local[1], blue + share * local[2]
             weight *= mirror + glass
@@ -185,9 +192,9 @@ def _nearest(
     own: int,
     left: int,
     within: int,
-) -> tuple[int, int, float, float, float]:
-    """What a ray meets first: instance, ``GROUND`` or ``NOTHING``; face; distance, m; weights of corners."""
-    met, face, distance, first, second = NOTHING, -1, np.inf, 0.0, 0.0
+) -> tuple[int, int, float, float, float, bool]:
+    """What a ray meets first: instance, ``GROUND`` or ``NOTHING``; then as ``Hit``, the distance in m."""
+    met, face, distance, first, second, on_image = NOTHING, -1, np.inf, 0.0, 0.0, False
     for k in range(len(world.instances)):
         if within != NOTHING and k != within:
             continue
@@ -200,13 +207,13 @@ def _nearest(
         else:
             hit = from_outside(world, shape, way, waiting, o, d)
         if hit[0] >= 0 and hit[1] < distance:
-            met, face, distance, first, second = k, hit[0], hit[1], hit[2], hit[3]
+            met, face, distance, first, second, on_image = k, hit[0], hit[1], hit[2], hit[3], hit[4]
     if world.ground[1] > 0.0 and within == NOTHING and direction[2] != 0.0:
         down = (world.ground[0] - origin[2]) / direction[2]
         x, y = origin[0] + down * direction[0], origin[1] + down * direction[1]
         if 1e-9 < down < distance and x * x + y * y <= world.ground[8] ** 2:
             met, distance = GROUND, down
-    return met, face, distance, first, second
+    return met, face, distance, first, second, on_image
 
 
 @kernel(inline="always")

@@ -76,10 +76,14 @@ class OpenCLTracer:
     def trace(self, camera: Camera, settings: TraceSettings) -> Colours:
         """As ``tracing.ray_tracer.trace``; ``settings.threads`` counts only where the CPU takes over.
 
+        The lookups of (u, v) always run on the CPU.
+
         Warns:
             OpenCLFallbackWarning: once, where the device fails its self-test and ``ray_tracer.trace`` takes
                 over.
         """
+        if {settings.way, settings.eye} & set(lookup_scene.UV_WAYS):
+            return trace(self.world, camera, settings)
         if self._fault is None:
             self._fault = self.fault_of(camera)
             if self._fault:
@@ -104,7 +108,15 @@ class OpenCLTracer:
         )
 
     def follow(self, camera: Camera, settings: TraceSettings) -> Colours:
-        """As ``trace``, on the device, without self-test."""
+        """As ``trace``, on the device, without self-test.
+
+        Raises:
+            InvalidInput: for a lookup of (u, v).
+        """
+        for name in ("way", "eye"):
+            if getattr(settings, name) not in lookup_scene.FACE_WAYS:
+                accepted = "on a device one of " + ", ".join(lookup_scene.FACE_WAYS)
+                raise InvalidInput(name, getattr(settings, name), accepted)
         image = np.empty((settings.rows, settings.columns, 3), dtype=np.uint8)
         kernel = self.session.kernel(SOURCES, "trace", *self._defines())
         with self.session.lock:

@@ -12,6 +12,7 @@ from ...errors import InvalidInput
 from ...meshes.surface import Surface
 from ..tables.inner_field import InnerField
 from ..tables.outer_field import OuterField
+from ..tables.reference_field import ReferenceField
 
 REFRACTIONS = ("full", "single")
 
@@ -24,11 +25,22 @@ class Shape:
         surface: ``surface_of``.
         outer: its outer field; None where rays are to be intersected exactly.
         inner: its inner field; None where rays that leave it are to be intersected exactly.
+        reference: its table of (u, v) and geometry image, for the lookups "uv-nearest" and "uv-linear"; None
+            where these are to be intersected exactly.
+
+    Raises:
+        InvalidInput: for a reference field of other samples than those of the outer field.
     """
 
     surface: Surface
     outer: OuterField | None = None
     inner: InnerField | None = None
+    reference: ReferenceField | None = None
+
+    def __post_init__(self) -> None:
+        samples = self.outer.samples if self.outer else 0
+        if self.reference and self.reference.samples != samples:
+            raise InvalidInput("reference", f"{self.reference.samples} samples", f"those of outer, {samples}")
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,8 @@ VIEW = {
         "--lookup",
         str,
         "accurate",
-        "Lookup of secondary rays: nearest, linear, accurate, or exact (no field).",
+        "Lookup of secondary rays: nearest, linear, accurate, exact (no field), or as published uv-nearest "
+        "or uv-linear.",
     ),
     "eye": Option("--eye", str, "exact", "Lookup of primary rays."),
     "index": Option("--index", float, "1.5", "Refractive index of the object."),

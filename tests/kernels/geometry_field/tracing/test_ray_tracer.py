@@ -12,7 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.geometry_field.tracing.lookup_scene import WAYS
+from bentray_kernels.geometry_field.image.geometry_image import geometry_image
+from bentray_kernels.geometry_field.layout.parameterisation import parameterise
+from bentray_kernels.geometry_field.tables.reference_field import reference_field
+from bentray_kernels.geometry_field.tracing.lookup_scene import UV_WAYS, WAYS
 from bentray_kernels.geometry_field.tracing.packed_scene import world_of
 from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, trace
 from bentray_kernels.geometry_field.tracing.scene import Ground, Instance, Material, Scene, Shape, placed
@@ -228,6 +231,61 @@ def test_primary_rays_can_use_the_field():
     assert np.mean(np.abs(exact - nearest).max(axis=2) > 8) > 0.03
 
 
+@cache
+def published_shape() -> Shape:
+    """A conformal chart, without a table for rays that leave it: these are exact."""
+    chart = parameterise(turned(octahedron(4))).chart
+    surface, image = surface_of(chart), geometry_image(chart, 129)
+    outer = field_of(surface, 16)
+    reference = reference_field(surface, outer, image.positions, image.normals, image.valid)
+    return Shape(surface, outer, reference=reference)
+
+
+def published(material: Material, **reference) -> Scene:
+    """The ball on a checkerboard, with arrays of its reference field replaced."""
+    shape = published_shape()
+    shape = replace(shape, reference=shape.reference._replace(**reference))
+    ground = Ground(-0.6, 0.4, 5.0)
+    place = placed((0.1, 0.2, 0.0), 1.2, (0.2, 0.1, 1.0), 25.0)
+    return Scene((Instance(shape, place, material),), striped(), ground)
+
+
+def test_published_lookups_make_nearly_the_exact_picture():
+    scene = published(Material(colour=(0.9, 0.5, 0.3)))
+    exact = picture(scene)
+    off = {way: np.abs(picture(scene, eye=way) - exact).max(axis=2) for way in (*UV_WAYS, "walk")}
+    # Nearest (u, v) is a mosaic, averages err at seam and silhouette, the walk only at the silhouette.
+    assert np.median(off["uv-linear"][exact.std(axis=2) > 0]) <= np.median(off["uv-nearest"])
+    assert (off["uv-linear"] > 16).mean() < 0.1
+    assert (off["uv-nearest"] > 32).mean() < 0.15
+    assert (off["walk"] > 16).mean() < (off["uv-linear"] > 16).mean()
+    glass = published(Material(glass=0.9))
+    for way in UV_WAYS:
+        changed = np.abs(picture(glass, eye=way, way=way) - picture(glass, way="exact")).max(axis=2)
+        assert 0.0 < (changed > 8).mean() < 0.5
+
+
+@pytest.mark.parametrize("way", UV_WAYS)
+def test_published_lookups_read_the_image(way):
+    image = published_shape().reference.image
+    dark = image.copy()
+    dark[..., 3:] *= -1.0
+    material = Material(colour=(1.0, 1.0, 1.0))
+    plain = picture(published(material), eye=way)
+    turned_over = picture(published(material, image=dark), eye=way)
+    shown = (plain != turned_over).any(axis=2)
+    # Normals away from the light show the ambient share alone.
+    assert shown.mean() > 0.05
+    assert np.isin(turned_over[shown & (plain > 80).all(axis=2)], (76, 77)).all()
+    moved = image.copy()
+    moved[..., :3] = 0.5
+    mirror = Material(mirror=1.0)
+    assert (picture(published(mirror), eye=way) != picture(published(mirror, image=moved), eye=way)).any()
+    nowhere = picture(published(material, image=np.full_like(image, np.nan)), eye=way)
+    away = Instance(round_shape(), placed((0.0, 0.0, 90.0), 1.0))
+    np.testing.assert_array_equal(nowhere, picture(replace(published(material), instances=(away,))))
+
+
 def test_pictures_do_not_depend_on_threads_or_runs():
     one = picture(crowded())
     np.testing.assert_array_equal(one, picture(crowded(), threads=2))
@@ -278,6 +336,7 @@ def test_rays_that_start_in_the_cube_of_another_body_see_it():
         ("environment", lambda: Scene((Instance(round_shape(), np.eye(4)[:3]),), 300.0 * WHITE)),
         ("light", lambda: Scene((Instance(round_shape(), np.eye(4)[:3]),), WHITE, light=(0.0, 0.0, 0.0))),
         ("ambient", lambda: Scene((Instance(round_shape(), np.eye(4)[:3]),), WHITE, ambient=-1.0)),
+        ("reference", lambda: Shape(round_shape().surface, reference=published_shape().reference)),
         ("depth", lambda: TraceSettings(depth=-1)),
         ("rows", lambda: TraceSettings(rows=0)),
         ("way", lambda: TraceSettings(way="furthest")),

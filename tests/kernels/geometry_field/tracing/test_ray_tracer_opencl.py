@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.geometry_field.tracing.lookup_scene import WAYS
+from bentray_kernels.geometry_field.tracing.lookup_scene import FACE_WAYS, UV_WAYS
 from bentray_kernels.geometry_field.tracing.packed_scene import World, world_of
 from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, trace
 from bentray_kernels.geometry_field.tracing.ray_tracer_opencl import OpenCLTracer, on_the_device
@@ -35,7 +35,7 @@ def odd(world: World, precision: str, **how) -> float:
     return float(np.mean(np.abs(found.astype(int) - trace(world, CAMERA, settings)).max(axis=2) > 1))
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", FACE_WAYS)
 def test_pictures_are_those_of_the_compiled_tracer(way):
     world = world_of(crowded(ground=Ground(-0.6, 0.3, 3.0)))
     assert odd(world, "float64", way=way, eye=way) <= 0.0005
@@ -51,6 +51,14 @@ def test_single_refraction_too():
 def test_a_shape_without_fields_is_intersected_exactly():
     scene = Scene((Instance(Shape(ball(3)), placed((0.0, 0.0, 0.0), 1.0), Material(glass=1.0)),), WHITE)
     assert odd(world_of(scene), "float64") == 0.0
+
+
+@pytest.mark.parametrize("way", UV_WAYS)
+def test_lookups_of_uv_run_on_the_cpu(way):
+    world, settings = world_of(crowded()), TraceSettings(16, 16, way=way)
+    np.testing.assert_array_equal(tracer_of(world).trace(CAMERA, settings), trace(world, CAMERA, settings))
+    with pytest.raises(InvalidInput, match="way"):
+        tracer_of(world).follow(CAMERA, settings)
 
 
 def test_cpu_replaces_wrong_device_results(monkeypatch):

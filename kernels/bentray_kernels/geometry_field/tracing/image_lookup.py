@@ -1,0 +1,94 @@
+"""Hits read from the geometry image at the (u, v) of the outer field: the tracer of the dissertation.
+
+Section 5.3.2: the (u, v) of the entries is looked up in the geometry image, which gives position and normal
+of the hit. The next ray starts at that position, which is not exactly on the ray.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Vector
+from ...compiled import kernel
+from ..tables.cube import number_at
+from ..tables.quadrilinear import corner_of, nearest_of
+from ..tables.reference_field import image_at, linear_uv_at
+from .appearance import to_world_normal, uv_of
+from .packed_scene import Hit, World
+
+# Channels of the image.
+POSITION, NORMAL = 0, 3
+
+
+@kernel(inline="always")
+def from_the_image(
+    world: World,
+    shape: int,
+    linear: bool,
+    origin: Vector,
+    direction: Vector,
+    entry: tuple[int, float, float],
+    leaving: tuple[int, float, float],
+) -> Hit:
+    """The first point of a shape on a ray that comes from outside its cube.
+
+    Args:
+        world: ``world_of``.
+        shape: which of its shapes; it has a reference field.
+        linear: whether (u, v) is averaged over 16 entries; else that of the nearest entry.
+        origin, direction: in the shape's unit cube.
+        entry, leaving: face, x and y where the ray enters the cube and leaves it, see ``cube.line_of``.
+    """
+    n, pixels = world.shapes[shape, 1], world.references[shape, 2]
+    table = world.uv[world.references[shape, 0] :]
+    if linear:
+        corner = corner_of(n, *entry, *leaving)
+        place = nearest_of(n, corner)
+        u, v = linear_uv_at(table, n, corner, place)
+    else:
+        place = number_at(*entry, n) * (6 * n * n) + number_at(*leaving, n)
+        u, v = table[2 * place], table[2 * place + 1]
+    # The face serves rays that leave it; positions are read from the image.
+    face = world.faces[world.shapes[shape, 2] + place]
+    none = (-1, np.inf, 0.0, 0.0, False)
+    # NaN is not equal to itself.
+    if face < 0 or u != u:
+        return none
+    x, y, z = image_at(world.images, world.references[shape, 1], pixels, u, v, POSITION)
+    along = (x - origin[0]) * direction[0] + (y - origin[1]) * direction[1] + (z - origin[2]) * direction[2]
+    square = direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2
+    if x != x:
+        return none
+    return face, along / square, float(u), float(v), True
+
+
+@kernel(inline="always")
+def on_the_image(world: World, shape: int, hit: Hit) -> Hit:
+    """The same hit by its (u, v), where the image covers it."""
+    face, distance, first, second, _ = hit
+    if face < 0:
+        return hit
+    u, v = uv_of(world, face, first, second)
+    start, pixels = world.references[shape, 1], world.references[shape, 2]
+    x, _, _ = image_at(world.images, start, pixels, u, v, POSITION)
+    return hit if x != x else (face, distance, u, v, True)
+
+
+@kernel(inline="always")
+def image_point(world: World, k: int, u: float, v: float) -> Vector:
+    """Position of an instance at (u, v), m, in the world."""
+    reference = world.references[world.instances[k, 0]]
+    x, y, z = image_at(world.images, reference[1], reference[2], u, v, POSITION)
+    m = world.to_world[k]
+    return (
+        m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3],
+        m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3],
+        m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3],
+    )
+
+
+@kernel(inline="always")
+def image_normal(world: World, k: int, u: float, v: float) -> Vector:
+    """Unit normal of an instance at (u, v), outward, in the world."""
+    reference = world.references[world.instances[k, 0]]
+    return to_world_normal(world, k, image_at(world.images, reference[1], reference[2], u, v, NORMAL))
