@@ -65,7 +65,7 @@ def picture(cases: Sequence[Case]) -> bytes:
     """PNG: for each case a row of wave fronts and a row of errors; all cases have the same methods."""
     methods = [eikonal.METHODS[name] for name in cases[0].solved]
     # More is done against the error from column to column.
-    methods.sort(key=lambda method: (method.order, method.factored))
+    methods.sort(key=lambda method: (method.order, method.differences))
     names = [method.name for method in methods]
     with drawing():
         figure = new_figure(PANEL_IN[0] * len(names) + 1.4, 2 * PANEL_IN[1] * len(cases) + 0.4)

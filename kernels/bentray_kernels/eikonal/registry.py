@@ -17,7 +17,7 @@ from ..errors import InvalidInput
 from .accurate import accurate
 from .fast_iterative import fast_iterative
 from .fast_iterative_opencl import fast_iterative_opencl, fast_iterative_opencl_many
-from .fast_marching import fast_marching, high_accuracy_fast_marching
+from .fast_marching import fast_marching, first_order_fast_marching, high_accuracy_fast_marching
 from .fast_marching_untidy import fast_marching_untidy
 from .fast_sweeping import fast_sweeping, fast_sweeping_many
 from .problem import PointSource, SlownessGrid
@@ -30,7 +30,9 @@ class Method:
     Attributes:
         name: of the method in requests.
         run: takes a ``PointSource`` and keyword options, gives the travel time in the grid's shape.
-        order: order of accuracy away from shocks.
+        order: order of accuracy away from shocks; the singularity of the point source limits it to 1 unless
+            it is factored out.
+        differences: order of the finite differences.
         factored: whether the source's singularity is factored out.
         summary: one line for help texts.
         run_many: as ``run`` for problems of one shape and spacing, into an array (batch, nx, ny[, nz]); None
@@ -41,6 +43,7 @@ class Method:
     name: str
     run: Callable[..., Floats]
     order: int
+    differences: int
     factored: bool
     summary: str
     run_many: Callable[..., None] | None = None
@@ -60,23 +63,33 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 "accurate",
                 accurate,
                 2,
+                2,
                 True,
                 "factored second order in the order of a first-order sweep (default); option supersample",
             ),
-            Method("fmm", fast_marching, 2, False, "fast marching, binary heap; options order=1 or 2"),
-            Method("hafmm", high_accuracy_fast_marching, 2, True, "fast marching, factored second order"),
+            Method(
+                "fmm",
+                fast_marching,
+                1,
+                2,
+                False,
+                "fast marching, binary heap, second-order differences; option order=1 or 2 of them",
+            ),
+            Method("hafmm", high_accuracy_fast_marching, 2, 2, True, "fast marching, factored second order"),
             Method(
                 "fsm",
                 fast_sweeping,
+                1,
                 1,
                 False,
                 "fast sweeping, first order; option tolerance",
                 fast_sweeping_many,
             ),
-            Method("fim", fast_iterative, 1, False, "fast iterative, first order; option tolerance"),
+            Method("fim", fast_iterative, 1, 1, False, "fast iterative, first order; option tolerance"),
             Method(
                 "fim-opencl",
                 fast_iterative_opencl,
+                1,
                 1,
                 False,
                 "fim in blocks on an OpenCL device (BENTRAY_OPENCL_DEVICE); option tolerance",
@@ -86,9 +99,18 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             Method(
                 "fmm-untidy",
                 fast_marching_untidy,
+                1,
                 2,
                 False,
-                "fast marching, O(N), error bounded; options order=1 or 2, width of a bucket",
+                "fast marching, O(N), error bounded; options order=1 or 2 of differences, width of a bucket",
+            ),
+            Method(
+                "fmm-first-order",
+                first_order_fast_marching,
+                1,
+                1,
+                False,
+                "fast marching, binary heap, first-order differences (chapter 6)",
             ),
         )
     }

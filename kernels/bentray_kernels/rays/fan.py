@@ -11,8 +11,12 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 from ..compiled import kernel
 from ..errors import InvalidInput
+from .squared_time_spline import squared_time_spline
 
 RayKind = Literal["curved", "straight"]
+# How ∇(T²) is read between the nodes: central differences at them, interpolated multilinearly; or the
+# gradient of the cubic B-spline of T², as in chapter 6.3.
+RayGradient = Literal["differences", "bspline"]
 
 
 class Fan(NamedTuple):
@@ -21,7 +25,8 @@ class Fan(NamedTuple):
     Attributes:
         receivers: (k, ndim); source: (ndim,).
         tof: flat travel time, s.
-        gradient: (nodes, ndim) ∇(T²) for curved rays, empty for straight ones.
+        gradient: (nodes, ndim) ∇(T²) for curved rays by differences, else empty.
+        spline: ``squared_time_spline`` for curved rays by B-splines, else empty; of ndim axes.
         shape, strides: of the grid; tuples, so that the compiler unrolls the loops over axes.
         curved: whether the rays follow the gradient.
     """
@@ -30,13 +35,20 @@ class Fan(NamedTuple):
     source: Floats
     tof: Floats
     gradient: Floats
+    spline: Floats
     shape: tuple[int, ...]
     strides: tuple[int, ...]
     curved: bool
 
     @classmethod
     def checked(
-        cls, tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, kind: RayKind
+        cls,
+        tof: ArrayLike,
+        spacing: float,
+        receivers: ArrayLike,
+        source: ArrayLike,
+        kind: RayKind,
+        gradient: RayGradient = "differences",
     ) -> Fan:
         """The fan for the arguments of ``trace``.
 
@@ -54,6 +66,8 @@ class Fan(NamedTuple):
             raise InvalidInput("spacing", spacing, "a finite node spacing > 0 m")
         if kind not in ("curved", "straight"):
             raise InvalidInput("kind", repr(kind), "curved or straight")
+        if gradient not in ("differences", "bspline"):
+            raise InvalidInput("gradient", repr(gradient), "differences or bspline")
         points = np.asarray(receivers, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != times.ndim:
             raise InvalidInput("receivers", f"shape {points.shape}", f"(receivers, {times.ndim})")
@@ -66,8 +80,12 @@ class Fan(NamedTuple):
         strides = tuple(int(math.prod(times.shape[axis + 1 :])) for axis in range(times.ndim))
         curved = kind == "curved"
         flat = times.ravel()
-        gradient = squared_gradient(flat, times.shape, strides) if curved else np.empty((0, times.ndim))
-        return cls(nodes, origin, flat, gradient, times.shape, strides, curved)
+        slopes, spline = np.empty((0, times.ndim)), np.empty((0,) * times.ndim)
+        if curved and gradient == "differences":
+            slopes = squared_gradient(flat, times.shape, strides)
+        elif curved:
+            spline = squared_time_spline(times)
+        return cls(nodes, origin, flat, slopes, spline, times.shape, strides, curved)
 
 
 @kernel

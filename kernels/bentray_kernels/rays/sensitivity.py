@@ -9,11 +9,17 @@ from scipy.sparse import csr_array
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from .descent import PARTS, STEP, empty_path, list_entries, merge_entries, trace_ray
-from .fan import Fan, RayKind
+from .fan import Fan, RayGradient, RayKind
 
 
 def sensitivities(
-    tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, *, kind: RayKind = "curved"
+    tof: ArrayLike,
+    spacing: float,
+    receivers: ArrayLike,
+    source: ArrayLike,
+    *,
+    kind: RayKind = "curved",
+    gradient: RayGradient = "differences",
 ) -> csr_array:
     """Length of each ray attributed to each node, the weights w of SART (chapter 6, equation 1).
 
@@ -21,7 +27,7 @@ def sensitivities(
     ray, and Σ w·slowness is the travel time as the integral of the slowness along the ray.
 
     Args:
-        tof, spacing, receivers, source, kind: as ``trace``.
+        tof, spacing, receivers, source, kind, gradient: as ``trace``.
 
     Returns:
         (receivers, nodes), m; columns are nodes in C order. Rows sum to the length of the ray; each node
@@ -30,7 +36,7 @@ def sensitivities(
     Raises:
         InvalidInput: as ``trace``.
     """
-    fan = Fan.checked(tof, spacing, receivers, source, kind)
+    fan = Fan.checked(tof, spacing, receivers, source, kind, gradient)
     pointers, columns, lengths = _rows(fan)
     return csr_array((lengths * spacing, columns, pointers), shape=(len(fan.receivers), fan.tof.size))
 

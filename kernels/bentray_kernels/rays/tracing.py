@@ -8,16 +8,22 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from .descent import STEP, empty_path, trace_ray
-from .fan import Fan, RayKind
+from .fan import Fan, RayGradient, RayKind
 
 
 def trace(
-    tof: ArrayLike, spacing: float, receivers: ArrayLike, source: ArrayLike, *, kind: RayKind = "curved"
+    tof: ArrayLike,
+    spacing: float,
+    receivers: ArrayLike,
+    source: ArrayLike,
+    *,
+    kind: RayKind = "curved",
+    gradient: RayGradient = "differences",
 ) -> list[Floats]:
     """Rays from every receiver back to the source, down the gradient of the travel time (chapter 6.2.2).
 
     Every ray arrives; no ray linking is needed. In a homogeneous medium the paths
-    are straight to rounding: T² is a paraboloid, for which central differences are exact.
+    are straight to rounding: T² is a paraboloid, for which central differences and splines are exact.
 
     Args:
         tof: (nx, ny[, nz]), s, as ``eikonal.solve`` gives it; straight rays use its shape alone.
@@ -25,6 +31,8 @@ def trace(
         receivers: (k, ndim), m, in the grid; node 0 lies at 0.
         source: (ndim,), m, where ``tof`` is 0.
         kind: ``curved`` or ``straight``.
+        gradient: of curved rays, ``differences``: central ones at the nodes, interpolated between them; or
+            ``bspline``: that of the cubic B-spline of T² (chapter 6.3). Behind shocks the spline swings.
 
     Returns:
         k paths, each (points, ndim), m, from the receiver to the source.
@@ -32,7 +40,7 @@ def trace(
     Raises:
         InvalidInput: naming the argument: shapes, travel times that are not finite, points outside the grid.
     """
-    fan = Fan.checked(tof, spacing, receivers, source, kind)
+    fan = Fan.checked(tof, spacing, receivers, source, kind, gradient)
     points, counts = _trace_all(fan)
     return np.split(points * spacing, np.cumsum(counts)[:-1]) if len(counts) else []
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
+from . import attenuation_sart
 from .focusing import focusing
 from .gauss_newton import huber
 from .gauss_newton.linear_problem import Linearised, smoothing
@@ -83,7 +84,7 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
     """The attenuation from the rows of all emitters, in their order.
 
     The rays are fixed, so the problem is linear: log ratios are integrals of the attenuation, once focusing
-    is taken off.
+    is taken off. It is solved for all rays at once with a penalty, or by SART, see ``attenuation_sart``.
 
     Returns:
         of the region's shape, Np/m, at least 0; that of the water outside the array.
@@ -96,6 +97,9 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
     density = problem.mean_in_region(ray_density(problem, parts))
     if density == 0.0:
         return water / problem.spacing
+    bounds = (0.0, MAX_NP_M * problem.spacing)
+    if settings.attenuation.attenuation_solver == "sart":
+        return attenuation_sart.solve(parts, water, problem.region, settings, bounds) / problem.spacing
     image, dual = water, np.zeros((len(shape), *shape))
     # Rays through a blurred speed image are all somewhat off, and none is an outlier: on Table 6 after SART
     # the limit made the error larger, after Gauss–Newton a third smaller.
@@ -107,7 +111,6 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
         remaining = [replace(part, residual=part.residual - part.project(image - water)) for part in parts]
         residual = np.concatenate([part.residual for part in remaining])
         limit = huber.limit(residual, spreads)
-        bounds = (0.0, MAX_NP_M * problem.spacing)
         misfit = huber.clipped_rms(residual, limit)
         image, dual = Linearised(
             remaining,

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 
-from ..ranges import Range, check_ranges, ranged
+from ..ranges import Range, ranged
+from ..rays.fan import RayGradient
+from ..request_fields import check
 
 BANDS = 4
 
@@ -25,6 +27,8 @@ class Numerics:
             in: rays bend as those of a band-limited wave; 0: none.
         ray_width_m: of Gauss–Newton, standard deviation of the Gaussian across a ray under which its time
             depends on the slowness, m; 0: thin rays. ``method`` auto sets it from the centre frequency.
+        ray_gradient: how ∇(T²) guides curved rays, ``differences`` or ``bspline`` (chapter 6.3), see
+            ``rays.trace``. The compiled pass over slices has differences alone, so ``bspline`` replaces it.
         relaxation_decay: factor of SART's relaxation from one iteration to the next, in (0, 1].
         subset: emitters in one update of SART.
         huber_scale: Gauss–Newton and the attenuation weigh residuals beyond this many standard deviations
@@ -46,6 +50,7 @@ class Numerics:
     stop_rms_s: float | None = ranged(None, Range(0.0, 1.0, unit="s"))
     front_smoothing_nodes: float = ranged(0.0, Range(0.0, 32.0))
     ray_width_m: float = ranged(0.0, Range(0.0, 0.1, unit="m"))
+    ray_gradient: RayGradient = "differences"
     relaxation_decay: float = ranged(1.0, Range(0.0, 1.0, above=True))
     subset: int = ranged(1, Range(1, 4096))
     huber_scale: float = ranged(3.0, Range(0.0, 100.0))
@@ -55,7 +60,7 @@ class Numerics:
     emitters: int | None = ranged(None, Range(1, 4096))
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check(self)
 
     def explained(self, rms_s: float) -> bool:
         """Whether a residual, s, is small enough to stop."""

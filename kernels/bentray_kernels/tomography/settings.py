@@ -116,6 +116,11 @@ class AttenuationSettings:
         "recorded: amplitudes of the file; read from the traces, ratio: height of the first pulse relative "
         "to water, or spectrum: loss of high frequencies relative to low ones.",
     )
+    attenuation_solver: Literal["penalised", "sart"] = setting(
+        "penalised",
+        "penalised: all rays at once, with the penalty_strength of gauss_newton; sart: one emitter after the "
+        "other with the settings of sart, without a penalty (chapter 6).",
+    )
     focusing: bool = setting(
         False,
         "Correct amplitudes for focusing by refraction, by the spreading of ray tubes in the speed image; "
@@ -152,11 +157,19 @@ class Settings:
         "curved: corrected for refraction; straight: without refraction. Method auto compares both, unless "
         "straight is requested.",
     )
-    eikonal: Literal["deviation", "fmm", "fmm-untidy", "hafmm", "fsm", "fim", "fim-opencl", "accurate"] = (
-        setting(
-            DEVIATION,
-            "Eikonal solver for curved rays. deviation: SART on slices; accurate replaces it elsewhere.",
-        )
+    eikonal: Literal[
+        "deviation",
+        "fmm",
+        "fmm-first-order",
+        "fmm-untidy",
+        "hafmm",
+        "fsm",
+        "fim",
+        "fim-opencl",
+        "accurate",
+    ] = setting(
+        DEVIATION,
+        "Eikonal solver for curved rays. deviation: SART on slices; accurate replaces it elsewhere.",
     )
     decomposition: Literal["slices", "volume"] | None = setting(
         None,
@@ -202,7 +215,9 @@ class Settings:
         Range(0.0, 1e6, unit="minutes"),
         unset="waveform: no limit; auto: no refinement",
     )
-    sart: SartSettings = field(default=SartSettings(), metadata={"description": "Only for method sart."})
+    sart: SartSettings = field(
+        default=SartSettings(), metadata={"description": "For method sart, and the attenuation by it."}
+    )
     gauss_newton: GaussNewtonSettings = field(
         default=GaussNewtonSettings(),
         metadata={"description": "For gauss-newton, and the attenuation."},

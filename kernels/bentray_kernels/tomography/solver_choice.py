@@ -29,7 +29,8 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
         dimensions: of an image, 2 or 3.
     """
     straight = settings.rays == "straight"
-    known = straight or settings.eikonal == DEVIATION
+    differences = settings.numerics.ray_gradient == "differences"
+    known = straight or (settings.eikonal == DEVIATION and differences)
     if settings.method == "sart" and dimensions == 2 and known:
         return Solver(True, None if straight else DEVIATION)
     return Solver(False, None if straight else settings.ray_eikonal)

@@ -47,6 +47,21 @@ def test_line_integrals_give_it_back(scan, method):
     assert rmse(result.attenuation, truth, inside) < 0.16 * (truth.max() - truth.min())
 
 
+def test_sart_gives_it_back_too(scan):
+    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+    sart = plan("sart", attenuation_solver="sart")
+    result = reconstruct(scan, sart)
+    found = rmse(result.attenuation, truth, inside)
+    constant = truth[inside].std()
+    assert result.attenuation.min() >= 0.0
+    assert found < 0.6 * constant
+    assert rmse(reconstruct(scan, sart.changed(iterations=1)).attenuation, truth, inside) > found
+    # The order of the emitters alone depends on the seed.
+    again, other = (reconstruct(scan, sart.changed(seed=seed)).attenuation for seed in (0, 1))
+    np.testing.assert_array_equal(again, result.attenuation)
+    assert 0.0 < np.abs(other - again).max() < 0.5 * truth.max()
+
+
 def test_ratios_from_traces_are_smoothed_more(scan):
     truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     rng = np.random.default_rng(3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,14 +36,27 @@ class Rows:
         columns: (entries,), flat node, C order.
         lengths: (entries,), nodes of ray; multiplied by the spacing they are the sensitivities.
         residual: (rays,), s, measured minus predicted travel time.
-        emitters: number of emitters of the rays.
+        counts: (emitters,), number of rays of each emitter, in the order of the rows.
     """
 
     pointers: Ints
     columns: NDArray[np.int32]
     lengths: NDArray[np.float32]
     residual: Floats
-    emitters: int
+    counts: Ints
+
+    def by_emitter(self) -> Iterator[Rows]:
+        """The rows of each emitter by themselves; views of these arrays."""
+        ends = np.concatenate(([0], np.cumsum(self.counts)))
+        for first, last in itertools.pairwise(ends):
+            entries = slice(self.pointers[first], self.pointers[last])
+            yield Rows(
+                self.pointers[first : last + 1] - self.pointers[first],
+                self.columns[entries],
+                self.lengths[entries],
+                self.residual[first:last],
+                np.array([last - first]),
+            )
 
     def project(self, image: Floats) -> Floats:
         """A·image, (rays,): sums along the rays."""
@@ -137,7 +150,8 @@ def _trace(
                 splines = {(slab.start, slab.stop): coefficients(-np.log(tof))}
             spline = splines[slab.start, slab.stop]
             tof = solve(tof, problem.spacing, source, settings.ray_eikonal)
-        fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays)
+        gradient = settings.numerics.ray_gradient
+        fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays, gradient)
         counts, columns, lengths, predicted = _rows(fan, front > 0.0, inside.ravel(), spline)
         if inside.shape != slowness.shape:
             column, height = np.divmod(columns, inside.shape[-1])
@@ -149,7 +163,8 @@ def _trace(
         )
         parts.append((counts, columns, lengths, residual))
     counts, columns, lengths, residual = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Rows(np.concatenate(([0], np.cumsum(counts))), columns, lengths, residual, len(emitters))
+    rays = np.array([part[0].size for part in parts])
+    return Rows(np.concatenate(([0], np.cumsum(counts))), columns, lengths, residual, rays)
 
 
 @kernel

@@ -101,7 +101,8 @@ def _traced(
         if settings.rays != "straight":
             speed = propagation_speed(inside, problem.region[..., slab], settings, warm=iteration > 0)
             tof = solve(speed, problem.spacing, source, settings.ray_eikonal)
-        fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays)
+        gradient = settings.numerics.ray_gradient
+        fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays, gradient)
         correction, weight, residual = _back_project(fan, inside.ravel() * problem.spacing, measured)
         corrections[..., slab] += correction.reshape(inside.shape)
         weights[..., slab] += weight.reshape(inside.shape)

@@ -52,7 +52,13 @@ def test_emitters_that_do_not_receive_keep_all_pairs():
 
 def rows(residual):
     """One ray through one node."""
-    return Rows(np.array([0, 1]), np.array([300], np.int32), np.ones(1, np.float32), np.array([residual]), 1)
+    return Rows(
+        np.array([0, 1]),
+        np.array([300], np.int32),
+        np.ones(1, np.float32),
+        np.array([residual]),
+        np.array([1]),
+    )
 
 
 def test_step_that_increases_the_misfit_is_halved_then_rejected():
@@ -110,7 +116,9 @@ def test_of_images_that_miss_alike_the_last_is_given(misfit, given):
 
 def test_no_ray_through_the_image_leaves_water():
     of = problem(np.zeros((8, 8)))
-    outside = Rows(np.array([0, 1]), np.array([0], np.int32), np.ones(1, np.float32), np.array([1e-7]), 1)
+    outside = Rows(
+        np.array([0, 1]), np.array([0], np.int32), np.ones(1, np.float32), np.array([1e-7]), np.array([1])
+    )
     state = gauss_newton_step.step(of, PLAN, gauss_newton_step.begin(initial_slowness(of, None)), [outside])
     assert np.allclose(state.slowness, 1.0 / WATER)
 

@@ -14,7 +14,11 @@ from bentray_kernels.tomography.gauss_newton.linearisation import Rows
 def rows_of(matrix, residual):
     sparse = csr_array(matrix)
     return Rows(
-        sparse.indptr.astype(np.int64), sparse.indices.astype(np.int32), sparse.data, residual, emitters=1
+        sparse.indptr.astype(np.int64),
+        sparse.indices.astype(np.int32),
+        sparse.data,
+        residual,
+        np.array([len(residual)]),
     )
 
 
@@ -200,7 +204,7 @@ def test_parts_of_the_rows_give_the_bits_of_the_whole(cuts, penalty):
                 part.columns[entries],
                 part.lengths[entries],
                 part.residual[first:last],
-                1,
+                np.array([last - first]),
             )
         )
     cut = Linearised(

@@ -41,6 +41,7 @@ CHOICES = [
     (["--no-examine"], "examine", False),
     (["--no-attenuation"], "attenuation", False),
     (["--amplitudes", "ratio"], "amplitudes", "ratio"),
+    (["--attenuation-solver", "sart"], "attenuation_solver", "sart"),
     (["--focusing"], "focusing", True),
 ]
 
