@@ -2,11 +2,11 @@
 
 from .cube_fields import CubeField, eight_bit, in_nodes, sampled
 from .detailed_breast import DETAILED_SIDE_M, DetailedBreast
-from .ellipses import Ellipse, EllipsePhantom
+from .ellipses import Ellipse, EllipsePhantom, HalfEllipse
 from .fringe_sphere import ONE_HOLE, TWO_HOLES, FringeSphere
 from .marschner_lobb import MarschnerLobb
 from .solids import Dome, Ellipsoid
-from .table6 import TABLE6_SIDE_M, table6
+from .table6 import TABLE6_SIDE_M, table6, table6_vertical
 from .table7 import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, table7_slices
 from .volume import Part, PhantomSlice, VolumePhantom
 
@@ -25,6 +25,7 @@ __all__ = [
     "EllipsePhantom",
     "Ellipsoid",
     "FringeSphere",
+    "HalfEllipse",
     "MarschnerLobb",
     "Part",
     "PhantomSlice",
@@ -33,6 +34,7 @@ __all__ = [
     "in_nodes",
     "sampled",
     "table6",
+    "table6_vertical",
     "table7",
     "table7_slices",
 ]

@@ -45,6 +45,17 @@ class Ellipse:
 
 
 @dataclass(frozen=True)
+class HalfEllipse(Ellipse):
+    """The half of an ellipse before its own second axis, where that coordinate is at most 0."""
+
+    def contains(self, x: Floats, y: Floats) -> Flags:
+        """As ``Ellipse``."""
+        c, s = math.cos(self.angle_rad), math.sin(self.angle_rad)
+        across = c * (y - self.centre_m[1]) - s * (x - self.centre_m[0])
+        return super().contains(x, y) & (across <= 0.0)
+
+
+@dataclass(frozen=True)
 class EllipsePhantom:
     """Ellipses painted in order over the coupling medium; the first is the outline of the object.
 

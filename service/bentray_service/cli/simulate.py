@@ -23,6 +23,7 @@ class BreastPhantom(StrEnum):
     """The breast phantoms."""
 
     TABLE6 = "table6"
+    TABLE6_VERTICAL = "table6-vertical"
     DETAILED = "detailed"
     TABLE7 = "table7"
 
@@ -39,7 +40,8 @@ def simulate(
     phantom: Annotated[
         BreastPhantom,
         typer.Option(
-            help="2-D breast phantom (Li 2008, Table 6), 2-D with glandular texture, or 3-D (Table 7)."
+            help="2-D breast phantom (Li 2008, Table 6), its vertical slice, 2-D with glandular texture, or "
+            "3-D (Table 7)."
         ),
     ] = BreastPhantom.TABLE6,
     nodes: Annotated[int, typer.Option(help="Nodes per side of the image that the scan is made for.")] = 128,

@@ -6,7 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.phantoms import TABLE6_SIDE_M, Ellipse, EllipsePhantom, table6
+from bentray_kernels.phantoms import (
+    TABLE6_SIDE_M,
+    Ellipse,
+    EllipsePhantom,
+    HalfEllipse,
+    table6,
+    table6_vertical,
+)
 
 from ...effort import effort
 
@@ -22,6 +29,37 @@ def test_average_keeps_the_area(axes, centre, angle):
     nodes, side = 81, 2.0
     area = (phantom.speed(nodes, side) - 0.5).sum() * (side / (nodes - 1)) ** 2
     assert area == pytest.approx(np.pi * axes[0] * axes[1], rel=0.01)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, np.pi])
+def test_half_an_ellipse_is_cut_along_its_first_axis(angle):
+    whole, half = (kind((0.1, -0.05), (0.6, 0.4), 1.5, 1.0, "half", angle) for kind in (Ellipse, HalfEllipse))
+    x, y = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 20_000))
+    x, y = x + 0.1, y - 0.05
+    before = np.cos(angle) * (y + 0.05) <= np.sin(angle) * (x - 0.1)
+    np.testing.assert_array_equal(half.contains(x, y), whole.contains(x, y) & before)
+    assert 0.45 < half.contains(x, y).sum() / whole.contains(x, y).sum() < 0.55
+
+
+def test_the_vertical_slice_hangs_from_its_cut():
+    phantom = table6_vertical(1400.0)
+    image, inside = phantom.speed(128, TABLE6_SIDE_M), phantom.inside(128, TABLE6_SIDE_M)
+    x, y = np.nonzero(inside)
+    # Widest at the chest, rounded below; water above.
+    widths = [np.ptp(x[y == row]) for row in range(y.min() + 1, y.max())]
+    assert (np.diff(widths) >= 0).all()
+    assert widths[-1] > 0.7 * 127
+    assert (image[:, y.max() + 2 :] == 1400.0).all()
+    # Lesions lie in the tissue whole, and the ring of a scan around all of it.
+    tissue = phantom.ellipses[1]
+    angle = np.linspace(0.0, 2.0 * np.pi, 90)
+    for lesion in phantom.ellipses[2:]:
+        radius = max(lesion.semi_axes_m)
+        around = lesion.centre_m[0] + radius * np.cos(angle), lesion.centre_m[1] + radius * np.sin(angle)
+        assert tissue.contains(*around).all()
+    place = (np.arange(128) / 127.0 - 0.5) * TABLE6_SIDE_M
+    assert np.hypot(place[x], place[y]).max() < 0.09
+    assert phantom.speed_range() == table6().speed_range()
 
 
 def test_edges_are_blended_and_the_rest_is_exact():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6_vertical
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.request import PhantomScan
@@ -80,6 +81,17 @@ def test_bad_settings_are_named(change, field):
     with pytest.raises(InvalidInput) as refusal:
         replace(SMALL, **change)
     assert refusal.value.field == field
+
+
+def test_the_vertical_slice_is_simulated_by_its_name():
+    scan = simulate(replace(SMALL, phantom="table6-vertical"))
+    assert scan.title.startswith("2-D breast phantom (Li 2008, Table 6), vertical slice")
+    nodes = SMALL.nodes
+    expected = table6_vertical(SMALL.coupling_mps).speed(nodes, TABLE6_SIDE_M)
+    np.testing.assert_array_equal(scan.truth.sound_speed_mps, expected)
+    np.testing.assert_array_equal(scan.roi, table6_vertical().inside(nodes, TABLE6_SIDE_M))
+    with pytest.raises(InvalidInput, match="phantom"):
+        PhantomScan(phantom="table6-vertical", waveform=True)
 
 
 def test_the_detailed_breast_is_simulated_by_its_name(tmp_path):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -14,19 +16,30 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeSca
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPEED_MPS
-from bentray_kernels.phantoms import DETAILED_SIDE_M, TABLE6_SIDE_M, DetailedBreast, EllipsePhantom, table6
+from bentray_kernels.phantoms import (
+    DETAILED_SIDE_M,
+    TABLE6_SIDE_M,
+    DetailedBreast,
+    EllipsePhantom,
+    table6,
+    table6_vertical,
+)
 from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.tomography.problem import MARGIN_NODES
 
 # The memory grows with its square; more gains less than the noise of any scan.
 MAX_REFINEMENT = 64
 
-PlanePhantom = Literal["table6", "detailed"]
+PlanePhantom = Literal["table6", "table6-vertical", "detailed"]
 TITLES = {
     "table6": "2-D breast phantom (Li 2008, Table 6)",
+    "table6-vertical": "2-D breast phantom (Li 2008, Table 6), vertical slice",
     "detailed": "2-D breast phantom with glandular texture",
 }
-SIDES_M = {"table6": TABLE6_SIDE_M, "detailed": DETAILED_SIDE_M}
+SIDES_M = {"table6": TABLE6_SIDE_M, "table6-vertical": TABLE6_SIDE_M, "detailed": DETAILED_SIDE_M}
+PLANE_PHANTOMS: Mapping[str, Callable[[float], EllipsePhantom | DetailedBreast]] = MappingProxyType(
+    {"table6": table6, "table6-vertical": table6_vertical, "detailed": DetailedBreast}
+)
 
 # Of all kinds of simulated scans.
 NODES = Range(16, 1024)
@@ -38,7 +51,8 @@ class SimulationSettings:
     """A scan of a 2-D breast phantom.
 
     Attributes:
-        phantom: that of Li 2008, Table 6, or one with skin and glandular texture.
+        phantom: that of Li 2008, Table 6, in its horizontal or vertical slice, or one with skin and glandular
+            texture.
         nodes: nodes along a side of the truth image, and of the reconstruction it is meant for.
         elements: of the ring, each emitter and receiver.
         coupling_mps: speed of sound in the coupling medium around the breast, m/s.
@@ -98,7 +112,7 @@ class SimulationSettings:
 
 def plane_phantom(name: PlanePhantom, coupling_mps: float) -> EllipsePhantom | DetailedBreast:
     """A 2-D phantom in water of a speed, m/s."""
-    return table6(coupling_mps) if name == "table6" else DetailedBreast(coupling_mps)
+    return PLANE_PHANTOMS[name](coupling_mps)
 
 
 def ring_radius(side_m: float, nodes: int) -> float:

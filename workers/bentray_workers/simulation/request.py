@@ -18,7 +18,7 @@ Simulated = SimulationSettings | VolumeSimulationSettings | WaveSimulationSettin
 
 KINDS = (SimulationSettings, VolumeSimulationSettings, WaveSimulationSettings, VolumeWaveSettings)
 
-CHOICES = {"phantom": ("table6", "detailed", "table7")}
+CHOICES = {"phantom": ("table6", "table6-vertical", "detailed", "table7")}
 
 
 def range_of(name: str) -> Range:
@@ -36,7 +36,7 @@ def range_of(name: str) -> Range:
 # Settings of some kinds of scan only, and their condition.
 CONDITIONS = {
     "refinement": "waveform is false",
-    "noise_s": "phantom is table6 or detailed, and waveform is false",
+    "noise_s": "phantom is table6, table6-vertical or detailed, and waveform is false",
     "slices": "phantom is table7 and waveform is false",
     "array": "phantom is table7 and waveform is false",
     "three_d": "phantom is table7 and waveform is false",
@@ -55,10 +55,11 @@ class PhantomScan:
         InvalidInput: naming the first field that is wrong, or belongs to another kind of scan.
     """
 
-    phantom: Literal["table6", "detailed", "table7"] = setting(
+    phantom: Literal["table6", "table6-vertical", "detailed", "table7"] = setting(
         "table6",
-        "table6: 2-D breast phantom (Li 2008, Table 6); detailed: 2-D, with skin and glandular "
-        "texture, travel times only; table7: 3-D breast phantom (Li 2008, Table 7).",
+        "table6: 2-D breast phantom (Li 2008, Table 6); table6-vertical: its vertical slice, half an "
+        "ellipse, travel times only; detailed: 2-D, with skin and glandular texture, travel times only; "
+        "table7: 3-D breast phantom (Li 2008, Table 7).",
     )
     waveform: bool = setting(
         False, "Simulate waves and record traces of object and water, not travel times; of table7 in space."
@@ -105,7 +106,7 @@ class PhantomScan:
     def chosen(self) -> Simulated:
         """The settings of the scan, with defaults for absent ones."""
         kind: type[Simulated] = SimulationSettings
-        if self.waveform and self.phantom == "detailed":
+        if self.waveform and self.phantom in ("table6-vertical", "detailed"):
             raise InvalidInput("phantom", repr(self.phantom), "table6 or table7, with waveform true")
         if self.waveform:
             kind = VolumeWaveSettings if self.phantom == "table7" else WaveSimulationSettings
