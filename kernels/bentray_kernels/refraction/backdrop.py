@@ -1,4 +1,4 @@
-"""Backdrops: flat images behind the object, and their intersection with rays."""
+"""Backdrops: images behind the object, flat or on height fields, and their intersection with rays."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
+from .relief import Place, meet_relief
 
 Colours = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
 class Plane:
-    """A rectangle with a picture on it.
+    """A rectangle with a picture on it, or a height field over it.
 
     Attributes:
         centre: (3,) m.
@@ -28,6 +29,8 @@ class Plane:
         repeats: number of copies of the picture along each edge of the rectangle.
         smooth: whether colours are interpolated between pixel centres; else pixels are squares.
         endless: whether the pattern continues beyond the rectangle.
+        relief: (rows, columns), 2 × 2 or more, heights of the surface over the rectangle along right × down,
+            m, at nodes from edge to edge, bilinear between them and mirrored beyond; None: flat.
     """
 
     centre: tuple[float, float, float]
@@ -37,6 +40,7 @@ class Plane:
     repeats: float = 1.0
     smooth: bool = True
     endless: bool = False
+    relief: Floats | None = None
 
     def __post_init__(self) -> None:
         picture = self.picture
@@ -48,6 +52,13 @@ class Plane:
             raise InvalidInput("right, down", (self.right, self.down), "two perpendicular edges, m")
         if not self.repeats > 0.0:
             raise InvalidInput("repeats", self.repeats, "a number > 0")
+        relief = self.relief
+        if relief is not None and (
+            relief.ndim != 2 or min(relief.shape) < 2 or not np.isfinite(relief).all()
+        ):
+            raise InvalidInput(
+                "relief", f"shape {relief.shape}", "finite heights (rows, columns), 2 x 2 or more, m"
+            )
 
 
 def checkerboard(
@@ -71,8 +82,11 @@ class Backdrop(NamedTuple):
         frames: (planes, 4, 3): centre; across and down, divided by their squared lengths; normal.
         edges: (planes, 2) lengths of the edges, m.
         repeats: (planes,).
-        tables: (planes, 5): place of the picture's first number, rows, columns, smooth, endless.
+        tables: (planes, 8): place of the picture's first number, rows, columns, smooth, endless; place of the
+            first height, rows and columns of the relief, 0 where it is flat.
         pictures: all pictures, one after the other.
+        reliefs: all heights, one after the other, m.
+        heights: (planes, 2) between which all of a plane's heights are, with room for rounding, m.
         beyond: (3,) colour where a ray ends on no plane.
     """
 
@@ -81,6 +95,8 @@ class Backdrop(NamedTuple):
     repeats: Floats
     tables: Ints
     pictures: Colours
+    reliefs: Floats
+    heights: Floats
     beyond: Colours
 
 
@@ -92,15 +108,17 @@ def backdrop_of(planes: Sequence[Plane], beyond: ArrayLike = (0, 0, 0)) -> Backd
     """
     if not planes:
         raise InvalidInput("planes", "none", "at least one plane")
-    frames, tables, start = [], [], 0
+    frames, tables, start, height = [], [], 0, 0
     for plane in planes:
         right, down = np.asarray(plane.right), np.asarray(plane.down)
         normal = np.cross(right, down)
         frames.append(
             [plane.centre, right / (right @ right), down / (down @ down), normal / np.linalg.norm(normal)]
         )
-        tables.append([start, *plane.picture.shape[:2], plane.smooth, plane.endless])
+        relief = np.zeros((0, 0)) if plane.relief is None else plane.relief
+        tables.append([start, *plane.picture.shape[:2], plane.smooth, plane.endless, height, *relief.shape])
         start += plane.picture.size
+        height += relief.size
     edges = [[np.linalg.norm(plane.right), np.linalg.norm(plane.down)] for plane in planes]
     return Backdrop(
         np.array(frames, dtype=np.float64),
@@ -108,8 +126,21 @@ def backdrop_of(planes: Sequence[Plane], beyond: ArrayLike = (0, 0, 0)) -> Backd
         np.array([plane.repeats for plane in planes]),
         np.array(tables, dtype=np.int64),
         np.concatenate([plane.picture.ravel() for plane in planes]),
+        np.concatenate(
+            [np.zeros(0), *(np.ravel(plane.relief) for plane in planes if plane.relief is not None)]
+        ),
+        np.array(
+            [
+                _range_of(plane.relief, room)
+                for plane, room in zip(planes, 1e-6 * np.max(edges, axis=1), strict=True)
+            ]
+        ),
         np.asarray(beyond, dtype=np.uint8),
     )
+
+
+def _range_of(relief: Floats | None, room: float) -> tuple[float, float]:
+    return (0.0, 0.0) if relief is None else (float(relief.min()) - room, float(relief.max()) + room)
 
 
 @kernel
@@ -124,12 +155,19 @@ def locate(
         directions: (n, 3).
         planes: (n,), filled with the number of the plane, −1 where there is none.
         places: (n, 2), filled with the place from the plane's centre, in edges, right and down; NaN for none.
+            On a relief that of the point of the rectangle below.
     """
     for n in range(len(points)):
         nearest = np.inf
         planes[n] = -1
         places[n, 0] = places[n, 1] = np.nan
         for m in range(len(backdrop.frames)):
+            if backdrop.tables[m, 6] > 0:
+                s, u, v = _on_relief(backdrop, m, points[n], directions[n], nearest)
+                if s < nearest:
+                    nearest = s
+                    planes[n], places[n, 0], places[n, 1] = m, u, v
+                continue
             across = away = 0.0
             for axis in range(3):
                 across += directions[n, axis] * backdrop.frames[m, 3, axis]
@@ -145,6 +183,21 @@ def locate(
             if backdrop.tables[m, 4] or (abs(u) <= 0.5 and abs(v) <= 0.5):
                 nearest = s
                 planes[n], places[n, 0], places[n, 1] = m, u, v
+
+
+@kernel
+def _on_relief(backdrop: Backdrop, m: int, point: Floats, direction: Floats, nearest: float) -> Place:
+    start, rows, columns = backdrop.tables[m, 5], backdrop.tables[m, 6], backdrop.tables[m, 7]
+    heights = backdrop.reliefs[start : start + rows * columns].reshape(rows, columns)
+    u = v = w = du = dv = dw = 0.0
+    for axis in range(3):
+        offset, along = point[axis] - backdrop.frames[m, 0, axis], direction[axis]
+        u, du = u + offset * backdrop.frames[m, 1, axis], du + along * backdrop.frames[m, 1, axis]
+        v, dv = v + offset * backdrop.frames[m, 2, axis], dv + along * backdrop.frames[m, 2, axis]
+        w, dw = w + offset * backdrop.frames[m, 3, axis], dw + along * backdrop.frames[m, 3, axis]
+    low, high = backdrop.heights[m]
+    endless = backdrop.tables[m, 4] != 0
+    return meet_relief(heights, endless, (u, v, w), (du, dv, dw), low, high, nearest)
 
 
 @kernel(inline="always")

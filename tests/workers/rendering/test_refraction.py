@@ -10,6 +10,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, FringeSphere, sampled
 from bentray_workers.cluster.resources import RECONSTRUCTION
 from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.images.backdrop_card import backdrop_card
 from bentray_workers.rendering import refraction, tiles
 from bentray_workers.rendering.refraction import draw_tile, frame_of, picture_png, tile_image
 from bentray_workers.rendering.refraction_view import RefractionView
@@ -44,6 +45,26 @@ def test_without_refraction_the_backdrop_is_seen_straight(path, camera, azimuth,
     pixel = side / 32
     np.testing.assert_allclose(found[..., 0], np.tile((np.arange(48) - 23.5) * pixel, (32, 1)), atol=1e-9)
     np.testing.assert_allclose(found[..., 1], np.tile((np.arange(32) - 15.5) * pixel, (48, 1)).T, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["checkerboard", "picture"])
+def test_a_warped_backdrop_is_met_at_its_heights(path, kind):
+    view = replace(SMALL, index=(1.0,), supersampling="none", backdrop=kind)
+    warped = replace(view, backdrop=f"warped-{kind}")
+    # Parallel rays meet the surface above the same place of the rectangle.
+    np.testing.assert_allclose(whole(path, warped).position_m, whole(path, view).position_m, atol=1e-9)
+    flat, found = (whole(path, replace(one, camera="perspective")).position_m for one in (view, warped))
+    # Rays of an eye meet it where both are as far behind the eye.
+    away = (refraction.EYE_DISTANCE + view.backdrop_distance) * 0.023 * np.sqrt(3.0)
+    rise = away * (found / flat - 1.0).mean(axis=2)
+    side = 1.25 * 0.023 * (1.0 + view.backdrop_distance / refraction.EYE_DISTANCE)
+    wide = side * (backdrop_card().shape[1] / backdrop_card().shape[0] if kind == "picture" else 1.0)
+    u, v = found[..., 0] / wide, found[..., 1] / side
+    height = 0.1 * side * (1.0 - np.cos(4.0 * np.pi * u) * np.cos(4.0 * np.pi * v))
+    np.testing.assert_allclose(rise, height, atol=2e-3 * side)
+    assert np.ptp(rise) > 0.15 * side
+    bent = replace(warped, index=(1.5,), supersampling="prss")
+    assert (whole(path, bent).image != whole(path, replace(bent, backdrop=kind)).image).any()
 
 
 def test_a_ball_of_glass_bends_as_snell_says(tmp_path):

@@ -38,6 +38,8 @@ VIEW_MARGIN = 1.25
 # Distance of the eye from the centre of the volume, in its diagonals.
 EYE_DISTANCE = 2.5
 BEYOND = (90, 90, 90)
+# Of a warped backdrop: half the height of its waves, in shorter sides of the picture; nodes along each edge.
+WAVE_HEIGHT, WAVE_NODES = 0.1, 97
 
 
 class Tile(NamedTuple):
@@ -131,14 +133,21 @@ def _backdrop(scene: Scene, view: RefractionView, card: Colours | None) -> Backd
     if view.camera == "perspective":
         side *= 1.0 + distance / (EYE_DISTANCE * _diagonal(scene))
     centre = tuple((distance * ahead).tolist())
-    if view.backdrop == "checkerboard":
-        return backdrop_of(
-            [checkerboard(centre, (side * right).tolist(), (side * down).tolist(), view.squares)], BEYOND
-        )
-    picture = backdrop_card() if card is None else card
-    wide = side * picture.shape[1] / picture.shape[0]
-    edges = [tuple((length * edge).tolist()) for length, edge in ((wide, right), (side, down))]
-    return backdrop_of([Plane(centre, edges[0], edges[1], picture, endless=True)], BEYOND)
+    relief = _waves(side) if view.backdrop.startswith("warped-") else None
+    if view.backdrop.endswith("checkerboard"):
+        plane = checkerboard(centre, (side * right).tolist(), (side * down).tolist(), view.squares)
+    else:
+        picture = backdrop_card() if card is None else card
+        wide = side * picture.shape[1] / picture.shape[0]
+        edges = [tuple((length * edge).tolist()) for length, edge in ((wide, right), (side, down))]
+        plane = Plane(centre, edges[0], edges[1], picture, endless=True)
+    return backdrop_of([replace(plane, relief=relief)], BEYOND)
+
+
+def _waves(side: float) -> Floats:
+    """Heights of a wavy surface over a rectangle, m, nowhere nearer to the volume than the rectangle."""
+    u, v = np.linspace(-0.5, 0.5, WAVE_NODES)[None, :], np.linspace(-0.5, 0.5, WAVE_NODES)[:, None]
+    return np.asarray(WAVE_HEIGHT * side * (1.0 - np.cos(4.0 * np.pi * u) * np.cos(4.0 * np.pi * v)))
 
 
 def _light(view: RefractionView) -> Light:

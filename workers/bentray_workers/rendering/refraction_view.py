@@ -19,7 +19,7 @@ INDEX = Range(0.01, 100.0)
 CHOICES = {
     "filter": tuple(FILTERS),
     "camera": ("orthographic", "perspective"),
-    "backdrop": ("checkerboard", "picture"),
+    "backdrop": ("checkerboard", "picture", "warped-checkerboard", "warped-picture"),
     "supersampling": ("none", "prss", "real"),
     "mode": ("refract", "shaded"),
 }
@@ -69,7 +69,10 @@ class RefractionView:
         20.0, "Elevation of the camera above the x-y plane, degrees.", Range(-90.0, 90.0)
     )
     zoom: float = setting(1.0, "1 shows the whole volume, 2 half of it.", Range(0.05, 50.0))
-    backdrop: Literal["checkerboard", "picture"] = setting("checkerboard", "What is behind the volume.")
+    backdrop: Literal["checkerboard", "picture", "warped-checkerboard", "warped-picture"] = setting(
+        "checkerboard",
+        "What is behind the volume: a plane with a checkerboard or a picture, or the same on a wavy surface.",
+    )
     squares: int = setting(
         16, "Squares of the checkerboard across the shorter side of the picture.", Range(1, 512)
     )

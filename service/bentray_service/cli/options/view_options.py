@@ -35,7 +35,11 @@ OPTIONS = {
     ),
     "zoom": Option("--zoom", float, "1.0", "Zoom factor; 1 shows the whole volume."),
     "backdrop": Option(
-        "--backdrop", str, "checkerboard", "Backdrop: checkerboard, picture (a test image), or an image file."
+        "--backdrop",
+        str,
+        "checkerboard",
+        "Backdrop: checkerboard, picture (a test image), warped-checkerboard or warped-picture (on a wavy "
+        "surface), or an image file.",
     ),
     "squares": Option("--squares", int, "16", "Squares of the checkerboard across the shorter side."),
     "backdrop_distance": Option(
