@@ -1,0 +1,28 @@
+"""Systems of the dissertation beside ours: rays, wave fronts, images, lookups, backdrops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.terminal import Step
+
+from ._published_images import image_rows
+from ._published_pictures import backdrop_rows, lookup_rows
+from ._published_rays import front_rows, ray_rows
+
+PARTS = (
+    ("rays", lambda quick, progress: ray_rows(quick)),
+    ("wave fronts", lambda quick, progress: front_rows(quick)),
+    ("images", image_rows),
+    ("lookups", lambda quick, progress: lookup_rows(quick)),
+    ("backdrops", lambda quick, progress: backdrop_rows(quick)),
+)
+
+
+def rows(quick: bool, progress: Step) -> Iterable[Row]:
+    """One table; each row names both figures, and its goal is that ours is no worse."""
+    for number, (name, part) in enumerate(PARTS):
+        progress(number, len(PARTS), name)
+        yield from part(quick, progress)
+    progress(len(PARTS), len(PARTS), "done")
