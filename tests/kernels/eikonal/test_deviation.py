@@ -73,6 +73,22 @@ def test_as_accurate_as_the_accurate_solver_in_tissue(seed, part):
     assert error < 0.05 * plain
 
 
+@given(part=st.tuples(st.floats(0.2, 0.8), st.floats(0.2, 0.8)), slope=st.floats(0.01, 0.03))
+@settings(deadline=None)
+def test_exact_in_a_constant_gradient_around_the_source(part, slope):
+    """The times of the first nodes decide about all later ones; the exact time is known."""
+    shape = (41, 41)
+    speed = WATER * (1.0 + slope * np.arange(41.0))[:, None] * np.ones(41)
+    source = place(shape, part)
+    at_source, per_metre = WATER * (1.0 + slope * source[0] / SPACING), WATER * slope / SPACING
+    squared = distances(shape, source) ** 2
+    exact = np.arccosh(1.0 + 0.5 * per_metre**2 * squared / (at_source * speed)) / per_metre
+    error = (factored_sweeping(PointSource.checked(speed, SPACING, source)) - exact) * at_source / SPACING
+    near = squared < (3.0 * SPACING) ** 2
+    assert np.abs(error[near]).max() < 0.05 * slope + 5e-4
+    assert np.abs(error).mean() < 6e-3
+
+
 @given(seed=st.integers(0, 2**32 - 1), shape=SHAPES, part=PARTS)
 @settings(max_examples=effort(20, 40), deadline=None)
 def test_rough_media_give_times_that_can_be(seed, shape, part):

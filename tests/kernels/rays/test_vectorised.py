@@ -66,6 +66,20 @@ def test_rays_through_water_are_straight(seed, count):
     assert np.allclose(weights[0], 2.0 * weights[1], rtol=1e-4, atol=1e-6)
 
 
+@pytest.mark.parametrize("shape", [(7, 5), (2, 2), (2, 6), (5, 2)])
+def test_slopes_of_a_plane_are_exact_at_every_node_and_those_of_a_parabola_inside(shape):
+    i, j = np.indices(shape).astype(float)
+    slowness = 1.0 + 0.1 * i + 0.01 * j
+    plane = interleaved(0.5 + 3.0 * i - 2.0 * j, slowness).reshape(*shape, 4)
+    assert np.allclose(plane[..., 0], 3.0)
+    assert np.allclose(plane[..., 1], -2.0)
+    assert np.allclose(plane[..., 2], slowness)
+    assert not plane[..., 3].any()
+    bowl = interleaved(0.5 * i**2 - 1.5 * j**2, slowness).reshape(*shape, 4)
+    assert np.allclose(bowl[1:-1, :, 0], i[1:-1])
+    assert np.allclose(bowl[:, 1:-1, 1], -3.0 * j[:, 1:-1])
+
+
 def tissue():
     """Slowness over that of the source, and the rays' ends."""
     x, y = np.meshgrid(*(np.linspace(-1.0, 1.0, n) for n in SHAPE), indexing="ij")

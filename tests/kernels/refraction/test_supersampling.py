@@ -65,6 +65,25 @@ def test_a_higher_degree_comes_closer_to_the_mean_over_the_pixel():
     assert errors[0] > errors[1] > errors[2] > errors[3]
 
 
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_samples_of_an_undistorted_view_are_those_of_real_supersampling(degree):
+    """A turned and sheared board: between places on a plane grid bilinear interpolation is exact."""
+    n, times = 24, 2 * degree + 1
+
+    def view(row, column):
+        i, j = np.meshgrid(row, column, indexing="ij")
+        return np.stack((0.013 + 0.041 * j + 0.017 * i, -0.021 + 0.032 * i - 0.008 * j), axis=-1)
+
+    still = np.zeros((n, n), dtype=np.int8), view(np.arange(n), np.arange(n)), np.zeros((n, n), np.int16)
+    fine = (np.arange(n * times) - degree) / times
+    samples = points(BOARD, np.zeros((n * times,) * 2, np.int8), view(fine, fine))
+    image = post(BOARD, *still, degree)
+    assert len(np.unique(image)) > times
+    np.testing.assert_allclose(
+        image[1:-1, 1:-1].astype(int), averaged(samples, times)[1:-1, 1:-1].astype(int), atol=1
+    )
+
+
 def test_no_interpolation_between_different_hits():
     planes, places, crossed = regular(8, 1.0)
     crossed[:, 4:] = 2

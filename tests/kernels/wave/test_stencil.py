@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.wave.medium import Medium
+from bentray_kernels.wave.medium import Medium, _sponge
 from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import HALO, longest_step, numerical_frequency, phase_error, symbol, weights
 
@@ -70,6 +70,45 @@ def grown(factor):
 def test_the_limit_of_stability_is_sharp():
     assert grown(0.999) < 1.0
     assert grown(1.02) > 1e3
+
+
+@given(
+    speed=st.floats(300.0, 6000.0),
+    spacing=st.floats(1e-5, 1e-2),
+    lost=st.floats(0.0, 20.0),
+    dimensions=st.sampled_from([2, 3]),
+)
+def test_the_limit_with_damping_is_where_the_shortest_wave_begins_to_grow(speed, spacing, lost, dimensions):
+    """Von Neumann: the two factors per step of the shortest mode lie in the unit circle up to the limit."""
+    damping = lost * speed / spacing
+    limit = longest_step(speed, spacing, damping, dimensions)
+
+    def growth(step):
+        turn = damping * step
+        curvature = dimensions * float(symbol(np.array(math.pi))) * (speed * step / spacing) ** 2
+        # next = keep·now − fade·before − drive·S·now, as ``Medium`` defines them.
+        now = (2.0 - turn**2 - curvature) / (1.0 + turn)
+        return np.abs(np.roots([1.0, -now, (1.0 - turn) / (1.0 + turn)])).max()
+
+    assert growth(0.999 * limit) <= 1.0 + 1e-9
+    assert growth(1.001 * limit) > 1.0 + 1e-6
+
+
+def test_a_lossy_medium_at_its_limit_stays_bounded():
+    """Strong absorption shortens the longest step, and the medium accepts no longer one."""
+    spacing, attenuation = 1e-3, np.full((30, 30), 1e4)
+    damping = 1500.0 * (1e4 + _sponge((30, 30), 20).max() / spacing)
+    longest = longest_step(1500.0, spacing, damping)
+    assert longest < 0.5 * longest_step(1500.0, spacing)
+    step = 0.99 * longest
+    medium = Medium.of(
+        np.full((30, 30), 1500.0), spacing, step, attenuation=attenuation, edge_nodes=20, dtype=np.float64
+    )
+    wavelet = np.exp(-((np.arange(400) - 80.0) ** 2) / 400.0)
+    at = np.array([[0.012, 0.013]])
+    assert np.abs(simulate(medium, at[0], at, wavelet)).max() < 10.0
+    with pytest.raises(InvalidInput, match="time_step_s"):
+        Medium.of(np.full((30, 30), 1500.0), spacing, 1.5 * longest, attenuation=attenuation)
 
 
 def measured_lag(points):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels.acquisition.picking.cross_correlation import match_pulse
 from bentray_kernels.acquisition.picking.differential import MIN_CORRELATION
-from bentray_kernels.acquisition.picking.onset import aic, prepare, threshold
+from bentray_kernels.acquisition.picking.onset import AIC_FLOOR, aic, prepare, threshold
 from bentray_kernels.acquisition.picking.pickers import AIC, ENERGY_RATIO, STA_LTA, THRESHOLD, onset
 
 from ....effort import effort
@@ -66,6 +66,24 @@ def test_silence_has_no_onset(picker):
 def test_an_onset_at_the_rim_of_the_window_is_none():
     assert np.isnan(threshold(trace(50.0), 50, 60, 0.0))
     assert np.isnan(aic(trace(50.0), 50, 54))
+
+
+@given(seed=st.integers(0, 2**32 - 1), offset=st.floats(-5.0, 5.0), place=st.floats(70.0, 130.0))
+@settings(deadline=None)
+def test_aic_is_the_split_of_the_lowest_criterion_whatever_the_offset(seed, offset, place):
+    """Maeda's criterion by NumPy's variances, which do not contain the mean."""
+    begin, end = 20, 180
+    noisy = trace(place) + offset + 0.05 * np.random.default_rng(seed).standard_normal(200)
+    part, n = noisy[begin:end], end - begin
+    floor = (AIC_FLOOR * np.abs(part).max()) ** 2
+    ks = np.arange(2, n - 1)
+    criterion = np.array(
+        [k * np.log(part[:k].var() + floor) + (n - k) * np.log(part[k:].var() + floor) for k in ks]
+    )
+    lowest = int(criterion.argmin())
+    low, middle, high = criterion[lowest - 1 : lowest + 2]
+    fraction = 0.5 * (low - high) / (low - 2.0 * middle + high)
+    assert aic(noisy, begin, end) == pytest.approx(begin + ks[lowest] + fraction, abs=1e-6)
 
 
 def test_offset_and_noise_come_from_before_the_arrival():

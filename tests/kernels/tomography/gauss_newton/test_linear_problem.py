@@ -90,6 +90,22 @@ def test_an_image_without_slopes_gets_plain_total_variation():
     assert np.array_equal(plain, flat)
 
 
+@pytest.mark.parametrize("edge", [np.inf, 2.0, 0.25, 0.05])
+def test_an_edge_loses_the_height_that_its_logarithm_costs(edge):
+    """Two plateaus, seen node by node. Each moves towards the other by the weight of the edge over its width.
+
+    Σ ½(u − data)² + weight·|step of u|, summed over a plateau: width·(u − data) = ±weight; the weight is the
+    slope of strength·edge·log(1 + |step|/edge), strength/(1 + |step|/edge).
+    """
+    width, strength, step = 3, 0.6, 1.0
+    plateaus = np.repeat([0.0, step], width)[:, None] * np.ones(4)
+    seen = rows_of(eye_array(plateaus.size, dtype=np.float32), np.zeros(plateaus.size))
+    asked = Linearised([seen], plateaus, 1.0, np.ones(plateaus.shape, bool), (-9.0, 9.0), strength, edge=edge)
+    lost = strength / (1.0 + step / edge) / width
+    expected = np.repeat([lost, step - lost], width)[:, None] * np.ones(4)
+    assert np.abs(settled(asked) - expected).max() < 0.02 * lost
+
+
 def second_differences(shape):
     """Of an image of two axes, as a matrix."""
 

@@ -90,6 +90,9 @@ def test_bounds_hold_and_weights_sum_to_one():
     work = EmitterPass.for_grid(SHAPE, 1)
     work.sums[0::2], work.sums[1::2] = 1.0, 1.0
     after, _ = moved(work, image(), 1.0)
-    assert after[REGION].max() == BOUNDS[1]
+    assert after[REGION].min() == after[REGION].max() == BOUNDS[1]
+    work.sums[0::2], work.sums[1::2] = -1.0, 1.0
+    after, _ = moved(work, image(), 1.0)
+    assert after[REGION].min() == after[REGION].max() == BOUNDS[0]
     assert gaussian(0.0).tolist() == [1.0]
     assert 2.0 * gaussian(1.7).sum() - gaussian(1.7)[0] == pytest.approx(1.0)

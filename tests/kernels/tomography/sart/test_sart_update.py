@@ -11,7 +11,7 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
 from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart.sart_step import advance, begin
-from bentray_kernels.tomography.sart.sart_update import propagation_speed
+from bentray_kernels.tomography.sart.sart_update import propagation_speed, update_for
 
 NODES, WATER = 64, 1375.0
 PHANTOM = table6(WATER)
@@ -29,6 +29,20 @@ def plan(**changes):
     return Settings.of(
         **{"method": "sart", "nodes": NODES, "side_m": TABLE6_SIDE_M, "iterations": 2, **changes}
     )
+
+
+@pytest.mark.parametrize("eikonal", [{}, {"eikonal": "accurate"}], ids=["compiled", "traced"])
+@pytest.mark.parametrize(("wrong_s", "end"), [(-1e-3, 1), (1e-3, 0)], ids=["too early", "too late"])
+def test_impossible_times_move_the_image_to_its_bounds_and_no_further(scan, eikonal, wrong_s, end):
+    wanted = plan(speed_bounds_mps=(1300.0, 1600.0), relaxation=1.0, **eikonal)
+    problem = Problem.of(replace(scan, delta_tof_s=scan.delta_tof_s + wrong_s), wanted)
+    slowness, coverage = initial_slowness(problem, None), np.zeros(problem.region.shape)
+    before = slowness.copy()
+    update_for(problem, wanted)(slowness, coverage, np.arange(8), 0)
+    passed = problem.region & (coverage > 0.0)
+    assert passed.sum() > 0.3 * problem.region.sum()
+    assert np.allclose(1.0 / slowness[passed], (1300.0, 1600.0)[end], rtol=1e-12)
+    assert np.array_equal(slowness[~problem.region], before[~problem.region])
 
 
 def test_data_driven_update_stretches_the_range():
