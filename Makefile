@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start hundreds of Python processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint docs bench lock clean
+.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint docs bench mutants lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -49,6 +49,9 @@ docs: install-docs ## build the documentation into build/docs; warnings are erro
 bench: install ## run the benchmark NAME; NAME=reconstruction ARGS=--quick
 	@mkdir -p build/bench
 	@$(BIN)/bentray bench $(NAME) $(ARGS) --json build/bench/$(NAME).json
+
+mutants: install-tests ## plant faults in the numerics one at a time and run the nearest tests (hours); ARGS="--count 20" narrows it
+	@PYTHONPATH=tests $(BIN)/python -m mutation $(ARGS)
 
 lock: ## update the lock files (needs uv on the PATH)
 	@command -v uv >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
