@@ -29,7 +29,7 @@ from bentray_service.cli.output.benchmark_row import Row
 from ..eikonal.eikonal import alternate
 from ..geometry_field._field_rays import build_outer_field
 from ..geometry_field._geometry_scenes import landscape
-from ..refraction._glass import BEHIND, DOWN, FRONT, RIGHT, ball, glass
+from ..refraction._glass import BEHIND, DOWN, FRONT, RIGHT, ball, glass, waves
 
 FACES, SAMPLES, IMAGE = 20_000, 24, 513
 SQUARES, SMOOTH = 24, "B-spline 3, smooth λ = 1"
@@ -75,12 +75,6 @@ def lookup_rows(quick: bool) -> Iterable[Row]:
 def board(relief: np.ndarray | None) -> Backdrop:
     """The checkerboard of chapter 3, flat or warped."""
     return backdrop_of([replace(checkerboard(BEHIND, RIGHT, DOWN, SQUARES), relief=relief)])
-
-
-def waves(nodes: int = 97) -> np.ndarray:
-    """Heights of a wavy backdrop, a tenth of its edge."""
-    u, v = np.meshgrid(np.linspace(-0.5, 0.5, nodes), np.linspace(-0.5, 0.5, nodes))
-    return 0.2 * (1.0 - np.cos(4.0 * np.pi * u) * np.cos(4.0 * np.pi * v))
 
 
 def backdrop_rows(quick: bool) -> Iterable[Row]:

@@ -127,3 +127,9 @@ def hills(pixels: int = 256) -> Plane:
         ridge = 0.5 + 0.14 * k + 0.06 * np.sin((5 + 3 * k) * across + 2 * k) + 0.02 * np.sin(31 * across + k)
         image[down > ridge] = colour
     return Plane(BEHIND, RIGHT, DOWN, image.astype(np.uint8))
+
+
+def waves(nodes: int = 97) -> np.ndarray:
+    """Heights of a wavy backdrop, a tenth of its edge."""
+    u, v = np.meshgrid(np.linspace(-0.5, 0.5, nodes), np.linspace(-0.5, 0.5, nodes))
+    return 0.2 * (1.0 - np.cos(4.0 * np.pi * u) * np.cos(4.0 * np.pi * v))

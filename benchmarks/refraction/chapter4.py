@@ -1,4 +1,4 @@
-"""Figures 17 to 22 of the dissertation on our volumes, in one picture, and the times of its Table 1."""
+"""Figures 17 to 22 of the dissertation on our volumes, and Tables 1 to 3 where volumes made here stand in."""
 
 from __future__ import annotations
 
@@ -6,13 +6,22 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from bentray_kernels.refraction import Backdrop, Plane, backdrop_of, checkerboard
+from bentray_kernels.refraction import (
+    Backdrop,
+    Plane,
+    backdrop_of,
+    checkerboard,
+    orthographic,
+    perspective,
+)
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.atomic import write_bytes
 
 from ..shared._contact_sheet import Panel, sheet
-from ._glass import ball, breast, drawn, glass, hills
+from ._glass import BEHIND, DOWN, RIGHT, ball, breast, drawn, glass, hills, waves
+from ._refraction_ladders import cells, ladder
+from ._stand_ins import ISO, stand_ins
 
 PICTURE = Path(__file__).parents[1] / "results" / "chapter4.png"
 
@@ -21,6 +30,9 @@ SMOOTH = "B-spline 3, smooth λ = 1"
 # Seconds of Table 1: without supersampling, with four rays a pixel, after refraction.
 TABLE1 = {"Catmull-Rom": (7.63, 28.02, 7.72), SMOOTH: (6.65, 26.83, 6.71)}
 WAYS = {"none": ("one ray a pixel", 1), "real": ("four rays a pixel", 2), "prss": ("after refraction", 1)}
+
+# Of whole volumes.
+WIDER = orthographic((0.0, 0.0, -3.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), 2.3)
 
 # m/s: where the fat of the breast begins, and its tissue.
 FAT, TISSUE = 1420.0, 1490.0
@@ -44,6 +56,11 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             yield Row(label, extra, 1.05 if way == "prss" else 5.0, "<=", "", detail)
     if quick:
         return
+    subjects = stand_ins()
+    for k, subject in enumerate(subjects):
+        progress(k, len(subjects), subject.name)
+        yield from cells(subject)
+        yield from ladder(subject, 3)
     landscape = backdrop_of([hills()])
     balls = [
         Panel(words, drawn(glass(ball(n), SMOOTH))[0])
@@ -53,6 +70,9 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         Panel(words, drawn(glass(ball(2), SMOOTH), backdrop=behind)[0])
         for words, behind in backdrops().items()
     ]
+    wavy = backdrop_of([replace(checkerboard(BEHIND, RIGHT, DOWN, 24), relief=4.0 * waves())])
+    eye = perspective((0.0, 0.0, -3.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 32.0)
+    balls.append(Panel("a warped checkerboard", drawn(glass(ball(1), SMOOTH), backdrop=wavy, camera=eye)[0]))
     nested = [
         Panel("core 1.2, shell 1.5", drawn(glass(ball(), SMOOTH, (60.0, 200.0), (1.0, 1.5, 1.2)))[0]),
         Panel("core 1.8, shell 1.2", drawn(glass(ball(), SMOOTH, (60.0, 200.0), (1.0, 1.2, 1.8)))[0]),
@@ -64,6 +84,14 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         progress(len(medical), 6, f"breast, {name}")
         scene = glass(breast(), name, (FAT, TISSUE), (1.0, 1.15, 1.4))
         medical.append(Panel(name, drawn(scene)[0]))
+    # Looked at along z.
+    upright = {"head": subjects[0].volume.transpose(0, 2, 1), "lobster": subjects[1].volume[:, ::-1]}
+    replaced = []
+    for what, volume in upright.items():
+        for name in ("central difference", SMOOTH):
+            progress(len(replaced), 4, f"{what}, {name}")
+            scene = glass(volume, name, (ISO,), (1.0, 1.2))
+            replaced.append(Panel(f"{what}, {name}", drawn(scene, camera=WIDER)[0]))
     photo = [
         Panel("ball", drawn(glass(ball(), SMOOTH), backdrop=landscape)[0]),
         Panel("ball with a hole", drawn(glass(ball(1), SMOOTH), backdrop=landscape)[0]),
@@ -78,7 +106,8 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             ("Figure 17: two filters, three ways to sample", panels17),
             ("Figure 18: holes of air, and other backdrops", balls),
             ("Figure 19: layers of different index", nested),
-            ("Figures 20 and 21: a breast of sound speeds as glass", medical),
+            ("Figure 20: a breast of sound speeds as glass", medical),
+            ("Figure 21: a head and a lobster made here, not the published volumes", replaced),
             ("Figure 22: before a landscape", photo),
         ]
     )

@@ -1,4 +1,7 @@
-"""Contact sheet of small images in rows, with their names."""
+"""Contact sheet of small images in rows, with their names, in few colours.
+
+For renderings alone: a picture with a colour bar is drawn in full colour, by ``_small_png``.
+"""
 
 from __future__ import annotations
 

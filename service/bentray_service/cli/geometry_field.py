@@ -38,6 +38,7 @@ def geometry_field(
     """
     source, folder = input_file(mesh, ACCEPTED), output_folder(output)
     settings, view = options.settings(), options.view()
+    view.check_samples(settings.samples)
 
     from bentray_service.rows.ids import field_of
     from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh

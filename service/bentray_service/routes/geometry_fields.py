@@ -44,6 +44,7 @@ async def image_png(
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
     field = await run_in_threadpool(service.geometry_fields.get, tenant, field_id)
+    view.check_samples(field["settings"]["samples"])
     folder = service.files.of(tenant).field(field["id"])
     return await picture(
         request, field, view.plain(), lambda: service.pictures.field_png(tenant, field, folder, view)

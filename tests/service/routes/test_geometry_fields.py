@@ -18,6 +18,7 @@ from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.mesh import StoredMesh, write_mesh
+from bentray_workers.rendering import field_view
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.geometry_field import build_field, bytes_of
@@ -129,6 +130,17 @@ def test_every_parameter_changes_the_tag(http, here):
         assert answer.status_code == 200, answer.text
         tags.add(answer.headers["etag"])
     assert len(tags) == len(OTHER) + 1
+
+
+def test_published_lookups_are_drawn_or_rejected(http, here, monkeypatch):
+    query = {**SMALL, "lookup": "uv-linear", "eye": "uv-nearest"}
+    pictures = [http.get(f"{here}/image.png", params=one) for one in (SMALL, query)]
+    assert [one.status_code for one in pictures] == [200, 200]
+    assert pictures[0].content != pictures[1].content
+    monkeypatch.setattr(field_view, "MAX_REFERENCE_SAMPLES", 3)
+    answer = http.get(f"{here}/image.png", params=query)
+    assert answer.status_code == 422
+    assert "samples" in answer.text
 
 
 @pytest.mark.parametrize("name", ["image.png", "geometry-image.png", "normal-map.png"])

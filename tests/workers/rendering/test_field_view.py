@@ -10,6 +10,14 @@ from bentray_workers.rendering.field_view import CHOICES, LOOKUPS, FieldView
 WITHIN = {name: (within.least, within.most) for name, within in ranges_of(FieldView).items()}
 
 
+def test_published_lookups_have_a_largest_number_of_samples():
+    FieldView().check_samples(48)
+    FieldView(eye="uv-linear").check_samples(24)
+    for name in ("lookup", "eye"):
+        with pytest.raises(InvalidInput, match="samples"):
+            FieldView(**{name: "uv-nearest"}).check_samples(25)
+
+
 def test_every_field_is_checked():
     assert set(CHOICES) | set(WITHIN) == set(FieldView().plain())
     assert set(LOOKUPS.values()) <= set(WAYS)

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.geometry_field.tables.reference_field import MAX_REFERENCE_SAMPLES
 from bentray_kernels.ranges import Range
 from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
 
@@ -93,6 +94,15 @@ class FieldView:
     def reads_image(self) -> bool:
         """Whether hits are read from the geometry image."""
         return self.lookup.startswith("uv-") or self.eye.startswith("uv-")
+
+    def check_samples(self, samples: int) -> None:
+        """Reject the published lookups for a field with too many samples.
+
+        Raises:
+            InvalidInput: naming ``samples``.
+        """
+        if self.reads_image and samples > MAX_REFERENCE_SAMPLES:
+            raise InvalidInput("samples", samples, f"at most {MAX_REFERENCE_SAMPLES}, for lookups of (u, v)")
 
     def plain(self) -> dict[str, Any]:
         """The fields as JSON values."""
