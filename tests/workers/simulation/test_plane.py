@@ -90,8 +90,6 @@ def test_the_vertical_slice_is_simulated_by_its_name():
     expected = table6_vertical(SMALL.coupling_mps).speed(nodes, TABLE6_SIDE_M)
     np.testing.assert_array_equal(scan.truth.sound_speed_mps, expected)
     np.testing.assert_array_equal(scan.roi, table6_vertical().inside(nodes, TABLE6_SIDE_M))
-    with pytest.raises(InvalidInput, match="phantom"):
-        PhantomScan(phantom="table6-vertical", waveform=True)
 
 
 def test_the_detailed_breast_is_simulated_by_its_name(tmp_path):

@@ -11,7 +11,7 @@ from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.request import CONDITIONS, PhantomScan
 from bentray_workers.simulation.volume import VolumeSimulationSettings
 from bentray_workers.simulation.volume_waves import VolumeWaveSettings
-from bentray_workers.simulation.waves import WaveSimulationSettings
+from bentray_workers.simulation.waves import VerticalWaveSettings, WaveSimulationSettings
 
 SIZES = {"nodes": st.integers(16, 1024), "elements": st.integers(8, 4096), "seed": st.integers(0, 2**40)}
 NOISE = {"snr": st.none() | st.floats(0.1, 1e6), "coupling_mps": st.floats(1300.0, 1700.0)}
@@ -46,6 +46,9 @@ def test_request_selects_the_phantom():
     assert PhantomScan(phantom="table7").chosen() == VolumeSimulationSettings()
     waves = PhantomScan(waveform=True, nodes=256, elements=128).chosen()
     assert waves == WaveSimulationSettings()
+    upright = PhantomScan(phantom="table6-vertical", waveform=True, nodes=256, elements=128).chosen()
+    assert upright == VerticalWaveSettings() != waves
+    assert PhantomScan(phantom="table6-vertical").chosen() == SimulationSettings(phantom="table6-vertical")
     in_space = PhantomScan(phantom="table7", waveform=True, nodes=256, elements=128).chosen()
     assert in_space == VolumeWaveSettings()
 

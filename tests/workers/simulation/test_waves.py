@@ -1,6 +1,6 @@
 """2-D wave simulation: arrivals, reciprocity, noise, dispersion, rejected settings."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import pytest
 from bentray_kernels.acquisition import pick
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.simulation.simulation_run import simulate
-from bentray_workers.simulation.waves import HIGHEST, Noise, WaveSimulationSettings
+from bentray_workers.simulation.waves import HIGHEST, Noise, VerticalWaveSettings, WaveSimulationSettings
 
 SMALL = WaveSimulationSettings(frequency_hz=3e5, side_m=0.05, elements=24, emissions=6, nodes=32)
 
@@ -42,6 +42,22 @@ def test_the_object_is_picked_slower_than_water_through_fat(scan):
     across = delta[0, np.argsort(scan.distance_m()[0])[-5:]]
     assert (across[np.isfinite(across)] > 1e-7).all()
     assert np.isfinite(across).any()
+
+
+def test_the_vertical_slice_has_water_above_the_chest(scan):
+    upright = VerticalWaveSettings(**asdict(SMALL))
+    found = simulate(upright)
+    assert found.title.startswith("2-D breast phantom (Li 2008, Table 6), vertical slice, 50 mm")
+    np.testing.assert_array_equal(found.waveform.water, scan.waveform.water)
+    assert (found.truth.sound_speed_mps[:, -8:] == SMALL.coupling_mps).all()
+    # From an element at the top to the next one the direct wave does not pass the object.
+    at = found.element_position_m
+    top = np.argsort(at[found.tx][:, 1])[-1]
+    beside = np.argsort(np.linalg.norm(at - at[found.tx[top]], axis=1))[1]
+    one, water = found.waveform.object[top, beside], found.waveform.water[top, beside]
+    peak = np.abs(water).argmax() + 1
+    assert np.abs(one[:peak] - water[:peak]).max() < 5e-3 * np.abs(water).max()
+    assert np.abs(one - water).max() > 1e-2 * np.abs(water).max()
 
 
 def test_noise_has_the_requested_size(scan):

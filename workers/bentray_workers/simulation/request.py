@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from types import MappingProxyType
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
@@ -12,9 +14,14 @@ from bentray_kernels.request_fields import check, setting
 from .plane import SimulationSettings
 from .volume import VolumeSimulationSettings
 from .volume_waves import VolumeWaveSettings
-from .waves import EMISSIONS, WaveSimulationSettings
+from .waves import EMISSIONS, VerticalWaveSettings, WaveSimulationSettings
 
 Simulated = SimulationSettings | VolumeSimulationSettings | WaveSimulationSettings
+
+# Waves through each phantom that has them.
+WAVES: Mapping[str, type[WaveSimulationSettings]] = MappingProxyType(
+    {"table6": WaveSimulationSettings, "table6-vertical": VerticalWaveSettings, "table7": VolumeWaveSettings}
+)
 
 KINDS = (SimulationSettings, VolumeSimulationSettings, WaveSimulationSettings, VolumeWaveSettings)
 
@@ -58,8 +65,8 @@ class PhantomScan:
     phantom: Literal["table6", "table6-vertical", "detailed", "table7"] = setting(
         "table6",
         "table6: 2-D breast phantom (Li 2008, Table 6); table6-vertical: its vertical slice, half an "
-        "ellipse, travel times only; detailed: 2-D, with skin and glandular texture, travel times only; "
-        "table7: 3-D breast phantom (Li 2008, Table 7).",
+        "ellipse; detailed: 2-D, with skin and glandular texture, travel times only; table7: 3-D breast "
+        "phantom (Li 2008, Table 7).",
     )
     waveform: bool = setting(
         False, "Simulate waves and record traces of object and water, not travel times; of table7 in space."
@@ -106,10 +113,12 @@ class PhantomScan:
     def chosen(self) -> Simulated:
         """The settings of the scan, with defaults for absent ones."""
         kind: type[Simulated] = SimulationSettings
-        if self.waveform and self.phantom in ("table6-vertical", "detailed"):
-            raise InvalidInput("phantom", repr(self.phantom), "table6 or table7, with waveform true")
+        if self.waveform and self.phantom == "detailed":
+            raise InvalidInput(
+                "phantom", repr(self.phantom), "table6, table6-vertical or table7, with waveform true"
+            )
         if self.waveform:
-            kind = VolumeWaveSettings if self.phantom == "table7" else WaveSimulationSettings
+            kind = WAVES[self.phantom]
         elif self.phantom == "table7":
             kind = VolumeSimulationSettings
         known = {one.name for one in fields(kind)}

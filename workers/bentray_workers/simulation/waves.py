@@ -17,7 +17,7 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPEED_MPS
-from bentray_kernels.phantoms import TABLE6_SIDE_M, EllipsePhantom, table6
+from bentray_kernels.phantoms import TABLE6_SIDE_M, EllipsePhantom, table6, table6_vertical
 from bentray_kernels.phantoms.volume import PhantomSlice
 from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.wave.medium import Medium
@@ -167,6 +167,18 @@ class WaveSimulationSettings:
     def senders(self) -> NDArray[np.int64]:
         """Emitting elements, (emissions,)."""
         return np.arange(self.emissions) * self.elements // self.emissions
+
+
+@dataclass(frozen=True)
+class VerticalWaveSettings(WaveSimulationSettings):
+    """As ``WaveSimulationSettings`` in the vertical slice of the phantom."""
+
+    phantom_name: ClassVar[str] = "2-D breast phantom (Li 2008, Table 6), vertical slice"
+
+    @property
+    def phantom(self) -> EllipsePhantom:
+        """The half ellipse in the plane of the ring."""
+        return table6_vertical(self.coupling_mps)
 
 
 class Noise:
