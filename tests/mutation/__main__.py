@@ -24,8 +24,8 @@ from .trial import Outcome, copy_of, replace_text, run_tests
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# Seconds for compilation, and factor for tests that a fault makes slower, before a fault counts as found.
-COMPILATION_S, SLOWER = 240.0, 4.0
+# Processor seconds of one run of tests, compilation included; a fault that takes longer counts as found.
+LIMIT_S = 75.0
 
 # Imported once, before the first process is forked.
 LIBRARIES = (
@@ -53,6 +53,8 @@ def main() -> None:
     if wanted.only:
         sampled = [(module, fault) for module, fault in sampled if wanted.only in module]
     left = [one for one in sampled if _is_left(done.get(key(entry(*one))), wanted)]
+    # Those with little to run first: a run that is ended early has tried more.
+    left.sort(key=lambda one: sum((ROOT / file).stat().st_size for file in near(ROOT, one[0])))
     print(f"{len(sampled)} faults, {len(left)} of them to try; state in {wanted.file}", flush=True)
     if wanted.list:
         for module, fault in left:
@@ -66,7 +68,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="bentray-mutants-") as scratch:
         trials = Trials(Path(scratch))
         for number, (module, fault) in enumerate(left, 1):
-            found = trials.of(module, fault, everything=wanted.wide or wanted.survivors)
+            found = trials.of(module, fault, everything=wanted.wide)
             done[key(found)] = found
             print(
                 f"{number}/{len(left)} {found['outcome']:8} {found['seconds']:5.0f} s  "
@@ -98,13 +100,12 @@ class Trials:
     """Faults tried one after the other in copies of the sources.
 
     Attributes:
-        clean: the copy without a fault, whose kernels are compiled once.
-        seconds: of the nearest tests without a fault, by module.
+        clean: the copy without a fault, in which tests that found one are confirmed.
     """
 
     def __init__(self, scratch: Path) -> None:
         self.clean, self.damaged = scratch / "clean", scratch / "damaged"
-        self.seconds: dict[tuple[str, ...], float] = {}
+        self.confirmed: dict[tuple[str, ...], Outcome] = {}
         copy_of(ROOT, self.clean)
         for path in self.clean.rglob("*"):
             # Not the files of the working tree, which an editor may change in place.
@@ -112,14 +113,15 @@ class Trials:
                 replace_text(path, path.read_text(encoding="utf-8"))
 
     def of(self, module: str, fault: Fault, *, everything: bool) -> dict[str, Any]:
-        """The entry of a fault with its outcome: killed, survived or equivalent."""
+        """The entry of a fault with its outcome: killed or survived."""
         found = entry(module, fault)
-        stages = [near(self.clean, module)] + ([wide(self.clean, module)] if everything else [])
+        files = near(self.clean, module)
+        stages = [files, *([one] for one in wide(self.clean, module))] if everything else [files]
         seconds = 0.0
-        for files in filter(None, stages):
-            outcome = self._try(module, fault, files)
+        for stage in stages:
+            outcome = self._try(module, fault, stage)
             seconds += outcome.seconds
-            if outcome.ended != "passed":
+            if outcome.ended in ("failed", "timeout"):
                 found |= {"outcome": "killed", "by": outcome.test or outcome.ended}
                 break
         else:
@@ -127,18 +129,28 @@ class Trials:
         return found | {"seconds": round(seconds, 1)}
 
     def _try(self, module: str, fault: Fault, files: list[str]) -> Outcome:
-        known = tuple(files)
-        if known not in self.seconds:
-            plain = run_tests(self.clean, files, 1800.0, fast=False)
-            if plain.ended not in ("passed", "no tests"):
-                log = (self.clean / "tests.log").read_text(encoding="utf-8", errors="replace")
-                raise SystemExit(f"without a fault {' '.join(files)} {plain.ended}:\n{log[-4000:]}")
-            self.seconds[known] = plain.seconds
         copy_of(self.clean, self.damaged)
         path = self.damaged / PACKAGE / module
         replace_text(path, fault.planted(path.read_text(encoding="utf-8")))
-        outcome = run_tests(self.damaged, files, COMPILATION_S + SLOWER * self.seconds[known], fast=True)
-        return Outcome("passed", "", outcome.seconds) if outcome.ended == "no tests" else outcome
+        outcome = run_tests(self.damaged, files, LIMIT_S)
+        if outcome.ended in ("failed", "timeout"):
+            self._confirm([outcome.test] if outcome.test else files)
+        return outcome
+
+    def _confirm(self, tests: list[str]) -> None:
+        """What failed with a fault must pass without, in less time.
+
+        Raises:
+            SystemExit: if not; then a test of this working tree fails, or is too slow.
+        """
+        known = tuple(tests)
+        if known not in self.confirmed:
+            self.confirmed[known] = run_tests(self.clean, tests, 0.6 * LIMIT_S)
+        if self.confirmed[known].ended != "passed":
+            log = (self.clean / "tests.log").read_text(encoding="utf-8", errors="replace")
+            raise SystemExit(
+                f"without a fault {' '.join(tests)} {self.confirmed[known].ended}:\n{log[-4000:]}"
+            )
 
 
 def save(file: Path, seed: int, faults: list[dict[str, Any]]) -> None:

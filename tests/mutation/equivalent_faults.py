@@ -2,5 +2,19 @@
 
 from __future__ import annotations
 
-# By module, function and change, as ``key`` of the mutation run writes them.
-EQUIVALENT: dict[str, str] = {}
+# By module, function and change, as ``key`` of the sample writes them.
+EQUIVALENT: dict[str, str] = {
+    "tomography/resolution.py _checkerboard: fields += along.reshape([-1 if a == axis else 1 for a in range("
+    "len(shape))]) -> fields -= along.reshape([-1 if a == axis else 1 for a in range(len(shape))])": "only "
+    "the parity of the sum counts, and a number has the parity of its negative",
+    "geometry_field/tables/cube.py line_of: along_out > zero -> along_out >= zero": "no component is 0 after "
+    "_not_zero",
+    "acquisition/pulse_spectrum.py power_of: -1 -> (1)": "the last axis of a 2-D array is axis 1",
+    "wave/points.py place: window = np.where(np.abs(offset) <= REACH, np.i0(SHAPE * inside) / np.i0(SHAPE), "
+    "0.0) -> window = np.where(np.abs(offset) <= REACH, np.i0(SHAPE * inside) / np.i0(SHAPE), 1.0)": "no "
+    "offset of the stencil is larger than REACH",
+    "meshes/geometric_error.py : SAMPLES = 100_000 -> SAMPLES = 100001": "one more random sample of 100,000",
+    "isosurface/accc.py : STEPS = 40 -> STEPS = 41": "Newton's iteration ends after about five steps",
+    "tomography/gauss_newton/linear_problem.py Linearised.solve: self.huber < math.inf -> self.huber <= "
+    "math.inf": "with equal weights the further solutions begin at the minimum and end there",
+}

@@ -19,3 +19,7 @@ def test_a_gap_does_not_change_it():
 @pytest.mark.parametrize("place", [np.zeros((1, 2)), np.zeros((5, 3)), np.full((4, 2), np.nan)])
 def test_no_distance_is_no_pitch(place):
     assert element_pitch(place) == 0.0
+
+
+def test_two_elements_have_their_distance():
+    assert element_pitch(np.array([[0.0, 0.0], [3.0, 4.0]])) == pytest.approx(5.0)

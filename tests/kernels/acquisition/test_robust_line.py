@@ -27,3 +27,9 @@ def test_outliers_do_not_move_it(slope, intercept, places, seed):
 
 def test_points_at_one_place_have_no_slope():
     assert robust_line(np.full(20, 3.0), np.arange(20.0)) == (0.0, 9.5)
+
+
+@pytest.mark.parametrize("points", [2, 3, 5, 7])
+def test_too_few_points_for_outliers_still_have_their_line(points):
+    x = np.arange(float(points))
+    assert robust_line(x, 2.0 * x + 1.0) == pytest.approx((2.0, 1.0))

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import speed_from_temperature, temperature_from_speed
+from bentray_kernels.acquisition.water import APERTURE, THERMOMETER_C, stated_deviation
 from bentray_kernels.errors import InvalidInput
 
 
@@ -34,3 +35,16 @@ def test_a_temperature_outside_the_fit_is_rejected(temperature):
 def test_a_speed_that_water_does_not_have_is_rejected(speed):
     with pytest.raises(InvalidInput, match="water@sound_speed_mps"):
         temperature_from_speed(speed)
+
+
+@pytest.mark.parametrize("temperature", [0.6, 20.0, 60.0, 94.4])
+def test_a_stated_speed_is_off_by_a_degree_at_its_temperature_and_by_the_size_of_the_array(temperature):
+    """At 60 °C a degree changes the speed by a third of what it does at 20 °C."""
+    rise = 50.0 * (speed_from_temperature(temperature + 0.01) - speed_from_temperature(temperature - 0.01))
+    expected = ((THERMOMETER_C * rise) ** 2 + (APERTURE * 1500.0) ** 2) ** 0.5
+    assert stated_deviation(1500.0, temperature) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("temperature", [None, 0.2, 94.8, 120.0])
+def test_without_a_temperature_of_water_the_rise_is_the_usual_one(temperature):
+    assert stated_deviation(1000.0, temperature) == pytest.approx(13.0**0.5)

@@ -46,6 +46,25 @@ def test_the_highlight_lies_where_the_light_is_mirrored():
     assert shaded.image[0, 0].tolist() == [1, 2, 3]
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_oblique_view_is_shaded_by_phongs_model(sign):
+    """The reflection of the light about the normal, seen along a direction with three components."""
+    ahead, towards = np.array([0.5, -0.3, 0.6]), np.array([-0.2, 0.7, -0.6])
+    ahead, towards = ahead / np.linalg.norm(ahead), towards / np.linalg.norm(towards)
+    light = Light(tuple(towards), 0.1, 0.4, 0.45, 3.0, colour=(200, 100, 50))
+    camera = orthographic(tuple(-2.0 * ahead), tuple(ahead), (0.0, -1.0, 0.0), 0.9)
+    shaded = shade(ball(sign), camera, light, 31, 31)
+    seen = np.isfinite(shaded.distance_m)
+    normal = shaded.normal[seen]
+    normal *= -np.sign(normal @ ahead)[:, None]
+    cosine = np.maximum(normal @ towards, 0.0)
+    mirrored = 2.0 * (normal @ towards)[:, None] * normal - towards
+    highlight = np.where(cosine > 0.0, np.maximum(-mirrored @ ahead, 0.0) ** 3.0, 0.0)
+    colour = (0.1 + 0.4 * cosine)[:, None] * [200, 100, 50] + 255.0 * 0.45 * highlight[:, None]
+    np.testing.assert_allclose(shaded.image[seen], np.minimum(colour, 255.0), atol=0.51)
+    assert highlight.max() > 0.9
+
+
 def test_no_pixels_are_rejected():
     with pytest.raises(InvalidInput, match="rows, columns"):
         shade(ball(1.0), CAMERA, Light((0.0, 0.0, -1.0)), 0, 4)

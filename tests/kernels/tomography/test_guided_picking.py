@@ -10,7 +10,7 @@ import pytest
 from bentray_kernels.acquisition import pick
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, reconstruct
-from bentray_kernels.tomography.guided_picking import predicted_delta
+from bentray_kernels.tomography.guided_picking import SETTLED_S, predicted_delta, same_picks
 
 from ..acquisition.traces import RADIUS_M, blob_delay, scan
 
@@ -51,3 +51,18 @@ def test_a_volume_is_rejected():
     result = replace(reconstruct(picked, SETTINGS), settings=replace(SETTINGS, decomposition="volume"))
     with pytest.raises(InvalidInput, match="decomposition"):
         predicted_delta(picked, result)
+
+
+def test_picks_are_the_same_until_they_move_by_more_than_the_limit():
+    before = pick(scan(blob_delay(8), elements=8))
+
+    def moved(by):
+        return replace(before, delta_tof_s=before.delta_tof_s + by)
+
+    assert same_picks(before, before)
+    assert same_picks(before, moved(0.9 * SETTLED_S))
+    assert not same_picks(before, moved(1.1 * SETTLED_S))
+    one_less = np.where(np.arange(64).reshape(8, 8) == 12, np.nan, before.delta_tof_s)
+    assert not same_picks(before, replace(before, delta_tof_s=one_less))
+    nothing = replace(before, delta_tof_s=np.full((8, 8), np.nan))
+    assert same_picks(nothing, nothing)

@@ -1,5 +1,7 @@
 """Measures of traces: the envelope is that of the analytic signal."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,21 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.signal import hilbert
 
-from bentray_kernels.acquisition.quality.measures import _envelope
+from bentray_kernels.acquisition.quality.measures import Measures, _envelope
+
+from ..traces import FREQUENCY_HZ, RATE_HZ, ricker, scan
+
+
+@pytest.mark.parametrize("start_s", [-4e-6, 0.0, 1e-5])
+def test_the_maximum_of_a_pulse_is_at_its_time_after_the_time_zero(start_s):
+    dataset = replace(scan(elements=4), t0_s=start_s)
+    time = start_s + np.arange(200) / RATE_HZ
+    at = start_s + np.array([6e-6, 9.03e-6, 12.51e-6])
+    measures = Measures.of([7.0 + ricker(time - at[:, None], FREQUENCY_HZ)], dataset)
+    assert measures.strongest_s[0] == pytest.approx(at, abs=0.02 / RATE_HZ)
+    assert measures.detected.all()
+    assert not (measures.broken | measures.constant | measures.clipped).any()
+    assert measures.peak[0] == pytest.approx(1.0, abs=0.1)
 
 
 @given(

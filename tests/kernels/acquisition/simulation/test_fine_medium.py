@@ -39,3 +39,10 @@ def test_reading_between_nodes_keeps_a_point_sources_curvature():
     )
     tof = np.linalg.norm(np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1) - source, axis=-1)
     assert read(tof, 1.0, source, points) == pytest.approx(np.linalg.norm(points - source, axis=1), abs=1e-12)
+
+
+def test_a_node_at_the_source_has_no_share_in_what_is_read_beside_it():
+    axis, source = np.arange(9.0), np.array([3.0, 5.0])
+    tof = 2.0 * np.hypot(axis[:, None] - 3.0, axis[None, :] - 5.0)
+    points = np.array([(3.3, 5.4), (2.9, 4.2), (3.0, 5.0), (2.1, 5.0)])
+    assert read(tof, 1.0, source, points) == pytest.approx(2.0 * np.linalg.norm(points - source, axis=1))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from bentray_kernels.geometry_field.tables.agreement import AGREE, APART, MIXED, NONE, agreement
+from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.meshes.surface import surface_of
 
 from ..shapes import dented, field_of, over_the_poles
@@ -24,3 +25,22 @@ def test_agreement_is_that_of_the_sixteen():
             assert known[entry, exit_] == expected
             seen.add(expected)
     assert seen == {NONE, AGREE, MIXED}
+
+
+def test_the_lowest_and_the_highest_of_the_sixteen_decide():
+    """Positions drawn at random, as far apart as the limit: about half of the cells agree."""
+    n, row = 3, 18
+    random = np.random.default_rng(1)
+    spread = np.float32(1.1 * APART / n)
+    fractions = random.uniform(-1.0, -1.0 + spread, (54, 54)).astype(np.float32) + np.float32(1.0)
+    known = agreement(OuterField(n, np.zeros((54, 54), np.int32), fractions))
+    counts = {AGREE: 0, MIXED: 0}
+    for entry in range(36):
+        for exit_ in range(36):
+            if entry % 3 == 2 or exit_ % 3 == 2:
+                continue
+            at = np.ix_(entry + np.array([0, 1, row, row + 1]), exit_ + np.array([0, 1, row, row + 1]))
+            expected = AGREE if np.ptp(fractions[at]) <= np.float32(APART / n) else MIXED
+            assert known[entry, exit_] == expected
+            counts[expected] += 1
+    assert min(counts.values()) > 50

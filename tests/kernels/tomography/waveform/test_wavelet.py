@@ -27,3 +27,12 @@ def test_wavelet_is_recovered():
 def test_rejects_silence():
     with pytest.raises(InvalidInput, match="waveform/water"):
         fit_wavelet(pulses(), np.ones((3, 200)), np.zeros((3, 200)))
+
+
+def test_a_thousandth_of_the_strongest_energy_counts_as_noise():
+    """An impulse has the same energy at all frequencies, so the factor is the same at all."""
+    simulated = np.zeros((1, 200))
+    simulated[0, 7] = 1.0
+    assert fit_wavelet(pulses(), simulated, 2.0 * simulated) == pytest.approx(
+        2.0 / 1.001 * pulses(), abs=1e-9
+    )
