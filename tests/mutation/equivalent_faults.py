@@ -9,12 +9,21 @@ EQUIVALENT: dict[str, str] = {
     "the parity of the sum counts, and a number has the parity of its negative",
     "geometry_field/tables/cube.py line_of: along_out > zero -> along_out >= zero": "no component is 0 after "
     "_not_zero",
-    "acquisition/pulse_spectrum.py power_of: -1 -> (1)": "the last axis of a 2-D array is axis 1",
+    "acquisition/pulse_spectrum.py power_of: return np.zeros(emission.shape[-1] // 2 + 1) -> return np.zeros("
+    "emission.shape[(1)] // 2 + 1)": "the last axis of a 2-D array is axis 1",
     "wave/points.py place: window = np.where(np.abs(offset) <= REACH, np.i0(SHAPE * inside) / np.i0(SHAPE), "
     "0.0) -> window = np.where(np.abs(offset) <= REACH, np.i0(SHAPE * inside) / np.i0(SHAPE), 1.0)": "no "
     "offset of the stencil is larger than REACH",
     "meshes/geometric_error.py : SAMPLES = 100_000 -> SAMPLES = 100001": "one more random sample of 100,000",
     "isosurface/accc.py : STEPS = 40 -> STEPS = 41": "Newton's iteration ends after about five steps",
+    "meshes/surface_distance.py SurfaceGrid.__init__: math.isqrt(len(mesh.faces)) // 3 -> math.isqrt(len("
+    "mesh.faces)) % 3": "the number of cells changes the time of a search, not its result",
+    "geometry_field/layout/boundary_joining.py joined_boundaries: loop_of = np.full(len(opened.origin), -1)"
+    " -> loop_of = np.full(len(opened.origin), (1))": "the entries of inner vertices are never read",
+    "geometry_field/layout/cutting.py Cutter.far_ends: np.abs(scale).max() > MIN_SCALE -> np.abs(scale).max()"
+    " >= MIN_SCALE": "no computed scale equals the limit",
+    "acquisition/calibration/water_times.py water_times: distance >= NEAREST * distance.max() -> distance > "
+    "NEAREST * distance.max()": "no distance equals this product",
     "tomography/gauss_newton/linear_problem.py Linearised.solve: self.huber < math.inf -> self.huber <= "
     "math.inf": "with equal weights the further solutions begin at the minimum and end there",
 }

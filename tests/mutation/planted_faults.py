@@ -163,7 +163,7 @@ class _Search:
         low, high = self._span(node)
         before = self.text[low:high]
         after = before[: begin - low] + new + before[end - low :]
-        if isinstance(node, ast.Constant):
+        if isinstance(node, ast.Constant) or isinstance(getattr(node, "operand", None), ast.Constant):
             # A bare number says nothing: its whole line does.
             row = node.lineno - 1
             low, high = self.starts[row], self.starts[row + 1]

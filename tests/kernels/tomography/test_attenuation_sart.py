@@ -30,8 +30,9 @@ def crossing(rays, seed=0):
     return random.random((rays, 30)) * (random.random((rays, 30)) < 0.3)
 
 
-def test_one_emitter_follows_equation_1():
-    matrix, residual = crossing(4), np.array([1.0, 0.5, 2.0, 0.2])
+@pytest.mark.parametrize("node", [1.0, 0.02], ids=["long rays", "rays shorter than a node"])
+def test_one_emitter_follows_equation_1(node):
+    matrix, residual = node * crossing(4), node * np.array([1.0, 0.5, 2.0, 0.2])
     water = np.full(SHAPE, 0.3)
     found = solve(
         [rows_of(matrix, residual, [4])], water, EVERYWHERE, plan(iterations=1, relaxation=0.5), BOUNDS

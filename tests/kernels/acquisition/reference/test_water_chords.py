@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.acquisition.reference import find_water_chords
-from bentray_kernels.acquisition.reference.water_chords import chord_offset
+from bentray_kernels.acquisition.reference.water_chords import NEAREST, NEAREST_PART, chord_offset
 from bentray_kernels.errors import InvalidInput
 
 from ..traces import FREQUENCY_HZ, RADIUS_M, WATER_MPS, scan
@@ -71,3 +71,12 @@ def test_the_offset_of_a_chord_is_its_distance_from_the_centre():
     offset = chord_offset(BARE)
     apart = np.abs(BARE.tx[:, None] - BARE.rx)
     assert offset == pytest.approx(np.abs(np.cos(np.pi * apart / ELEMENTS)), abs=1e-12)
+
+
+def test_chords_nearer_than_a_few_wavelengths_are_not_used_and_all_others_may_be():
+    """Here the limit by wavelengths is below that by the size of the ring; in a slow pulse it is above."""
+    distance = BARE.distance_m()
+    for period_s in (PERIOD_S, 10.0 * PERIOD_S):
+        limits = NEAREST * WATER_MPS * period_s, NEAREST_PART * distance.max()
+        chords = find_water_chords(BARE, distance / WATER_MPS, period_s)
+        assert (chords.pairs == (distance > min(limits))).all()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
-from bentray_kernels.acquisition.simulation.volume_scan import VolumeScan
+from bentray_kernels.acquisition.simulation.volume_scan import AXIAL_MARGIN_NODES, VolumeScan
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import Dome, Ellipsoid, Part, VolumePhantom, table7
 
@@ -47,6 +47,16 @@ def test_medium_and_elements_share_their_origin():
     shape = np.array(medium.speed.shape)
     assert ((scan.elements() >= 0.0) & (scan.elements() <= (shape - 1) * medium.spacing)).all()
     assert scan.positions().mean(axis=0) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("z_m", [(0.0,), (-0.01, 0.0, 0.01), (-0.03, 0.01)])
+def test_the_same_margin_lies_below_the_lowest_and_above_the_highest_element(z_m):
+    scan = replace(SCAN, phantom=BALL, three_d=True, refinement=2, z_m=z_m)
+    medium, height = scan.medium(), scan.elements()[:, 2]
+    margin = AXIAL_MARGIN_NODES * 2 * medium.spacing
+    assert height.min() == pytest.approx(margin)
+    above = (medium.speed.shape[2] - 1) * medium.spacing - height.max()
+    assert margin - 1e-9 <= above < margin + medium.spacing
 
 
 def test_slices_of_the_breast_differ():

@@ -66,3 +66,13 @@ def test_fixed_vertices_stay():
     np.testing.assert_array_equal(np.flatnonzero((found != plane).any(axis=1)), [6, 12])
     assert found[12] == pytest.approx(np.vstack((found[6], plane[[7, 11, 13, 17, 18]])).mean(axis=0))
     np.testing.assert_array_equal(relaxed(plane, disk.faces, np.array([], int)), plane)
+
+
+def test_the_boundary_goes_round_the_circle_once_each_side_with_its_share():
+    patch = flat_patch(7, 4)
+    disk = disk_of(mesh(patch.vertices * (1.0, 3.0, 1.0), patch.faces))
+    plane = round_embedding(disk)[disk.boundary]
+    lengths = np.linalg.norm(np.roll(plane, -1, axis=0) - plane, axis=1)
+    turns = 2.0 * np.arcsin(0.5 * lengths)
+    assert turns.sum() == pytest.approx(2.0 * np.pi)
+    assert np.sort(turns) == pytest.approx(2.0 * np.pi * np.sort(disk.side_lengths) / disk.side_lengths.sum())

@@ -57,3 +57,13 @@ def test_a_band_begins_with_it_where_the_settings_say_so(truth, spoiled):
     expected = estimate_source(spoiled[1], on_grid(truth, spoiled[1]), SETTINGS.window_s)
     np.testing.assert_array_equal(band.model.wavelet, expected)
     assert band.model.attenuation is None
+
+
+def test_gains_of_traces_and_their_scale_change_no_source(truth, spoiled):
+    right, _ = spoiled
+    speed = on_grid(truth, right)
+    gain = 1e-4 * right.gain * np.random.default_rng(0).uniform(0.2, 5.0, right.gain.shape)
+    estimated, scaled = (
+        estimate_source(problem, speed, SETTINGS.window_s) for problem in (right, replace(right, gain=gain))
+    )
+    np.testing.assert_allclose(scaled, estimated, atol=1e-4 * np.abs(estimated).max())
