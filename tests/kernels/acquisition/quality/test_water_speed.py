@@ -72,7 +72,10 @@ def test_a_stated_speed_that_no_water_explains_is_rejected():
 
 
 def test_a_fit_worse_than_the_assumption_does_not_replace_it():
-    assert not find_water_speed(stated(1440.0, assumed=True), WATER_MPS, 40.0)
+    """Three standard deviations of the fit against five degrees, which are 15 m/s."""
+    for sigma_mps in (5.1, 40.0):
+        assert not find_water_speed(stated(1440.0, assumed=True), WATER_MPS, sigma_mps)
+    assert find_water_speed(stated(1440.0, assumed=True), WATER_MPS, 4.9)
 
 
 def test_the_summary_states_which_speed_is_used():
