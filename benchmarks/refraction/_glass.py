@@ -90,12 +90,13 @@ def drawn(
     camera: Camera = FRONT,
     degree: int = 1,
     pixels: int = PIXELS,
+    repeats: int = REPEATS,
 ) -> tuple[np.ndarray, float]:
-    """A picture, and the least seconds that it took on one core in ``REPEATS`` runs, once compiled."""
+    """A picture, and the least seconds that it took on one core in so many runs, once compiled."""
     how = RenderSettings(pixels, pixels, supersampling=supersampling, degree=degree, seed=None)
     render(scene, camera, backdrop, replace(how, rows=8, columns=8))
     seconds = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         started = time.perf_counter()
         image = render(scene, camera, backdrop, how).image
         seconds.append(time.perf_counter() - started)

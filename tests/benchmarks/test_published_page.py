@@ -1,0 +1,46 @@
+"""The page of published systems agrees with the recorded rows, and names settings that exist."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from bentray_kernels.request_fields import choices_of
+from bentray_kernels.tomography import AttenuationSettings, Settings
+from bentray_workers.rendering import field_view, refraction_view
+from bentray_workers.simulation import request
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs/reference/published-systems.md").read_text()
+ROWS = {
+    row["target"]: row for row in json.loads((ROOT / "benchmarks/results/published_systems.json").read_text())
+}
+STATED = re.findall(r"^\| (.+?) \| ([\d.]+) \| ([\d.]+) \|$", TEXT, re.MULTILINE)
+
+
+def test_figures_are_the_recorded_ones():
+    assert len(STATED) > 10
+    for target, published, ours in STATED:
+        row = ROWS[target]
+        assert (f"{row['value']:.3g}", f"{row['goal']:.3g}") == (published, ours), target
+
+
+@pytest.mark.parametrize(
+    ("word", "choices"),
+    [
+        ("warped-checkerboard", refraction_view.CHOICES["backdrop"]),
+        ("uv-linear", field_view.CHOICES["lookup"]),
+        ("fmm-first-order", choices_of(Settings)["eikonal"]),
+        (
+            "attenuation_solver=sart",
+            ["attenuation_solver=" + one for one in choices_of(AttenuationSettings)["attenuation_solver"]],
+        ),
+        ("table6-vertical", request.CHOICES["phantom"]),
+    ],
+)
+def test_settings_exist(word, choices):
+    assert word in TEXT
+    assert word in choices
