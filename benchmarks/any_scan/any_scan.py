@@ -1,4 +1,4 @@
-"""Any scan with default settings: targets A1 to A3, one file for each."""
+"""Any scan with default settings: targets A1 to A3, one file for each, and a scan by k-Wave."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 
-from . import _any_array, _default_settings, _without_water_shot
+from . import _any_array, _default_settings, _other_simulator, _without_water_shot
 
 # Each measures the rows of one target.
-TARGETS = (_without_water_shot.rows, _default_settings.rows, _any_array.rows)
+TARGETS = (_without_water_shot.rows, _default_settings.rows, _any_array.rows, _other_simulator.rows)
 
 
 def rows(quick: bool, progress: Step) -> Iterable[Row]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .export import AttenuationUnit, Quantity
+from .export import AttenuationFrequency, AttenuationUnit, Quantity
 from .options.paths import output_file
 from .output.exit_codes import client_errors
 from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
@@ -31,6 +31,7 @@ def download(
     ] = None,
     quantity: Quantity = "speed",
     attenuation: AttenuationUnit = "Np/m",
+    frequency: AttenuationFrequency = None,
     url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
@@ -63,9 +64,9 @@ def download(
     if chosen is None:
         raise InvalidInput("output", output, "a name ending in " + ", ".join(formats) + ", or --format")
     target = output_file(output, force=force)
-    defaults = {"quantity": "speed", "attenuation": "Np/m"}
-    requested = {"quantity": quantity, "attenuation": attenuation}
-    how = {name: value for name, value in requested.items() if value != defaults[name]}
+    defaults = {"quantity": "speed", "attenuation": "Np/m", "frequency_hz": None}
+    requested = {"quantity": quantity, "attenuation": attenuation, "frequency_hz": frequency}
+    how: dict[str, Any] = {name: value for name, value in requested.items() if value != defaults[name]}
 
     from ..client import Client
 

@@ -34,6 +34,10 @@ Quantity = Annotated[
     str, typer.Option(help="Quantity of .npy, .nii, .nrrd and .mha: speed or attenuation; others hold all.")
 ]
 AttenuationUnit = Annotated[str, typer.Option("--attenuation", help="Its unit: Np/m or dB/cm/MHz.")]
+AttenuationFrequency = Annotated[
+    float | None,
+    typer.Option("--frequency", show_default="of the scan", help="Frequency for dB/cm/MHz, Hz."),
+]
 
 
 def export(
@@ -41,10 +45,7 @@ def export(
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write; the suffix is the format.")],
     quantity: Quantity = "speed",
     attenuation: AttenuationUnit = "Np/m",
-    frequency: Annotated[
-        float | None,
-        typer.Option(show_default="of the scan", help="Frequency for dB/cm/MHz, Hz."),
-    ] = None,
+    frequency: AttenuationFrequency = None,
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -60,7 +60,7 @@ def submit(
         typer.Option(
             metavar="DIR",
             show_default=False,
-            help="Reconstruct every *.h5 in DIR on --scheduler, instead of FILE.",
+            help="Reconstruct every scan in DIR on --scheduler, instead of FILE.",
         ),
     ] = None,
     scheduler: Annotated[
@@ -114,8 +114,8 @@ def submit(
             "output", f"{output} with --no-wait", "one of the two: there is no result to download yet"
         )
     settings = settings_from(options)
+    given = scan_metadata(map, unit, temperature, sound_speed, frequency)
     if file is not None:
-        given = scan_metadata(map, unit, temperature, sound_speed, frequency)
         source = input_scan(file)
         folder = None if output is None else output_folder(output)
         with dataset_file(source, given, folder or Path(gettempdir())) as scan:
@@ -123,7 +123,7 @@ def submit(
     if batch is not None and scheduler is not None:
         from .batch import submit_batch
 
-        submit_batch(batch, scheduler, settings, output, at_once, tls, as_json=as_json)
+        submit_batch(batch, scheduler, settings, given, output, at_once, tls, as_json=as_json)
 
 
 def _submit(

@@ -110,9 +110,9 @@ def download(
     volume_id: str,
     format: Format,  # noqa: A002 - the name of the query parameter
     path: Path | str,
-    **how: str,
+    **how: str | float,
 ) -> Flow[Path]:
-    """Download a volume to ``path``, atomically; ``how``: quantity, attenuation."""
+    """Download a volume to ``path``, atomically; ``how``: quantity, attenuation, frequency_hz."""
     yield DownloadStep(f"/v1/volumes/{volume_id}/data", {"params": {"format": format, **how}}, Path(path))
     return Path(path)
 

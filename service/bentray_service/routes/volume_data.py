@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import FREQUENCY_HZ
 from bentray_workers.files.volume_export import FORMATS, Selection, largest_bytes
 
 from .. import __version__
@@ -51,8 +52,16 @@ async def volume_data(
     ] = "speed",
     attenuation: Annotated[
         Literal["Np/m", "dB/cm/MHz"],
-        Query(description="Unit of the attenuation. dB/cm/MHz needs the frequency of the scan."),
+        Query(description="Unit of the attenuation. dB/cm/MHz refers to the frequency of the scan."),
     ] = "Np/m",
+    frequency_hz: Annotated[
+        float | None,
+        Query(
+            ge=FREQUENCY_HZ.least,
+            le=FREQUENCY_HZ.most,
+            description="Frequency for dB/cm/MHz, Hz; default: that of the scan.",
+        ),
+    ] = None,
 ) -> Response:
     """Download a volume.
 
@@ -64,16 +73,16 @@ async def volume_data(
     # Exports are deleted together with the volume.
     path = await run_in_threadpool(service.files.store.fetch, files.volume(volume["id"]))
     seed = repr((volume["id"], volume["created"], "hdf5" if format == "h5" else format))
-    selection = Selection(quantity, attenuation)
+    selection = Selection(quantity, attenuation, frequency_hz)
     if format in ("hdf5", "h5"):
         if selection != Selection():
-            field = "quantity" if quantity != Selection().quantity else "attenuation"
+            field = "quantity" if quantity != "speed" else "attenuation"
             accepted = "speed and Np/m for hdf5, which holds all quantities in SI units"
             raise InvalidInput(field, f"{quantity}, {attenuation}", accepted)
         return download(request, path, seed, HDF5)
     chosen = FORMATS[format]
     # Exports are deterministic, so the ETag is computed from the volume.
-    which = "" if selection == Selection() else f"{quantity}-{'np' if attenuation == 'Np/m' else 'db'}."
+    which = "" if selection == Selection() else f"{quantity}-{attenuation.partition('/')[0]}-{frequency_hz}."
     seed = repr((seed, which)) if which else seed
     tag = tag_of(path, repr((__version__, seed)))
     if (response := unchanged(request, tag)) is not None:

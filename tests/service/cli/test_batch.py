@@ -14,6 +14,7 @@ import pytest
 from typer.testing import Result
 
 from bentray_workers.cluster.connection import Cluster, open_cluster
+from bentray_workers.files.dataset import read_dataset
 from bentray_workers.files.reconstruction import read_reconstruction
 
 QUICK = ("--method", "sart", "--nodes", 24, "--iterations", 1, "--rays", "straight")
@@ -32,7 +33,10 @@ def quick_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """The pictures have tests of their own, and take longer than all the rest here."""
     for module in ("bentray_workers.reconstruction.batch", "bentray_workers.images.report"):
         monkeypatch.setattr(
-            f"{module}.report_png", lambda result, truth, roi: b"\x89PNG of " + bytes(truth.axes, "ascii")
+            f"{module}.report_png",
+            lambda result, truth, roi: (
+                b"\x89PNG of " + (b"no truth" if truth is None else truth.axes.encode())
+            ),
         )
 
 
@@ -146,7 +150,46 @@ def test_rejects_invalid_arguments(bentray: Callable[..., Result], words: tuple[
     assert result.stderr.startswith(line)
 
 
+def test_scans_of_other_programs_are_converted(
+    bentray: Callable[..., Result], cluster: Cluster, scan_file: Path, tmp_path: Path
+) -> None:
+    scan, folder = read_dataset(scan_file), tmp_path / "scans"
+    folder.mkdir()
+    position = 1e3 * scan.element_position_m
+    np.savez(folder / "own.npz", pos=position, tx=scan.tx, rx=scan.rx, dtof=scan.delta_tof_s)
+    words = (
+        "--map",
+        "element_position=pos",
+        "--map",
+        "delta_tof=dtof",
+        "--unit",
+        "mm",
+        "--sound-speed",
+        1500,
+    )
+    address = cluster.client.scheduler.address
+    batch = ("submit", "--batch", folder, "--scheduler", address, "--json", *QUICK)
+    assert states(json.loads(bentray(*batch, *words).stdout)) == {"own": "succeeded"}
+    found = read_reconstruction(folder / "results" / "own" / "reconstruction.h5")
+    alone = bentray("reconstruct", folder / "own.npz", *words, *QUICK, "-o", tmp_path / "alone")
+    assert alone.exit_code == 0
+    expected = read_reconstruction(tmp_path / "alone" / "reconstruction.h5")
+    np.testing.assert_array_equal(found.speed, expected.speed)
+    assert not list((folder / "results" / "own").glob(".converted*"))
+    # The same file with other options is another request.
+    assert states(json.loads(bentray(*batch, *words).stdout)) == {"own": "skipped"}
+    slower = (*words[:-1], 1490)
+    assert states(json.loads(bentray(*batch, *slower).stdout)) == {"own": "succeeded"}
+
+
+def test_two_scans_of_the_same_name_are_rejected(bentray: Callable[..., Result], scans: Path) -> None:
+    (scans / "one.mat").write_bytes(b"")
+    result = bentray("submit", "--batch", scans, "--scheduler", "tcp://127.0.0.1:1")
+    assert result.exit_code == 2
+    assert "found one.h5 and one.mat; accepted: names that differ" in result.stderr
+
+
 def test_a_folder_without_scans_is_rejected(bentray: Callable[..., Result], tmp_path: Path) -> None:
     result = bentray("submit", "--batch", tmp_path, "--scheduler", "tcp://127.0.0.1:1")
     assert result.exit_code == 2
-    assert "without any *.h5" in result.stderr
+    assert "without any scan" in result.stderr

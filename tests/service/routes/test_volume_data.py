@@ -217,6 +217,13 @@ def test_quantity_and_unit_of_a_reconstruction(http, result, upload):
     plain, decibel = (http.get(result, params={"format": "npy", "attenuation": unit}) for unit in UNITS)
     assert plain.content == decibel.content
     assert plain.headers["etag"] != decibel.headers["etag"]
+    stated = {"format": "npy", "attenuation": "dB/cm/MHz", "frequency_hz": 4e5}
+    assert http.get(result, params=stated).headers["etag"] not in (
+        plain.headers["etag"],
+        decibel.headers["etag"],
+    )
+    refused = http.get(result, params={"format": "npy", "frequency_hz": 4e5}).json()
+    assert (refused["field"], refused["accepted"]) == ("frequency", "none: Np/m refers to no frequency")
 
 
 UNITS = ("Np/m", "dB/cm/MHz")

@@ -323,6 +323,7 @@ def test_page_requests_and_sends_a_key(page, serve, scan, work, tmp_path):
     expect(image).to_have_attribute("src", re.compile("^blob:"))
     expect(image).not_to_have_js_property("naturalWidth", 0)
     with page.expect_download() as saved:
+        job.get_by_text("Download", exact=True).click()
         job.get_by_role("link", name="NumPy").click()
     assert np.load(saved.value.path()).shape == (32, 32)
     assert key.shown() not in page.url + page.content()

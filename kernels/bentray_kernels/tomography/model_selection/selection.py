@@ -74,21 +74,27 @@ def candidate_settings(
         front = plan.numerics.front_smoothing_nodes * coarser
         # An image of half the nodes has half the edge nodes for the same rays.
         strength = plan.gauss_newton.penalty_strength * (coarser if plan.numerics.ray_width_m > 0.0 else 1.0)
-        plans.append(
-            plan.changed(nodes=nodes, coarser_grids=0, front_smoothing_nodes=front, penalty_strength=strength)
+        plan = plan.changed(
+            nodes=nodes, coarser_grids=0, front_smoothing_nodes=front, penalty_strength=strength
         )
+        plans.append(_from_coarser_grids(plan))
     return plans
 
 
 def final_settings(settings: Settings, changes: dict[str, Any]) -> Settings:
     """The settings of the reconstruction by a candidate: thin bent rays start on coarser grids."""
     chosen = settings.changed(**changes)
-    if chosen.rays == "straight" or chosen.numerics.ray_width_m > 0.0 or chosen.numerics.coarser_grids:
-        return chosen
+    return chosen if chosen.numerics.coarser_grids else _from_coarser_grids(chosen)
+
+
+def _from_coarser_grids(settings: Settings) -> Settings:
+    """The same on coarser grids first, for thin bent rays: on one grid they keep to wrong paths."""
+    if settings.rays == "straight" or settings.numerics.ray_width_m > 0.0:
+        return settings
     grids = 0
-    while chosen.grid_nodes >> (grids + 1) >= COARSEST_NODES:
+    while settings.grid_nodes >> (grids + 1) >= COARSEST_NODES:
         grids += 1
-    return chosen.changed(coarser_grids=grids)
+    return settings.changed(coarser_grids=grids)
 
 
 def select_model(

@@ -6,6 +6,10 @@ import { glassOf, queryOf } from "./views.js";
 const SVG = "http://www.w3.org/2000/svg";
 const RAYS = { curved: "Bent rays", straight: "Straight rays" };
 const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "automatic", waveform: "full waveform" };
+const FORMATS = [
+  ["hdf5", "HDF5"], ["npy", "NumPy"], ["mat", "MATLAB"], ["nifti", "NIfTI"], ["nrrd", "NRRD"], ["metaimage", "MetaImage"],
+  ["vti", "VTK (ParaView)"], ["ome-zarr", "OME-Zarr"], ["dicom", "DICOM"],
+];
 const cards = new Map();
 
 function make(tag, className, text) {
@@ -139,7 +143,7 @@ function summaryOf({ kind, settings }) {
 
 // The plan in a line, with details on demand.
 function planned({ tasks, largest_bytes: bytes, minutes, why }) {
-  const box = make("details");
+  const box = make("details", "plan");
   const time = minutes ? `, about ${duration(60 * minutes)}` : "";
   box.append(make("summary", "", `Plan: ${tasks} tasks of up to ${Math.ceil(bytes / 2 ** 20)} MiB${time}`), make("p", "", why));
   return box;
@@ -181,7 +185,10 @@ function facts(job, title, onCancel) {
   }
   if (job.links.animation) row.append(link("Frames", job.links.animation, true));
   if (job.links.data) {
-    row.append(link("HDF5", `${job.links.data}?format=hdf5`, true), link("NumPy", `${job.links.data}?format=npy`, true));
+    const formats = make("details", "formats");
+    formats.append(make("summary", "", "Download"));
+    for (const [format, label] of FORMATS) formats.append(link(label, `${job.links.data}?format=${format}`, true));
+    row.append(formats);
   }
   if (job.links.cancel) {
     const cancel = make("button", "quiet", "Cancel");
@@ -214,8 +221,10 @@ export function showJobs(list, jobs, titleOf, onCancel) {
     if (card.signature !== signature) {
       const focused = card.node.contains(document.activeElement) && document.activeElement.tagName === "BUTTON";
       const fresh = facts(job, title, onCancel);
-      const open = card.node.querySelector("details")?.open;
-      if (open) fresh.querySelector("details").open = true;
+      for (const open of card.node.querySelectorAll("details[open]")) {
+        const same = fresh.querySelector(`details.${open.className}`);
+        if (same) same.open = true;
+      }
       if (card.state === job.state) card.node.lastChild.replaceWith(fresh);
       else card.node.replaceChildren(pictures(job, title), fresh);
       if (focused) fresh.querySelector("button")?.focus();

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.array_shapes import arc, facing_lines
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography.model_selection.held_out import part_of
 
@@ -41,6 +42,16 @@ def test_views_are_a_tenth_and_whole_sectors():
     assert (blocks > 0).sum(axis=1).max() == 1
     sent, received = np.nonzero(blocks)
     assert {3, 5} == set(np.abs(sent - received).tolist())
+
+
+@pytest.mark.parametrize("array", [arc(64, 0.1, 200.0), facing_lines(32, 0.1, 0.1)], ids=["arc", "lines"])
+def test_views_of_an_open_array_hold_as_many_pairs_as_those_of_a_ring(array):
+    every = np.arange(64)
+    scan = Dataset(array.position_m, every, every, 1500.0, delta_tof_s=np.zeros((64, 64)), array_type="free")
+    held = np.isfinite(part_of(scan, "held-out-views").differential_tof())
+    assert held.sum() == 6 * 64
+    # Each element loses at most the eighth that faces it.
+    assert set(held.sum(axis=0)) == {0, 8}
 
 
 def test_all_is_the_scan_itself():
