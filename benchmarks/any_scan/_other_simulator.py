@@ -19,11 +19,12 @@ from bentray_service.cli.output.terminal import Step
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
+from ..shared._baselines import Images
+from ..shared._image_error import object_error
 from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
 from ..shared._small_png import figure_png
 from ..waves._kwave_peer import Peer, installed
 from ._planted_scan import planted, without_water_shot
-from ._without_water_shot import constants
 
 RESULTS = Path(__file__).parents[1] / "results"
 
@@ -57,16 +58,18 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         way: reconstruct_on_workers(dataset, Settings.of(attenuation=False, **changes), progress)
         for way, changes in WAYS.items()
     }
-    detail = ", ".join(
-        f"{name} {error:.1f}" for name, error in constants(dataset, images["straight"].result).items()
-    )
-    detail += ", " + ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.0f} s" for way, one in images.items())
+    detail = ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.0f} s" for way, one in images.items())
     detail += f" (m/s); load at the end {os.getloadavg()[0]:.1f}"
+    made = Images(
+        dataset,
+        lambda scan, settings: reconstruct_on_workers(scan, settings, progress).result,
+        Settings.of(attenuation=False),
+    )
     for way, goal in GOALS.items():
         ratio = images[way].rms / images["straight"].rms
-        yield Row(
-            f"k-Wave scan without water shot, {way}: error over straight rays", ratio, goal, "<=", "", detail
-        )
+        target = f"k-Wave scan without water shot, {way}: error over straight rays"
+        compared = made.compared(images[way].result, object_error(dataset))
+        yield compared.row(target, ratio, goal, "<=", "", detail)
     (RESULTS / "any_scan_kwave.png").write_bytes(picture(dataset, images))
 
 
