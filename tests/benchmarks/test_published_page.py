@@ -44,3 +44,10 @@ def test_figures_are_the_recorded_ones():
 def test_settings_exist(word, choices):
     assert word in TEXT
     assert word in choices
+
+
+@pytest.mark.parametrize("chapter", range(3, 7))
+def test_figures_of_a_chapter_are_recorded_as_rows(chapter):
+    results = ROOT / "benchmarks/results"
+    assert (results / f"chapter{chapter}.png").exists()
+    assert json.loads((results / f"chapter{chapter}.json").read_text())

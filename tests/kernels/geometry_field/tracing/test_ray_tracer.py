@@ -286,6 +286,31 @@ def test_published_lookups_read_the_image(way):
     np.testing.assert_array_equal(nowhere, picture(replace(published(material), instances=(away,))))
 
 
+@pytest.mark.parametrize("way", UV_WAYS)
+def test_published_hits_are_as_far_as_they_are(way):
+    # A wall just behind the ball, and a mirror that sees both: a farther ball would be behind the wall.
+    scene = published(Material(colour=(1.0, 0.0, 0.0)))
+    low = replace(scene, ground=Ground(-0.2, 0.4, 5.0, ((0.0, 1.0, 0.0), (0.0, 1.0, 0.0))), ambient=1.0)
+    camera = perspective((0.0, -0.6, 4.0), (0.1, 0.2, 0.0), (0.0, 1.0, 0.0), 25.0)
+    exact, found = picture(low, camera), picture(low, camera, eye=way)
+    assert (exact[..., 0] == 255).mean() > 0.3
+    assert np.mean((exact != found).any(axis=2)) < 0.06
+
+
+@pytest.mark.parametrize("way", UV_WAYS)
+def test_rays_within_a_body_leave_it_by_the_image(way):
+    image = published_shape().reference.image
+    scene = published(Material(glass=1.0))
+    away = scene.instances[0].to_world[:, :3].T @ np.array([0.0, 1.0, 0.0]) / 1.2
+    behind = (image[..., :3] - 0.5) @ away > 0.2
+    flat = image.copy()
+    flat[behind, 3:] = away
+    plain = picture(scene, eye=way, way=way)
+    other = picture(published(Material(glass=1.0), image=flat), eye=way, way=way)
+    # Where rays come in the image is the same.
+    assert np.mean((plain != other).any(axis=2)) > 0.05
+
+
 def test_pictures_do_not_depend_on_threads_or_runs():
     one = picture(crowded())
     np.testing.assert_array_equal(one, picture(crowded(), threads=2))
