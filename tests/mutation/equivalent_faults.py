@@ -22,6 +22,12 @@ EQUIVALENT: dict[str, str] = {
     " -> loop_of = np.full(len(opened.origin), (1))": "the entries of inner vertices are never read",
     "geometry_field/layout/cutting.py Cutter.far_ends: np.abs(scale).max() > MIN_SCALE -> np.abs(scale).max()"
     " >= MIN_SCALE": "no computed scale equals the limit",
+    "refraction/render.py _tiles: min(first + at_once, rows) -> (first + at_once)": "slices end with the "
+    "array",
+    "acquisition/reference/reference_shot.py _Fit.__init__: frequency * period_s <= HIGHEST -> frequency * "
+    "period_s < HIGHEST": "one bin at the edge of the band",
+    "isosurface/cell_weights.py _extremes: flat < stop -> flat <= stop": "the end itself is in "
+    "the list",
     "acquisition/calibration/water_times.py water_times: distance >= NEAREST * distance.max() -> distance > "
     "NEAREST * distance.max()": "no distance equals this product",
     "tomography/gauss_newton/linear_problem.py Linearised.solve: self.huber < math.inf -> self.huber <= "

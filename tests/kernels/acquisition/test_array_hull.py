@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition.array_hull import check_extent, depth_inside, inside_array
+from bentray_kernels.acquisition.array_hull import _open, check_extent, depth_inside, inside_array
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 
@@ -99,3 +99,15 @@ def test_elements_without_extent_are_refused(position, words):
 def test_depth_is_the_distance_from_the_nearest_face():
     places = np.array([[0.0, 0.0], [0.02, 0.01], [0.0, 0.03]])
     assert depth_inside(lines(), places) == pytest.approx([0.025, 0.01, -0.005])
+
+
+@pytest.mark.parametrize("highest", [1, 2, 3, 6])
+def test_an_end_whose_highest_elements_lie_on_a_line_is_open(highest):
+    angle = 2.0 * np.pi * np.arange(12) / 12
+    ring = np.column_stack((20.0 * np.cos(angle), 20.0 * np.sin(angle), np.zeros(12)))
+    row = np.column_stack((np.linspace(-4.0, 4.0, highest), np.full(highest, 1.0), np.full(highest, 9.0)))
+    assert _open(np.concatenate((ring, row)), 1.0, 2.0)
+    # Below there is nothing but the ring; a plate across it closes it.
+    assert _open(np.concatenate((ring, row)), -1.0, 2.0)
+    plate = np.random.default_rng(0).uniform(-10.0, 10.0, (40, 2))
+    assert not _open(np.concatenate((ring, row, np.column_stack((plate, np.zeros(40))))), -1.0, 2.0)
