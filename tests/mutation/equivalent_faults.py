@@ -26,8 +26,17 @@ EQUIVALENT: dict[str, str] = {
     "array",
     "acquisition/reference/reference_shot.py _Fit.__init__: frequency * period_s <= HIGHEST -> frequency * "
     "period_s < HIGHEST": "one bin at the edge of the band",
-    "isosurface/cell_weights.py _extremes: flat < stop -> flat <= stop": "the end itself is in "
-    "the list",
+    "isosurface/cell_weights.py _extremes: flat < stop -> flat <= stop": "the end itself is in the list",
+    "refraction/supersampling.py post_refraction_colours: a + b > 0 -> a + b >= 0": "at no distance the "
+    "sample is the pixel's own place",
+    "refraction/relief.py meet_relief: across <= down -> across < down": "at a corner the other line follows after a "
+    "step of 0",
+    "eikonal/deviation.py _sweep_first_order: way > 0 -> way >= 0": "the direction is 1 or -1",
+    "eikonal/deviation.py _sweep_second_order: way > 0 -> way >= 0": "the direction is 1 or -1",
+    "eikonal/deviation.py deviate: way > 0 -> way >= 0": "the direction is 1 or -1",
+    "geometry_field/layout/parameterisation.py _checked: longest = np.linalg.norm(np.roll(mesh.corners, -1, "
+    "axis=1) - mesh.corners, axis=-1).max(axis=1) -> longest = np.linalg.norm(np.roll(mesh.corners, -2, "
+    "axis=1) - mesh.corners, axis=-1).max(axis=1)": "either way round there are the same three sides",
     "acquisition/calibration/water_times.py water_times: distance >= NEAREST * distance.max() -> distance > "
     "NEAREST * distance.max()": "no distance equals this product",
     "tomography/gauss_newton/linear_problem.py Linearised.solve: self.huber < math.inf -> self.huber <= "

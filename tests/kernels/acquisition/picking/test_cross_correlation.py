@@ -29,3 +29,7 @@ def test_the_pulse_is_found_anywhere_in_noise(shift, gain, seed):
 def test_silence_and_window_edges_give_no_delay():
     assert np.isnan(find_delay(trace(100.0), np.zeros(240), 90, 110, -30.0, 30.0, 0.0))
     assert np.isnan(find_delay(trace(100.0), trace(130.0), 90, 110, -30.0, 29.0, 0.0))
+
+
+def test_an_empty_range_has_no_delay():
+    assert np.isnan(find_delay(trace(100.0), trace(100.0), 90, 110, 5.0, -5.0, 0.0))

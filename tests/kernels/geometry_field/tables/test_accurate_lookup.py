@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentray_kernels.geometry_field.tables.accurate_lookup import STEPS, find
+from bentray_kernels.geometry_field.tables.accurate_lookup import STEPS, find, settle
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import Surface, surface_of
 
-from ...meshes.examples import bunny
+from ...meshes.examples import bunny, flat_patch
 from ...meshes.test_intersector import first_faces
 from ..shapes import ball, dented, field_of, over_the_poles
 
@@ -95,6 +95,38 @@ def test_rays_that_start_before_the_cube_are_the_same_rays():
     same = before == faces
     assert same.mean() > 0.995
     np.testing.assert_allclose(later[same] - 1.0, distances[same], atol=1e-5)
+
+
+def test_every_face_of_a_ball_is_found_from_above_its_middle():
+    surface = ball(3)
+    corners = surface.triangles[:, :9].reshape(-1, 3, 3)
+    middle = corners.mean(axis=1)
+    inwards = 0.5 - middle
+    faces, _, weights = found(surface, field_of(surface, 8), middle - 2.0 * inwards, inwards, STEPS)
+    np.testing.assert_array_equal(faces, np.arange(len(faces)))
+    np.testing.assert_allclose(weights, 1.0 / 3.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_walk_over_an_open_patch_ends_below_the_ray_or_nowhere(side):
+    """From every face to places on the patch and beside it."""
+    patch = flat_patch(5, 4).in_unit_cube()
+    surface = surface_of(Chart(patch, np.zeros((len(patch.faces), 3, 2))))
+    corners = surface.triangles[:, :9].reshape(-1, 3, 3).astype(float)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    up = np.sign(np.cross(corners[0, 1] - corners[0, 0], corners[0, 2] - corners[0, 0])[2]) * side
+    random = np.random.default_rng(0)
+    for x, y in low[:2] + random.uniform(-0.4, 1.4, (60, 2)) * (high - low)[:2]:
+        a, b, c = np.moveaxis(corners[..., :2], 1, 0)
+        system = np.stack([a - c, b - c], axis=-1)
+        one, two = np.linalg.solve(system, (np.array([x, y]) - c)[..., None])[..., 0].T
+        below = np.flatnonzero((one >= 0.0) & (two >= 0.0) & (one + two <= 1.0))
+        expected = below[0] if len(below) else -1
+        for first in range(len(corners)):
+            face, away, _, _ = settle(surface, first, side, 60, x, y, low[2] + up, 0.0, 0.0, -up)
+            assert face == expected
+            assert away == pytest.approx(1.0)
+            assert settle(surface, first, -side, 60, x, y, low[2] + up, 0.0, 0.0, -up)[0] == -1
 
 
 def test_positions_lie_on_the_returned_faces():

@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, Trial, reconstruct
 from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.inversion_state import BandEnd, Image
-from bentray_kernels.tomography.waveform.refinement import predicts_better
+from bentray_kernels.tomography.waveform.refinement import _band_note, predicts_better
 from bentray_kernels.tomography.waveform.validation import Validation
 from bentray_kernels.tomography.waveform.waveform_cost import advice
 
@@ -110,3 +110,14 @@ def test_improvements_of_bands_multiply(held, expected):
         ends.append(BandEnd(image, skipped=False, history=passes))
     assert predicts_better([SimpleNamespace(ends=ends)]) is expected
     assert not predicts_better([SimpleNamespace(ends=ends[:1])])
+
+
+def test_the_note_of_a_band_counts_slices_where_there_are_several():
+    record = Evaluation(0.5, 0.4, True)
+    image = Image(np.ones((2, 2)), 1e-3, (0.0, 0.0))
+    whole, ended = (BandEnd(image, skipped, (record,)) for skipped in (False, True))
+    left_out = BandEnd(image, True, ())
+    assert _band_note([]) == _band_note([whole]) == ""
+    assert _band_note([ended]).startswith("stopped as the misfit rose")
+    assert _band_note([ended, whole, ended]).startswith("stopped in 2 slices as the misfit rose")
+    assert _band_note([left_out, left_out]).startswith("left out")
