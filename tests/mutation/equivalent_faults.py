@@ -29,8 +29,8 @@ EQUIVALENT: dict[str, str] = {
     "isosurface/cell_weights.py _extremes: flat < stop -> flat <= stop": "the end itself is in the list",
     "refraction/supersampling.py post_refraction_colours: a + b > 0 -> a + b >= 0": "at no distance the "
     "sample is the pixel's own place",
-    "refraction/relief.py meet_relief: across <= down -> across < down": "at a corner the other line follows after a "
-    "step of 0",
+    "refraction/relief.py meet_relief: across <= down -> across < down": "at a corner the other "
+    "line follows after a step of 0",
     "eikonal/deviation.py _sweep_first_order: way > 0 -> way >= 0": "the direction is 1 or -1",
     "eikonal/deviation.py _sweep_second_order: way > 0 -> way >= 0": "the direction is 1 or -1",
     "eikonal/deviation.py deviate: way > 0 -> way >= 0": "the direction is 1 or -1",
