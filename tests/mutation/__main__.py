@@ -53,8 +53,8 @@ def main() -> None:
     if wanted.only:
         sampled = [(module, fault) for module, fault in sampled if wanted.only in module]
     left = [one for one in sampled if _is_left(done.get(key(entry(*one))), wanted)]
-    # Those with little to run first: a run that is ended early has tried more.
-    left.sort(key=lambda one: sum((ROOT / file).stat().st_size for file in near(ROOT, one[0])))
+    # Survivors first, then those with little to run: a run that is ended early has tried more.
+    left.sort(key=lambda one: (key(entry(*one)) not in done, _to_run(one[0])))
     print(f"{len(sampled)} faults, {len(left)} of them to try; state in {wanted.file}", flush=True)
     if wanted.list:
         for module, fault in left:
@@ -90,6 +90,11 @@ def _arguments() -> argparse.Namespace:
     options.add_argument("--wide", action="store_true", help="with all tests of the part of the kernels")
     options.add_argument("--list", action="store_true", help="print the faults and end")
     return options.parse_args()
+
+
+def _to_run(module: str) -> int:
+    """Bytes of the nearest tests."""
+    return sum((ROOT / file).stat().st_size for file in near(ROOT, module))
 
 
 def _is_left(known: dict[str, Any] | None, wanted: argparse.Namespace) -> bool:

@@ -171,3 +171,17 @@ def test_water_that_warms_or_cools_during_the_scan(water, change_c):
     assert finding.check == "water temperature drift"
     assert finding.value == pytest.approx(2.9 * change_c, rel=0.15)
     assert f"{'warms' if change_c > 0.0 else 'cools'} by 0.5 °C" in finding.found
+
+
+def test_an_element_is_dead_where_the_water_shot_has_no_pulse_of_it():
+    """The object may hide an element; the water does not."""
+    traces = recorded().waveform
+    water, hidden = traces.water.copy(), traces.object.copy()
+    water[7], hidden[9] = 0.0, 0.0
+    scans = (Waveform(traces.object, water), Waveform(hidden, traces.water))
+    dead, none = (
+        [finding for finding in found(replace(recorded(), waveform=one)) if "dead" in finding.check]
+        for one in scans
+    )
+    assert [(finding.elements, finding.role) for finding in dead] == [((7,), "emission")]
+    assert none == []
