@@ -75,7 +75,7 @@ def test_a_sample_covers_all_modules_before_it_repeats_one():
     ("module", "first"),
     [
         ("wave/stencil.py", "tests/kernels/wave/test_stencil.py"),
-        ("eikonal/updates.py", "tests/kernels/eikonal/test_accurate.py"),
+        ("acquisition/picking/differential.py", "tests/kernels/acquisition/picking/test_onset.py"),
     ],
 )
 def test_every_module_has_tests_and_the_mirrored_file_comes_first(module, first):
