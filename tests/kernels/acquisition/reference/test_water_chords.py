@@ -80,3 +80,13 @@ def test_chords_nearer_than_a_few_wavelengths_are_not_used_and_all_others_may_be
         limits = NEAREST * WATER_MPS * period_s, NEAREST_PART * distance.max()
         chords = find_water_chords(BARE, distance / WATER_MPS, period_s)
         assert (chords.pairs == (distance > min(limits))).all()
+
+
+@pytest.mark.parametrize(("part", "speed_mps"), [(0.7, 1440.0), (0.7, 1500.0), (0.8, 1530.0)])
+def test_the_outermost_chords_show_the_line_where_most_chords_cross_the_object(part, speed_mps):
+    """The line through most arrivals is that of the object; no outermost chord lies on it."""
+    inside = in_disc_m(BARE, part * RADIUS_M, (0.0, 0.0))
+    arrival = BARE.distance_m() / WATER_MPS + inside * (1.0 / speed_mps - 1.0 / WATER_MPS)
+    chords = find_water_chords(BARE, arrival, PERIOD_S)
+    assert chords.speed_mps == pytest.approx(WATER_MPS, abs=0.1)
+    assert not inside[chords.pairs].any()
