@@ -50,9 +50,7 @@ def main() -> None:
     if wanted.file.is_file():
         done = {key(one): one for one in json.loads(wanted.file.read_text(encoding="utf-8"))["faults"]}
     sampled = sample(ROOT, wanted.count, wanted.seed)
-    if wanted.only:
-        sampled = [(module, fault) for module, fault in sampled if wanted.only in module]
-    left = [one for one in sampled if _is_left(done.get(key(entry(*one))), wanted)]
+    left = [one for one in sampled if wanted.only in one[0] and _is_left(done.get(key(entry(*one))), wanted)]
     # Survivors first, then those with little to run: a run that is ended early has tried more.
     left.sort(key=lambda one: (key(entry(*one)) not in done, _to_run(one[0])))
     print(f"{len(sampled)} faults, {len(left)} of them to try; state in {wanted.file}", flush=True)

@@ -10,7 +10,7 @@ from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import Surface, surface_of
 
-from ...meshes.examples import bunny, flat_patch
+from ...meshes.examples import bunny, flat_patch, without
 from ...meshes.test_intersector import first_faces
 from ..shapes import ball, dented, field_of, over_the_poles
 
@@ -127,6 +127,32 @@ def test_a_walk_over_an_open_patch_ends_below_the_ray_or_nowhere(side):
             assert face == expected
             assert away == pytest.approx(1.0)
             assert settle(surface, first, -side, 60, x, y, low[2] + up, 0.0, 0.0, -up)[0] == -1
+
+
+def test_a_walk_that_leaves_the_mesh_ends_there():
+    """A strip of squares with a hole between the first face and the place below the ray."""
+    strip = without(flat_patch(7, 3), [7, 19]).in_unit_cube()
+    surface = surface_of(Chart(strip, np.zeros((len(strip.faces), 3, 2))))
+    middle = surface.triangles[:, :9].reshape(-1, 3, 3).mean(axis=1).astype(float)
+    upper = middle[:, 1] > np.median(middle[:, 1])
+    first = np.flatnonzero(upper)[middle[upper, 0].argmax()]
+    x, y, z = middle[np.flatnonzero(upper)[middle[upper, 0].argmin()]]
+    assert settle(surface, first, 1.0, 60, x, middle[first, 1], z + 1.0, 0.0, 0.0, -1.0)[0] == -1
+    x, y, z = middle[first]
+    assert settle(surface, first, 1.0, 60, x, y, z + 1.0, 0.0, 0.0, -1.0)[0] == first
+
+
+def test_the_first_row_of_the_triangles_is_a_face_as_any_other():
+    surface = ball(3)
+    random = np.random.default_rng(0)
+    corners = surface.triangles[0, :9].reshape(3, 3).astype(float)
+    points = random.dirichlet((3.0, 3.0, 3.0), 200) @ corners
+    inwards = 0.5 - points + random.uniform(-0.25, 0.25, (200, 3))
+    origins = points - 3.0 * inwards
+    expected, _, _, _ = first_faces(surface, origins, inwards)
+    faces, _, _ = found(surface, field_of(surface, 4), origins, inwards, 60)
+    assert (expected == 0).mean() > 0.9
+    assert (faces[expected == 0] == 0).mean() > 0.9
 
 
 def test_positions_lie_on_the_returned_faces():
