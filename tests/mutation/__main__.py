@@ -73,8 +73,8 @@ def main() -> None:
                 f"{module}:{fault.line} {fault.before}  ->  {fault.after}",
                 flush=True,
             )
-            save(wanted.file, wanted.seed, [done[k] for one in sampled if (k := key(entry(*one))) in done])
-    save(wanted.file, wanted.seed, [done[k] for one in sampled if (k := key(entry(*one))) in done])
+            save(wanted.file, wanted, [done[k] for one in sampled if (k := key(entry(*one))) in done])
+    save(wanted.file, wanted, [done[k] for one in sampled if (k := key(entry(*one))) in done])
     print(json.dumps(json.loads(wanted.file.read_text(encoding="utf-8"))["summary"]))
 
 
@@ -156,7 +156,7 @@ class Trials:
             )
 
 
-def save(file: Path, seed: int, faults: list[dict[str, Any]]) -> None:
+def save(file: Path, wanted: argparse.Namespace, faults: list[dict[str, Any]]) -> None:
     """Write the faults and their summary; survivors that change no result are marked with the reason."""
     faults = [dict(one) for one in faults]
     for one in faults:
@@ -172,14 +172,17 @@ def save(file: Path, seed: int, faults: list[dict[str, Any]]) -> None:
     total = sum(parts.values(), Counter())
     counted = total["killed"] + total["survived"]
     summary = {
-        "faults": total.total(),
+        "sampled": wanted.count,
+        "tried": total.total(),
         **{name: total[name] for name in ("killed", "survived", "equivalent")},
         "killed_part": round(total["killed"] / counted, 4) if counted else None,
         "parts": {part: dict(sorted(counts.items())) for part, counts in sorted(parts.items())},
     }
     file.parent.mkdir(parents=True, exist_ok=True)
     partial = file.with_suffix(".partial")
-    text = json.dumps({"seed": seed, "summary": summary, "faults": faults}, indent=1, ensure_ascii=False)
+    text = json.dumps(
+        {"seed": wanted.seed, "summary": summary, "faults": faults}, indent=1, ensure_ascii=False
+    )
     partial.write_text(text + "\n", encoding="utf-8")
     partial.replace(file)
 
