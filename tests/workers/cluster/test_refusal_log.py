@@ -1,10 +1,11 @@
-"""Bad input that a worker refuses is one line of its log; a fault keeps its traceback."""
+"""Rejected input is one line in the log of a worker, a closed scheduler none; a fault keeps its traceback."""
 
 import logging
 
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.cluster.refusal_log import shorten
 
 
 def refuse():
@@ -23,3 +24,14 @@ def test_the_log_of_a_task_that_raises(cluster, caplog, task, error, traced):
         cluster.client.submit(task, pure=False).result()
     (said,) = (one.getMessage() for one in caplog.records if error.__name__ in one.getMessage())
     assert ("\n" in said, "Traceback" in said) == (traced, traced)
+
+
+@pytest.mark.parametrize("level", [logging.INFO, logging.WARNING])
+def test_a_heartbeat_to_a_closed_scheduler_is_no_error(level):
+    log = logging.getLogger("distributed.worker.test")
+    log.setLevel(level)
+    error = (OSError, OSError("Stream is closed"), None)
+    said = "Failed to communicate with scheduler during heartbeat."
+    record = log.makeRecord(log.name, logging.ERROR, "worker.py", 1, said, (), error)
+    assert shorten(record) == (level == logging.INFO)
+    assert (record.levelname, record.exc_info) == ("INFO", None)

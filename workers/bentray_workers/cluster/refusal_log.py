@@ -1,4 +1,4 @@
-"""Log filter of workers: one line for rejected input, which is an error of the user only."""
+"""Log filter of workers: one line for rejected input and for a closed scheduler, which are no faults here."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from bentray_kernels.errors import InvalidInput
 
 
 def shorten(record: logging.LogRecord) -> bool:
-    """A logging filter that shortens the report of Dask on InvalidInput to one line, and drops no record."""
+    """A logging filter: InvalidInput in one line, and a lost scheduler at level INFO without its stack."""
     message, arguments = str(record.msg), record.args
+    if message.startswith("Failed to communicate with scheduler during heartbeat"):
+        # Also at the end of an embedded cluster, whose scheduler closes first. Level INFO is not shown.
+        record.levelno, record.levelname, record.exc_info = logging.INFO, "INFO", None
+        return logging.getLogger(record.name).isEnabledFor(logging.INFO)
     if message.startswith("Compute Failed") and isinstance(arguments, tuple) and len(arguments) == 5:
         key, refused = arguments[0], str(arguments[3])
         if refused.startswith(InvalidInput.__name__):
