@@ -11,12 +11,10 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats
 from ..compiled import kernel
 from ..errors import InvalidInput
+from ..ray_gradient_names import RayGradient
 from .squared_time_spline import squared_time_spline
 
 RayKind = Literal["curved", "straight"]
-# How ∇(T²) is read between the nodes: central differences at them, interpolated multilinearly; or the
-# gradient of the cubic B-spline of T², as in chapter 6.3.
-RayGradient = Literal["differences", "bspline"]
 
 
 class Fan(NamedTuple):

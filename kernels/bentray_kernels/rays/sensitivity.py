@@ -8,8 +8,9 @@ from scipy.sparse import csr_array
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
+from ..ray_gradient_names import RayGradient
 from .descent import PARTS, STEP, empty_path, list_entries, merge_entries, trace_ray
-from .fan import Fan, RayGradient, RayKind
+from .fan import Fan, RayKind
 
 
 def sensitivities(

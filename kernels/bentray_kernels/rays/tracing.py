@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
+from ..ray_gradient_names import RayGradient
 from .descent import STEP, empty_path, trace_ray
-from .fan import Fan, RayGradient, RayKind
+from .fan import Fan, RayKind
 
 
 def trace(

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass
 
 from ..ranges import Range, ranged
-from ..rays.fan import RayGradient
+from ..ray_gradient_names import RayGradient
 from ..request_fields import check
 
 BANDS = 4

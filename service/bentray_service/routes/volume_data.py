@@ -73,7 +73,7 @@ async def volume_data(
     # Exports are deleted together with the volume.
     path = await run_in_threadpool(service.files.store.fetch, files.volume(volume["id"]))
     seed = repr((volume["id"], volume["created"], "hdf5" if format == "h5" else format))
-    selection = Selection(quantity, attenuation, frequency_hz)
+    selection = Selection(quantity, attenuation, None if attenuation == "Np/m" else frequency_hz)
     if format in ("hdf5", "h5"):
         if selection != Selection():
             field = "quantity" if quantity != "speed" else "attenuation"
@@ -82,7 +82,11 @@ async def volume_data(
         return download(request, path, seed, HDF5)
     chosen = FORMATS[format]
     # Exports are deterministic, so the ETag is computed from the volume.
-    which = "" if selection == Selection() else f"{quantity}-{attenuation.partition('/')[0]}-{frequency_hz}."
+    which = (
+        ""
+        if selection == Selection()
+        else f"{quantity}-{attenuation.partition('/')[0]}-{selection.frequency_hz}."
+    )
     seed = repr((seed, which)) if which else seed
     tag = tag_of(path, repr((__version__, seed)))
     if (response := unchanged(request, tag)) is not None:

@@ -148,7 +148,11 @@ def test_large_picture_is_rendered_in_tiles(http, cluster, monkeypatch):
         ("azimuth_deg=inf", "azimuth_deg", "36000"),
         ("elevation_deg=91", "elevation_deg", "90"),
         ("zoom=0", "zoom", "0.05"),
-        ("backdrop=forest", "backdrop", "'checkerboard' or 'picture'"),
+        (
+            "backdrop=forest",
+            "backdrop",
+            "'checkerboard', 'picture', 'warped-checkerboard' or 'warped-picture'",
+        ),
         ("squares=0", "squares", "1"),
         ("backdrop_distance=0.1", "backdrop_distance", "0.5"),
         ("supersampling=post", "supersampling", "prss"),

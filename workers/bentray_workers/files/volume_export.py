@@ -74,8 +74,6 @@ class Selection:
                 raise InvalidInput(name, repr(value)[:40], "one of " + ", ".join(accepted))
         if self.frequency_hz is not None:
             FREQUENCY_HZ.check("frequency", self.frequency_hz)
-            if self.attenuation == "Np/m":
-                raise InvalidInput("frequency", self.frequency_hz, "none: Np/m refers to no frequency")
 
 
 @dataclass(frozen=True)
