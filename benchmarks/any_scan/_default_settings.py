@@ -15,15 +15,13 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.model_selection.selection import explain_trials
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.images.canvas import drawing, new_figure
-from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
-from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
-from ..shared._small_png import figure_png
+from ..shared._reconstruction_on_workers import reconstruct_on_workers
+from ._images_beside_truth import images_beside_truth
 
 RESULTS = Path(__file__).parents[1] / "results"
 
@@ -76,7 +74,9 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         target = f"{name}: time on {os.cpu_count()} cores"
         yield compared.row(target, default.seconds, SECONDS, "<=", "s", detail)
         if not quick and not noise:
-            (RESULTS / "any_scan_default_settings.png").write_bytes(picture(dataset, images))
+            (RESULTS / "any_scan_default_settings.png").write_bytes(
+                images_beside_truth("Exact times, 256 elements", {"detailed breast": (dataset, images)})
+            )
 
 
 def blurred_error(dataset: Dataset) -> float:
@@ -87,21 +87,3 @@ def blurred_error(dataset: Dataset) -> float:
     speed = truth.sound_speed_mps
     difference = gaussian_filter(speed, BLUR_M / truth.spacing_m[0]) - speed
     return float(np.sqrt((difference[roi] ** 2).mean()))
-
-
-def picture(dataset: Dataset, images: dict[str, Made]) -> bytes:
-    """PNG: the truth and the images."""
-    truth = dataset.truth
-    assert truth is not None
-    with drawing():
-        figure = new_figure(13.0, 3.5)
-        panels = figure.subplots(1, 1 + len(images))
-        limits = robust_limits([truth.sound_speed_mps])
-        grid = truth.spacing_m, truth.origin_m
-        maps = [draw_map(panels[0], truth.sound_speed_mps, *grid, limits, colormap=SPEED, title="truth")]
-        for axes, (way, one) in zip(panels[1:], images.items(), strict=True):
-            title = f"{way}: {one.rms:.1f} m/s, {one.seconds:.0f} s"
-            grid = one.result.spacing_m, one.result.origin_m
-            maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
-        draw_bar(maps, "speed (m/s)")
-        return figure_png(figure)

@@ -16,14 +16,12 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.wave.stencil import longest_step
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.images.canvas import drawing, new_figure
-from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
-from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
-from ..shared._small_png import figure_png
+from ..shared._reconstruction_on_workers import reconstruct_on_workers
 from ..waves._kwave_peer import Peer, installed
+from ._images_beside_truth import images_beside_truth
 from ._planted_scan import planted, without_water_shot
 
 RESULTS = Path(__file__).parents[1] / "results"
@@ -70,7 +68,9 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         target = f"k-Wave scan without water shot, {way}: error over straight rays"
         compared = made.compared(images[way].result, object_error(dataset))
         yield compared.row(target, ratio, goal, "<=", "", detail)
-    (RESULTS / "any_scan_kwave.png").write_bytes(picture(dataset, images))
+    (RESULTS / "any_scan_kwave.png").write_bytes(
+        images_beside_truth("Waves by k-Wave, no water shot", {"detailed breast": (dataset, images)})
+    )
 
 
 def simulated(peer: Peer, progress: Step) -> Dataset:
@@ -125,22 +125,3 @@ def simulated(peer: Peer, progress: Step) -> Dataset:
         t0_s=-BEFORE / CENTRE_HZ,
         source="made by k-Wave",
     )
-
-
-def picture(dataset: Dataset, images: dict[str, Made]) -> bytes:
-    """PNG: the truth and the images."""
-    truth = dataset.truth
-    assert truth is not None
-    with drawing():
-        figure = new_figure(15.0, 3.3)
-        figure.suptitle("Waves by k-Wave, no water shot: truth and images")
-        panels = figure.subplots(1, 1 + len(images))
-        limits = robust_limits([truth.sound_speed_mps])
-        grid = truth.spacing_m, truth.origin_m
-        maps = [draw_map(panels[0], truth.sound_speed_mps, *grid, limits, colormap=SPEED, title="truth")]
-        for axes, (way, one) in zip(panels[1:], images.items(), strict=True):
-            title = f"{way}: {one.rms:.1f} m/s, {one.seconds:.0f} s"
-            grid = one.result.spacing_m, one.result.origin_m
-            maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
-        draw_bar(maps, "speed (m/s)")
-        return figure_png(figure)

@@ -12,15 +12,13 @@ from bentray_kernels.tomography import Reconstruction, Settings
 from bentray_service.cli.output.benchmark_row import BEST_CONSTANT, WATER_ALONE, Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
-from bentray_workers.images.canvas import drawing, new_figure
-from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
 from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
-from ..shared._small_png import figure_png
+from ._images_beside_truth import images_beside_truth
 from ._planted_scan import planted, without_water_shot
 
 RESULTS = Path(__file__).parents[1] / "results"
@@ -52,7 +50,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             )
             for shot, scan in (("with", dataset), ("none", without_water_shot(dataset))):
                 images[f"{way}, {shot}"] = reconstruct_on_workers(scan, settings, progress)
-        shown[name] = dataset, images
+        shown[name] = dataset, {way: images[way] for way in SHOWN}
         made = Images(
             without_water_shot(dataset),
             lambda scan, settings: reconstruct_on_workers(scan, settings, progress).result,
@@ -60,7 +58,11 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         )
         yield from scan_rows(name, dataset, images, made)
     if not quick:
-        (RESULTS / "any_scan_without_water_shot.png").write_bytes(picture(shown))
+        (RESULTS / "any_scan_without_water_shot.png").write_bytes(
+            images_beside_truth(
+                "Images with the water shot, and with one estimated from the scan (none)", shown
+            )
+        )
 
 
 def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
@@ -92,25 +94,3 @@ def constants(dataset: Dataset, result: Reconstruction) -> dict[str, float]:
         BEST_CONSTANT: error.of_constant(error.best_constant),
         WATER_ALONE: error.of_constant(dataset.water_speed_mps),
     }
-
-
-def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Made]]]) -> bytes:
-    """PNG: the truth and the images of each scan."""
-    with drawing():
-        figure = new_figure(15.0, 3.1 * len(scans) + 0.4)
-        figure.suptitle("Images with the water shot, and with one estimated from the scan (none)")
-        panels = figure.subplots(len(scans), 1 + len(SHOWN), squeeze=False)
-        for row, (name, (dataset, images)) in zip(panels, scans.items(), strict=True):
-            truth = dataset.truth
-            assert truth is not None
-            limits = robust_limits([truth.sound_speed_mps])
-            grid = truth.spacing_m, truth.origin_m
-            title = f"{name}: truth"
-            maps = [draw_map(row[0], truth.sound_speed_mps, *grid, limits, colormap=SPEED, title=title)]
-            for axes, way in zip(row[1:], SHOWN, strict=True):
-                one = images[way]
-                title = f"{way}: {one.rms:.1f} m/s, {one.seconds:.0f} s"
-                grid = (one.result.spacing_m, one.result.origin_m)
-                maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
-            draw_bar(maps, "speed (m/s)")
-        return figure_png(figure)

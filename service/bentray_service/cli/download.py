@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .export import AttenuationFrequency, AttenuationUnit, Quantity
+from .export import SUFFIXES, AttenuationFrequency, AttenuationUnit, Quantity
 from .options.paths import output_file
 from .output.exit_codes import client_errors
 from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
@@ -43,18 +43,10 @@ def download(
 
     Example:  bentray download ds-0123456789abcdef0123 -o scan.h5
     """
-    formats: dict[str, Format] = {".h5": "hdf5"}
+    formats: dict[str, Format] = {".h5": "hdf5", ".hdf5": "hdf5"}
     if stored.startswith("vol-"):
-        formats |= {
-            ".nii": "nifti",
-            ".mha": "metaimage",
-            ".nrrd": "nrrd",
-            ".mat": "mat",
-            ".vti": "vti",
-            ".zip": "ome-zarr",
-            ".dcm": "dicom",
-            ".npy": "npy",
-        }
+        # A service sends OME-Zarr as a zip.
+        formats = {suffix: cast("Format", name) for suffix, name in SUFFIXES.items() if suffix != ".zarr"}
     elif not stored.startswith("ds-"):
         raise InvalidInput("id", repr(stored), "the id of a scan (ds-…) or a volume (vol-…)")
     names: dict[str, Format] = {**{one: one for one in formats.values()}, "h5": "hdf5"}

@@ -67,7 +67,7 @@ def test_a_format_by_its_name(bentray: Callable[..., Result], tmp_path: Path, as
     [
         ("mesh-1", "m.ply", "id: found 'mesh-1'"),
         (SCAN, "scan.mat", "a name ending in .h5"),
-        (VOLUME, "v.png", ".nii, .mha, .nrrd, .mat, .vti, .zip, .dcm, .npy"),
+        (VOLUME, "v.png", ".hdf5, .npy, .nii, .nrrd, .mha, .mat, .vti, .ozx, .zip, .dcm"),
         (SCAN, "there.h5", "(exists)"),
     ],
 )

@@ -11,7 +11,7 @@ def shorten(record: logging.LogRecord) -> bool:
     """A logging filter: InvalidInput in one line, and a lost scheduler at level INFO without its stack."""
     message, arguments = str(record.msg), record.args
     if message.startswith("Failed to communicate with scheduler during heartbeat"):
-        # Also at the end of an embedded cluster, whose scheduler closes first. Level INFO is not shown.
+        # Also at the end of an embedded cluster, whose scheduler closes first and whose level is WARNING.
         record.levelno, record.levelname, record.exc_info = logging.INFO, "INFO", None
         return logging.getLogger(record.name).isEnabledFor(logging.INFO)
     if message.startswith("Compute Failed") and isinstance(arguments, tuple) and len(arguments) == 5:

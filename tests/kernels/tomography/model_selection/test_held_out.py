@@ -33,6 +33,16 @@ def test_the_parts_are_the_whole_and_share_no_pair(parts, elements):
     assert np.array_equal(held, held.T)
 
 
+@pytest.mark.parametrize(("elements", "kept"), [(255, 1), (256, 2), (400, 3)])
+def test_scattered_pairs_of_many_elements_are_those_of_some(elements, kept):
+    parts = [np.isfinite(part_of(ring(elements), part).differential_tof()) for part in PAIRS]
+    used = np.flatnonzero((parts[0] | parts[1]).any(axis=0))
+    assert np.array_equal(used, np.arange(0, elements, kept))
+    expected = np.isfinite(ring(elements).differential_tof())[np.ix_(used, used)]
+    assert np.array_equal((parts[0] | parts[1])[np.ix_(used, used)], expected)
+    assert not (parts[0] & parts[1]).any()
+
+
 def test_views_are_a_tenth_and_whole_sectors():
     held = np.isfinite(part_of(ring(64), "held-out-views").differential_tof())
     assert held.mean() == pytest.approx(6 / 64)
