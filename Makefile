@@ -48,7 +48,7 @@ docs: install-docs ## build the documentation into build/docs; warnings are erro
 
 bench: install ## run the benchmark NAME; NAME=reconstruction ARGS=--quick
 	@mkdir -p build/bench
-	@$(BIN)/bentray bench $(NAME) $(ARGS) --json build/bench/$(NAME).json
+	@$(BIN)/bentray bench $(NAME) $(ARGS) --json build/bench/$(NAME).json --pictures build/bench
 
 mutants: install-tests ## plant faults in the numerics one at a time and run the nearest tests (hours); ARGS="--count 20" narrows it
 	@PYTHONPATH=tests $(BIN)/python -m mutation $(ARGS)

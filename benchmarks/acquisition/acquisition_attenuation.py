@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import CONSTANTS, STRAIGHT_RAYS, Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
@@ -34,11 +35,11 @@ AMPLITUDES: dict[str, dict[str, object]] = {
 }
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """NRMSE inside the object by FWI and by rays, relative to the true range; quick: only of a small scan."""
-    for name, dataset in scans(quick, progress):
+    for name, dataset in scans(context.quick, context.progress):
         picked = replace(pick(dataset), waveform=dataset.waveform)
-        images = Images(picked, partial(run, progress))
+        images = Images(picked, partial(run, context.progress))
         error_on = object_attenuation_error(dataset)
         ways = {
             f"{rays} rays, {way}": Settings.of(method="sart", rays=rays, **changes)

@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.acquisition import PICKERS, Dataset, Waveform, pick
 from bentray_kernels.tomography import Settings
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset, write_dataset
@@ -35,12 +36,12 @@ NEAREST_M = 0.01
 HARD_SNR = 4.0
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Median, MAD, 95 % quantile and picked fraction for each picker; then guided picks in noise."""
-    name, dataset = scan(quick, progress)
+    name, dataset = scan(context.quick, context.progress)
     true = blurred_times(dataset)
     for count, picker in enumerate(PICKERS):
-        progress(count, len(PICKERS), f"picking, {picker}")
+        context.progress(count, len(PICKERS), f"picking, {picker}")
         yield from pick_rows(f"picks {name}, {picker}", pick(dataset, picker).delta_tof_s, true, dataset)
     yield from guided_rows(name, dataset, true)
 

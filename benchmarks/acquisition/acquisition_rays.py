@@ -12,8 +12,8 @@ from bentray_kernels.acquisition import Dataset, Waveform, pick
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import finite_frequency_candidates
 from bentray_kernels.tomography.model_selection.selection import explain_trials
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import STRAIGHT_RAYS, Row
-from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
@@ -41,17 +41,17 @@ SNRS = (np.inf, 30.0, 10.0)
 RADIUS_M = 0.0675
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """R4 for each scan and noise; R7, unless quick."""
-    for asked in (QUICK,) if quick else SCANS:
+    for asked in (QUICK,) if context.quick else SCANS:
         name = f"simulated {1e-3 * asked.frequency_hz:.0f} kHz, {1e3 * asked.side_m:.0f} mm"
-        clean = simulate(asked, lambda now, n=name: progress(now.done, now.total, n))
-        for snr in (30.0,) if quick else SNRS:
+        clean = simulate(asked, lambda now, n=name: context.progress(now.done, now.total, n))
+        for snr in (30.0,) if context.quick else SNRS:
             detail = name + (f", SNR {snr:g}" if snr < np.inf else ", no noise")
             yield from scan_rows(detail, noisy(clean, snr))
-    if not quick and OTHERS.exists():
+    if not context.quick and OTHERS.exists():
         yield from scan_rows("ring_wave_a 400 kHz", read_dataset(OTHERS))
-    yield from measured(quick)
+    yield from measured(context.quick)
 
 
 def noisy(dataset: Dataset, snr: float) -> Dataset:

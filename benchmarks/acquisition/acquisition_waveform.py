@@ -11,6 +11,7 @@ from typing import Any
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.tomography import Reconstruction, Settings
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import finite_frequency_candidates
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
@@ -23,8 +24,6 @@ from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
 from ._acquisition_picture import picture
 from ._ideal_times import ideal
 
-RESULTS = Path(__file__).parents[1] / "results"
-
 # A scan simulated by another solver, not in the repository.
 OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
 
@@ -35,17 +34,16 @@ RAYS: dict[str, dict[str, Any]] = {
 }
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """R10 for each scan; the picture of all of them, unless quick."""
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """R10 for each scan, with a picture of all of them."""
     shown: dict[str, tuple[Dataset, dict[str, Made]]] = {}
-    for name, dataset in scans(quick, progress):
-        scan = WaveScan(dataset, progress)
+    for name, dataset in scans(context.quick, context.progress):
+        scan = WaveScan(dataset, context)
         shown[name] = dataset, scan.made
         yield from scan.rows(name)
-    if not quick:
-        (RESULTS / "acquisition_waveform.png").write_bytes(
-            picture(shown, "wall-clock seconds of two workers")
-        )
+    context.save_picture(
+        "acquisition_waveform.png", lambda: picture(shown, "wall-clock seconds of two workers")
+    )
     reason = "stride: the package registry has none of it"
     yield Row("R10 over stride at equal time", None, 1.0, "<", "", reason)
 
@@ -63,33 +61,33 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
 class WaveScan:
     """The images of one scan by workers: along rays, by default settings, and by FWI."""
 
-    def __init__(self, dataset: Dataset, progress: Step) -> None:
+    def __init__(self, dataset: Dataset, context: BenchmarkContext) -> None:
         """Reconstruct; rays share their picks, ``ideal times`` are exact.
 
         Args:
             dataset: with traces and truth.
-            progress: called meanwhile.
+            context: of the run.
         """
         picked = pick(dataset)
         width = finite_frequency_candidates(picked, Settings())[0]["ray_width_m"]
         wide = {"method": "gauss-newton", "ray_width_m": width}
         changes = {**RAYS, "bent, finite frequency": wide}
         self.made = {
-            way: reconstruct_on_workers(replace(picked, waveform=None), Settings.of(**one), progress)
+            way: reconstruct_on_workers(replace(picked, waveform=None), Settings.of(**one), context)
             for way, one in changes.items()
         }
         self.made["ideal times"] = reconstruct_on_workers(
             replace(picked, delta_tof_s=ideal(dataset), sigma_s=None, waveform=None),
             Settings.of(**RAYS["bent, Gauss-Newton"]),
-            progress,
+            context,
         )
-        images = Images(dataset, lambda of, settings: self._on_workers(of, settings, progress))
+        images = Images(dataset, lambda of, settings: self._on_workers(of, settings, context))
         images.default()
-        self.made["waveform"] = reconstruct_on_workers(dataset, Settings(method="waveform"), progress)
+        self.made["waveform"] = reconstruct_on_workers(dataset, Settings(method="waveform"), context)
         self.compared = images.compared(self.made["waveform"].result, object_error(dataset))
 
-    def _on_workers(self, dataset: Dataset, settings: Settings, progress: Step) -> Reconstruction:
-        made = reconstruct_on_workers(dataset, settings, progress)
+    def _on_workers(self, dataset: Dataset, settings: Settings, context: BenchmarkContext) -> Reconstruction:
+        made = reconstruct_on_workers(dataset, settings, context)
         if settings == Settings():
             self.made["default"] = made
         return made.result

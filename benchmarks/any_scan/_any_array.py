@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +14,8 @@ from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
 from bentray_kernels.arrays import Floats, Ints
 from bentray_kernels.phantoms import Ellipsoid, Part, VolumePhantom
 from bentray_kernels.tomography import Problem, Reconstruction, Settings, reconstruct
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import CONSTANTS, WATER_ALONE, Row
-from bentray_service.cli.output.terminal import Step
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from bentray_workers.images.truth_on_grid import on_grid
@@ -24,8 +23,6 @@ from bentray_workers.images.truth_on_grid import on_grid
 from ..shared._baselines import Compared, Images
 from ..shared._image_error import ImageError
 from ..shared._small_png import figure_png
-
-RESULTS = Path(__file__).parents[1] / "results"
 
 WATER_MPS, RADIUS_M, SIDE_M = 1480.0, 0.095, 0.2
 
@@ -108,12 +105,12 @@ def arrays(*, quick: bool) -> dict[str, Array]:
     return found
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """A3 for each array; the picture of all of them, unless quick."""
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """A3 for each array, with a picture of all of them."""
     images = {}
-    chosen = arrays(quick=quick)
+    chosen = arrays(quick=context.quick)
     for number, (name, array) in enumerate(chosen.items()):
-        progress(number, len(chosen), name)
+        context.progress(number, len(chosen), name)
         images[name] = made(simulated(array))
         yield array_row(name, array, images[name])
     stated = sum(
@@ -126,8 +123,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     yield Row(
         "A3 arrays that state a limited angle, if they have one", stated, len(chosen), "==", "arrays", detail
     )
-    if not quick:
-        (RESULTS / "any_scan_arrays.png").write_bytes(picture(images))
+    context.save_picture("any_scan_arrays.png", lambda: picture(images))
 
 
 def simulated(array: Array) -> Dataset:

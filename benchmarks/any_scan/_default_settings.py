@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,8 @@ from scipy.ndimage import gaussian_filter
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.model_selection.selection import explain_trials
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 
@@ -22,8 +22,6 @@ from ..shared._baselines import Images
 from ..shared._image_error import object_error
 from ..shared._reconstruction_on_workers import reconstruct_on_workers
 from ._images_beside_truth import images_beside_truth
-
-RESULTS = Path(__file__).parents[1] / "results"
 
 # The target is 27 m/s where the truth differs from itself, blurred by this, m, by 19 m/s.
 BLUR_M = 1e-3
@@ -40,25 +38,25 @@ WAYS: dict[str, dict[str, Any]] = {
 NOISES_S = (0.0, 2e-8)
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """A2 without noise and with some; the picture of the first, unless quick."""
-    for noise in NOISES_S[: 1 if quick else None]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """A2 without noise and with some, with a picture of the first."""
+    for noise in NOISES_S[: 1 if context.quick else None]:
         asked = SimulationSettings(
             "detailed",
-            nodes=64 if quick else 256,
-            elements=64 if quick else 256,
+            nodes=64 if context.quick else 256,
+            elements=64 if context.quick else 256,
             coupling_mps=1480.0,
             noise_s=noise,
         )
-        dataset = simulate(asked, lambda now: progress(now.done, now.total, "simulation"))
+        dataset = simulate(asked, lambda now: context.progress(now.done, now.total, "simulation"))
         images = {
-            way: reconstruct_on_workers(dataset, Settings.of(attenuation=False, **changes), progress)
+            way: reconstruct_on_workers(dataset, Settings.of(attenuation=False, **changes), context)
             for way, changes in WAYS.items()
         }
         default, blurred = images["default"], blurred_error(dataset)
         made = Images(
             dataset,
-            lambda scan, settings: reconstruct_on_workers(scan, settings, progress).result,
+            lambda scan, settings: reconstruct_on_workers(scan, settings, context).result,
             Settings.of(attenuation=False),
         )
         compared = made.compared(default.result, object_error(dataset))
@@ -73,10 +71,10 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         yield compared.row(f"{name}: error over that of the blurred truth", ratio, GOAL, "<=", "", detail)
         target = f"{name}: time on {os.cpu_count()} cores"
         yield compared.row(target, default.seconds, SECONDS, "<=", "s", detail)
-        if not quick and not noise:
-            (RESULTS / "any_scan_default_settings.png").write_bytes(
-                images_beside_truth("Exact times, 256 elements", {"detailed breast": (dataset, images)})
-            )
+        if not noise:
+            title = f"Exact times, {asked.elements} elements"
+            drawn = partial(images_beside_truth, title, {"detailed breast": (dataset, images)})
+            context.save_picture("any_scan_default_settings.png", drawn)
 
 
 def blurred_error(dataset: Dataset) -> float:

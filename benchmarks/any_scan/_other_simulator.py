@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.phantoms import DETAILED_SIDE_M, DetailedBreast
 from bentray_kernels.tomography import Settings
 from bentray_kernels.wave.stencil import longest_step
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 
@@ -23,8 +23,6 @@ from ..shared._reconstruction_on_workers import reconstruct_on_workers
 from ..waves._kwave_peer import Peer, installed
 from ._images_beside_truth import images_beside_truth
 from ._planted_scan import planted, without_water_shot
-
-RESULTS = Path(__file__).parents[1] / "results"
 
 WATER_MPS, CENTRE_HZ, SIDE_M, RING = 1480.0, 3e5, 0.12, 0.45
 ELEMENTS, EMISSIONS, SNR = 128, 48, 30.0
@@ -46,21 +44,21 @@ WAYS: dict[str, dict[str, Any]] = {
 GOALS = {"auto": 0.9, "waveform": 0.5}
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """The rows of a scan by k-Wave, where it is installed."""
     found, _ = installed()
-    if not found or quick:
+    if not found or context.quick:
         return
-    dataset = without_water_shot(planted(simulated(found["k-Wave"], progress), 2))
+    dataset = without_water_shot(planted(simulated(found["k-Wave"], context.progress), 2))
     images = {
-        way: reconstruct_on_workers(dataset, Settings.of(attenuation=False, **changes), progress)
+        way: reconstruct_on_workers(dataset, Settings.of(attenuation=False, **changes), context)
         for way, changes in WAYS.items()
     }
     detail = ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.0f} s" for way, one in images.items())
     detail += f" (m/s); load at the end {os.getloadavg()[0]:.1f}"
     made = Images(
         dataset,
-        lambda scan, settings: reconstruct_on_workers(scan, settings, progress).result,
+        lambda scan, settings: reconstruct_on_workers(scan, settings, context).result,
         Settings.of(attenuation=False),
     )
     for way, goal in GOALS.items():
@@ -68,8 +66,9 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         target = f"k-Wave scan without water shot, {way}: error over straight rays"
         compared = made.compared(images[way].result, object_error(dataset))
         yield compared.row(target, ratio, goal, "<=", "", detail)
-    (RESULTS / "any_scan_kwave.png").write_bytes(
-        images_beside_truth("Waves by k-Wave, no water shot", {"detailed breast": (dataset, images)})
+    shown = {"detailed breast": (dataset, images)}
+    context.save_picture(
+        "any_scan_kwave.png", lambda: images_beside_truth("Waves by k-Wave, no water shot", shown)
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import BEST_CONSTANT, WATER_ALONE, Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.dataset import read_dataset
@@ -20,8 +21,6 @@ from ..shared._image_error import object_error
 from ..shared._reconstruction_on_workers import Made, reconstruct_on_workers
 from ._images_beside_truth import images_beside_truth
 from ._planted_scan import planted, without_water_shot
-
-RESULTS = Path(__file__).parents[1] / "results"
 
 # A scan simulated by another solver, not in the repository.
 OTHERS = Path(__file__).parents[3] / "shared" / "data" / "ring_wave_a.h5"
@@ -39,30 +38,26 @@ WAYS: dict[str, dict[str, Any]] = {
 SHOWN = ("straight, none", "bent, none", "waveform, with", "waveform, none")
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """A1 for each scan; the picture of all of them, unless quick."""
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """A1 for each scan, with a picture of all of them."""
     shown: dict[str, tuple[Dataset, dict[str, Made]]] = {}
-    for name, dataset in scans(quick, progress):
+    for name, dataset in scans(context.quick, context.progress):
         images = {}
         for way, changes in WAYS.items():
             settings = Settings.of(
-                attenuation=False, **({"nodes": 48, "bands": 2} if quick else {}), **changes
+                attenuation=False, **({"nodes": 48, "bands": 2} if context.quick else {}), **changes
             )
             for shot, scan in (("with", dataset), ("none", without_water_shot(dataset))):
-                images[f"{way}, {shot}"] = reconstruct_on_workers(scan, settings, progress)
+                images[f"{way}, {shot}"] = reconstruct_on_workers(scan, settings, context)
         shown[name] = dataset, {way: images[way] for way in SHOWN}
         made = Images(
             without_water_shot(dataset),
-            lambda scan, settings: reconstruct_on_workers(scan, settings, progress).result,
+            lambda scan, settings: reconstruct_on_workers(scan, settings, context).result,
             Settings.of(attenuation=False),
         )
         yield from scan_rows(name, dataset, images, made)
-    if not quick:
-        (RESULTS / "any_scan_without_water_shot.png").write_bytes(
-            images_beside_truth(
-                "Images with the water shot, and with one estimated from the scan (none)", shown
-            )
-        )
+    title = "Images with the water shot, and with one estimated from the scan (none)"
+    context.save_picture("any_scan_without_water_shot.png", lambda: images_beside_truth(title, shown))
 
 
 def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 
 from . import _any_array, _default_settings, _other_simulator, _without_water_shot
 
@@ -13,7 +13,7 @@ from . import _any_array, _default_settings, _other_simulator, _without_water_sh
 TARGETS = (_without_water_shot.rows, _default_settings.rows, _any_array.rows, _other_simulator.rows)
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """The rows of all targets."""
     for target in TARGETS:
-        yield from target(quick, progress)
+        yield from target(context)

@@ -19,6 +19,7 @@ from bentray_kernels import eikonal
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.task_graph import Cancelled, Task
 from bentray_kernels.tomography import Settings
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_service.compute import Compute
@@ -38,10 +39,10 @@ THEIRS_S = {128: 0.007, 256: 0.039}
 RUNS = 2
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """All rows, with the load average at their start."""
     load = os.getloadavg()[0]
-    for row in measured(quick, progress):
+    for row in measured(context.quick, context.progress):
         yield replace(row, detail=f"{row.detail}; load average {load:.1f} at the start")
 
 

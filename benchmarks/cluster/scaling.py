@@ -6,9 +6,8 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.atomic import write_bytes
 
 from ._scaling_cluster import Run, machine
 from ._scaling_model import DAY_S, Model
@@ -24,18 +23,19 @@ SHORT_S = 0.02
 RUN_S, QUICK_RUN_S = 4.0, 1.0
 
 MANY_WORKERS, MANY_SCANS = 1000, 10_000
-PICTURE = Path(__file__).resolve().parents[2] / "deploy" / "scaling.png"
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """Cost of a task, and limits of one scheduler; the figure is drawn only in a full run."""
-    scans = QUICK_SCANS if quick else SCANS
-    progress(0, 3, "slices")
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """Cost of a task, and limits of one scheduler, with a picture."""
+    scans = QUICK_SCANS if context.quick else SCANS
+    context.progress(0, 3, "slices")
     works = [of_a_slice(nodes, elements, sweeps) for nodes, elements, sweeps, _ in scans]
-    progress(1, 3, "sleeping tasks")
-    runs = measured(works[0], QUICK_WORKERS if quick else WORKERS, QUICK_RUN_S if quick else RUN_S)
+    context.progress(1, 3, "sleeping tasks")
+    runs = measured(
+        works[0], QUICK_WORKERS if context.quick else WORKERS, QUICK_RUN_S if context.quick else RUN_S
+    )
     models = [Model.fitted(work, runs) for work in works]
-    progress(2, 3, "extrapolating")
+    context.progress(2, 3, "extrapolating")
     yield from costs(models[0], runs)
     for (nodes, _, _, slices), model in zip(scans, models, strict=True):
         yield from limits(model, nodes, slices)
@@ -43,11 +43,10 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     yield Row(
         f"shortest task, {MANY_WORKERS} workers", shortest, 5.0, "<=", "s", "that one scheduler can feed"
     )
-    if not quick:
-        driven = [run for run in runs if run.tasks]
-        slices_of = [slices for *_, slices in scans]
-        write_bytes(PICTURE, picture(models, driven, slices_of, MANY_SCANS, MANY_WORKERS))
-    progress(3, 3, "done")
+    driven = [run for run in runs if run.tasks]
+    slices_of = [slices for *_, slices in scans]
+    context.save_picture("scaling.png", lambda: picture(models, driven, slices_of, MANY_SCANS, MANY_WORKERS))
+    context.progress(3, 3, "done")
 
 
 def measured(work: Work, workers: tuple[int, ...], seconds: float) -> list[Run]:

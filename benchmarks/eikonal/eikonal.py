@@ -11,8 +11,8 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from bentray_kernels import eikonal, rays
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 
 from ._eikonal_peers import installed
 from ._reference_times import edge_times, equation_error
@@ -97,7 +97,7 @@ def alternate(runs: dict[str, Callable[[], object]], repeats: int = REPEATS) -> 
     return least
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """E1 to E11; ``quick`` covers E1 to E5 and E7 on the small problems."""
     peers, missing = installed()
     parts: list[Callable[[dict, dict, bool], Iterable[Row]]] = [
@@ -107,12 +107,12 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         along_rays,
         batches,
     ]
-    if not quick:
+    if not context.quick:
         parts += [tracing, threads, three_dimensions, sharp_edges, robustness]
     for k, part in enumerate(parts):
-        progress(k, len(parts), part.__name__)
-        yield from part(peers, missing, quick)
-    progress(len(parts), len(parts), "done")
+        context.progress(k, len(parts), part.__name__)
+        yield from part(peers, missing, context.quick)
+    context.progress(len(parts), len(parts), "done")
 
 
 def against(

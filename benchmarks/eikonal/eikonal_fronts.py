@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 
 from bentray_kernels import eikonal
 from bentray_kernels.opencl import choose
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.atomic import write_bytes
 
 from ._fronts_picture import Case, Solved, picture
 from .eikonal import Problem, breast, gradient
-
-PICTURE = Path(__file__).parents[1] / "results" / "eikonal_fronts.png"
 
 # The breast's reference comes from a grid so many times finer. At the ring it differs by about 1 ns rms from
 # that of a grid eight times finer.
@@ -26,29 +22,27 @@ REFINEMENT = 4
 SLACK = 1e-6
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """Ring rms and largest ring error of each method; the full run, at 256², also writes the picture.
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """Ring rms and largest ring error of each method, with a picture of the fronts.
 
     The goal is the error of first-order fast marching on the same grid: what solves the same equations
     otherwise should equal it, and what claims to be more accurate should stay below.
     """
-    nodes = 128 if quick else 256
+    nodes = 128 if context.quick else 256
     device = choose().device
     names = [name for name in eikonal.methods() if device or not eikonal.METHODS[name].on_device]
     makers = (breast_case, gradient_case)
     cases = []
     for k, make in enumerate(makers):
-        progress(k, len(makers) + 1, make.__name__.replace("_case", ""))
+        context.progress(k, len(makers) + 1, make.__name__.replace("_case", ""))
         p, case = make(nodes, names)
         cases.append(case)
         first = p.ring(eikonal.solve(p.speed, p.spacing, p.source, "fmm", order=1))
         for name in eikonal.methods():
             yield from errors(case, name, first)
-    if not quick:
-        progress(len(makers), len(makers) + 1, "picture")
-        PICTURE.parent.mkdir(exist_ok=True)
-        write_bytes(PICTURE, picture(cases))
-    progress(len(makers) + 1, len(makers) + 1, "done")
+    context.progress(len(makers), len(makers) + 1, "picture")
+    context.save_picture("eikonal_fronts.png", lambda: picture(cases))
+    context.progress(len(makers) + 1, len(makers) + 1, "done")
 
 
 def errors(case: Case, name: str, first: np.ndarray) -> Iterable[Row]:

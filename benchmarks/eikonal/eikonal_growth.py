@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from bentray_kernels import eikonal
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 
 from .eikonal import Problem, gradient
 
@@ -31,18 +31,18 @@ BYTES_GOAL = 200.0
 MIN_SECONDS = 0.5
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """A row a method, dimension and quantity; speed 1 to 5 along x, one thread."""
-    sides = QUICK_SIDES if quick else SIDES
+    sides = QUICK_SIDES if context.quick else SIDES
     names = [name for name in eikonal.methods() if not eikonal.METHODS[name].on_device]
     cases = [(name, ndim) for ndim in sides for name in names]
     total = 2 * len(cases)
     for k, (name, ndim) in enumerate(cases):
-        progress(2 * k, total, f"{name} {ndim}-D time")
+        context.progress(2 * k, total, f"{name} {ndim}-D time")
         yield growth_of_time(name, ndim, sides[ndim])
-        progress(2 * k + 1, total, f"{name} {ndim}-D memory")
+        context.progress(2 * k + 1, total, f"{name} {ndim}-D memory")
         yield growth_of_memory(name, ndim, sides[ndim])
-    progress(total, total, "done")
+    context.progress(total, total, "done")
 
 
 def growth_of_time(name: str, ndim: int, sides: tuple[int, ...]) -> Row:

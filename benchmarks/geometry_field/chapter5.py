@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 
@@ -14,27 +13,27 @@ from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, tra
 from bentray_kernels.geometry_field.tracing.scene import Scene
 from bentray_kernels.refraction import Camera
 from bentray_kernels.refraction.supersampling import averaged
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.atomic import write_bytes
 
 from ..shared._contact_sheet import Panel, sheet
 from ._geometry_scenes import SCENES, glass, self_reflection
 from ._lookup_figure import lookup_panels
 
-PICTURE = Path(__file__).parents[1] / "results" / "chapter5.png"
+# Of the pictures.
+COLOURS = 256
 THREADS = len(os.sched_getaffinity(0))
 
 # Share of pixels that fields may change, %; refraction doubles what a surface is off.
 ODD = {"body refracting twice": 3.0}
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """Pixels that fields change, scene by scene; and the sheet of all figures."""
-    pixels = 176 if quick else 352
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """Pixels that fields change, scene by scene, and Figures 25 to 27."""
+    pixels = 176 if context.quick else 352
     panels: dict[str, Panel] = {}
     for k, (name, make) in enumerate(SCENES.items()):
-        progress(k, len(SCENES), name)
+        context.progress(k, len(SCENES), name)
         scene, camera = make()
         seconds, image = drawn(scene, camera, pixels)
         _, exact = drawn(scene, camera, pixels, "exact")
@@ -42,8 +41,15 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         off = np.abs(image.astype(int) - exact).max(axis=2) > 8
         detail = "pixels of the averaged picture off by more than 8 of 255 against no fields at all"
         yield Row(f"Figure 26, 27: {name}", 100.0 * off.mean(), ODD.get(name, 1.0), "<=", "%", detail)
-    if quick:
-        return
+    lookups = "Figure 25: ways to look up"
+    context.save_picture("figure25.png", lambda: sheet([(lookups, lookup_panels(pixels))], COLOURS))
+    mirrors = [panels[name] for name in list(SCENES)[:4]]
+    context.save_picture("figure26.png", lambda: sheet([("Figure 26: bodies in mirrors", mirrors)], COLOURS))
+    context.save_picture("figure27.png", lambda: figure27(panels, pixels))
+
+
+def figure27(scenes: dict[str, Panel], pixels: int) -> bytes:
+    """Refraction and self-reflection, in parts and together."""
     more = {
         "ball refracting once": glass("ball", "single"),
         "body refracting once": glass("body", "single"),
@@ -51,14 +57,12 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         "self-reflection alone": self_reflection(True, False),
         "others alone": self_reflection(False, True),
     }
-    panels |= {name: Panel(name, drawn(*scene, pixels)[1]) for name, scene in more.items()}
+    panels = scenes | {name: Panel(name, drawn(*scene, pixels)[1]) for name, scene in more.items()}
     groups = {
-        "Figure 26: bodies in mirrors": list(SCENES)[:4],
         "Figure 27: refraction": [name for name in panels if "refracting" in name],
         "Figure 27: self-reflection": [*list(more)[2:], "self-reflection and others"],
     }
-    found = [(title, [panels[name] for name in names]) for title, names in groups.items()]
-    write_bytes(PICTURE, sheet([("Figure 25: ways to look up", lookup_panels(pixels)), *found], 256))
+    return sheet([(title, [panels[name] for name in names]) for title, names in groups.items()], COLOURS)
 
 
 def drawn(scene: Scene, camera: Camera, pixels: int, way: str = "walk") -> tuple[float, np.ndarray]:

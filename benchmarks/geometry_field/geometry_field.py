@@ -12,8 +12,8 @@ from bentray_kernels.geometry_field.layout.parameterisation import parameterise
 from bentray_kernels.meshes.example_surfaces import bumpy_ball
 from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import surface_of
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 
 from ..eikonal.eikonal import alternate
 from ..shared._available import available
@@ -28,35 +28,35 @@ REPEATS = 9
 BALLS, BALL_RAYS = (5_000, 20_000, 100_000), 200_000
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """G1, G2, G3, G4 and G6, and frames a second."""
-    progress(0, 6, "laying the mesh out")
+    context.progress(0, 6, "laying the mesh out")
     name, mesh = load_mesh()
     chart = parameterise(mesh).chart
-    progress(1, 6, "building the field")
+    context.progress(1, 6, "building the field")
     surface = surface_of(chart)
     build_outer_field(surface, 4)
     seconds = []
-    for _ in range(1 if quick else 3):
+    for _ in range(1 if context.quick else 3):
         start = time.perf_counter()
         build_outer_field(surface_of(chart), SAMPLES)
         seconds.append(time.perf_counter() - start)
     detail = f"{name}, n = {SAMPLES}, two threads, hierarchy included; theirs 420 to 672 s"
     yield Row("G1 outer field", min(seconds), 10.0, "<=", "s", detail)
     lookups = Lookups.of(chart, SAMPLES)
-    progress(2, 6, "comparing with exact intersectors")
+    context.progress(2, 6, "comparing with exact intersectors")
     peers, missing = available({peer: (module, adapt) for peer, (module, adapt) in PEERS.items()})
     exact = {peer: adapter(mesh) for peer, adapter in peers.items()} | {"ours": Ours(lookups.surface)}
     reasons = "; ".join(missing.values())
-    yield from incoherent_rows(lookups, exact, reasons, 200_000 if quick else 1_000_000)
-    progress(3, 6, "rays of a camera")
-    yield from coherent_rows(lookups, exact, reasons, 256 if quick else 1024)
-    progress(4, 6, "the published lookups")
+    yield from incoherent_rows(lookups, exact, reasons, 200_000 if context.quick else 1_000_000)
+    context.progress(3, 6, "rays of a camera")
+    yield from coherent_rows(lookups, exact, reasons, 256 if context.quick else 1024)
+    context.progress(4, 6, "the published lookups")
     yield from published_rows(lookups, geometry_image(chart, PIXELS), 200_000)
-    progress(5, 6, "more and fewer faces")
-    yield from face_rows(8 if quick else SAMPLES)
-    yield from frame_rows(quick)
-    progress(6, 6, "done")
+    context.progress(5, 6, "more and fewer faces")
+    yield from face_rows(8 if context.quick else SAMPLES)
+    yield from frame_rows(context.quick)
+    context.progress(6, 6, "done")
 
 
 def timed(lookups: Lookups, exact: dict, rays: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:

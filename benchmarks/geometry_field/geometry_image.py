@@ -15,15 +15,13 @@ from bentray_kernels.geometry_field.layout.parameterisation import Parameterisat
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere, torus
 from bentray_kernels.meshes.geometric_error import geometric_error
 from bentray_kernels.meshes.mesh import TriangleMesh
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.atomic import write_bytes
 from bentray_workers.files.mesh_formats import read_mesh
 
 from ._geometry_image_picture import picture
 
 BUNNY = Path(__file__).resolve().parents[3] / "shared" / "data" / "bunny.off"
-PICTURE = Path(__file__).parents[1] / "results" / "geometry_image.png"
 
 SIZE = 512
 REPEATS = 3
@@ -47,30 +45,27 @@ class Made:
     chart_busy: float
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """G1's parameterisation and G5 on the bunny, Table 5; the full run also draws the picture."""
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """G1's parameterisation and G5 on the bunny, Table 5, with a picture."""
     surfaces: dict[str, TriangleMesh | None] = {"sphere": sphere(), "torus": torus(), "bunny": bunny()}
-    surfaces["bumpy ball"] = bumpy_ball(5_000 if quick else 75_408)
+    surfaces["bumpy ball"] = bumpy_ball(5_000 if context.quick else 75_408)
     # So that nothing is compiled in the time that counts.
     made(bumpy_ball(1_000), 1)
     found = {}
     for k, (name, surface) in enumerate(surfaces.items()):
-        progress(k, len(surfaces), name)
+        context.progress(k, len(surfaces), name)
         if surface is not None:
-            found[name] = made(surface, 1 if quick else REPEATS)
+            found[name] = made(surface, 1 if context.quick else REPEATS)
     for name, theirs in TABLE5.items():
         yield from table5_rows(name, theirs, found.get(name))
     for name, goal in (("bunny", ""), ("bumpy ball", ", bumpy ball")):
         yield from target_rows(goal, found.get(name))
-    if not quick:
-        views = {"sphere": FRONT, "torus": ASLANT, "bunny": FRONT}
-        shown = {
-            name: (found[name].chart, found[name].image, view)
-            for name, view in views.items()
-            if name in found
-        }
-        write_bytes(PICTURE, picture(shown))
-    progress(len(surfaces), len(surfaces), "done")
+    views = {"sphere": FRONT, "torus": ASLANT, "bunny": FRONT}
+    shown = {
+        name: (found[name].chart, found[name].image, view) for name, view in views.items() if name in found
+    }
+    context.save_picture("geometry_image.png", lambda: picture(shown))
+    context.progress(len(surfaces), len(surfaces), "done")
 
 
 def bunny() -> TriangleMesh | None:

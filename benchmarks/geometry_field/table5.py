@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere, torus
 from bentray_kernels.meshes.mesh import TriangleMesh
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 from bentray_workers.files.mesh import StoredMesh, write_mesh
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.geometry_field import build_field
@@ -38,15 +38,15 @@ TABLE = (
 SETTINGS = FieldSettings(samples=24, image_size=513)
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Three rows a surface, and the whole from a mesh file to a field on disk; quick: the small ones."""
-    shown = TABLE[: 2 if quick else len(TABLE)]
+    shown = TABLE[: 2 if context.quick else len(TABLE)]
     # So that nothing is compiled in the time that counts.
     made(bumpy_ball(500), FieldSettings(samples=4, inner_samples=4, image_size=33))
     for number, theirs in enumerate(shown):
-        progress(number, len(shown), theirs.surface)
+        context.progress(number, len(shown), theirs.surface)
         yield from rows_of(theirs)
-    progress(len(shown), len(shown), "done")
+    context.progress(len(shown), len(shown), "done")
 
 
 def rows_of(theirs: PublishedTimes) -> Iterable[Row]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 
 from ._published_images import image_rows
 from ._published_pictures import backdrop_rows, lookup_rows
@@ -20,9 +20,9 @@ PARTS = (
 )
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """One table; each row names both figures, and its goal is that ours is no worse."""
     for number, (name, part) in enumerate(PARTS):
-        progress(number, len(PARTS), name)
-        yield from part(quick, progress)
-    progress(len(PARTS), len(PARTS), "done")
+        context.progress(number, len(PARTS), name)
+        yield from part(context.quick, context.progress)
+    context.progress(len(PARTS), len(PARTS), "done")

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from bentray_kernels.phantoms import TABLE6_SIDE_M
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.atomic import write_bytes
 from bentray_workers.simulation.plane import SimulationSettings
 
 from ._ladder import BESIDE, FAT_MPS, LADDER, THEIRS, TUNED, WATER_MPS, ladder_step
 from ._phantom_scan import PhantomScan, ReconstructionError
 from ._sections_picture import Panel, picture
-
-PICTURE = Path(__file__).parents[1] / "results" / "chapter6.png"
 
 # Of the attenuation, as root mean square over the range; its prose says less than 7 %.
 THEIR_ATTENUATION = 0.07
@@ -24,16 +20,16 @@ THEIR_ATTENUATION = 0.07
 SNR = 10.0
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Mean absolute errors of Figure 31, and with SNR 10, in two couplings; the goal is theirs."""
-    nodes, elements = (64, 64) if quick else (128, 256)
+    nodes, elements = (64, 64) if context.quick else (128, 256)
     panels: list[Panel] = []
     for coupling in (FAT_MPS, WATER_MPS):
         for snr in (None, SNR):
             asked = SimulationSettings(
                 nodes=nodes, elements=elements, coupling_mps=coupling, attenuation=True, snr=snr
             )
-            scan = PhantomScan.of_table6(asked, progress)
+            scan = PhantomScan.of_table6(asked, context.progress)
             noise = "" if snr is None else f", SNR {snr:g}"
             where = f"coupling {coupling:g}{noise}"
             if snr is None:
@@ -59,17 +55,8 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             detail = f"theirs below 7 %; {images['default'].how}"
             target = f"Figure 31 attenuation, {where}"
             yield loss.row(target, loss.error, THEIR_ATTENUATION, "<=", "of range", detail)
-    if not quick:
-        PICTURE.parent.mkdir(exist_ok=True)
-        write_bytes(
-            PICTURE,
-            picture(
-                "2-D breast phantom (Li 2008, Table 6), mean absolute error",
-                panels,
-                11,
-                TABLE6_SIDE_M,
-            ),
-        )
+    title = "2-D breast phantom (Li 2008, Table 6), mean absolute error"
+    context.save_picture("chapter6.png", lambda: picture(title, panels, 11, TABLE6_SIDE_M))
 
 
 def speed_row(

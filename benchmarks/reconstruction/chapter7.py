@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from bentray_kernels.phantoms import TABLE7_SIDE_M
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.atomic import write_bytes
 
 from ._ladder import FAT_MPS, TUNED, WATER_MPS
 from ._phantom_scan import PhantomScan
 from ._sections_picture import Panel, picture
-
-PICTURE = Path(__file__).parents[1] / "results" / "chapter7.png"
 
 # Root mean square errors over the range, on data of a wave equation; ours are on Eikonal times.
 THEIRS = {"straight": 0.25, "SART": 0.04, "default": 0.04, "tuned": 0.04}
@@ -26,14 +22,14 @@ WAYS: dict[str, dict[str, object]] = {"straight": {"rays": "straight"}, "SART": 
 SNR = 10.0
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Errors of two slices in two couplings, and of the one at the centre with SNR 10; the goal is theirs."""
-    nodes, elements = (64, 64) if quick else (128, 256)
+    nodes, elements = (64, 64) if context.quick else (128, 256)
     panels: list[Panel] = []
     cases = [(c, z, None) for c in (FAT_MPS, WATER_MPS) for z in HEIGHTS]
     cases += [(c, "centre", SNR) for c in (FAT_MPS, WATER_MPS)]
     for coupling, place, snr in cases:
-        scan = PhantomScan.of_table7(HEIGHTS[place], nodes, elements, coupling, snr, progress)
+        scan = PhantomScan.of_table7(HEIGHTS[place], nodes, elements, coupling, snr, context.progress)
         where = f"{place}, coupling {coupling:g}" + ("" if snr is None else f", SNR {snr:g}")
         panels.append(Panel(f"{place} in {coupling:g} m/s", scan.truth))
         images = {name: scan.run(name, **changes) for name, changes in WAYS.items()}
@@ -53,7 +49,6 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
                 detail = f"inside the breast; theirs {THEIR_ATTENUATION:g} of the whole image"
                 target = f"Figure 33 attenuation, {where}"
                 yield loss.row(target, loss.error, THEIR_ATTENUATION, "<=", "of range", detail)
-    if not quick:
-        PICTURE.parent.mkdir(exist_ok=True)
-        title = "3-D breast phantom (Li 2008, Table 7), rms error over the range"
-        write_bytes(PICTURE, picture(title, panels, 2 * (2 + len(WAYS)), TABLE7_SIDE_M))
+    title = "3-D breast phantom (Li 2008, Table 7), rms error over the range"
+    columns = 2 * (2 + len(WAYS))
+    context.save_picture("chapter7.png", lambda: picture(title, panels, columns, TABLE7_SIDE_M))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import STRAIGHT_RAYS, Row
 from bentray_service.cli.output.terminal import Step
 from bentray_workers.simulation.plane import SimulationSettings
@@ -13,11 +14,11 @@ from ._ladder import FAT_MPS, LADDER, THEIRS, TUNED, WATER_MPS, ladder_step
 from ._phantom_scan import PhantomScan, ReconstructionError
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """R1 to R3 and R8; ``reconstruction_time``, ``_peers`` and ``_volume`` measure R5, R6 and R9."""
-    nodes, elements = (64, 64) if quick else (128, 256)
-    yield from fat_coupling(nodes, elements, progress)
-    yield from water_coupling(nodes, elements, progress)
+    nodes, elements = (64, 64) if context.quick else (128, 256)
+    yield from fat_coupling(nodes, elements, context.progress)
+    yield from water_coupling(nodes, elements, context.progress)
 
 
 def fat_coupling(nodes: int, elements: int, progress: Step) -> Iterable[Row]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct, rmse
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 
@@ -45,7 +46,7 @@ class Found:
         return f"{self.rmse_mps:.1f} m/s in {self.processor_s:.1f} s"
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """R6: ours against a goal, then each peer over our default settings, above 1 where ours is better.
 
     The same times for all, made by a third package on a grid four times finer. Runs of minutes are timed
@@ -53,21 +54,21 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
     processor time. The strengths of the peers are tuned on this slice. The mesh that pyGIMLi
     gets is too coarse in the quick run, and its error there is not what it can do.
     """
-    nodes, elements = (64, 64) if quick else (128, 256)
+    nodes, elements = (64, 64) if context.quick else (128, 256)
     peers, missing = _tomography_peers.installed()
     solvers, without = _eikonal_peers.installed()
-    for coupling in COUPLINGS_MPS[: 1 if quick else None]:
+    for coupling in COUPLINGS_MPS[: 1 if context.quick else None]:
         water = f"water {coupling:g}"
         if SOLVER not in solvers:
             yield Row(f"R6 unseen slice rmse, {water}", None, RMSE_GOAL_MPS, "<=", "m/s", without[SOLVER])
             continue
 
         def made(done: int, total: int, water: str = water) -> None:
-            progress(done, total, f"travel times, {water}")
+            context.progress(done, total, f"travel times, {water}")
 
         tiny = scan(coupling, 32, 16, solvers[SOLVER], lambda done, total: None)
         dataset = scan(coupling, nodes, elements, solvers[SOLVER], made)
-        ours = run_ours(dataset, tiny, nodes, progress)
+        ours = run_ours(dataset, tiny, nodes, context.progress)
         how = f"{nodes}² nodes of the truth, {elements} elements, {SOLVER} times"
         for name, (found, compared) in ours.items():
             label = f"{name}, {water}"
@@ -79,10 +80,10 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             yield compared.row(f"R6 unseen slice time, {label}", found.seconds, SECONDS_GOAL, "<", "s", clock)
         first = next(iter(OURS))
         for k, name in enumerate(_tomography_peers.PEERS):
-            progress(k, len(_tomography_peers.PEERS), f"{name}, {water}")
+            context.progress(k, len(_tomography_peers.PEERS), f"{name}, {water}")
             theirs = run_peer(peers[name], dataset, tiny) if name in peers else None
             yield from peer_rows(f"{name}, {water}", theirs, *ours[first], first, missing.get(name, ""))
-    progress(1, 1, "done")
+    context.progress(1, 1, "done")
 
 
 def peer_rows(

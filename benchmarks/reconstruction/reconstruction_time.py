@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -17,9 +15,10 @@ from bentray_kernels.tomography.gauss_newton.gauss_newton_step import trace_rays
 from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart.sart_step import advance, begin
 from bentray_kernels.tomography.stage_graphs import batches_of
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import STRAIGHT_RAYS, Row
 from bentray_service.cli.output.terminal import Step
-from bentray_workers.cluster.connection import Cluster, open_cluster
+from bentray_workers.cluster.connection import Cluster
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.simulation.simulation_run import simulate
@@ -48,12 +47,12 @@ NODES, ELEMENTS = (64, 96, 128, 192, 256), (64, 128, 256, 512)
 QUICK_NODES, QUICK_ELEMENTS = (32, 64), (32, 64)
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Seconds of three sweeps over a Table 7 volume on two cores, and how a sweep grows."""
-    for nodes, slices, elements, distinct in QUICK if quick else SIZES:
-        yield from volume(nodes, slices, elements, distinct, progress)
+    for nodes, slices, elements, distinct in QUICK if context.quick else SIZES:
+        yield from volume(nodes, slices, elements, distinct, context)
         yield where(nodes, slices, elements)
-    yield from growth(quick, progress)
+    yield from growth(context.quick, context.progress)
 
 
 def where(nodes: int, slices: int, elements: int) -> Row:
@@ -64,19 +63,17 @@ def where(nodes: int, slices: int, elements: int) -> Row:
     return Row(label, 1e3 * parts.whole, goal, "<=", "ms", str(parts))
 
 
-def volume(nodes: int, slices: int, elements: int, distinct: int, progress: Step) -> Iterable[Row]:
+def volume(nodes: int, slices: int, elements: int, distinct: int, context: BenchmarkContext) -> Iterable[Row]:
     """One volume, and straight rays, which spend the same on everything but the front.
 
     The slices repeat a few, so that the error is that of these; an image that loses to a constant does not
     meet the goal, however fast it is.
     """
-    with open_cluster(workers=2) as cluster:
-        few = simulated(nodes, distinct, elements, cluster, progress)
+    with context.cluster() as cluster:
+        few = simulated(nodes, distinct, elements, cluster, context.progress)
         many = repeated(few, nodes, slices)
         seconds, made = {}, {}
-        images = Images(
-            few, lambda dataset, settings: run(cluster, dataset, settings, progress, "few slices")
-        )
+        images = Images(few, lambda dataset, settings: run(context, cluster, dataset, settings, "few slices"))
         for rays in ("straight", "curved"):
             settings = Settings.of(
                 method="sart",
@@ -86,7 +83,7 @@ def volume(nodes: int, slices: int, elements: int, distinct: int, progress: Step
                 iterations=SWEEPS,
                 attenuation=False,
             )
-            seconds[rays] = timed(cluster, many, settings, progress, f"{nodes}², {rays} rays")
+            seconds[rays] = timed(context, cluster, many, settings, f"{nodes}², {rays} rays")
             made[rays] = images.made(settings).result
         compared = images.compared(made["curved"], object_error(few, relative=True))
     passes = slices * elements * SWEEPS
@@ -124,28 +121,32 @@ def repeated(few: Dataset, nodes: int, slices: int) -> Dataset:
     )
 
 
-def timed(cluster: Cluster, dataset: Dataset, settings: Settings, progress: Step, what: str) -> float:
+def timed(
+    context: BenchmarkContext, cluster: Cluster, dataset: Dataset, settings: Settings, what: str
+) -> float:
     """Seconds of a reconstruction by both workers, compiled before."""
     assert dataset.delta_tof_s is not None
     assert dataset.slice_z_m is not None
     tiny = replace(dataset, delta_tof_s=dataset.delta_tof_s[:2], slice_z_m=dataset.slice_z_m[:2])
-    run(cluster, tiny, replace(settings, iterations=1), progress, what)
+    run(context, cluster, tiny, replace(settings, iterations=1), what)
     started = time.perf_counter()
-    run(cluster, dataset, settings, progress, what)
+    run(context, cluster, dataset, settings, what)
     return time.perf_counter() - started
 
 
-def run(cluster: Cluster, dataset: Dataset, settings: Settings, progress: Step, what: str) -> Reconstruction:
+def run(
+    context: BenchmarkContext, cluster: Cluster, dataset: Dataset, settings: Settings, what: str
+) -> Reconstruction:
     """A reconstruction by both workers, from a file."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "scan.h5"
+    with context.temporary_folder() as folder:
+        path = folder / "scan.h5"
         write_dataset(path, dataset)
         return reconstruct(
             cluster.client,
             path,
             settings,
-            lambda p: progress(p.done, p.total, what),
-            work_dir=Path(folder),
+            lambda p: context.progress(p.done, p.total, what),
+            work_dir=folder,
         )
 
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Progress, Reconstruction, Settings
 from bentray_kernels.tomography.problem import MARGIN_NODES
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.cluster.connection import Cluster, open_cluster
-from bentray_workers.files.atomic import write_bytes
+from bentray_workers.cluster.connection import Cluster
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.simulation.simulation_run import simulate
@@ -25,7 +22,6 @@ from ..shared._baselines import Compared, Images
 from ..shared._image_error import object_error
 from ._volume_picture import picture
 
-PICTURE = Path(__file__).parents[1] / "results" / "reconstruction_volume.png"
 COUPLING_MPS = 1375.0
 
 # The dissertation's slices are 128² times 40. In space each of their wave fronts costs a hundred times what
@@ -38,17 +34,17 @@ SNR = 10.0
 Show = Callable[[Progress], None]
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Errors inside the breast over the range of the phantom, without noise and with SNR 10."""
-    nodes, slices, elements = QUICK if quick else FULL
+    nodes, slices, elements = QUICK if context.quick else FULL
     asked = VolumeSimulationSettings(
         nodes, slices, elements, COUPLING_MPS, refinement=2, three_d=True, array="moved"
     )
     size = f"{nodes}² by {slices}, {elements} elements, times in space on a grid twice as fine"
-    with open_cluster(workers=2) as cluster:
+    with context.cluster() as cluster:
 
         def show(what: str) -> Show:
-            return lambda p: progress(p.done, p.total, what)
+            return lambda p: context.progress(p.done, p.total, what)
 
         clean = simulate(asked, show("simulating in space"), cluster.client)
         delta = clean.delta_tof_s
@@ -57,7 +53,9 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         noisy = replace(clean, delta_tof_s=delta + noise)
         found: dict[str, Reconstruction] = {}
         for label, dataset in (("exact", clean), (f"SNR {SNR:g}", noisy)):
-            images = Images(dataset, lambda scan, settings, n=label: run(cluster, scan, settings, show(n)))
+            images = Images(
+                dataset, lambda scan, settings, n=label: run(context, cluster, scan, settings, show(n))
+            )
             compared: dict[str, Compared] = {}
             for way in ("slices", "volume"):
                 settings = Settings(
@@ -73,18 +71,18 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             worse = compared["slices"].error - compared["volume"].error
             target = f"R9 slice-wise over 3-D, {label}"
             yield compared["slices"].row(target, worse, 0.003, "<=", "of range", f"NRMSE, {size}")
-        if not quick:
-            PICTURE.parent.mkdir(exist_ok=True)
-            write_bytes(PICTURE, picture(clean.truth, found))
-        progress(1, 1, "done")
+        context.save_picture("reconstruction_volume.png", lambda: picture(clean.truth, found))
+        context.progress(1, 1, "done")
 
 
-def run(cluster: Cluster, dataset: Dataset, settings: Settings, show: Show) -> Reconstruction:
+def run(
+    context: BenchmarkContext, cluster: Cluster, dataset: Dataset, settings: Settings, show: Show
+) -> Reconstruction:
     """A reconstruction on both cores."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "scan.h5"
+    with context.temporary_folder() as folder:
+        path = folder / "scan.h5"
         write_dataset(path, dataset)
-        return reconstruct(cluster.client, path, settings, show, work_dir=Path(folder))
+        return reconstruct(cluster.client, path, settings, show, work_dir=folder)
 
 
 def inner(result: Reconstruction, slices: int) -> Reconstruction:

@@ -11,8 +11,8 @@ import numpy as np
 from bentray_kernels import eikonal
 from bentray_kernels.opencl import choose
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 
 SOURCES = 64
 SIDES = (128, 256)
@@ -57,21 +57,21 @@ class Figures:
     of_many: float | None
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """A row a cell and a way to solve; ``quick`` covers 128²."""
-    sides = SIDES[:1] if quick else SIDES
+    sides = SIDES[:1] if context.quick else SIDES
     names = tuple(dict.fromkeys(column.ours for column in COLUMNS))
     device, refusal = opencl()
     for i, nodes in enumerate(sides):
         found: dict[str, Figures] = {}
         for k, name in enumerate(names):
-            progress(i * len(names) + k, len(sides) * len(names), f"{name} {nodes}²")
+            context.progress(i * len(names) + k, len(sides) * len(names), f"{name} {nodes}²")
             if device or not eikonal.METHODS[name].on_device:
                 found[name] = measured(name, nodes)
         for column in COLUMNS:
             ran_on = device if eikonal.METHODS[column.ours].on_device else "one core"
             yield from beside(column, nodes, found.get(column.ours), ran_on, refusal)
-    progress(len(sides) * len(names), len(sides) * len(names), "done")
+    context.progress(len(sides) * len(names), len(sides) * len(names), "done")
 
 
 def beside(column: Column, nodes: int, figures: Figures | None, ran_on: str, refusal: str) -> Iterable[Row]:

@@ -12,8 +12,8 @@ from bentray_kernels.opencl import OpenCLFallbackWarning, choose
 from bentray_kernels.refraction import Picture, RenderSettings, Scene, render
 from bentray_kernels.refraction.caster_opencl import OpenCLCaster, on_the_device
 from bentray_kernels.splines import Spline
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 
 from ..eikonal.eikonal import alternate
 from ._refracting_ball import board, camera, scene, signed_distance
@@ -32,10 +32,10 @@ WORTH_SAME, WORTH_OTHER = 0.5, 1.0
 ODD_PIXELS = {"float64": 0.02, "float32": 0.5}
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Frames a second and odd pixels for each precision; sampled after refraction."""
     made = scene(Spline(signed_distance()), 0.0)
-    progress(0, 2, "trying the device")
+    context.progress(0, 2, "trying the device")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", OpenCLFallbackWarning)
         casters = {precision: on_the_device(made, precision) for precision in ODD_PIXELS}
@@ -52,11 +52,11 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             for label, goal, op, unit in _targets(precision)
         )
         return
-    progress(1, 2, "rendering")
+    context.progress(1, 2, "rendering")
     one, all_of_them = "compiled, 1 thread", f"compiled, {PROCESSORS} threads"
     runs = {precision: _frame(made, 1, caster) for precision, caster in casters.items()}
     runs |= {one: _frame(made, 1, None), all_of_them: _frame(made, PROCESSORS, None)}
-    seconds = alternate(runs, 5 if quick else 15)
+    seconds = alternate(runs, 5 if context.quick else 15)
     expected = runs[one]().image.astype(int)
     listed = ", ".join(f"{name} {1.0 / least:.1f}" for name, least in seconds.items())
     for precision, caster in casters.items():
@@ -68,7 +68,7 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         )
         for (label, goal, op, unit), (value, detail) in zip(_targets(precision), found, strict=True):
             yield Row(label, float(value), goal, op, unit, detail)
-    progress(2, 2, "done")
+    context.progress(2, 2, "done")
 
 
 def _targets(precision: str) -> tuple[tuple[str, float, str, str], ...]:

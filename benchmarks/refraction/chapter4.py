@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
+from typing import Any
+
+import numpy as np
 
 from bentray_kernels.refraction import (
     Backdrop,
     Plane,
+    Scene,
     backdrop_of,
     checkerboard,
     orthographic,
     perspective,
 )
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.atomic import write_bytes
 
 from ..eikonal.eikonal import alternate
 from ..shared._contact_sheet import Panel, sheet
 from ._glass import BEHIND, DOWN, REPEATS, RIGHT, ball, breast, drawn, glass, hills, waves
 from ._refraction_ladders import cells, ladder
 from ._stand_ins import ISO, stand_ins
-
-PICTURE = Path(__file__).parents[1] / "results" / "chapter4.png"
 
 SMOOTH = "B-spline 3, smooth λ = 1"
 
@@ -35,16 +36,19 @@ WAYS = {"none": ("one ray a pixel", 1), "real": ("four rays a pixel", 2), "prss"
 # Of whole volumes.
 WIDER = orthographic((0.0, 0.0, -3.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), 2.3)
 
+# Renders a scene; takes the backdrop and the camera of ``drawn``.
+Draw = Callable[..., np.ndarray]
+
 # m/s: where the fat of the breast begins, and its tissue.
 FAT, TISSUE = 1420.0, 1490.0
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """Table 1: what each way to supersample costs over none; and the sheet of all figures."""
-    pixels = 96 if quick else 352
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """Table 1: cost of each way to supersample over none; Tables 2 and 3 unless quick; Figures 17 to 22."""
+    pixels = 96 if context.quick else 352
     panels17 = []
     for name, theirs in TABLE1.items():
-        progress(len(panels17), 2 * len(WAYS), name)
+        context.progress(len(panels17), 2 * len(WAYS), name)
         scene = glass(ball(), name)
         # In turn, so that the load of the machine meets all ways alike.
         seconds = alternate(
@@ -65,64 +69,90 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
             detail = f"{ours}; theirs {their_extra:.2f}"
             label = f"Table 1 {WAYS[way][0]} / one ray, {name}"
             yield Row(label, extra, 1.05 if way == "prss" else 5.0, "<=", "", detail)
-    if quick:
-        return
+    title = "Figure 17: two filters, three ways to sample"
+    context.save_picture("figure17.png", lambda: sheet([(title, panels17)]))
     subjects = stand_ins()
-    for k, subject in enumerate(subjects):
-        progress(k, len(subjects), subject.name)
+    for k, subject in enumerate([] if context.quick else subjects):
+        context.progress(k, len(subjects), subject.name)
         yield from cells(subject)
         yield from ladder(subject, 3)
-    landscape = backdrop_of([hills()])
-    balls = [
-        Panel(words, drawn(glass(ball(n), SMOOTH))[0])
-        for n, words in enumerate(("no hole", "one hole", "two"))
-    ]
-    balls += [
-        Panel(words, drawn(glass(ball(2), SMOOTH), backdrop=behind)[0])
-        for words, behind in backdrops().items()
-    ]
+    for k, (name, (title, panels)) in enumerate(FIGURES.items()):
+        context.progress(k, len(FIGURES), title)
+        context.save_picture(
+            name, lambda title=title, panels=panels: sheet([(title, panels(partial(frame, pixels)))])
+        )
+
+
+def frame(pixels: int, scene: Scene, **how: Any) -> np.ndarray:
+    """A picture of a scene, drawn once."""
+    return drawn(scene, pixels=pixels, repeats=1, **how)[0]
+
+
+def holes_and_backdrops(draw: Draw) -> list[Panel]:
+    """Balls with holes of air, and one before other backdrops."""
+    holes = ("no hole", "one hole", "two")
+    panels = [Panel(words, draw(glass(ball(n), SMOOTH))) for n, words in enumerate(holes)]
+    for words, behind in backdrops().items():
+        panels.append(Panel(words, draw(glass(ball(2), SMOOTH), backdrop=behind)))
     wavy = backdrop_of([replace(checkerboard(BEHIND, RIGHT, DOWN, 24), relief=4.0 * waves())])
     eye = perspective((0.0, 0.0, -3.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 32.0)
-    balls.append(Panel("a warped checkerboard", drawn(glass(ball(1), SMOOTH), backdrop=wavy, camera=eye)[0]))
-    nested = [
-        Panel("core 1.2, shell 1.5", drawn(glass(ball(), SMOOTH, (60.0, 200.0), (1.0, 1.5, 1.2)))[0]),
-        Panel("core 1.8, shell 1.2", drawn(glass(ball(), SMOOTH, (60.0, 200.0), (1.0, 1.2, 1.8)))[0]),
-        Panel("hole, shell 1.3, core 1.5", drawn(glass(ball(1), SMOOTH, (60.0, 200.0), (1.0, 1.3, 1.5)))[0]),
-        Panel("two holes, the same", drawn(glass(ball(2), SMOOTH, (60.0, 200.0), (1.0, 1.3, 1.5)))[0]),
+    warped = draw(glass(ball(1), SMOOTH), backdrop=wavy, camera=eye)
+    return [*panels, Panel("a warped checkerboard", warped)]
+
+
+def layers(draw: Draw) -> list[Panel]:
+    """A core and a shell of different index, and holes in them."""
+    cases = {
+        "core 1.2, shell 1.5": (0, (1.0, 1.5, 1.2)),
+        "core 1.8, shell 1.2": (0, (1.0, 1.2, 1.8)),
+        "hole, shell 1.3, core 1.5": (1, (1.0, 1.3, 1.5)),
+        "two holes, the same": (2, (1.0, 1.3, 1.5)),
+    }
+    return [
+        Panel(words, draw(glass(ball(holes), SMOOTH, (60.0, 200.0), indices)))
+        for words, (holes, indices) in cases.items()
     ]
-    medical = []
-    for name in ("central difference", "Catmull-Rom", "B-spline 3", SMOOTH):
-        progress(len(medical), 6, f"breast, {name}")
-        scene = glass(breast(), name, (FAT, TISSUE), (1.0, 1.15, 1.4))
-        medical.append(Panel(name, drawn(scene)[0]))
-    # Looked at along z.
-    upright = {"head": subjects[0].volume.transpose(0, 2, 1), "lobster": subjects[1].volume[:, ::-1]}
-    replaced = []
-    for what, volume in upright.items():
-        for name in ("central difference", SMOOTH):
-            progress(len(replaced), 4, f"{what}, {name}")
-            scene = glass(volume, name, (ISO,), (1.0, 1.2))
-            replaced.append(Panel(f"{what}, {name}", drawn(scene, camera=WIDER)[0]))
-    photo = [
-        Panel("ball", drawn(glass(ball(), SMOOTH), backdrop=landscape)[0]),
-        Panel("ball with a hole", drawn(glass(ball(1), SMOOTH), backdrop=landscape)[0]),
-        Panel(
-            "breast", drawn(glass(breast(), SMOOTH, (FAT, TISSUE), (1.0, 1.15, 1.4)), backdrop=landscape)[0]
-        ),
-        Panel("ball with two holes", drawn(glass(ball(2), SMOOTH), backdrop=landscape)[0]),
+
+
+def breasts(draw: Draw) -> list[Panel]:
+    """The sound speed of a breast as glass, by four filters."""
+    return [
+        Panel(name, draw(glass(breast(), name, (FAT, TISSUE), (1.0, 1.15, 1.4))))
+        for name in ("central difference", "Catmull-Rom", "B-spline 3", SMOOTH)
     ]
-    PICTURE.parent.mkdir(exist_ok=True)
-    found = sheet(
-        [
-            ("Figure 17: two filters, three ways to sample", panels17),
-            ("Figure 18: holes of air, and other backdrops", balls),
-            ("Figure 19: layers of different index", nested),
-            ("Figure 20: a breast of sound speeds as glass", medical),
-            ("Figure 21: a head and a lobster made here, not the published volumes", replaced),
-            ("Figure 22: before a landscape", photo),
-        ]
-    )
-    write_bytes(PICTURE, found)
+
+
+def replaced(draw: Draw) -> list[Panel]:
+    """The volumes that replace the published head and lobster, by two filters."""
+    head, lobster = (subject.volume for subject in stand_ins())
+    # Along z.
+    upright = {"head": head.transpose(0, 2, 1), "lobster": lobster[:, ::-1]}
+    return [
+        Panel(f"{what}, {name}", draw(glass(volume, name, (ISO,), (1.0, 1.2)), camera=WIDER))
+        for what, volume in upright.items()
+        for name in ("central difference", SMOOTH)
+    ]
+
+
+def landscapes(draw: Draw) -> list[Panel]:
+    """Volumes before a landscape."""
+    scenes = {
+        "ball": glass(ball(), SMOOTH),
+        "ball with a hole": glass(ball(1), SMOOTH),
+        "breast": glass(breast(), SMOOTH, (FAT, TISSUE), (1.0, 1.15, 1.4)),
+        "ball with two holes": glass(ball(2), SMOOTH),
+    }
+    return [Panel(words, draw(scene, backdrop=backdrop_of([hills()]))) for words, scene in scenes.items()]
+
+
+# File, title and panels of each figure after Figure 17.
+FIGURES: dict[str, tuple[str, Callable[[Draw], list[Panel]]]] = {
+    "figure18.png": ("Figure 18: holes of air, and other backdrops", holes_and_backdrops),
+    "figure19.png": ("Figure 19: layers of different index", layers),
+    "figure20.png": ("Figure 20: a breast of sound speeds as glass", breasts),
+    "figure21.png": ("Figure 21: a head and a lobster made here, not the published volumes", replaced),
+    "figure22.png": ("Figure 22: before a landscape", landscapes),
+}
 
 
 def backdrops() -> dict[str, Backdrop]:

@@ -10,9 +10,8 @@ import numpy as np
 
 from bentray_kernels.refraction import Picture, RenderSettings, Scene, render
 from bentray_kernels.splines import Spline
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.atomic import write_bytes
 
 from ..eikonal.eikonal import alternate
 from ..shared._available import available
@@ -33,8 +32,6 @@ from ._refraction_opencl import rows as opencl_rows
 from ._refraction_picture import picture as picture_of_balls
 from ._refraction_povray import PovRay
 
-PICTURE = Path(__file__).parents[1] / "results" / "refraction.png"
-
 REPEATS = 9
 
 # Times below the error of Mitsuba with distances, with 8 bits, and of POV-Ray with 8 bits.
@@ -44,16 +41,15 @@ DISTANCE, EIGHT_BIT, POVRAY = 50.0, 3.0, 8.0
 FRAME_POVRAY, FRAME_MITSUBA, SAMPLE_MITSUBA = 30.0, 2.0, 1.1
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """V2 to V6; the quick run leaves out the teapot and table 4."""
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """V2 to V6, with a picture; the quick run leaves out the teapot and table 4."""
     parts: list[Callable[[bool], Iterable[Row]]] = [mitsuba_rows, povray_rows, supersampling_rows, table_rows]
     for k, part in enumerate(parts):
-        progress(k, len(parts), part.__name__)
-        yield from part(quick)
-    yield from opencl_rows(quick, progress)
-    if not quick:
-        write_bytes(PICTURE, picture_of_balls())
-    progress(len(parts), len(parts), "done")
+        context.progress(k, len(parts), part.__name__)
+        yield from part(context.quick)
+    yield from opencl_rows(context)
+    context.save_picture("refraction.png", picture_of_balls)
+    context.progress(len(parts), len(parts), "done")
 
 
 def picture(made: Scene, **settings) -> Picture:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import psutil
 
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_service.cli.service_process import running_service
@@ -29,14 +30,14 @@ SLOW = 100
 SETTINGS = {"BENTRAY_MAX_UPLOAD_BYTES": str(2**36), "BENTRAY_WORKERS": "1"}
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
+def rows(context: BenchmarkContext) -> Iterable[Row]:
     """All rows, with the load that they began under; ``quick`` takes less of everything."""
     busy = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as name, environment(SETTINGS):
         folder = Path(name)
         with running_service(folder / "data", folder / "log") as url:
             process = next(child for child in psutil.Process().children() if "serve" in child.cmdline())
-            for row in measured(url, process, folder, quick, progress):
+            for row in measured(url, process, folder, context.quick, context.progress):
                 yield replace(row, detail=f"{row.detail}; load average {busy:.1f} at the start")
 
 

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
 from bentray_kernels.splines import Spline
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
-from bentray_workers.files.atomic import write_bytes
 
 from ..eikonal.eikonal import alternate
 from ._filters_picture import picture
 from ._gradient_angles import BALL_NODES, RINGS_NODES, RINGS_RADIUS, ball, rings
 from ._spline_peers import installed
-
-PICTURE = Path(__file__).parents[1] / "results" / "filters.png"
 
 REPEATS = 15
 
@@ -29,15 +25,14 @@ NODES = 64
 DRJIT, NDIMAGE, ND_BSPLINE = 1.25, 6.0, 40.0
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """V1 and V7; the full run also draws figure 1."""
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """V1 and V7, with Figure 1."""
     parts: list[Callable[[bool], Iterable[Row]]] = [speed, rings_rows, ball_rows]
     for k, part in enumerate(parts):
-        progress(k, len(parts), part.__name__)
-        yield from part(quick)
-    if not quick:
-        write_bytes(PICTURE, picture())
-    progress(len(parts), len(parts), "done")
+        context.progress(k, len(parts), part.__name__)
+        yield from part(context.quick)
+    context.save_picture("filters.png", picture)
+    context.progress(len(parts), len(parts), "done")
 
 
 def speed(quick: bool) -> Iterable[Row]:

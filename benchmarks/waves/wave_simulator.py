@@ -5,18 +5,15 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable
-from pathlib import Path
 
 import numpy as np
 
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
-from bentray_service.cli.output.terminal import Step
 
 from ._kwave_peer import Peer, installed, padded
 from ._wave_picture import picture
 from ._wave_shots import MEDIA, Shot, delays, misfit
-
-RESULTS = Path(__file__).parents[1] / "results"
 
 # Nodes in the shortest wave: those of a refinement's grids, and those of ``bentray simulate``.
 POINTS = (4.5, 7.0)
@@ -31,13 +28,14 @@ REFINED = 0.01
 TURNS = 5
 
 
-def rows(quick: bool, progress: Step) -> Iterable[Row]:
-    """Two for each medium and grid, one of the time; the picture of all, unless quick."""
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """Two for each medium and grid, one of the time; with a picture of all."""
     found, missing = installed()
-    shots = [Shot(name, points, QUICK_SIDE_M if quick else SIDE_M) for name in MEDIA for points in POINTS]
+    side_m = QUICK_SIDE_M if context.quick else SIDE_M
+    shots = [Shot(name, points, side_m) for name in MEDIA for points in POINTS]
     shown = []
     for done, shot in enumerate(shots):
-        progress(done, len(shots) + 1, f"{shot.name}, {shot.points:g} nodes")
+        context.progress(done, len(shots) + 1, f"{shot.name}, {shot.points:g} nodes")
         label = f"wave simulator against k-Wave, {shot.name}, {shot.points:g} nodes in a wave"
         if missing:
             yield Row(f"{label}, over the budget", None, OVER_BUDGET, "<=", "", missing["k-Wave"])
@@ -48,14 +46,13 @@ def rows(quick: bool, progress: Step) -> Iterable[Row]:
         refined = shot.as_a_refinement(theirs)
         yield from judged(label, shot, (ours, theirs), refined)
         shown.append((shot, (ours, theirs), refined))
-    progress(len(shots), len(shots) + 1, "time of a step")
+    context.progress(len(shots), len(shots) + 1, "time of a step")
     label = "wave simulator against k-Wave, time of a node and step"
     if missing:
         yield Row(label, None, 1.0, "<", "", missing["k-Wave"])
         return
     yield timed(label, next(shot for shot in shots if shot.name == "breast"), found["k-Wave"])
-    if not quick:
-        (RESULTS / "wave_simulator.png").write_bytes(picture(shown))
+    context.save_picture("wave_simulator.png", lambda: picture(shown))
 
 
 def judged(

@@ -15,17 +15,34 @@ import typer
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import write_bytes
 
+from .output.benchmark_context import BenchmarkContext
 from .output.benchmark_row import Row
 from .output.exit_codes import WorkFailed
-from .output.terminal import Step, print_lines, print_table, progress_bar, without_nan
+from .output.terminal import print_lines, print_table, progress_bar, without_nan
 
-Rows = Callable[[bool, Step], Iterable[Row]]
+Rows = Callable[[BenchmarkContext], Iterable[Row]]
 
 
 def bench(
     name: Annotated[str, typer.Argument(help="Benchmark: a file name in benchmarks/*/, without .py.")],
     json_file: Annotated[Path, typer.Option("--json", help="File to write the rows to.")],
     quick: Annotated[bool, typer.Option("--quick", help="Smaller problems, as a quick check.")] = False,
+    pictures: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder to write pictures to, e.g. benchmarks/results.", show_default="no pictures"
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Dask scheduler to use instead of own workers, e.g. tcp://head:8786."),
+    ] = None,
+    tls: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder with authority.pem, certificate.pem and key.pem, for a scheduler at tls://…"
+        ),
+    ] = None,
 ) -> None:
     """Run a benchmark against its targets and peers, in one run on this machine.
 
@@ -37,9 +54,11 @@ def bench(
         raise InvalidInput(
             "--json", f"{json_file} (its folder does not exist)", "a path in an existing folder"
         )
+    if pictures is not None and not pictures.is_dir():
+        raise InvalidInput("--pictures", f"{pictures} (no such folder)", "an existing folder")
     measure = load(name, benchmark_folder())
     with progress_bar(f"Measuring {name}") as step:
-        rows = list(measure(quick, step))
+        rows = list(measure(BenchmarkContext(quick, step, pictures, scheduler, tls)))
     measured = {"measured": date.today().isoformat()}
     text = json.dumps(without_nan([row.to_dict() | measured for row in rows]), indent=2, allow_nan=False)
     write_bytes(json_file, (text + "\n").encode())
@@ -63,7 +82,7 @@ def benchmark_folder() -> Path:
 
 
 def load(name: str, folder: Path) -> Rows:
-    """The function ``rows(quick, progress)`` of one benchmark.
+    """The function ``rows(context)`` of one benchmark.
 
     Raises:
         InvalidInput: for an unknown name, with the list of all benchmarks.
@@ -82,7 +101,7 @@ def load(name: str, folder: Path) -> Rows:
     module = importlib.import_module(f"{folder.name}.{known[stem]}.{stem}")
     measure: Rows | None = getattr(module, "rows", None)
     if measure is None:
-        raise WorkFailed(f"benchmarks/{known[stem]}/{stem}.py defines no rows(quick, progress)")
+        raise WorkFailed(f"benchmarks/{known[stem]}/{stem}.py defines no rows(context)")
     return measure
 
 

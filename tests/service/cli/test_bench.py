@@ -14,18 +14,23 @@ from typer.testing import Result
 from bentray_kernels.errors import InvalidInput
 from bentray_service.cli import bench as module
 from bentray_service.cli.bench import benchmark_folder, load
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.exit_codes import WorkFailed
 
 FAKE = """
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-def rows(quick, progress):
-    progress(1, 2, "first")
-    yield Row("E1", 2.5 if quick else 1.0, 2.0, ">=", "", "ratio of times")
+def rows(context):
+    context.progress(1, 2, "first")
+    context.save_picture("fake.png", lambda: b"picture")
+    yield Row("E1", 2.5 if context.quick else 1.0, 2.0, ">=", "", "ratio of times")
     yield Row("E2", None, 1.02, "<=", "", "eikonalfm is not installed")
     yield Row("E3", float("nan"), 1.0, "<=", "s", "diverged")
 """
+
+QUICK = BenchmarkContext(True, lambda done, total, note="": None)
 
 
 @pytest.fixture
@@ -72,13 +77,13 @@ def test_an_unknown_name_lists_the_known_ones(
 @pytest.mark.parametrize("name", ["two-words", "two_words"])
 def test_accepts_a_joined_command_line(folder: Path, name: str) -> None:
     (folder / "table" / "two_words.py").write_text(FAKE)
-    rows = load(name, folder)(True, lambda done, of, words: None)
+    rows = load(name, folder)(QUICK)
     assert [row.target for row in rows] == ["E1", "E2", "E3"]
 
 
 def test_a_benchmark_may_be_called_as_a_package_is(folder: Path) -> None:
     (folder / "table" / "distributed.py").write_text(FAKE)
-    rows = load("distributed", folder)(True, lambda done, of, words: None)
+    rows = load("distributed", folder)(QUICK)
     assert [row.target for row in rows] == ["E1", "E2", "E3"]
     assert Path(str(sys.modules["distributed"].__file__)).name == "__init__.py"
 
@@ -97,6 +102,22 @@ def test_the_file_for_the_rows_is_checked_before_anything_runs(
     assert "its folder does not exist" in result.stderr
 
 
+def test_pictures_are_written_only_to_the_folder_that_is_given(
+    bentray: Callable[..., Result], folder: Path, tmp_path: Path
+) -> None:
+    before = sorted(tmp_path.rglob("*.png"))
+    assert bentray("bench", "fake", "--json", tmp_path / "rows.json").exit_code == 0
+    assert sorted(tmp_path.rglob("*.png")) == before == []
+    drawn = tmp_path / "drawn"
+    result = bentray("bench", "fake", "--json", tmp_path / "rows.json", "--pictures", drawn)
+    assert result.exit_code == 2
+    assert f"--pictures: found {drawn} (no such folder); accepted: an existing folder" in result.stderr
+    drawn.mkdir()
+    result = bentray("bench", "fake", "--json", tmp_path / "rows.json", "--pictures", drawn)
+    assert result.exit_code == 0
+    assert (drawn / "fake.png").read_bytes() == b"picture"
+
+
 def test_outside_a_checkout_the_reason_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed = tmp_path / "lib" / "site-packages" / "bentray_service" / "cli" / "bench.py"
     monkeypatch.setattr(module, "__file__", str(installed))
@@ -112,7 +133,7 @@ def test_every_benchmark_of_the_checkout_fits_the_frame(path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.nightly
 def test_reconstruction_benchmark_reports_all_rows() -> None:
-    rows = list(load("reconstruction", benchmark_folder())(True, lambda done, total, note="": None))
+    rows = list(load("reconstruction", benchmark_folder())(QUICK))
     assert all(isinstance(row, Row) for row in rows)
     labels = {row.target.split()[0] for row in rows}
     assert {"R1", "R3"} <= labels
