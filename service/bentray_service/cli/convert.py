@@ -8,18 +8,15 @@ from typing import Annotated, Any
 import typer
 
 from .options.paths import check_apart, output_file
-from .options.scan_options import Frequency, Map, SoundSpeed, Temperature, Unit, input_scan, scan_metadata
+from .options.scan_options import ScanOptions, input_scan, with_scan_options
 from .output.terminal import AsJson, print_json, print_lines
 
 
+@with_scan_options
 def convert(
     file: Annotated[Path, typer.Argument(help="Scan; the format is detected from its content.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (.h5).")],
-    map: Map = None,  # noqa: A002 - the name of the option
-    unit: Unit = None,
-    temperature: Temperature = None,
-    sound_speed: SoundSpeed = None,
-    frequency: Frequency = None,
+    scan_options: ScanOptions,
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -36,7 +33,7 @@ def convert(
     """
     source, target = input_scan(file), output_file(output, force=force, suffix=".h5")
     check_apart({"output": target}, {"file": source})
-    given = scan_metadata(map, unit, temperature, sound_speed, frequency)
+    given = scan_options.metadata()
 
     from bentray_workers.foreign_scans import convert_dataset
 

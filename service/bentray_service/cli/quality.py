@@ -12,16 +12,7 @@ import typer
 from bentray_kernels.picker_names import DEFAULT_PICKER
 
 from .options.paths import output_folder
-from .options.scan_options import (
-    Frequency,
-    Map,
-    SoundSpeed,
-    Temperature,
-    Unit,
-    dataset_file,
-    input_scan,
-    scan_metadata,
-)
+from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options
 from .output.exit_codes import WorkFailed
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
@@ -33,9 +24,11 @@ class Water(StrEnum):
     fitted = "fitted"
 
 
+@with_scan_options
 def quality(
     file: Annotated[Path, typer.Argument(help="Dataset file, or a scan of another program.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
+    scan_options: ScanOptions,
     picker: Annotated[str, typer.Option(help="Picker of first arrivals in raw traces.")] = DEFAULT_PICKER,
     calibrate: Annotated[
         Water | None,
@@ -45,11 +38,6 @@ def quality(
             show_default="no calibration",
         ),
     ] = None,
-    map: Map = None,  # noqa: A002 - the name of the option
-    unit: Unit = None,
-    temperature: Temperature = None,
-    sound_speed: SoundSpeed = None,
-    frequency: Frequency = None,
     as_json: AsJson = False,
 ) -> None:
     """Check the data quality of a scan: report in OUTPUT/quality.json and .png, corrected scan in picked.h5.
@@ -61,7 +49,7 @@ def quality(
     Example:  bentray quality scan.h5 -o report
     """
     source, folder = input_scan(file), output_folder(output)
-    given = scan_metadata(map, unit, temperature, sound_speed, frequency)
+    given = scan_options.metadata()
 
     from bentray_workers.files.atomic import write_bytes
     from bentray_workers.files.dataset import write_dataset

@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .options.paths import output_folder
-from .options.scan_options import (
-    Frequency,
-    Map,
-    SoundSpeed,
-    Temperature,
-    Unit,
-    dataset_file,
-    input_scan,
-    scan_metadata,
-)
+from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options
 from .options.settings_options import SettingsOptions, settings_from, with_settings_options
 from .output.results import show_results, write_results
 from .output.terminal import AsJson, progress_bar, residual_note
@@ -30,11 +21,13 @@ if TYPE_CHECKING:
     from bentray_kernels.tomography import Progress, Reconstruction, Settings
 
 
+@with_scan_options
 @with_settings_options
 def reconstruct(
     file: Annotated[Path, typer.Argument(help="Dataset file, or a scan of another program.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
     options: SettingsOptions,
+    scan_options: ScanOptions,
     workers: Annotated[
         int | None,
         typer.Option(
@@ -43,11 +36,6 @@ def reconstruct(
             help="Worker processes; 1 runs in this process.",
         ),
     ] = None,
-    map: Map = None,  # noqa: A002 - the name of the option
-    unit: Unit = None,
-    temperature: Temperature = None,
-    sound_speed: SoundSpeed = None,
-    frequency: Frequency = None,
     as_json: AsJson = False,
 ) -> None:
     """Reconstruct a scan into OUTPUT/reconstruction.h5, .png and .json.
@@ -55,7 +43,7 @@ def reconstruct(
     Example:  bentray reconstruct scan.h5 -o result --rays curved --iterations 6
     """
     source, folder = input_scan(file), output_folder(output)
-    settings, given = settings_from(options), scan_metadata(map, unit, temperature, sound_speed, frequency)
+    settings, given = settings_from(options), scan_options.metadata()
 
     from bentray_kernels.tomography.requirements import check_scan
     from bentray_workers.files.dataset import read_dataset

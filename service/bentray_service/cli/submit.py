@@ -11,16 +11,7 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .options.paths import output_folder
-from .options.scan_options import (
-    Frequency,
-    Map,
-    SoundSpeed,
-    Temperature,
-    Unit,
-    dataset_file,
-    input_scan,
-    scan_metadata,
-)
+from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options
 from .options.settings_options import SettingsOptions, settings_from, with_settings_options
 from .output.exit_codes import client_errors
 from .output.results import show_results, write_results
@@ -33,6 +24,7 @@ if TYPE_CHECKING:
     from ..routes.models.job_records import JobRecord
 
 
+@with_scan_options
 @with_settings_options
 def submit(
     *,
@@ -41,6 +33,7 @@ def submit(
         typer.Argument(help="Dataset file, or a scan of another program.", show_default="with --batch, none"),
     ] = None,
     options: SettingsOptions,
+    scan_options: ScanOptions,
     url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
     output: Annotated[
         Path | None,
@@ -77,11 +70,6 @@ def submit(
         ),
     ] = None,
     tls: Tls = None,
-    map: Map = None,  # noqa: A002 - the name of the option
-    unit: Unit = None,
-    temperature: Temperature = None,
-    sound_speed: SoundSpeed = None,
-    frequency: Frequency = None,
     as_json: AsJson = False,
 ) -> None:
     """Upload a scan, reconstruct it on a service and download the result.
@@ -114,7 +102,7 @@ def submit(
             "output", f"{output} with --no-wait", "one of the two: there is no result to download yet"
         )
     settings = settings_from(options)
-    given = scan_metadata(map, unit, temperature, sound_speed, frequency)
+    given = scan_options.metadata()
     if file is not None:
         source = input_scan(file)
         folder = None if output is None else output_folder(output)

@@ -33,13 +33,14 @@ class Option:
 
 
 def with_options(
-    options: Mapping[str, Option], collect: Callable[[dict[str, Any]], Any]
+    options: Mapping[str, Option], collect: Callable[[dict[str, Any]], Any], replaced: str = "options"
 ) -> Callable[[Command], Command]:
-    """A decorator that replaces the parameter ``options`` of a command by one CLI option per field.
+    """A decorator that replaces one parameter of a command by one CLI option per field.
 
     Args:
         options: by field.
-        collect: converts the values of the CLI options, by field, to the argument ``options``.
+        collect: converts the values of the CLI options, by field, to the argument.
+        replaced: name of the parameter.
     """
 
     def decorate(command: Command) -> Command:
@@ -47,11 +48,11 @@ def with_options(
         def run(**given: Any) -> None:
             # Typer passes an empty list for a repeatable option that is not given.
             values = {name: value for name in options if (value := given.pop(name)) not in (None, [])}
-            command(options=collect(values), **given)
+            command(**{replaced: collect(values)}, **given)
 
         parameters: list[inspect.Parameter] = []
         for parameter in inspect.signature(command, eval_str=True).parameters.values():
-            if parameter.name == "options":
+            if parameter.name == replaced:
                 parameters += [option.parameter(name) for name, option in options.items()]
             else:
                 parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))

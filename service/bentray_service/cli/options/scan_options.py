@@ -2,58 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from bentray_kernels.errors import InvalidInput
+
+from .option_tables import Command, Option, with_options
 
 if TYPE_CHECKING:
     from bentray_workers.foreign_scans import ScanMetadata
 
 ACCEPTED = "the path of a scan, see the documentation of scan files"
 
-Map = Annotated[
-    list[str] | None,
-    typer.Option(
+# By the arguments of ``ScanMetadata.of``.
+OPTIONS = {
+    "map": Option(
         "--map",
-        metavar="FIELD=VARIABLE",
-        show_default=False,
-        help="Own variable of a MATLAB, HDF5 or NumPy file, e.g. element_position=pos; repeatable.",
+        list[str],
+        "",
+        "Own variable of a MATLAB, HDF5 or NumPy file, e.g. element_position=pos; repeatable.",
+        "FIELD=VARIABLE",
     ),
-]
-Unit = Annotated[
-    list[str] | None,
-    typer.Option("--unit", show_default="m and s", help="Unit of lengths or times in FILE; repeatable."),
-]
-Temperature = Annotated[
-    float | None,
-    typer.Option("--temperature", show_default="of FILE, else 20", help="Temperature of the water, °C."),
-]
-SoundSpeed = Annotated[
-    float | None,
-    typer.Option("--sound-speed", show_default="by the temperature", help="Speed of the water, m/s."),
-]
-Frequency = Annotated[
-    float | None, typer.Option("--frequency", show_default="of FILE", help="Centre frequency, Hz.")
-]
+    "unit": Option("--unit", list[str], "m and s", "Unit of lengths or times in FILE; repeatable."),
+    "temperature_c": Option("--temperature", float, "of FILE, else 20", "Temperature of the water, °C."),
+    "sound_speed_mps": Option("--sound-speed", float, "by the temperature", "Speed of the water, m/s."),
+    "frequency_hz": Option("--frequency", float, "of FILE", "Centre frequency, Hz."),
+}
 
 
-def scan_metadata(
-    map: Sequence[str] | None,  # noqa: A002 - the name of the option
-    unit: Sequence[str] | None,
-    temperature: float | None,
-    sound_speed: float | None,
-    frequency: float | None,
-) -> ScanMetadata:
-    """The values of the options; raises InvalidInput naming the first invalid one."""
-    from bentray_workers.foreign_scans import ScanMetadata
+@dataclass(frozen=True)
+class ScanOptions:
+    """What a command line states about a scan: values of the options that were given, by name."""
 
-    return ScanMetadata.of(map or (), unit or (), temperature, sound_speed, frequency)
+    options: dict[str, Any]
+
+    def metadata(self) -> ScanMetadata:
+        """The values as metadata of a scan; raises InvalidInput naming the first invalid one."""
+        from bentray_workers.foreign_scans import ScanMetadata
+
+        return ScanMetadata.of(**self.options)
+
+
+def with_scan_options(command: Command) -> Command:
+    """The command with the options about a scan in place of its parameter ``scan_options``."""
+    return with_options(OPTIONS, ScanOptions, "scan_options")(command)
 
 
 def input_scan(path: Path) -> Path:

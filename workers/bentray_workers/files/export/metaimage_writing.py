@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
 from .even_spacing import check_even_spacing
+from .header_and_values import type_name, write_header_and_values
 
 # Names of the types of volumes.
 ELEMENTS = {"u1": "MET_UCHAR", "u2": "MET_USHORT", "f4": "MET_FLOAT", "f8": "MET_DOUBLE"}
@@ -45,7 +45,6 @@ def write_metaimage(
     """
     check_even_spacing(spacing_m, "MetaImage")
     ndim = values.ndim
-    stored = np.asarray(values, dtype=values.dtype.newbyteorder("<"))
     tags = {
         "ObjectType": "Image",
         "NDims": ndim,
@@ -58,18 +57,14 @@ def write_metaimage(
         "CenterOfRotation": _row(np.zeros(ndim, int)),
         "ElementSpacing": _row(np.divide(spacing_m, UNITS_M["mm"])),
         "DimSize": _row(values.shape),
-        "ElementType": ELEMENTS[stored.dtype.str[1:]],
+        "ElementType": type_name(values, ELEMENTS),
         # The values follow this line.
         "ElementDataFile": "LOCAL",
     }
     if not tags["Comment"]:
         del tags["Comment"]
     header = "".join(f"{name} = {value}\n" for name, value in tags.items())
-    with atomic_replace(path) as partial, partial.open("wb") as file:
-        file.write(header.encode())
-        # x varies fastest; one slice at a time, since transposing the whole would double the memory.
-        for k in range(stored.shape[-1]):
-            file.write(stored[..., k].tobytes(order="F"))
+    write_header_and_values(path, header, values)
 
 
 def _row(values: Any) -> str:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
 from .even_spacing import check_even_spacing
+from .header_and_values import type_name, write_header_and_values
 
 TYPES = {"u1": "uint8", "u2": "uint16", "f4": "float", "f8": "double"}
 
@@ -41,12 +41,11 @@ def write_nrrd(
         slices, which pynrrd cannot do.
     """
     check_even_spacing(spacing_m, "NRRD")
-    stored = np.asarray(values, dtype=values.dtype.newbyteorder("<"))
     ndim = values.ndim
     steps = np.diag(np.divide(spacing_m, UNITS_M["mm"]))
     fields = {
         "content": " ".join(title.split()),
-        "type": TYPES[stored.dtype.str[1:]],
+        "type": type_name(values, TYPES),
         "dimension": ndim,
         "space dimension": ndim,
         "sizes": " ".join(map(str, values.shape)),
@@ -59,11 +58,7 @@ def write_nrrd(
     if not fields["content"]:
         del fields["content"]
     header = "NRRD0004\n" + "".join(f"{name}: {value}\n" for name, value in fields.items()) + "\n"
-    with atomic_replace(path) as partial, partial.open("wb") as file:
-        file.write(header.encode())
-        # x varies fastest; one slice at a time, since transposing the whole would double the memory.
-        for k in range(stored.shape[-1]):
-            file.write(stored[..., k].tobytes(order="F"))
+    write_header_and_values(path, header, values)
 
 
 def _vector(values: NDArray[Any]) -> str:
