@@ -21,7 +21,7 @@ THEIRS_MS = {
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
-    """Seconds of nine rays a pixel over those of one with neighbours, by filter, and Figures 7 to 9."""
+    """Seconds of nine rays a pixel over those of one with neighbours, by filter; Figures 2 and 7 to 9."""
     pixels = 96 if context.quick else 352
     volume = ball()
     single, many, post = [], [], []
@@ -41,6 +41,8 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         yield Row(f"Figure 8 nine rays / supersampling, {name}", nine / one, theirs, ">=", "", detail)
     title = "Figure 7: a glass ball of 8 bits before a checkerboard, one ray a pixel"
     context.save_picture("figure7.png", lambda: sheet([(title, single)]))
+    poor = [panel for panel in single if panel.name.startswith("Catmull-Rom")]
+    context.save_picture("figure2.png", lambda: sheet([("Figure 2: Catmull-Rom", poor)]))
     ways = [("Figure 8: nine rays a pixel ...", many), ("... and one, supersampled after refraction", post)]
     context.save_picture("figure8.png", lambda: sheet(ways))
     context.save_picture("figure9.png", lambda: figure9(context.progress))
