@@ -88,18 +88,21 @@ install-tests: install
 compiled: install
 	@$(BIN)/python -m bentray_workers.compilation.precompile
 
+# A lock file is complete, so pip resolves nothing; Python compiles the modules that it imports, not all.
+PINNED = $(BIN)/pip install -qq --no-deps --no-compile --require-hashes
+
 .venv/.installed: requirements.lock pyproject.toml | .venv/bin/python
 	@echo "Installing the packages of requirements.lock (about a minute the first time)"
-	@$(BIN)/pip install -qq --require-hashes -r requirements.lock
+	@$(PINNED) -r requirements.lock
 	@$(BIN)/pip install -qq --no-deps --no-build-isolation -e .
 	@touch $@
 
 .venv/.installed-dev: requirements-dev.lock .venv/.installed
 	@echo "Installing the tools for tests and checks"
-	@$(BIN)/pip install -qq --require-hashes -r requirements-dev.lock
+	@$(PINNED) -r requirements-dev.lock
 	@touch $@
 
 .venv/.installed-docs: requirements-docs.lock .venv/.installed
 	@echo "Installing the tools for the documentation"
-	@$(BIN)/pip install -qq --require-hashes -r requirements-docs.lock
+	@$(PINNED) -r requirements-docs.lock
 	@touch $@

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.fft import dctn, idctn
 
 from ...arrays import Flags, Floats
 from ..finite_frequency import blurred
-from .linearisation import Rows
+from .linearisation import Rows, halves
 from .penalties import Penalty, adjoint, gradient, laplacian, length, roughness, shrink
 from .ray_matrix import normal_product
 
@@ -40,6 +44,32 @@ REWEIGHTINGS = 4
 def smoothing(wavenumber: float) -> float:
     """Strength of a ``laplacian`` that outweighs data from all sides beyond a wavenumber of 1/node."""
     return CURVATURE / wavenumber**5
+
+
+# Entries of the matrix that are worth a second thread.
+MIN_ENTRIES = 200_000
+
+
+@dataclass(frozen=True)
+class _Rays:
+    """The rows of all emitters in two halves, and a ``map`` that processes both at the same time.
+
+    An update waits for all emitters, so that the cores that traced their rays would be idle. Sums over the
+    halves have the same bits whether one thread or two compute them.
+    """
+
+    halves: Sequence[Sequence[Rows]]
+    map: Callable[..., Iterable[Any]]
+
+
+@contextmanager
+def _by_threads(parts: Sequence[Rows]) -> Iterator[_Rays]:
+    """The rows for one solution."""
+    if sum(part.columns.size for part in parts) < MIN_ENTRIES:
+        yield _Rays(halves(parts), map)
+        return
+    with ThreadPoolExecutor(2, "update") as pool:
+        yield _Rays(halves(parts), pool.map)
 
 
 @dataclass(frozen=True)
@@ -89,13 +119,16 @@ class Linearised:
         if not self.density > 0.0:
             return self.image, dual
         if self.penalty == "total-variation" and self.strength > 0.0:
-            return self._split(dual)
-        image = self.image
-        for _ in range(REWEIGHTINGS if self.huber < math.inf else 1):
-            image = self._descend(image, self._penalty_gradient(image), self._penalty_hessian, MAX_STEPS)
+            with _by_threads(self.parts) as rays:
+                return self._split(rays, dual)
+        image, steps = self.image, MAX_STEPS
+        with _by_threads(self.parts) as rays:
+            for _ in range(REWEIGHTINGS if self.huber < math.inf else 1):
+                steepness = self._penalty_gradient(image)
+                image = self._descend(rays, image, steepness, self._penalty_hessian, steps)
         return image, dual
 
-    def _split(self, dual: Floats) -> tuple[Floats, Floats]:
+    def _split(self, rays: _Rays, dual: Floats) -> tuple[Floats, Floats]:
         """The alternating direction method of multipliers (Boyd et al. 2011, section 6.4.1).
 
         Alternates between a quadratic problem, by conjugate gradients, and soft thresholding of the
@@ -108,7 +141,7 @@ class Linearised:
             edges = shrink(slope, cost / SPLIT)
             dual = slope - edges
             steepness = SPLIT * adjoint(gradient(image) - edges + dual)
-            image = self._descend(image, steepness, lambda change: SPLIT * adjoint(gradient(change)), STEPS)
+            image = self._descend(rays, image, steepness, _slope_hessian, STEPS)
         return image, dual
 
     def _penalty_gradient(self, image: Floats) -> Floats:
@@ -123,18 +156,21 @@ class Linearised:
         return self.strength * (change if self.penalty == "tikhonov" else laplacian(laplacian(change)))
 
     def _descend(
-        self, image: Floats, steepness: Floats, stiffness: Callable[[Floats], Floats], steps: int
+        self,
+        rays: _Rays,
+        image: Floats,
+        steepness: Floats,
+        stiffness: Callable[[Floats], Floats],
+        steps: int,
     ) -> Floats:
         """The image after conjugate gradient steps.
 
         Args:
             steepness: gradient of the quadratic term at the image; stiffness: its second derivative.
         """
-        weights, downhill = [], np.zeros(image.size)
-        for part, residual_part in zip(self.parts, self._residuals(image), strict=True):
-            weights.append(self._weights(residual_part))
-            part.back_project(weights[-1] * residual_part, downhill)
-        residual = self._on_image(downhill) - np.where(self.region, steepness, 0.0)
+        change = blurred(image - self.image, self.width)
+        weights, downhill = zip(*rays.map(partial(self._back_projected, change), rays.halves), strict=True)
+        residual = self._on_image(np.sum(downhill, axis=0)) - np.where(self.region, steepness, 0.0)
         precondition = self._preconditioner()
         change, direction = np.zeros_like(residual), precondition(residual)
         square = float((residual * direction).sum())
@@ -142,10 +178,8 @@ class Linearised:
         for _ in range(steps):
             if square <= enough:
                 break
-            curved = np.zeros(image.size)
             wide = blurred(direction, self.width).ravel()
-            for part, weight in zip(self.parts, weights, strict=True):
-                normal_product(part.pointers, part.columns, part.lengths, weight, wide, curved)
+            curved = np.sum(list(rays.map(partial(_curvature, wide), rays.halves, weights)), axis=0)
             bent = self._on_image(curved) + np.where(self.region, stiffness(direction), 0.0)
             step = square / float((direction * bent).sum())
             change = change + step * direction
@@ -171,14 +205,30 @@ class Linearised:
         """A back-projection as an image, blurred to the ray width, over the density, in the region."""
         return np.where(self.region, blurred(flat.reshape(self.image.shape), self.width) / self.density, 0.0)
 
-    def _residuals(self, image: Floats) -> Iterator[Floats]:
-        """Residuals of an image, part by part, s."""
-        change = blurred(image - self.image, self.width)
-        for part in self.parts:
-            yield part.residual - part.project(change)
+    def _back_projected(self, change: Floats, half: Sequence[Rows]) -> tuple[list[Floats], Floats]:
+        """Weights of the rows of some parts, and their weighted residuals of an image back-projected."""
+        weights, into = [], np.zeros(change.size)
+        for part in half:
+            residual = part.residual - part.project(change)
+            weights.append(self._weights(residual))
+            part.back_project(weights[-1] * residual, into)
+        return weights, into
 
     def _weights(self, residual_part: Floats) -> Floats:
         """Weights of rows in the Huber loss: 1, less beyond its limit."""
         if self.huber == math.inf:
             return np.ones_like(residual_part)
         return self.huber / np.maximum(np.abs(residual_part), self.huber)
+
+
+def _curvature(image: Floats, half: Sequence[Rows], weights: Sequence[Floats]) -> Floats:
+    """Aᵀ·W·A·image of the rows of some parts, (nodes,), with weights by part."""
+    into = np.zeros(image.size)
+    for part, weight in zip(half, weights, strict=True):
+        normal_product(part.pointers, part.columns, part.lengths, weight, image, into)
+    return into
+
+
+def _slope_hessian(change: Floats) -> Floats:
+    """The second derivative of the quadratic term of the splitting times a change."""
+    return SPLIT * adjoint(gradient(change))

@@ -45,18 +45,22 @@ class Rows:
     residual: Floats
     counts: Ints
 
+    def between(self, first: int, last: int) -> Rows:
+        """The rows ``first`` up to, without, ``last``, as of one emitter; views of these arrays."""
+        entries = slice(self.pointers[first], self.pointers[last])
+        return Rows(
+            self.pointers[first : last + 1] - self.pointers[first],
+            self.columns[entries],
+            self.lengths[entries],
+            self.residual[first:last],
+            np.array([last - first]),
+        )
+
     def by_emitter(self) -> Iterator[Rows]:
         """The rows of each emitter by themselves; views of these arrays."""
         ends = np.concatenate(([0], np.cumsum(self.counts)))
         for first, last in itertools.pairwise(ends):
-            entries = slice(self.pointers[first], self.pointers[last])
-            yield Rows(
-                self.pointers[first : last + 1] - self.pointers[first],
-                self.columns[entries],
-                self.lengths[entries],
-                self.residual[first:last],
-                np.array([last - first]),
-            )
+            yield self.between(first, last)
 
     def project(self, image: Floats) -> Floats:
         """A·image, (rays,): sums along the rays."""
@@ -67,6 +71,21 @@ class Rows:
     def back_project(self, values: Floats, into: Floats) -> None:
         """Add Aᵀ·values to ``into``, (nodes,)."""
         back_project(self.pointers, self.columns, self.lengths, values, into)
+
+
+def halves(parts: Sequence[Rows]) -> list[list[Rows]]:
+    """The first and the last half of the rays; the same for any split into parts."""
+    middle = sum(part.residual.size for part in parts) // 2
+    found: list[list[Rows]] = [[], []]
+    begin = 0
+    for part in parts:
+        count = part.residual.size
+        cut = min(max(middle - begin, 0), count)
+        begin += count
+        for half, first, last in zip(found, (0, cut), (cut, count), strict=True):
+            if first < last:
+                half.append(part.between(first, last))
+    return found
 
 
 def ray_density(problem: Problem, parts: Sequence[Rows]) -> Floats:

@@ -1,12 +1,14 @@
 """The linear problem: the minimum each penalty must have, edges kept sharp, outliers, the same bits."""
 
 import itertools
+import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.sparse import csr_array, diags_array, eye_array, kron, random_array
 
+from bentray_kernels.tomography.gauss_newton import linear_problem
 from bentray_kernels.tomography.gauss_newton.linear_problem import Linearised, smoothing
 from bentray_kernels.tomography.gauss_newton.linearisation import Rows
 
@@ -206,23 +208,32 @@ def test_bounds_and_region_hold(penalty):
 
 
 @pytest.mark.parametrize("penalty", ["total-variation", "laplacian"])
+def test_two_threads_give_the_bits_of_one(penalty, monkeypatch):
+    asked = problem(0.05, TRUTH, rows=31, penalty=penalty, huber=0.5)
+    dual = np.zeros((2, *TRUTH.shape))
+    alone, alone_dual = asked.solve(dual)
+    names, curvature = set(), linear_problem._curvature
+
+    def seen(*args):
+        names.add(threading.current_thread().name)
+        return curvature(*args)
+
+    monkeypatch.setattr(linear_problem, "_curvature", seen)
+    monkeypatch.setattr(linear_problem, "MIN_ENTRIES", 0)
+    both, both_dual = asked.solve(dual)
+    assert names
+    assert threading.current_thread().name not in names
+    np.testing.assert_array_equal(both, alone)
+    np.testing.assert_array_equal(both_dual, alone_dual)
+
+
+@pytest.mark.parametrize("penalty", ["total-variation", "laplacian"])
 @pytest.mark.parametrize("cuts", [1, 3])
 def test_parts_of_the_rows_give_the_bits_of_the_whole(cuts, penalty):
     whole = problem(0.05, TRUTH, rows=30, penalty=penalty, huber=0.5)
     part = whole.parts[0]
     ends = [0, *np.linspace(0, 30, cuts + 1).astype(int)[1:]]
-    parts = []
-    for first, last in itertools.pairwise(ends):
-        entries = slice(part.pointers[first], part.pointers[last])
-        parts.append(
-            Rows(
-                part.pointers[first : last + 1] - part.pointers[first],
-                part.columns[entries],
-                part.lengths[entries],
-                part.residual[first:last],
-                np.array([last - first]),
-            )
-        )
+    parts = [part.between(first, last) for first, last in itertools.pairwise(ends)]
     cut = Linearised(
         parts,
         whole.image,
