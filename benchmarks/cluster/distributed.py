@@ -1,7 +1,8 @@
-"""Cluster benchmark: scaling to two workers, task overhead, rendering under load, resuming, Table 8."""
+"""Cluster benchmark: scaling to two workers, task overhead, rendering under load, resuming."""
 
 from __future__ import annotations
 
+import asyncio
 import os
 import tempfile
 import threading
@@ -15,27 +16,22 @@ from typing import Any
 import numpy as np
 from distributed import Future
 
-from bentray_kernels import eikonal
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.task_graph import Cancelled, Task
 from bentray_kernels.tomography import Settings
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
-from bentray_service.compute import Compute
+from bentray_service.pictures import Pictures
+from bentray_service.rows.tenants import LOCAL
 from bentray_workers.cluster.attempts import Attempts
 from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.fair_shares import IN_FLIGHT
 from bentray_workers.cluster.task_pool import finished
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
-from bentray_workers.reconstruction.subdomains import solve_in_blocks
 
 from ..shared._synthetic_scan import made_up_scan
 
-# Processes and blocks along each axis in the column of Table 8; the machine may have fewer cores.
-PROCESSES: dict[int, tuple[int, int]] = {1: (1, 1), 2: (2, 1), 4: (2, 2), 8: (4, 2)}
-THEIRS_S = {128: 0.007, 256: 0.039}
 RUNS = 2
 
 
@@ -55,7 +51,6 @@ def measured(quick: bool, progress: Step) -> Iterable[Row]:
             yield overhead(cluster, folder, 200 if quick else 1000, progress)
             yield rendering(cluster, folder, quick, progress)
             yield resuming(cluster, folder, quick, progress)
-        yield from blocks(folder, quick, progress)
 
 
 def scaling(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
@@ -117,7 +112,6 @@ def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Ro
     write_reconstruction(
         picture, reconstruct(cluster.client, path, Settings(method="sart", nodes=nodes, iterations=1))
     )
-    compute = Compute(cluster, lambda path: path)
     stop, taken = threading.Event(), []
     settings = Settings(method="sart", nodes=nodes, iterations=1000)
 
@@ -130,11 +124,22 @@ def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Ro
     thread = threading.Thread(target=work)
     thread.start()
     count = 10 if quick else 100
+
+    async def draw() -> None:
+        pictures = Pictures(cluster, lambda path: path)
+        volume = {"job_id": "job_1", "shape": (nodes, nodes, slices)}
+        try:
+            for k in range(count):
+                progress(k, count, "pictures beside a reconstruction")
+                begun = time.perf_counter()
+                await pictures.slice_png(LOCAL, volume, picture, {"index": k % slices})
+                taken.append(time.perf_counter() - begun)
+                await asyncio.sleep(0.05)
+        finally:
+            await pictures.close()
+
     try:
-        for k in range(count):
-            progress(k, count, "pictures beside a reconstruction")
-            taken.append(seconds(partial(compute.slice_png, picture, index=k % slices)))
-            time.sleep(0.05)
+        asyncio.run(draw())
         busy = thread.is_alive()
     finally:
         stop.set()
@@ -167,52 +172,6 @@ def resuming(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Row
     rest = seconds(lambda: reconstruct(cluster.client, path, settings, work_dir=folder / "torn"))
     detail = f"undisturbed {whole:.2f} s; torn after {first:.2f} s, resumed for {rest:.2f} s"
     return Row("resumed over undisturbed time", (first + rest) / whole, 1.2, "<=", "", detail)
-
-
-def blocks(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
-    """Table 8's cluster column: one projection in blocks on so many processes."""
-    cores = len(os.sched_getaffinity(0))
-    sides = (128,) if quick else (128, 256)
-    fields = {side: (table6(1500.0).speed(side, TABLE6_SIDE_M), TABLE6_SIDE_M / (side - 1)) for side in sides}
-    deep = 48 if quick else 160
-    volume = np.random.default_rng(8).uniform(1400.0, 1600.0, (deep,) * 3)
-    np.save(folder / "volume.npy", volume)
-    alone = least(lambda: eikonal.solve(volume, 1e-3, (0.02, 0.02, 0.02), "fsm"), 1 if quick else RUNS)
-    for count, (along_x, along_y) in PROCESSES.items():
-        if quick and count != 2:
-            continue
-        more = f", oversubscribed: {cores} cores" if count > cores else ""
-        with open_cluster(workers=count, local_directory=folder) as cluster:
-            for side, (speed, spacing) in fields.items():
-                progress(count, 8, f"{side}² in blocks on {count} processes")
-                source = (0.1 * TABLE6_SIDE_M, 0.5 * TABLE6_SIDE_M)
-                run = in_blocks(cluster, speed, spacing, source, (along_x, along_y))
-                found = least(run, RUNS)
-                single = least(partial(eikonal.solve, speed, spacing, source, "fsm"), RUNS)
-                detail = (
-                    f"{along_x} by {along_y} blocks; alone without a cluster "
-                    f"{1e3 * single:.3g} ms; theirs {1e3 * THEIRS_S[side]:g} ms on 8 nodes, 2008{more}"
-                )
-                yield Row(
-                    f"Table 8 {side}² FSM cluster, {count} processes",
-                    found,
-                    THEIRS_S[side],
-                    "<=",
-                    "s",
-                    detail,
-                )
-            run = in_blocks(cluster, folder / "volume.npy", 1e-3, (0.02,) * 3, (along_x, along_y, 1))
-            found = least(run, 1 if quick else RUNS)
-            detail = f"{along_x} by {along_y} by 1 blocks {found:.2f} s, whole {alone:.2f} s{more}"
-            yield Row(
-                f"FSM in blocks {deep}³ on {count} processes, speed-up", alone / found, 1.0, ">=", "", detail
-            )
-
-
-def in_blocks(cluster: Cluster, *arguments: Any) -> Callable[[], object]:
-    """A solve whose blocks stay on their workers."""
-
-    return partial(solve_in_blocks, cluster.client, *arguments)
 
 
 def least(run: Callable[[], object], runs: int) -> float:

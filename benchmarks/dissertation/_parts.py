@@ -82,8 +82,7 @@ class Parts:
         An exception of the benchmark is kept as ``error``: other parts are still measured.
         """
         drawn, settings = self.pictures(benchmark), settings_of(rows, context)
-        self._file(benchmark).unlink(missing_ok=True)
-        shutil.rmtree(drawn, ignore_errors=True)
+        self.forget(benchmark)
         drawn.mkdir(parents=True)
         connected = ConnectedContext(**vars(replace(context, pictures=drawn)))
         started, found, error = time.perf_counter(), [], ""
@@ -91,19 +90,34 @@ class Parts:
             found += rows(connected)
         except Exception as exception:  # Of any package that a benchmark compares with.
             error = f"{type(exception).__name__}: {exception}"
-        part = Part(
-            benchmark,
-            settings,
-            date.today().isoformat(),
-            time.perf_counter() - started,
-            os.getloadavg()[0],
-            [row.to_dict() for row in found],
-            sorted(path.name for path in drawn.iterdir()),
-            error,
-            bool(connected.connections),
+        return self._kept(
+            Part(
+                benchmark,
+                settings,
+                date.today().isoformat(),
+                time.perf_counter() - started,
+                os.getloadavg()[0],
+                [row.to_dict() for row in found],
+                sorted(path.name for path in drawn.iterdir()),
+                error,
+                bool(connected.connections),
+            )
         )
+
+    def forget(self, benchmark: str) -> None:
+        """Delete a part and its pictures."""
+        self._file(benchmark).unlink(missing_ok=True)
+        shutil.rmtree(self.pictures(benchmark), ignore_errors=True)
+
+    def keep_failure(self, benchmark: str, error: str, seconds: float) -> Part:
+        """Keep a part without rows, of a benchmark that ended its process."""
+        return self._kept(
+            Part(benchmark, {}, date.today().isoformat(), seconds, os.getloadavg()[0], error=error)
+        )
+
+    def _kept(self, part: Part) -> Part:
         text = json.dumps(without_nan(asdict(part)), indent=1, allow_nan=False)
-        write_bytes(self._file(benchmark), text.encode())
+        write_bytes(self._file(part.benchmark), text.encode())
         return part
 
     def _file(self, benchmark: str) -> Path:

@@ -89,6 +89,13 @@ CASES = (
     Case("Figure 34, slices", "reconstruction_volume", "R9 exact, slices", published=0.036),
     Case("Figure 34, 3-D", "reconstruction_volume", "R9 exact, volume", published=0.034),
     Case(
+        "Figure 34, slices scanned by waves (tuned: waveform)",
+        "chapter7_waves",
+        "M1 slices, default settings, whole image",
+        "M1 slices, waveform, whole image",
+        0.036,
+    ),
+    Case(
         "Table 8, 128² by 40, three iterations (Tesla)",
         "reconstruction_time",
         "R5 128² by 40, 256 transducers",

@@ -17,7 +17,10 @@ from bentray_workers.files.atomic import write_bytes
 from ._outline import CHAPTERS, Item, benchmarks_of, items
 from ._page import page
 from ._parts import OWN_WORKERS, Part, Parts, Rows, settings_of
+from ._process import Load, measure_in_process
 from ._report import report_of
+
+Measure = Callable[[Load, Parts, str, BenchmarkContext], Part]
 
 JSON, HTML = "report.json", "report.html"
 
@@ -26,8 +29,9 @@ def report(
     context: BenchmarkContext,
     folder: Path,
     only: Sequence[str],
-    load: Callable[[str], Rows],
+    load: Load,
     say: Callable[[str], None],
+    measure: Measure = measure_in_process,
 ) -> dict[str, Any]:
     """Measure what is not complete in a folder, and write ``report.json`` and ``report.html`` there.
 
@@ -39,6 +43,7 @@ def report(
         only: names of chapters, tables and figures to measure; empty: all.
         load: the rows of a benchmark by its name.
         say: called with a line after each part.
+        measure: measures and keeps a part.
 
     Raises:
         InvalidInput: for a name that is no chapter, table or figure, or an address without a scheduler.
@@ -66,7 +71,7 @@ def report(
             share = done / total if total else 0.0
             context.progress(int(100 * (number + min(share, 1.0))), 100 * len(chosen), f"{name}: {note}")
 
-        part = parts[name] = store.measure(name, measures[name], replace(context, progress=step))
+        part = parts[name] = measure(load, store, name, replace(context, progress=step))
         outcome = written(store, parts, context)
         ended = f"stopped: {part.error}" if part.error else f"{len(part.rows)} rows"
         say(f"{name}: {ended} in {part.seconds:.0f} s ({number + 1} of {len(chosen)})")

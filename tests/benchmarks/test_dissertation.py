@@ -1,105 +1,35 @@
-"""The report of the dissertation, with benchmarks made for the test."""
+"""A report of the dissertation is resumed, narrowed and refused; with benchmarks made for the test."""
 
 from __future__ import annotations
 
 import json
-import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
 from contextlib import nullcontext
-from html.parser import HTMLParser
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from benchmarks.dissertation import dissertation
-from benchmarks.dissertation._outline import CHAPTERS, benchmarks_of, items
-from benchmarks.dissertation._page import fragment, page
+from benchmarks.dissertation._outline import CHAPTERS, benchmarks_of
 from benchmarks.dissertation._parts import Parts
-from benchmarks.dissertation._report import MISSED, PARTLY, REPRODUCED, SKETCH, report_of
-from benchmarks.dissertation._summary import CASES
+from benchmarks.dissertation._report import PARTLY
 from typer.testing import CliRunner
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.cli import app
 from bentray_service.cli import bench as command
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
-from bentray_service.cli.output.benchmark_row import Row
+
+from ._fake_benchmarks import NAMES, Fakes, by_name, in_this_process, of, state_of
 
 ROOT = Path(__file__).resolve().parents[2]
-NAMES = benchmarks_of(tuple(items()))
-PNG = b"\x89PNG"
-IMAGE = {"best constant": 0.3, "water alone": 0.4, "straight rays": 0.2, "default settings": 0.1}
-
-
-class Fakes:
-    """Benchmarks by name: each yields two rows for every label of the outline, and its pictures."""
-
-    def __init__(self) -> None:
-        self.ran: list[str] = []
-        self.stops: dict[str, BaseException] = {}
-
-    def load(self, name: str) -> Callable[[BenchmarkContext], Iterable[Row]]:
-        def rows(context: BenchmarkContext) -> Iterable[Row]:
-            self.ran.append(name)
-            sources = [(item, one) for item in items() for one in item.sources if one.benchmark == name]
-            for file in {file for item, _ in sources for file in item.pictures}:
-                context.save_picture(file, lambda: PNG)
-            context.progress(1, 2, "half")
-            for target in dict.fromkeys(target for _, one in sources for target in one.targets):
-                yield Row(f"{target} <first>", 0.1, 0.2, "<=", "of range", "a & b", baselines=IMAGE)
-                yield Row(f"{target} second", 2.0, 1.0, "<=", "", "missed")
-            if name in self.stops:
-                raise self.stops[name]
-            if name == "reconstruction_volume":
-                context.cluster()
-
-        return rows
-
-    def report(self, folder: Path, *only: str, quick: bool = True, scheduler: str | None = None) -> dict:
-        context = BenchmarkContext(quick, lambda done, total, note="": None, scheduler=scheduler)
-        return dissertation.report(context, folder, only, self.load, lambda line: None)
 
 
 @pytest.fixture
 def fakes(monkeypatch: pytest.MonkeyPatch) -> Fakes:
     monkeypatch.setattr(BenchmarkContext, "cluster", lambda self: nullcontext())
     return Fakes()
-
-
-def test_every_table_and_figure_of_chapters_3_to_7_is_listed():
-    assert [chapter.number for chapter in CHAPTERS] == [3, 4, 5, 6, 7]
-    listed = [item.name for item in items()]
-    assert sorted(listed, key=lambda name: (name[0], int(name.split()[1]))) == [
-        *(f"Figure {number}" for number in range(1, 35)),
-        *(f"Table {number}" for number in range(1, 9)),
-    ]
-    last = {3: 9, 4: 22, 5: 27, 6: 31, 7: 34}
-    for chapter in CHAPTERS:
-        figures = [int(item.name.split()[1]) for item in chapter.items if item.name.startswith("Figure")]
-        assert figures == list(range(last.get(chapter.number - 1, 0) + 1, last[chapter.number] + 1))
-    for item in items():
-        assert item.sketch or item.sources, item.name
-
-
-def test_labels_of_the_outline_and_of_the_summary_are_labels_of_recorded_rows():
-    for item in items():
-        for source in item.sources:
-            file = ROOT / f"benchmarks/results/{source.benchmark}.json"
-            assert list((ROOT / "benchmarks").glob(f"*/{source.benchmark}.py")), source.benchmark
-            for target in source.targets if file.exists() else ():
-                labels = [row["target"] for row in json.loads(file.read_text())]
-                assert any(label.startswith(target) for label in labels), (source.benchmark, target)
-    for case in CASES:
-        file = ROOT / f"benchmarks/results/{case.benchmark}.json"
-        if file.exists():
-            labels = [row["target"] for row in json.loads(file.read_text())]
-            for name in filter(None, (case.default, case.tuned)):
-                # Some recorded files hold one water only.
-                stem = re.split(", (?:coupling|water) ", name)[0]
-                assert any(label.startswith(stem) for label in labels), case.name
 
 
 def test_a_second_run_continues_after_the_parts_that_are_complete(fakes: Fakes, tmp_path: Path):
@@ -125,7 +55,7 @@ def test_a_killed_run_loses_only_the_part_in_progress(tmp_path: Path):
 import os, signal, sys
 from pathlib import Path
 sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests" / "benchmarks")!r}]
-from test_dissertation import NAMES, BenchmarkContext, Fakes
+from _fake_benchmarks import NAMES, BenchmarkContext, Fakes
 BenchmarkContext.cluster = lambda self: None
 class Killed(Fakes):
     def load(self, name):
@@ -201,95 +131,6 @@ def test_a_benchmark_that_stops_is_stated_and_tried_again(fakes: Fakes, tmp_path
     assert fakes.ran == ["table5"]
 
 
-def test_states_counts_and_sentences():
-    def part(*rows: Row) -> SimpleNamespace:
-        listed = [row.to_dict() for row in rows]
-        return SimpleNamespace(
-            benchmark="table5",
-            rows=listed,
-            pictures=[],
-            error="",
-            measured="2026-01-01",
-            seconds=1.0,
-            load=0.5,
-            uses_cluster=False,
-        )
-
-    met, missed = (Row(f"Table 5 {value}", value, 2.0, "<=", "s", "") for value in (1.0, 3.0))
-    absent = Row("Table 5 none", None, 2.0, "<=", "s", "no peer")
-    for rows, state in (((met, absent), REPRODUCED), ((met, missed), PARTLY), ((missed,), MISSED)):
-        made = report_of({"table5": part(*rows)}, quick=False, cluster="own workers")
-        assert state_of(made, "Table 5") == state
-        assert bool(of(made, "Table 5")["sentence"]) is (state != REPRODUCED)
-    assert made["rows"] == {"met": 0, "missed": 1, "without a value": 0}
-    for one in made["chapters"]:
-        for item in one["items"]:
-            assert item["sentence"].count(". ") == 0, item["sentence"]
-    assert of(made, "Figure 24")["state"] == SKETCH
-    quick = report_of({"table5": part(missed)}, quick=True, cluster="own workers")
-    assert of(quick, "Table 5")["sentence"].startswith("1 of 1 rows miss their goal on the small problems")
-
-
-def test_the_summary_names_the_best_peer_and_the_baselines():
-    peers = {"pyGIMLi": 1.2, "ttcrpy": 1.1}
-    water = "water 1500"
-    rows = [Row(f"R6 unseen slice rmse, default, {water}", 25.0, 28.0, "<=", "m/s", "", baselines=IMAGE)]
-    rows += [Row(f"R6 rmse below {name}, {water}", ratio, 1.0, ">", "", "") for name, ratio in peers.items()]
-    part = SimpleNamespace(
-        benchmark="reconstruction_peers",
-        rows=[row.to_dict() for row in rows],
-        pictures=[],
-        error="",
-        measured="2026-01-01",
-        seconds=1.0,
-        load=0.5,
-        uses_cluster=False,
-    )
-    (line,) = report_of({"reconstruction_peers": part}, quick=False, cluster="")["summary"]
-    assert line["best_peer"] == {"name": "ttcrpy", "error": pytest.approx(27.5)}
-    assert (line["default"], line["best_constant"], line["straight"]) == (25.0, 0.3, 0.2)
-    assert line["published"] is None
-
-
-class Outside(HTMLParser):
-    """Collects every address that a page would load or link to."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.found: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        for name, value in attrs:
-            if name in ("src", "href", "srcset", "action", "poster", "data") and value is not None:
-                self.found.append(value)
-
-
-def test_the_page_is_self_contained_and_escaped(fakes: Fakes, tmp_path: Path):
-    made = fakes.report(tmp_path)
-    html = (tmp_path / "report.html").read_text()
-    parser = Outside()
-    parser.feed(html)
-    assert parser.found
-    assert all(address.startswith(("data:image/png;base64,", "#")) for address in parser.found)
-    assert not re.search(r"https?://|url\(|@import|<script|<link", html)
-    assert "&lt;first&gt;" in html
-    assert "a &amp; b" in html
-    assert html.count("<img") == len({file for item in items() for file in item.pictures})
-    targets = re.findall(r' id="([^"]+)"', html)
-    assert len(targets) == len(set(targets))
-    assert {address[1:] for address in parser.found if address.startswith("#")} <= set(targets)
-    assert "prefers-color-scheme: dark" in html
-    assert "@media print" in html
-    assert "width=device-width" in html
-    for item in items():
-        assert f">{item.name}<" in html
-    inner = fragment(made, lambda benchmark, name: None)
-    assert "<html" not in inner
-    assert "<img" not in inner
-    assert "Quick run." in inner
-    assert "Quick run." not in page(made | {"quick": False}, lambda benchmark, name: None)
-
-
 def test_which_parts_used_workers_is_stated(fakes: Fakes, tmp_path: Path):
     made = fakes.report(tmp_path, "figure34", "table5", scheduler="tcp://head:8786")
     on_workers = {part["benchmark"]: part["on_workers"] for part in made["parts"] if part["measured"]}
@@ -297,15 +138,21 @@ def test_which_parts_used_workers_is_stated(fakes: Fakes, tmp_path: Path):
     assert made["cluster"] == "workers of tcp://head:8786"
 
 
-def test_an_address_without_a_scheduler_is_refused_before_anything_runs(tmp_path: Path):
-    fakes = Fakes()
+def test_an_address_without_a_scheduler_is_refused_before_anything_runs(
+    fakes: Fakes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def refuse(self: BenchmarkContext) -> None:
+        raise InvalidInput("scheduler_address", self.scheduler, "the address of a running Dask scheduler")
+
+    monkeypatch.setattr(BenchmarkContext, "cluster", refuse)
     with pytest.raises(InvalidInput, match="scheduler_address"):
-        fakes.report(tmp_path, "table5", scheduler="tcp://127.0.0.1:1")
+        fakes.report(tmp_path, "table5", scheduler="tcp://head:1")
     assert fakes.ran == []
 
 
 def test_the_command(fakes: Fakes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(command, "load", lambda name, folder: fakes.load(name))
+    monkeypatch.setattr(dissertation.report, "__defaults__", (in_this_process,))
     folder = tmp_path / "report"
 
     def run(*words: object) -> tuple[int, str, str]:
@@ -338,15 +185,3 @@ def test_the_command(fakes: Fakes, tmp_path: Path, monkeypatch: pytest.MonkeyPat
         status, _, stderr = run(*words)
         assert status == 2, words
         assert reason in stderr, words
-
-
-def by_name(name: str):
-    return next(item for item in items() if item.name == name)
-
-
-def of(made: dict, name: str) -> dict:
-    return next(item for one in made["chapters"] for item in one["items"] if item["name"] == name)
-
-
-def state_of(made: dict, name: str) -> str:
-    return of(made, name)["state"]

@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from datetime import date
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated
@@ -120,9 +121,7 @@ def write_report(context: BenchmarkContext, output: Path, only: Sequence[str]) -
     if output.exists() and not output.is_dir():
         raise InvalidInput("-o", f"{output} (a file)", "a folder")
     folder = benchmark_folder()
-    made = module_of(REPORT, folder).report(
-        context, output, only, lambda benchmark: load(benchmark, folder), remark
-    )
+    made = module_of(REPORT, folder).report(context, output, only, partial(load, folder=folder), remark)
     rows = [(item["name"], item["state"], item["title"]) for one in made["chapters"] for item in one["items"]]
     print_table("dissertation, quick" if context.quick else REPORT, ("item", "state", "content"), rows)
     print_lines([str(output / "report.html"), str(output / "report.json")])
