@@ -134,7 +134,7 @@ def test_a_benchmark_that_stops_is_stated_and_tried_again(fakes: Fakes, tmp_path
 def test_which_parts_used_workers_is_stated(fakes: Fakes, tmp_path: Path):
     made = fakes.report(tmp_path, "figure34", "table5", scheduler="tcp://head:8786")
     on_workers = {part["benchmark"]: part["on_workers"] for part in made["parts"] if part["measured"]}
-    assert on_workers == {"reconstruction_volume": True, "table5": False}
+    assert (on_workers["reconstruction_volume"], on_workers["table5"]) == (True, False)
     assert made["cluster"] == "workers of tcp://head:8786"
 
 
