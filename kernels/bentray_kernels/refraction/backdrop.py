@@ -13,6 +13,7 @@ from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
 from .relief import Place, meet_relief
+from .texels import Texels, packed
 
 Colours = NDArray[np.uint8]
 
@@ -82,9 +83,10 @@ class Backdrop(NamedTuple):
         frames: (planes, 4, 3): centre; across and down, divided by their squared lengths; normal.
         edges: (planes, 2) lengths of the edges, m.
         repeats: (planes,).
-        tables: (planes, 8): place of the picture's first number, rows, columns, smooth, endless; place of the
-            first height, rows and columns of the relief, 0 where it is flat.
+        tables: (planes, 9): place of the picture's first number, rows, columns, smooth, endless; place of the
+            first height, rows and columns of the relief, 0 where it is flat; place of the first packed texel.
         pictures: all pictures, one after the other.
+        texels: ``texels.packed`` of all smooth pictures, one after the other.
         reliefs: all heights, one after the other, m.
         heights: (planes, 2) between which all of a plane's heights are, with room for rounding, m.
         beyond: (3,) colour where a ray ends on no plane.
@@ -95,6 +97,7 @@ class Backdrop(NamedTuple):
     repeats: Floats
     tables: Ints
     pictures: Colours
+    texels: Texels
     reliefs: Floats
     heights: Floats
     beyond: Colours
@@ -108,7 +111,8 @@ def backdrop_of(planes: Sequence[Plane], beyond: ArrayLike = (0, 0, 0)) -> Backd
     """
     if not planes:
         raise InvalidInput("planes", "none", "at least one plane")
-    frames, tables, start, height = [], [], 0, 0
+    frames, tables, texels = [], [], [np.zeros(0, dtype=np.uint64)]
+    start = height = first = 0
     for plane in planes:
         right, down = np.asarray(plane.right), np.asarray(plane.down)
         normal = np.cross(right, down)
@@ -116,7 +120,12 @@ def backdrop_of(planes: Sequence[Plane], beyond: ArrayLike = (0, 0, 0)) -> Backd
             [plane.centre, right / (right @ right), down / (down @ down), normal / np.linalg.norm(normal)]
         )
         relief = np.zeros((0, 0)) if plane.relief is None else plane.relief
-        tables.append([start, *plane.picture.shape[:2], plane.smooth, plane.endless, height, *relief.shape])
+        tables.append(
+            [start, *plane.picture.shape[:2], plane.smooth, plane.endless, height, *relief.shape, first]
+        )
+        if plane.smooth:
+            texels.append(packed(plane.picture, plane.endless or plane.repeats != 1.0).ravel())
+            first += texels[-1].size
         start += plane.picture.size
         height += relief.size
     edges = [[np.linalg.norm(plane.right), np.linalg.norm(plane.down)] for plane in planes]
@@ -126,6 +135,7 @@ def backdrop_of(planes: Sequence[Plane], beyond: ArrayLike = (0, 0, 0)) -> Backd
         np.array([plane.repeats for plane in planes]),
         np.array(tables, dtype=np.int64),
         np.concatenate([plane.picture.ravel() for plane in planes]),
+        np.concatenate(texels),
         np.concatenate(
             [np.zeros(0), *(np.ravel(plane.relief) for plane in planes if plane.relief is not None)]
         ),

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..compiled import kernel
 from .backdrop import Backdrop, Colours, colour_at
+from .picture_supersampling import filter_picture
 
 Planes = NDArray[np.int8]
 Crossed = NDArray[np.int16]
@@ -29,9 +30,16 @@ def point_colours(
     rows, columns = planes.shape
     for i in range(rows):
         for j in range(columns):
-            colour = colour_at(backdrop, planes[i, j], places[i, j, 0], places[i, j, 1])
-            for c in range(3):
-                image[i, j, c] = np.uint8(colour[c] * weights[i, j] + 0.5)
+            _point(backdrop, planes, places, weights, image, i, j)
+
+
+@kernel(inline="always")
+def _point(
+    backdrop: Backdrop, planes: Planes, places: Floats, weights: Floats, image: Colours, i: int, j: int
+) -> None:
+    colour = colour_at(backdrop, planes[i, j], places[i, j, 0], places[i, j, 1])
+    for c in range(3):
+        image[i, j, c] = np.uint8(colour[c] * weights[i, j] + 0.5)
 
 
 @kernel
@@ -51,7 +59,8 @@ def post_refraction_colours(
     bilinearly; the low-pass is their mean. For degree 1 these are the pixel's own place and the 8
     intermediate ones of the dissertation, a third of the way. A neighbour whose ray met another number of
     interfaces, or ended on another plane, belongs to another piece of the picture: its samples are replaced
-    by the pixel's own colour.
+    by the pixel's own colour. In patterns only pixels near the edge of a square are sampled; of interpolated
+    pictures see ``filter_picture``.
 
     Args:
         backdrop, planes, places, weights: as for ``point_colours``.
@@ -59,8 +68,43 @@ def post_refraction_colours(
         degree: at least 1.
         image: (rows, columns, 3), filled.
     """
+    patterns = False
+    for plane in range(len(backdrop.tables)):
+        patterns |= backdrop.tables[plane, 3] == 0
+    if patterns:
+        point_colours(backdrop, planes, places, weights, image)
+        _filter_patterns(backdrop, planes, places, crossed, weights, degree, image)
+    else:
+        _colour_beyond(backdrop, planes, places, weights, image)
+    for plane in range(len(backdrop.tables)):
+        if backdrop.tables[plane, 3]:
+            filter_picture(backdrop, plane, planes, places, crossed, weights, degree, image)
+
+
+@kernel
+def _colour_beyond(
+    backdrop: Backdrop, planes: Planes, places: Floats, weights: Floats, image: Colours
+) -> None:
+    """Colours of the pixels that see no plane."""
     rows, columns = planes.shape
-    point_colours(backdrop, planes, places, weights, image)
+    for i in range(rows):
+        for j in range(columns):
+            if planes[i, j] < 0:
+                _point(backdrop, planes, places, weights, image, i, j)
+
+
+@kernel
+def _filter_patterns(
+    backdrop: Backdrop,
+    planes: Planes,
+    places: Floats,
+    crossed: Crossed,
+    weights: Floats,
+    degree: int,
+    image: Colours,
+) -> None:
+    """Supersampling of the pixels that see a pattern of squares."""
+    rows, columns = planes.shape
     pieces, squares = np.empty((rows, columns), dtype=np.int32), np.empty((rows, columns), dtype=np.int64)
     _name_pieces(backdrop, planes, places, crossed, pieces, squares)
     # Of the four pixels about each corner; none beyond the rim.
@@ -74,7 +118,7 @@ def post_refraction_colours(
         for j in range(columns):
             upper = same_square[i, j] and same_square[i, j + 1]
             lower = same_square[i + 1, j] and same_square[i + 1, j + 1]
-            if planes[i, j] < 0 or (upper and lower):
+            if planes[i, j] < 0 or backdrop.tables[planes[i, j], 3] or (upper and lower):
                 continue
             own = colour_at(backdrop, planes[i, j], places[i, j, 0], places[i, j, 1])
             red = green = blue = 0.0
@@ -117,11 +161,8 @@ def _name_pieces(
             plane = planes[i, j]
             piece = 256 * np.int64(crossed[i, j]) + plane
             pieces[i, j] = piece
-            if plane < 0:
+            if plane < 0 or backdrop.tables[plane, 3]:
                 squares[i, j] = -1
-            elif backdrop.tables[plane, 3]:
-                # Colours run into each other: no two pixels see the same.
-                squares[i, j] = i * columns + j
             else:
                 across = backdrop.repeats[plane] * backdrop.tables[plane, 2]
                 below = backdrop.repeats[plane] * backdrop.tables[plane, 1]

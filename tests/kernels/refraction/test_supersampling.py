@@ -118,6 +118,68 @@ def test_smooth_pictures_are_filtered_as_well_and_light_is_weakened():
     assert image[1:-1, 1:-1].std() < 0.8 * plain[1:-1, 1:-1].std()
 
 
+def bilinear(plane: Plane, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Colours of an interpolated picture, (..., 3)."""
+    rows, columns = plane.picture.shape[:2]
+    alone = plane.repeats == 1.0 and not plane.endless
+    x, y = ((np.mod((place + 0.5) * plane.repeats, 1.0)) for place in (u, v))
+    x, y = x * columns - 0.5, y * rows - 0.5
+    left, upper = np.floor(x).astype(int), np.floor(y).astype(int)
+    t, w = (x - left)[..., None], (y - upper)[..., None]
+
+    def at(row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        if alone:
+            return plane.picture[row.clip(0, rows - 1), column.clip(0, columns - 1)]
+        return plane.picture[row % rows, column % columns]
+
+    above = (1 - t) * at(upper, left) + t * at(upper, left + 1)
+    below = (1 - t) * at(upper + 1, left) + t * at(upper + 1, left + 1)
+    return (1 - w) * above + w * below
+
+
+def sampled(plane: Plane, places: np.ndarray, pieces: np.ndarray, i: int, j: int, degree: int) -> np.ndarray:
+    """Mean of the samples of one pixel, by the definition."""
+    rows, columns = pieces.shape
+    total = np.zeros(3)
+    for a in range(-degree, degree + 1):
+        for b in range(-degree, degree + 1):
+            p, q = i + (1 if a >= 0 else -1), j + (1 if b >= 0 else -1)
+            place = places[i, j]
+            inside = 0 <= p < rows and 0 <= q < columns
+            if inside and (pieces[[i, p, p], [q, j, q]] == pieces[i, j]).all():
+                t, w = abs(a) / (2 * degree + 1), abs(b) / (2 * degree + 1)
+                place = (1 - t) * ((1 - w) * place + w * places[i, q])
+                place = place + t * ((1 - w) * places[p, j] + w * places[p, q])
+            total += bilinear(plane, *place)
+    return total / (2 * degree + 1) ** 2
+
+
+@pytest.mark.parametrize("degree", [1, 2, 5])
+@pytest.mark.parametrize(("repeats", "endless"), [(1.0, False), (1.0, True), (2.5, True)])
+def test_pixels_of_a_picture_are_means_of_samples_between_their_neighbours(repeats, endless, degree):
+    rng = np.random.default_rng(1)
+    picture = rng.integers(0, 256, (19, 23, 3), dtype=np.uint8)
+    plane = Plane((0, 0, 1), (1, 0, 0), (0, 1, 0), picture, repeats, endless=endless)
+    squares = checkerboard((0, 0, 2), (1, 0, 0), (0, 1, 0), 8)
+    backdrop = backdrop_of([squares, plane])
+    planes, places, crossed = regular(12, 0.9 if not endless else 2.6, -0.45)
+    places = (places + 0.01 * rng.standard_normal(places.shape)).clip(-0.5, None if endless else 0.5)
+    planes[:], planes[:2], planes[10:, 5:] = 1, -1, 0
+    places[:2] = np.nan
+    crossed[6:, :4] = 2
+    weights = rng.random(planes.shape)
+    image = post(backdrop, planes, places, crossed, degree, weights)
+    pieces = np.where(planes == 1, crossed, -9)
+    seen = planes == 1
+    expected = np.array([sampled(plane, places, pieces, i, j, degree) for i, j in np.argwhere(seen)])
+    np.testing.assert_allclose(image[seen], expected * weights[seen][:, None], atol=3.0)
+    # A step is 1/64 of a texel: on average the colours differ by less than rounding does.
+    assert np.abs(image[seen] - expected * weights[seen][:, None]).mean() < 0.6
+    assert (image[planes < 0] == 0).all()
+    alone = post(backdrop_of([squares]), np.where(planes == 1, -1, planes).astype(np.int8), places, crossed)
+    np.testing.assert_array_equal(image[planes == 0] > 0, alone[planes == 0] > 0)
+
+
 def test_real_samples_are_averaged():
     image = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
     means = image.reshape(2, 2, 3, 2, 3).mean(axis=(1, 3))
