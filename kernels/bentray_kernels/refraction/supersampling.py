@@ -105,26 +105,33 @@ def _filter_patterns(
 ) -> None:
     """Supersampling of the pixels that see a pattern of squares."""
     rows, columns = planes.shape
-    pieces, squares = np.empty((rows, columns), dtype=np.int32), np.empty((rows, columns), dtype=np.int64)
-    _name_pieces(backdrop, planes, places, crossed, pieces, squares)
-    # Of the four pixels about each corner; none beyond the rim.
-    same_square = np.ones((rows + 1, columns + 1), dtype=np.bool_)
-    same_piece = np.zeros((rows + 1, columns + 1), dtype=np.bool_)
-    for i in range(1, rows):
-        _compare(squares[i - 1], squares[i], same_square[i])
-        _compare(pieces[i - 1], pieces[i], same_piece[i])
+    # Of two rows, in turn.
+    pieces, squares = np.empty((2, columns), dtype=np.int32), np.empty((2, columns), dtype=np.int64)
+    # Of the four pixels about each corner above and below a row; none beyond the rim.
+    same_square = np.ones((2, columns + 1), dtype=np.bool_)
+    same_piece = np.zeros((2, columns + 1), dtype=np.bool_)
     share = 1.0 / (2 * degree + 1) ** 2
+    _name_pieces(backdrop, planes[0], places[0], crossed[0], pieces[0], squares[0])
     for i in range(rows):
+        here, after = i % 2, 1 - i % 2
+        if i + 1 < rows:
+            _name_pieces(
+                backdrop, planes[i + 1], places[i + 1], crossed[i + 1], pieces[after], squares[after]
+            )
+            _compare(squares[here], squares[after], same_square[after])
+            _compare(pieces[here], pieces[after], same_piece[after])
+        else:
+            same_square[after], same_piece[after] = True, False
         for j in range(columns):
-            upper = same_square[i, j] and same_square[i, j + 1]
-            lower = same_square[i + 1, j] and same_square[i + 1, j + 1]
-            if planes[i, j] < 0 or backdrop.tables[planes[i, j], 3] or (upper and lower):
+            upper = same_square[here, j] & same_square[here, j + 1]
+            lower = same_square[after, j] & same_square[after, j + 1]
+            if (upper & lower) or planes[i, j] < 0 or backdrop.tables[planes[i, j], 3]:
                 continue
             own = colour_at(backdrop, planes[i, j], places[i, j, 0], places[i, j, 1])
             red = green = blue = 0.0
             for down in range(2):
                 for right in range(2):
-                    corner = (i + down, j + right)
+                    corner = ((i + down) % 2, j + right)
                     other = not same_square[corner] and same_piece[corner]
                     # Samples on a line between two corners go with the one below or to the right.
                     for a in range(1 - down, degree + 1):
@@ -145,7 +152,7 @@ def _filter_patterns(
             image[i, j, 2] = np.uint8(blue * scale + 0.5)
 
 
-@kernel
+@kernel(inline="always")
 def _name_pieces(
     backdrop: Backdrop,
     planes: Planes,
@@ -154,21 +161,19 @@ def _name_pieces(
     pieces: NDArray[np.int32],
     squares: NDArray[np.int64],
 ) -> None:
-    """A number for the piece of the picture that a pixel belongs to, and one for its square of a pattern."""
-    rows, columns = planes.shape
-    for i in range(rows):
-        for j in range(columns):
-            plane = planes[i, j]
-            piece = 256 * np.int64(crossed[i, j]) + plane
-            pieces[i, j] = piece
-            if plane < 0 or backdrop.tables[plane, 3]:
-                squares[i, j] = -1
-            else:
-                across = backdrop.repeats[plane] * backdrop.tables[plane, 2]
-                below = backdrop.repeats[plane] * backdrop.tables[plane, 1]
-                x = np.int64(np.floor((places[i, j, 0] + 0.5) * across)) & 0x1FFFFF
-                y = np.int64(np.floor((places[i, j, 1] + 0.5) * below)) & 0x1FFFFF
-                squares[i, j] = (piece << 42) ^ (x << 21) ^ y
+    """Numbers for the pieces of the picture that the pixels of a row belong to, and for their squares."""
+    for j in range(len(planes)):
+        plane = planes[j]
+        piece = 256 * np.int64(crossed[j]) + plane
+        pieces[j] = piece
+        if plane < 0 or backdrop.tables[plane, 3]:
+            squares[j] = -1
+        else:
+            across = backdrop.repeats[plane] * backdrop.tables[plane, 2]
+            below = backdrop.repeats[plane] * backdrop.tables[plane, 1]
+            x = np.int64(np.floor((places[j, 0] + 0.5) * across)) & 0x1FFFFF
+            y = np.int64(np.floor((places[j, 1] + 0.5) * below)) & 0x1FFFFF
+            squares[j] = (piece << 42) ^ (x << 21) ^ y
 
 
 @kernel(inline="always")
