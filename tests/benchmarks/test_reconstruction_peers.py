@@ -7,6 +7,8 @@ from benchmarks.reconstruction import reconstruction_peers
 from benchmarks.reconstruction.reconstruction_peers import Found, peer_rows, rows
 from benchmarks.shared._baselines import Compared
 
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
+
 BESIDE = Compared(20.0, {"best constant": 50.0})
 
 
@@ -37,6 +39,6 @@ def test_rows_report_a_missing_time_solver(monkeypatch: pytest.MonkeyPatch) -> N
         "installed",
         lambda: ({}, {reconstruction_peers.SOLVER: "eikonalfm is not installed"}),
     )
-    found = list(rows(True, quiet))
+    found = list(rows(BenchmarkContext(True, quiet)))
     assert [row.value for row in found] == [None]
     assert found[0].detail == "eikonalfm is not installed"

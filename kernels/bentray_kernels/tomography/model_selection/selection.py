@@ -56,7 +56,7 @@ TRIAL_NODES = 64
 CLEARLY = 0.92
 
 # Thin bent rays start on coarser grids, each of half the nodes of the next, down to this many nodes.
-COARSEST_NODES = 40
+COARSEST_NODES = 32
 
 # Without enough pairs to hold some out.
 UNVALIDATED: dict[str, Any] = {"rays": "curved", "method": "sart"}
