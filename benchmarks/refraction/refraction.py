@@ -16,6 +16,7 @@ from bentray_service.cli.output.benchmark_row import Row
 
 from ..eikonal.eikonal import alternate
 from ..shared._available import available
+from ._octree_counts import rows as operation_rows
 from ._refracting_ball import (
     DISTANCE_RADIUS,
     RIM_RADIUS,
@@ -197,5 +198,6 @@ def table_rows(quick: bool) -> Iterable[Row]:
     for subject in subjects()[: 1 if quick else None]:
         yield from cells(subject)
         yield from ladder(subject, 5)
+        yield from operation_rows(subject)
         if not quick:
             yield from filters(subject, 5)

@@ -41,4 +41,30 @@ EQUIVALENT: dict[str, str] = {
     "NEAREST * distance.max()": "no distance equals this product",
     "tomography/gauss_newton/linear_problem.py Linearised.solve: self.huber < math.inf -> self.huber <= "
     "math.inf": "with equal weights the further solutions begin at the minimum and end there",
+    "rays/spreading.py _across: abs(x) <= abs(z) -> abs(x) < abs(z)": (
+        "where two components are equal, either axis gives a unit normal"
+    ),
+    "rays/tracing.py _trace_all: max(16, sum(fan.shape) // 2) -> (sum(fan.shape) // 2)": (
+        "the buffer of points grows when it is full"
+    ),
+    "isosurface/roots.py brent: (b - a) * (v - 1.0) -> (b - a) / (v - 1.0)": (
+        "a bad interpolation is replaced by a bisection: more steps, the same root"
+    ),
+    "isosurface/crossing.py leave_interval: changed > 1 -> changed >= 1": (
+        "one level of the octree more is looked at, in which nothing is new"
+    ),
+    "isosurface/ccc.py exact_range: depth == 0 -> depth != 0": (
+        "without the tolerance the halving goes on, and the range stays within it"
+    ),
+    "geometry_field/tracing/ray_tracer.py colour_of: own, left, within = NOTHING, -1, NOTHING -> own, "
+    "left, within = NOTHING, (1), NOTHING": (
+        "the face that a ray leaves is not read while it leaves no instance"
+    ),
+    "acquisition/quality/shadow.py find_scatterer: best < INSIDE -> best <= INSIDE": (
+        "one part of the chords at the limit itself"
+    ),
+    "acquisition/reference/chord_pulses.py read_pulses: begin + length <= traces.object.shape[-1] -> begin "
+    "+ length < traces.object.shape[-1]": "one chord that ends with the last sample",
+    "acquisition/quality/time_zero.py find_time_shift: missing.size < MIN_PAIRS -> missing.size <= "
+    "MIN_PAIRS": "one number of pairs at the limit itself",
 }

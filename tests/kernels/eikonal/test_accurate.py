@@ -104,3 +104,14 @@ def test_supersampling_brings_the_time_nearer_the_exact_one(ndim):
     truth = times(4, 2)
     plain, fine = (np.abs(times(1, supersample) - truth).mean() for supersample in (1, 2))
     assert 0.1 * plain < fine < 0.4 * plain
+
+
+def test_the_finer_medium_stays_within_the_range_of_the_medium():
+    """A cubic spline overshoots beside a step."""
+    speed = np.full((12, 12), 1500.0)
+    speed[6:] = 1800.0
+    problem = PointSource.checked(speed, 1e-3, (0.002, 0.005))
+    fine = accurate._supersampled(problem, 3).slowness
+    assert fine.shape == (34, 34)
+    assert fine.min() == problem.slowness.min()
+    assert fine.max() == problem.slowness.max()

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels import eikonal, rays
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.rays.fan import squared_gradient
+from bentray_kernels.rays.fan import _inside, squared_gradient
 
 from ...effort import effort
 from ...opencl import methods
@@ -169,3 +169,9 @@ def test_bad_input_is_named(change, field):
     with pytest.raises(InvalidInput) as refusal:
         rays.trace(**arguments)
     assert refusal.value.field == field
+
+
+def test_points_outside_by_rounding_are_moved_onto_the_grid():
+    points = np.array([[-1e-10, 3.0], [4.0, 7.0 + 1e-10]])
+    inside = _inside("receivers", points, np.array([7.0, 7.0]), 1e-3)
+    np.testing.assert_array_equal(inside, [[0.0, 3.0], [4.0, 7.0]])

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import PICKERS, Waveform, pick
+from bentray_kernels.acquisition.picking.first_arrivals import ROUNDING
 from bentray_kernels.errors import InvalidInput
 
 from ....effort import effort
@@ -275,3 +276,8 @@ def test_a_scan_by_another_teams_wave_solver(by_another_team, picker):
     assert np.isfinite(central).mean() > (0.95 if picker in ("aic", "threshold", "correlation") else 0.9)
     assert abs(np.nanmedian(central)) < 50e-9
     assert np.sqrt(np.nanmean(central**2)) < 200e-9
+
+
+def test_rounding_to_whole_numbers_has_this_deviation():
+    values = np.random.default_rng(0).uniform(-1000.0, 1000.0, 100_000)
+    assert pytest.approx((values - np.round(values)).std(), rel=0.01) == ROUNDING

@@ -12,6 +12,9 @@ from hypothesis import strategies as st
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.calibration import calibrate, water_times
 from bentray_kernels.acquisition.quality import Examined, Finding, corrected, examine
+from bentray_kernels.acquisition.quality.element_errors import _robust_fit
+from bentray_kernels.acquisition.quality.polarity import MIN_PAIRS, _majority
+from bentray_kernels.acquisition.quality.swapped import _exchanged
 
 from ..waves import ELEMENTS, FREQUENCY_HZ, NOISE, SKIP, STEP_S, wave_scan
 
@@ -162,3 +165,31 @@ def test_an_eccentricity_of_a_millimetre_is_named_survived_and_calibrated(sought
         np.linalg.norm(drawn - true, axis=1)
     )
     assert not found(examine(replace(dataset, element_position_m=fitted)), "element positions")
+
+
+def test_a_swap_is_reported_with_the_larger_deviation_of_the_two():
+    random = np.random.default_rng(0)
+    expected = random.uniform(-2e-6, 2e-6, (24, 6))
+    times = expected.copy()
+    times[:, 4], times[:, 1] = expected[:, 1], expected[:, 4] + 1e-9
+    own = [np.median(np.abs(times[:, k] - expected[:, k])) for k in (1, 4)]
+    for order in (slice(None), slice(None, None, -1)):
+        ((_, _, deviation),) = _exchanged(times[:, order], expected[:, order], 2e-7)
+        assert deviation == pytest.approx(max(own))
+    assert own[0] != own[1]
+
+
+def test_as_many_pairs_as_needed_decide_about_the_polarity():
+    sign = np.full((2, MIN_PAIRS + 2), np.nan)
+    sign[0, :MIN_PAIRS], sign[1, : MIN_PAIRS - 1] = -1.0, -1.0
+    np.testing.assert_array_equal(_majority(sign, 1), [-1.0, 1.0])
+    np.testing.assert_array_equal(_majority(sign.T, 0), [-1.0, 1.0])
+
+
+def test_the_deviation_of_a_fit_is_that_of_repeated_fits():
+    random = np.random.default_rng(0)
+    rows = random.normal(size=(60, 3))
+    fits = [_robust_fit(rows, rows @ (1.0, -2.0, 0.5) + random.normal(size=60)) for _ in range(200)]
+    solutions, sigmas = (np.array(part) for part in zip(*fits, strict=True))
+    np.testing.assert_allclose(solutions.mean(axis=0), [1.0, -2.0, 0.5], atol=0.05)
+    np.testing.assert_allclose(sigmas.mean(axis=0), solutions.std(axis=0), rtol=0.3)

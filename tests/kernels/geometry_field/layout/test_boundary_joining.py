@@ -54,3 +54,18 @@ def test_one_boundary_or_none_needs_no_way():
         topology = topology_of(surface.faces)
         cut = np.zeros(len(topology.edges), bool)
         assert joined_boundaries(topology, lengths_of(surface, topology), cut) is cut
+
+
+def test_a_long_way_is_cut_edge_by_edge():
+    """A hole in the middle of a square: only edges of one way to the rim are cut."""
+    fine = flat_patch(25, 25)
+    hole = np.argmin(np.linalg.norm(fine.corners.mean(axis=1) - (12.4, 12.4, 0.0), axis=1))
+    surface = without(fine, [hole])
+    topology = topology_of(surface.faces)
+    lengths = lengths_of(surface, topology)
+    cut = joined_boundaries(topology, lengths, np.zeros(len(lengths), bool))
+    ends = topology.edges[cut]
+    # The eleven or twelve edges from the hole to the rim are one way: its inner vertices have two of them.
+    assert 11 <= cut.sum() <= 12
+    assert sorted(np.bincount(ends.ravel())[np.unique(ends)])[:3] == [1, 1, 2]
+    assert np.bincount(ends.ravel()).max() == 2

@@ -185,3 +185,17 @@ def test_the_bunny_keeps_target_g2():
     errors, wrong = off(surface, field_of(surface, 24), STEPS, 100_000)
     assert np.median(errors) < 1e-6
     assert wrong <= 0.021
+
+
+def test_a_walk_does_not_go_on_in_another_part_of_the_mesh():
+    """Two squares apart from each other: from the one no walk ends in the other."""
+    strip = flat_patch(4, 2)
+    strip = without(strip, [1, 4]).in_unit_cube()
+    surface = surface_of(Chart(strip, np.zeros((len(strip.faces), 3, 2))))
+    middle = surface.triangles[:, :9].reshape(-1, 3, 3).mean(axis=1).astype(float)
+    left = middle[:, 0] < 0.5
+    assert left.sum() == 2
+    for goal, (x, y, z) in enumerate(middle):
+        for first in range(4):
+            found = settle(surface, first, 1.0, 9, x, y, z + 1.0, 0.0, 0.0, -1.0)[0]
+            assert found == (goal if left[goal] == left[first] else -1)

@@ -158,3 +158,20 @@ def test_flat_parts_come_back_sharper_when_edges_are_cheap():
         rmse(reconstruct(scan, plan.changed(edge_mps=edge)).speed, truth, inside) for edge in (0.0, 7.0)
     )
     assert sharp < 0.9 * plain
+
+
+@pytest.mark.parametrize(("penalty", "scale"), [("laplacian", 1.0), ("total-variation", 3e-7)])
+def test_quadratic_penalties_are_relative_to_the_data_and_the_total_variation_to_the_misfit(
+    monkeypatch, penalty, scale
+):
+    strengths = []
+
+    class Recorded(gauss_newton_step.Linearised):
+        def __init__(self, *values):
+            strengths.append(values[5])
+            super().__init__(*values)
+
+    monkeypatch.setattr(gauss_newton_step, "Linearised", Recorded)
+    of, plan = problem(np.zeros((8, 8))), PLAN.changed(penalty=penalty, penalty_strength=0.25)
+    gauss_newton_step.step(of, plan, gauss_newton_step.begin(initial_slowness(of, None)), [rows(3e-7)])
+    assert strengths == [pytest.approx(0.25 * scale)]

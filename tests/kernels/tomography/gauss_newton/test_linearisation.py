@@ -84,3 +84,26 @@ def test_pairs_without_data_have_no_row(problem):
     settings = Settings(method="sart", rays="straight")
     rows = linearise(replace(problem, delta_tof=gaps), settings, medium(), np.array([3]))
     assert len(rows.residual) == 4
+
+
+def test_rays_of_a_ring_in_a_volume_stay_in_its_slab():
+    """Straight rays between elements of one height, as far below the top of the volume as above its floor."""
+    centre, nodes, heights = 0.5 * 15 * SPACING, 16, 13
+    angle = 2.0 * np.pi * np.arange(6) / 6
+    ring = np.column_stack(
+        (centre + 0.012 * np.cos(angle), centre + 0.012 * np.sin(angle), np.full(6, 7 * SPACING))
+    )
+    delta = np.where(np.eye(6, dtype=bool), np.nan, 0.0)
+    region = np.ones((nodes, nodes, heights), dtype=bool)
+    volume = Problem(
+        ring, ring[None], np.zeros(6, int), delta, region, SPACING, (0.0,) * 3, WATER, axial_margin=2
+    )
+    rows = linearise(
+        volume, Settings(method="sart", rays="straight"), np.full(region.shape, 1 / WATER), np.arange(6)
+    )
+    x, y, z = np.unravel_index(rows.columns, region.shape)
+    assert rows.columns.size > 100
+    assert set(z[rows.lengths > 1e-3]) == {7}
+    # The first ray passes the middle between its ends.
+    assert np.hypot(x - 7.5, y - 7.5).max() < 0.012 / SPACING + 2.0
+    np.testing.assert_allclose(rows.residual, 0.0, atol=1e-11)
