@@ -36,6 +36,7 @@ class Item:
         pictures: files that the benchmarks draw.
         replaced: what a replaced input is, if the picture cannot be drawn of the published one.
         sketch: whether it is a sketch of a method, which has no result.
+        unreached: whether a published value is not reached although no row has it as its goal.
         why: one sentence on what does not reproduce.
     """
 
@@ -46,6 +47,7 @@ class Item:
     pictures: tuple[str, ...] = ()
     replaced: str = ""
     sketch: bool = False
+    unreached: bool = False
     why: str = ""
 
     @property

@@ -95,7 +95,8 @@ def state_of(item: Item, rows: Sequence[Mapping[str, Any]], pictures: Sequence[o
     valued = [row for row in rows if row["value"] is not None]
     if valued:
         met = sum(row["met"] for row in valued)
-        return REPRODUCED if met == len(valued) else PARTLY if met else MISSED
+        whole = met == len(valued) and not item.unreached
+        return REPRODUCED if whole else PARTLY if met else MISSED
     if rows:
         return NO_VALUES
     if pictures:
@@ -113,7 +114,7 @@ def sentence(item: Item, state: str, rows: Sequence[Mapping[str, Any]], *, quick
         return ""
     missed = sum(not row["met"] and row["value"] is not None for row in rows)
     counted = f"{missed} of {len(rows)} rows miss their goal"
-    if quick:
+    if quick and missed:
         return f"{counted} on the small problems of a quick run. {item.why}".strip()
     return item.why or f"{counted}."
 

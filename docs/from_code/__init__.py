@@ -8,6 +8,7 @@ from typing import Any
 
 from .command_line import commands
 from .dispersion import dispersion
+from .dissertation import dissertation
 from .reconstruction_settings import reconstruction_settings
 from .rest import records, routes
 from .scan_limits import scan_limits
@@ -20,6 +21,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "routes": routes,
     "records": records,
     "dispersion": dispersion,
+    "dissertation": dissertation,
     "scan limits": scan_limits,
     "scan readers": scan_readers,
     "service settings": settings_table,

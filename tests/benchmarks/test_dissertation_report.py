@@ -6,6 +6,7 @@ import json
 import re
 from contextlib import nullcontext
 from html.parser import HTMLParser
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -36,6 +37,7 @@ def test_every_table_and_figure_of_chapters_3_to_7_is_listed():
         assert figures == list(range(last.get(chapter.number - 1, 0) + 1, last[chapter.number] + 1))
     for item in items():
         assert item.sketch or item.sources, item.name
+        assert item.why or not item.unreached, item.name
 
 
 def test_labels_of_the_outline_and_of_the_summary_are_labels_of_recorded_rows():
@@ -81,6 +83,12 @@ def test_states_counts_and_sentences():
         for item in one["items"]:
             assert item["sentence"].count(". ") == 0, item["sentence"]
     assert of(made, "Figure 24")["state"] == SKETCH
+    # A published value that no row has as its goal.
+    frames = part(Row("Figure 26, 27: ball refracting", 0.5, 1.0, "<=", "%", ""))
+    frames.benchmark = "chapter5"
+    made_of_frames = report_of({"chapter5": frames}, quick=True, cluster="own workers")
+    assert state_of(made_of_frames, "Figure 27") == PARTLY
+    assert of(made_of_frames, "Figure 27")["sentence"].startswith("The published rates")
     quick = report_of({"table5": part(missed)}, quick=True, cluster="own workers")
     assert of(quick, "Table 5")["sentence"].startswith("1 of 1 rows miss their goal on the small problems")
 
@@ -144,3 +152,17 @@ def test_the_page_is_self_contained_and_escaped(tmp_path: Path, monkeypatch: pyt
     assert "<img" not in inner
     assert "Quick run." in inner
     assert "Quick run." not in page(made | {"quick": False}, lambda benchmark, name: None)
+
+
+def test_the_recorded_report_lists_every_item_and_is_a_page_of_the_documentation(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    recorded = json.loads((ROOT / "benchmarks/results/dissertation.json").read_text())
+    listed = [item["name"] for chapter in recorded["chapters"] for item in chapter["items"]]
+    assert listed == [item.name for item in items()]
+    assert "<!-- from the code: dissertation -->" in (ROOT / "docs/explanation/how-good-is-it.md").read_text()
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    text = import_module("from_code.dissertation").dissertation()
+    assert ("Quick run." in text) is recorded["quick"]
+    assert ("<img" in text) is not recorded["quick"]
+    assert all(f"<h3>{name}</h3>" in text for name in listed)

@@ -17,6 +17,7 @@ from bentray_service.cli.bench import REPORT, benchmark_folder, load, module_of
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.exit_codes import WorkFailed
+from bentray_workers.cluster.connection import open_cluster
 
 FAKE = """
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
@@ -116,6 +117,29 @@ def test_pictures_are_written_only_to_the_folder_that_is_given(
     result = bentray("bench", "fake", "--json", tmp_path / "rows.json", "--pictures", drawn)
     assert result.exit_code == 0
     assert (drawn / "fake.png").read_bytes() == b"picture"
+
+
+ON_WORKERS = """
+from bentray_service.cli.output.benchmark_row import Row
+
+def rows(context):
+    with context.cluster() as cluster, context.temporary_folder() as folder:
+        (folder / "scan").write_text("abc")
+        read = cluster.client.submit(lambda path: len(path.read_text()), folder / "scan", pure=False)
+        yield Row("length", read.result(), 3.0, "==", "", cluster.describe()["scheduler"])
+"""
+
+
+def test_a_scheduler_is_used_where_a_benchmark_computes_on_workers(
+    bentray: Callable[..., Result], folder: Path, tmp_path: Path
+) -> None:
+    (folder / "table" / "on_workers.py").write_text(ON_WORKERS)
+    with open_cluster(workers=1, local_directory=tmp_path, processes=False) as cluster:
+        address = cluster.describe()["scheduler"]
+        result = bentray("bench", "on-workers", "--json", tmp_path / "rows.json", "--scheduler", address)
+    assert result.exit_code == 0
+    (row,) = json.loads((tmp_path / "rows.json").read_text())
+    assert (row["met"], row["detail"]) == (True, address)
 
 
 def test_outside_a_checkout_the_reason_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
