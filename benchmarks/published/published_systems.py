@@ -10,11 +10,14 @@ from bentray_service.cli.output.benchmark_row import Row
 from ._published_images import image_rows
 from ._published_pictures import backdrop_rows, lookup_rows
 from ._published_rays import front_rows, ray_rows
+from ._speed_updates import SEEDS
+from ._speed_updates import rows as update_rows
 
 PARTS = (
     ("rays", lambda quick, progress: ray_rows(quick)),
     ("wave fronts", lambda quick, progress: front_rows(quick)),
     ("images", image_rows),
+    ("speed updates", lambda quick, progress: update_rows(1 if quick else SEEDS)),
     ("lookups", lambda quick, progress: lookup_rows(quick)),
     ("backdrops", lambda quick, progress: backdrop_rows(quick)),
 )
