@@ -21,8 +21,9 @@ OnBytes = Callable[[int, int], None]
 # Path of each kind.
 PLACES: Mapping[str, str] = {"dataset": "/v1/datasets", "volume": "/v1/volumes", "mesh": "/v1/meshes"}
 
-# Attempts in a row without progress, and the pauses between them, s.
-TRIES = 6
+# Attempts in a row without progress, and the pauses between them, s: 60 s in all, the default time that a
+# service waits for a connection that was lost without notice (``BENTRAY_UPLOAD_PATIENCE_S``).
+TRIES = 9
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 15.0
 # Interval between polls of an upload during ingestion, s.
 FIRST_LOOK_S, LONGEST_LOOK_S = 0.05, 1.0

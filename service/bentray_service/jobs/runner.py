@@ -6,7 +6,7 @@ import errno
 import logging
 import shutil
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from pathlib import Path
@@ -139,14 +139,9 @@ class Runner:
         """Stop the running jobs, queue them again and end the threads."""
         self._leaving.set()
         self._wake.set()
-        for thread in [*self._threads, *tuple(self._running)]:
-            thread.join(STOP_SECONDS)
-            if thread.is_alive():
-                log.warning(
-                    "%s did not stop in %g s; its job will be repeated after the next start",
-                    thread.name,
-                    STOP_SECONDS,
-                )
+        _join(self._threads)
+        # A job may have begun until they ended.
+        _join(tuple(self._running))
 
     def _take(self) -> None:
         """Claim jobs and start each in its own thread."""
@@ -321,3 +316,14 @@ class Runner:
                     return None
                 if self._leaving.wait(IDLE_SECONDS):
                     raise
+
+
+def _join(threads: Iterable[threading.Thread]) -> None:
+    for thread in threads:
+        thread.join(STOP_SECONDS)
+        if thread.is_alive():
+            log.warning(
+                "%s did not stop in %g s; its job will be repeated after the next start",
+                thread.name,
+                STOP_SECONDS,
+            )

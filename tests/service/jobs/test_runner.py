@@ -2,6 +2,7 @@
 
 import errno
 import shutil
+import threading
 import time
 
 import numpy as np
@@ -78,6 +79,28 @@ def test_new_job_starts_at_once(start, uploaded, submitted, until, work, monkeyp
     dataset = uploaded(http)
     time.sleep(0.1)  # by now it has looked and waits
     assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded"
+
+
+def test_a_job_that_begins_while_the_service_stops_is_put_back(start, uploaded, submitted, work, monkeypatch):
+    http = start()
+    parts, claimed, claim = http.app.state.parts, threading.Event(), Queue.claim
+
+    def late(self, *args, **kwargs):
+        job = claim(self, *args, **kwargs)
+        if job is not None:
+            claimed.set()
+            # Until the service has begun to stop.
+            parts.runner._leaving.wait(10.0)
+            time.sleep(0.1)
+        return job
+
+    work.hold.clear()
+    dataset = uploaded(http)
+    monkeypatch.setattr(Queue, "claim", late)
+    job = submitted(http, dataset)
+    assert claimed.wait(10.0)
+    parts.runner.stop()
+    assert parts.queue.state(job["id"]) == "queued"
 
 
 def test_cancel_a_running_job(start, uploaded, submitted, until, work):

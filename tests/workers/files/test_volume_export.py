@@ -41,3 +41,18 @@ def test_a_volume_deleted_during_its_export_is_named(
     write_volume(stored, Volume(np.zeros((3, 4, 5), np.float32), (1e-3,) * 3, (0.0,) * 3, ""))
     with pytest.raises(FileNotFoundError):
         export_volume(stored, target=missing, name="npy")
+
+
+def test_a_volume_deleted_after_it_was_read_is_named(
+    stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = volume_export.read_volume
+
+    def read_and_delete(path: Path) -> Volume:
+        found = read(path)
+        path.unlink()
+        return found
+
+    monkeypatch.setattr(volume_export, "read_volume", read_and_delete)
+    with pytest.raises(InvalidInput, match="volume: found one that was deleted during its export"):
+        export_volume(stored, target=tmp_path / "volume.npy", name="npy")

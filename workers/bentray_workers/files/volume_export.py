@@ -134,14 +134,13 @@ def export_volume(volume: Path, *, target: Path, name: str, selection: Selection
     with opened(volume, Limits()) as reader:
         uploaded = reader.text("", "format") == FORMAT
     chosen = selection or Selection()
-    content = _uploaded(volume) if uploaded else _reconstructed(volume, chosen)
     if uploaded and chosen != Selection():
         found = f"{chosen.quantity}, {chosen.attenuation}"
         raise InvalidInput("quantity", found, "none: an uploaded volume has values only")
     try:
-        FORMATS[name].write(target, content)
+        FORMATS[name].write(target, _uploaded(volume) if uploaded else _reconstructed(volume, chosen))
     except FileNotFoundError:
-        # Deleting a volume removes its exports, also unfinished ones.
+        # Deleting a volume removes its file and its exports, also unfinished ones.
         if not target.parent.is_dir():
             raise
         raise InvalidInput("volume", "one that was deleted during its export", "one that stays") from None

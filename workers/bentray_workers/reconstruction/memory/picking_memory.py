@@ -19,8 +19,9 @@ from ...files.dataset.counts import Traces
 # Samples of object and water in one task: half a second to a second.
 TASK_SAMPLES = 10_000_000
 
-# Overhead of tasks that read traces, with their libraries; that examine times; that write the result.
-READING_BYTES, TIMES_BYTES, WRITING_BYTES = 30 * 2**20, 6 * 2**20, 11 * 2**20
+# Overhead of tasks that read traces, with their libraries; that examine times; that find chords through
+# water; that write the result.
+READING_BYTES, TIMES_BYTES, CHORDS_BYTES, WRITING_BYTES = 30 * 2**20, 6 * 2**20, 10 * 2**20, 11 * 2**20
 
 # Bytes per sample of one emission: statistics; reading; filtering, padded to a power of two.
 MEASURE_BYTES, READ_BYTES, FILTER_BYTES = 58, 12, 64
@@ -31,8 +32,8 @@ GATE_BYTES, POWER_BYTES = 24, 100
 # Bytes per sample of an estimated water shot; per chord that it is estimated from: pulse, spectra.
 SHOT_BYTES, PULSE_BYTES, SPECTRA_BYTES = 8, 2048, 10 * 1024
 
-# Bytes per pair: copies of a period of its pulse and statistics; neighbours and their medians.
-PULSE_COPIES, FIGURE_BYTES, SETTLE_BYTES = 3 * 8, 100, 720
+# Bytes per pair: copies of a period of its pulse and statistics; chords; neighbours and their medians.
+PULSE_COPIES, FIGURE_BYTES, CHORD_BYTES, SETTLE_BYTES = 3 * 8, 100, 210, 720
 
 
 def parts_of(emissions: int, trace_samples: int) -> list[range]:
@@ -86,7 +87,7 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
         chords = traces.emissions * chords_of_emission(traces.emissions)
         # One of two shots is read, the other computed.
         sizes["pick_emissions"] += SHOT_BYTES * samples - 2 * READING_BYTES // 5
-        sizes["find_chords"] = TIMES_BYTES + FIGURE_BYTES * of_slice
+        sizes["find_chords"] = CHORDS_BYTES + CHORD_BYTES * of_slice
         sizes["read_chords"] = reading + READ_BYTES * samples + PULSE_BYTES * chords
         sizes["estimate_slice_water"] = TIMES_BYTES + SPECTRA_BYTES * chords
     if settings.picking.examine or not traces.water_shot:

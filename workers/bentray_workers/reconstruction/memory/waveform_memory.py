@@ -15,11 +15,11 @@ from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSett
 from ...files.dataset.counts import Traces
 
 # Overhead of Python in any task.
-FLOOR_BYTES = 11 * 2**20 // 2
+FLOOR_BYTES = 13 * 2**20 // 2
 
 # Bytes per sample: simulated and recorded water shots, spectra and windows; traces, window and residuals of
 # one emitter; entries of the resampler while it is made.
-SHOT_BYTES, LOOK_BYTES, SAMPLER_BYTES = 140, 96, 64
+SHOT_BYTES, LOOK_BYTES, SAMPLER_BYTES = 144, 96, 64
 
 # Bytes per node: medium and fields; images of an update, without L-BFGS pairs.
 MEDIUM_BYTES, STEP_BYTES = 72, 280
