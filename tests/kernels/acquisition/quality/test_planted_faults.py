@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.calibration import calibrate, water_times
 from bentray_kernels.acquisition.quality import Examined, Finding, corrected, examine
+from bentray_kernels.acquisition.quality.chords import _log_ratio
 from bentray_kernels.acquisition.quality.element_errors import _robust_fit
 from bentray_kernels.acquisition.quality.polarity import MIN_PAIRS, _majority
 from bentray_kernels.acquisition.quality.swapped import _exchanged
@@ -193,3 +195,15 @@ def test_the_deviation_of_a_fit_is_that_of_repeated_fits():
     solutions, sigmas = (np.array(part) for part in zip(*fits, strict=True))
     np.testing.assert_allclose(solutions.mean(axis=0), [1.0, -2.0, 0.5], atol=0.05)
     np.testing.assert_allclose(sigmas.mean(axis=0), solutions.std(axis=0), rtol=0.3)
+
+
+def test_amplitudes_are_freed_of_distance_emitter_and_receiver():
+    random = np.random.default_rng(0)
+    distance = random.uniform(0.05, 0.2, (3, 5))
+    gain = random.uniform(0.1, 10.0, (3, 1)) * random.uniform(0.1, 10.0, 5)
+    peak = gain / np.sqrt(distance)
+    peak[1, 2], peak[2, 0] = 0.0, np.nan
+    dataset = SimpleNamespace(distance_m=lambda: distance, valid=None)
+    ratio = _log_ratio(dataset, SimpleNamespace(peak=peak))
+    np.testing.assert_array_equal(np.isnan(ratio), ~(peak > 0.0))
+    np.testing.assert_allclose(ratio[np.isfinite(ratio)], 0.0, atol=1e-6)
