@@ -84,7 +84,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         if context.quick or z == heights[0]:
             noisy.append(scanned(context, asked, with_noise(dataset)))
     yield from summarised(chosen, judged, noisy)
-    context.save_picture("chapter7_waves.png", lambda: drawn([*chosen, *judged, *noisy]))
+    context.save_picture("chapter7_waves.png", lambda: drawn([*chosen, *judged], noisy))
 
 
 def summarised(
@@ -152,12 +152,13 @@ def errors(name: str, slices: Sequence[Scanned]) -> Iterator[Row]:
             yield Row(target, found[way], BY_SLICES, "<=", "of range", detail, baselines=beside)
 
 
-def drawn(slices: Sequence[Scanned]) -> bytes:
-    """The phantom and the images of each slice, side by side."""
+def drawn(clean: Sequence[Scanned], noisy: Sequence[Scanned]) -> bytes:
+    """The phantom and the images of each slice, side by side, those with noise last."""
     panels = []
-    for one in slices:
+    named = [(one.place, one) for one in clean] + [(f"{one.place}, SNR {SNR:g}", one) for one in noisy]
+    for name, one in named:
         over = Slices([one.asked.phantom])
-        panels.append(Panel(one.place, one.asked.phantom.speed(NODES, TABLE7_SIDE_M)))
+        panels.append(Panel(name, one.asked.phantom.speed(NODES, TABLE7_SIDE_M)))
         panels += [
             Panel(f"{way}\n{over.error([speed]):.4f}", speed)
             for way, speed in ((way, one.speeds[way]) for way in (STRAIGHT_RAYS, *SETTINGS))
