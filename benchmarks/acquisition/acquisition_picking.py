@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from bentray_kernels.acquisition import PICKERS, Dataset, Waveform, pick
+from bentray_kernels.acquisition import PICKERS, Dataset, pick
 from bentray_kernels.tomography import Settings
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
@@ -20,6 +20,7 @@ from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
+from ..shared._trace_noise import with_trace_noise
 from ._ideal_times import ideal
 
 # A scan simulated by another solver, not in the repository.
@@ -86,7 +87,10 @@ def pick_rows(label: str, found: np.ndarray, true: np.ndarray, dataset: Dataset)
 
 def guided_rows(name: str, dataset: Dataset, true: np.ndarray) -> Iterable[Row]:
     """In noise: rms error of guided picks over that of unguided ones."""
-    noisy = with_trace_noise(dataset, HARD_SNR)
+    assert dataset.waveform is not None
+    far = dataset.distance_m() > 0.9 * dataset.distance_m().max()
+    peak = float(np.median(np.abs(dataset.waveform.object[far]).max(axis=-1)))
+    noisy = with_trace_noise(dataset, HARD_SNR, peak)
     errors = [1e9 * (one.delta_tof_s - true) for one in (pick(noisy), guided_picks(noisy))]
     rms = [float(np.sqrt(np.nanmean(error**2))) for error in errors]
     known = [int(np.isfinite(error).sum()) for error in errors]
@@ -107,17 +111,3 @@ def guided_picks(dataset: Dataset) -> Dataset:
         write_dataset(scan_file, dataset)
         reconstruct(None, scan_file, settings, work_dir=work_dir)
         return read_dataset(sorted(work_dir.glob("*-picked.h5"))[-1])
-
-
-def with_trace_noise(dataset: Dataset, snr: float) -> Dataset:
-    """Add white noise of equal strength to all traces of both scans."""
-    assert dataset.waveform is not None
-    assert dataset.waveform.water is not None
-    far = dataset.distance_m() > 0.9 * dataset.distance_m().max()
-    sigma = float(np.median(np.abs(dataset.waveform.object[far]).max(axis=-1))) / snr
-    random = np.random.default_rng(0)
-    noisy = [
-        (traces + sigma * random.standard_normal(traces.shape)).astype(np.float32)
-        for traces in (dataset.waveform.object, dataset.waveform.water)
-    ]
-    return replace(dataset, waveform=Waveform(*noisy))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bentray_kernels.acquisition import Dataset, Waveform, pick
+from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import finite_frequency_candidates
 from bentray_kernels.tomography.model_selection.selection import explain_trials
@@ -20,6 +20,7 @@ from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
+from ..shared._trace_noise import with_trace_noise
 from ._ideal_times import ideal
 from ._registration import registered, registered_error
 
@@ -48,28 +49,10 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         clean = simulate(asked, lambda now, n=name: context.progress(now.done, now.total, n))
         for snr in (30.0,) if context.quick else SNRS:
             detail = name + (f", SNR {snr:g}" if snr < np.inf else ", no noise")
-            yield from scan_rows(detail, noisy(clean, snr))
+            yield from scan_rows(detail, with_trace_noise(clean, snr))
     if not context.quick and OTHERS.exists():
         yield from scan_rows("ring_wave_a 400 kHz", read_dataset(OTHERS))
     yield from measured(context.quick)
-
-
-def noisy(dataset: Dataset, snr: float) -> Dataset:
-    """Add white noise to the traces of object and water; ``snr`` as in ``WaveSimulationSettings``."""
-    traces = dataset.waveform
-    assert traces is not None
-    assert traces.water is not None
-    random = np.random.default_rng(0)
-    sigma = float(np.median(np.abs(traces.water).max(axis=-1))) / snr
-    return replace(
-        dataset,
-        waveform=Waveform(
-            *(
-                (part + sigma * random.standard_normal(part.shape)).astype(np.float32)
-                for part in (traces.object, traces.water)
-            )
-        ),
-    )
 
 
 def scan_rows(name: str, dataset: Dataset) -> Iterable[Row]:

@@ -20,6 +20,7 @@ from bentray_service.cli.output.terminal import Step
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
 from ..shared._reconstruction_on_workers import reconstruct_on_workers
+from ..shared._trace_noise import with_trace_noise
 from ..waves._kwave_peer import Peer, installed
 from ._images_beside_truth import images_beside_truth
 from ._planted_scan import planted, without_water_shot
@@ -103,19 +104,13 @@ def simulated(peer: Peer, progress: Step) -> Dataset:
             traces = peer(speed, spacing, step, ring[element], ring[others], pulse)
             shots[number, others] = traces[:, ::skip]
         recorded[name] = shots
-    sigma = float(np.median(np.abs(recorded["water"]).max(axis=-1))) / SNR
-    random = np.random.default_rng(3)
-    noisy = {
-        name: (shots + sigma * random.standard_normal(shots.shape)).astype(np.float32)
-        for name, shots in recorded.items()
-    }
     corner = -0.5 * SIDE_M
-    return Dataset(
+    dataset = Dataset(
         element_position_m=ring * spacing + corner,
         tx=tx,
         rx=np.arange(ELEMENTS),
         water_speed_mps=WATER_MPS,
-        waveform=Waveform(noisy["object"], noisy["water"]),
+        waveform=Waveform(recorded["object"], recorded["water"]),
         roi=breast.inside(nodes, DETAILED_SIDE_M),
         truth=Truth(media["object"], (spacing, spacing), (corner, corner)),
         radius_m=RING * SIDE_M,
@@ -124,3 +119,4 @@ def simulated(peer: Peer, progress: Step) -> Dataset:
         t0_s=-BEFORE / CENTRE_HZ,
         source="made by k-Wave",
     )
+    return with_trace_noise(dataset, SNR, seed=3)

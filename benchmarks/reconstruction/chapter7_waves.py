@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bentray_kernels.acquisition import Dataset, Waveform, pick
+from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.arrays import Floats
 from bentray_kernels.phantoms import TABLE7_SIDE_M, table7_slices
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
@@ -17,6 +17,7 @@ from bentray_service.cli.output.benchmark_row import DEFAULT_SETTINGS, STRAIGHT_
 from bentray_workers.simulation.simulation_run import simulate
 
 from ..shared._baselines import Images
+from ..shared._trace_noise import with_trace_noise
 from ._sections_picture import Panel, picture
 from ._table7_errors import Slices, contrasts, least_contrast, on_phantom_nodes
 from ._table7_slices import NODES, SliceWaves
@@ -82,7 +83,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         dataset = simulate(asked, lambda p, what=what: context.progress(p.done, p.total, what))
         (chosen if z == CENTRE_M else judged).append(scanned(context, asked, dataset))
         if context.quick or z == heights[0]:
-            noisy.append(scanned(context, asked, with_noise(dataset)))
+            noisy.append(scanned(context, asked, with_trace_noise(dataset, SNR)))
     yield from summarised(chosen, judged, noisy)
     context.save_picture("chapter7_waves.png", lambda: drawn([*chosen, *judged], noisy))
 
@@ -103,19 +104,6 @@ def summarised(
         target = f"M1 lesions of {SMALLEST_VOXELS} voxels, {name}, least part of their contrast"
         yield Row(target, float(least), VISIBLE, ">=", "", "; ".join(parts))
     yield Row("M1 in space", None, IN_SPACE, "<=", "of range", NO_SPACE)
-
-
-def with_noise(dataset: Dataset) -> Dataset:
-    """A scan with Gaussian noise: the median peak of the water traces over its deviation is ``SNR``."""
-    traces = dataset.waveform
-    assert traces is not None
-    assert traces.water is not None
-    random = np.random.default_rng(0)
-    sigma = float(np.median(np.abs(traces.water).max(axis=-1))) / SNR
-    object_noise, water_noise = (
-        sigma * random.standard_normal(traces.object.shape, dtype=np.float32) for _ in range(2)
-    )
-    return replace(dataset, waveform=Waveform(traces.object + object_noise, traces.water + water_noise))
 
 
 def scanned(context: BenchmarkContext, asked: SliceWaves, dataset: Dataset) -> Scanned:

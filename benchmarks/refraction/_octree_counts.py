@@ -76,6 +76,5 @@ def rows(subject: Subject, pixels: int = PIXELS) -> Iterable[Row]:
         theirs,
         ">=",
         "",
-        f"evaluations of the spline, and cells or nodes, a ray: {listed}; the goal is their gain in time. "
-        "An evaluation takes 15 to 30 ns here, so after the octree other work takes most time",
+        f"evaluations of the spline, and cells or nodes, a ray: {listed}; the goal is their gain in time",
     )
