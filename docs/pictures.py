@@ -182,7 +182,7 @@ def viewer(
             client.wait(client.submit(client.upload(file).id, dict(settings)).id)
             browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
             page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-            page.goto(url)
+            page.goto(f"{url}/#/jobs")
             page.get_by_text("succeeded").first.wait_for()
             image = page.locator("#jobs img").first
             page.locator("main").evaluate("one => one.scrollIntoView()")

@@ -37,7 +37,9 @@ SLOW_S, USUAL_S = 10.0, 0.13
 LONG_S = {
     "faults/test_kills.py": 60.0,
     "deploy/test_installation.py": 40.0,
-    "service/web/test_viewer.py": 30.0,
+    "service/web/test_scan_page.py": 15.0,
+    "service/web/test_shell.py": 12.0,
+    "service/web/test_surfaces_page.py": 10.0,
     "service/cli/test_worker.py": 25.0,
     "service/test_schema.py": 25.0,
     "faults/test_poison.py": 20.0,

@@ -43,12 +43,14 @@ def reference_page(document: Node) -> str:
 <title>Bentray: REST reference</title>
 <link rel="icon" href="/static/icon.svg" type="image/svg+xml">
 <link rel="stylesheet" href="/static/style.css">
+<script src="/static/theme.js"></script>
 </head>
 <body>
 <header class="top">
-<div class="brand"><img src="/static/icon.svg" alt="" width="36" height="36">
-<div><h1>Bentray {escape(document["info"]["version"])}</h1><p>REST reference</p></div></div>
-<nav><a href="/">Viewer</a> · <a href="/openapi.json">openapi.json</a></nav>
+<div class="brand"><img src="/static/icon.svg" alt="" width="32" height="32">
+<div><h1>Bentray {escape(document["info"]["version"])}</h1><small>REST reference</small></div></div>
+<nav><a href="/">Viewer</a><a href="/openapi.json">openapi.json</a></nav>
+<button id="theme" type="button" class="quiet">Dark</button>
 </header>
 <main class="reference">
 <p>{escape(document["info"]["description"])}</p>

@@ -6,7 +6,9 @@ import pytest
 
 from bentray_service.routes.pages import WEB
 
-ASSETS = sorted(f"/static/{path.name}" for path in (WEB / "static").iterdir())
+ASSETS = sorted(
+    f"/static/{path.relative_to(WEB / 'static')}" for path in (WEB / "static").rglob("*") if path.is_file()
+)
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", *ASSETS])

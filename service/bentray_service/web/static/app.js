@@ -1,122 +1,61 @@
-// The viewer: upload a scan, start a reconstruction, follow the jobs; see glass.js for volumes, mesh.js for meshes.
-import { request } from "./api.js";
-import { at, showError } from "./dom.js";
-import { loadVolumes, volumeTitle, watchGlass } from "./glass.js";
-import { showJobs } from "./jobs.js";
-import { admitted } from "./key.js";
-import { loadMeshes, meshTitle, showFields, watchMeshes } from "./mesh.js";
-import { fillSelect, startJob } from "./panel.js";
-import { uploads } from "./uploads.js";
+// The shell of the viewer: opens the page that the address names, and shows the state of the service.
+import { request } from "./parts/api.js";
+import { at, make } from "./parts/dom.js";
+import { admitted } from "./parts/key.js";
+import { parse } from "./parts/address.js";
 
-const BUSY_MS = 700;
-const IDLE_MS = 4000;
-const datasets = new Map();
-// Volumes of jobs that are in the list of volumes already.
-const listed = new Set();
-let timer = 0;
+// A page is pages/NAME.js with open(root, { id, query }), which returns close(), or a promise of it.
+const PAGES = [
+  [/^\/$/, "start", "#/"],
+  [/^\/scans\/([^/]+)$/, "scan", "#/"],
+  [/^\/jobs$/, "jobs", "#/jobs"],
+  [/^\/jobs\/([^/]+)$/, "job", "#/jobs"],
+  [/^\/compare\/([^/]+)$/, "compare", "#/jobs"],
+  [/^\/rendering(?:\/([^/]+))?$/, "rendering", "#/rendering"],
+  [/^\/surfaces(?:\/([^/]+))?$/, "surfaces", "#/surfaces"],
+  [/^\/service$/, "service", "#/service"],
+];
+const HEALTH_MS = 15000;
+let closeShown = () => {};
+let visit = 0;
 
-function titleOf(dataset) {
-  return dataset.title || dataset.id;
+function markMenu(entry) {
+  for (const anchor of at("pages").querySelectorAll("a")) {
+    if (anchor.getAttribute("href") === entry) anchor.setAttribute("aria-current", "page");
+    else anchor.removeAttribute("aria-current");
+  }
 }
 
-function titleOfJob(job) {
-  if (job.mesh) return meshTitle(job.mesh);
-  if (job.kind === "simulation" && !job.dataset) return "Will be a scan to reconstruct";
-  return datasets.has(job.dataset) ? titleOf(datasets.get(job.dataset)) : volumeTitle(job.volume);
-}
-
-function showFacts() {
-  const dataset = datasets.get(at("dataset").value);
-  for (const id of ["start", "best", "start-own"]) at(id).disabled = !dataset;
-  if (!dataset) return;
-  const times = dataset.has_travel_times ? "travel times" : "raw traces";
-  const slices = dataset.slices > 1 ? ` · ${dataset.slices} slices` : "";
-  at("dataset-facts").textContent =
-    `${dataset.ntx} emitters × ${dataset.nrx} receivers · ${times}${slices} · water ${dataset.water_speed_mps.toFixed(1)} m/s`;
-}
-
-async function loadDatasets(chosen) {
-  const { datasets: rows } = await request("/v1/datasets");
-  datasets.clear();
-  for (const row of rows) datasets.set(row.id, row);
-  fillSelect("dataset", rows, titleOf, chosen);
-  showFacts();
-}
-
-async function refresh() {
-  clearTimeout(timer);
-  let wait = IDLE_MS;
+async function openPage(first) {
+  const mine = ++visit;
+  const { path, query } = parse(location.hash);
+  const found = PAGES.find(([pattern]) => pattern.test(path));
+  closeShown();
+  closeShown = () => {};
+  document.title = "Bentray";
+  markMenu(found?.[2]);
+  const root = make("div", "content");
+  at("page").replaceChildren(root);
+  if (!first) at("page").focus({ preventScroll: true });
+  scrollTo(0, 0);
   try {
-    const { jobs } = await request("/v1/jobs");
-    if (jobs.some((job) => job.dataset && !datasets.has(job.dataset))) await loadDatasets();
-    const made = jobs.filter((job) => job.volume && !listed.has(job.volume)).map((job) => job.volume);
-    if (made.length) await loadVolumes();
-    for (const volume of made) listed.add(volume);
-    at("empty").hidden = jobs.length > 0;
-    showJobs(at("jobs"), jobs, titleOfJob, cancel);
-    showFields(jobs);
-    if (jobs.some((job) => ["queued", "running", "cancelling"].includes(job.state))) wait = BUSY_MS;
-    showError("jobs-error", null);
+    if (!found) throw new Error(`There is no page ${path}`);
+    const [pattern, name] = found;
+    const { open } = await import(`./pages/${name}.js`);
+    if (mine !== visit) return;
+    const close = await open(root, { id: pattern.exec(path)[1], query });
+    // The reader may have gone on while the page was opened.
+    if (mine === visit) closeShown = close;
+    else close();
   } catch (error) {
-    showError("jobs-error", error);
-  }
-  timer = setTimeout(refresh, wait);
-}
-
-async function cancel(job) {
-  try {
-    await request(job.links.cancel, { method: "POST" });
-    await refresh();
-  } catch (error) {
-    showError("jobs-error", error);
+    if (mine !== visit) return;
+    const message = make("p", "error", error.message);
+    message.setAttribute("role", "alert");
+    root.replaceChildren(message);
   }
 }
 
-// Settings of the two buttons. Best may take half an hour of one processor core for full waveforms.
-const PRESETS = { fast: { method: "auto" }, best: { method: "auto", minutes: 30 } };
-
-function showMethod() {
-  at("rays").disabled = new FormData(at("run")).get("method") === "auto";
-}
-
-function start(event) {
-  event.preventDefault();
-  const preset = PRESETS[event.submitter?.value ?? "fast"];
-  startJob({ kind: "reconstruction", dataset: at("dataset").value, settings: preset ?? ownSettings(event.target) }, "run-error", refresh);
-}
-
-function ownSettings(element) {
-  const form = new FormData(element);
-  const settings = { method: form.get("method"), iterations: Number(form.get("iterations")) };
-  if (form.get("nodes")) settings.nodes = Number(form.get("nodes"));
-  // The method auto chooses the rays itself.
-  if (form.has("rays")) settings.rays = form.get("rays");
-  return settings;
-}
-
-// The default settings of jobs, from the OpenAPI description.
-async function fillDefaults() {
-  const { components } = await request("/openapi.json");
-  for (const [id, schema] of [["run", "Settings"], ["look", "Turntable"], ["field", "FieldSettings"]]) {
-    for (const input of at(id).querySelectorAll("input[required]")) {
-      // Also used when the form is reset.
-      if (input.type === "number") input.defaultValue = components.schemas[schema].properties[input.name].default;
-    }
-  }
-}
-
-// What the form states about a file of another program.
-function scanAddress() {
-  const query = new URLSearchParams();
-  for (const [name, value] of new FormData(at("own"))) {
-    for (const one of value.split(",")) {
-      if (one.trim()) query.append(name, one.trim());
-    }
-  }
-  return `/v1/datasets?${query}`;
-}
-
-async function health() {
+async function showHealth() {
   const sign = at("health");
   try {
     const { workers } = await request("/health/ready");
@@ -126,25 +65,15 @@ async function health() {
     sign.textContent = error.message;
     sign.className = "health bad";
   }
-  setTimeout(health, 15000);
+  setTimeout(showHealth, HEALTH_MS);
 }
 
-const sendAgain = uploads("scan", scanAddress, "application/x-hdf5", (dataset) => loadDatasets(dataset.id));
-at("own").addEventListener("submit", (event) => {
+at("skip").addEventListener("click", (event) => {
   event.preventDefault();
-  sendAgain();
+  at("page").focus();
 });
-watchGlass(refresh);
-watchMeshes(refresh);
-at("dataset").addEventListener("change", showFacts);
-at("run").addEventListener("submit", start);
-at("run").addEventListener("change", showMethod);
-showMethod();
-fillDefaults().catch((error) => showError("run-error", error));
-health();
+showHealth();
 if (await admitted(request)) {
-  loadDatasets().catch((error) => showError("jobs-error", error));
-  loadVolumes().catch((error) => showError("jobs-error", error));
-  loadMeshes().catch((error) => showError("jobs-error", error));
-  refresh();
+  addEventListener("hashchange", () => openPage(false));
+  openPage(true);
 }

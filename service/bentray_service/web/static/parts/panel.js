@@ -17,6 +17,7 @@ export function fillSelect(id, records, titleOf, chosen) {
 export function imageFrame(id, errorId) {
   let shown = "";
   const finish = (content) => {
+    if (!at(id)) return;
     at(id).replaceChildren(content);
     at(id).className = "picture";
   };

@@ -1,5 +1,6 @@
 // The list of jobs: one card a job, kept and updated in place so that the focus and the pictures stay.
 import { inWords, request } from "./api.js";
+import { make } from "./dom.js";
 import { showOnceNear, withKey } from "./key.js";
 import { glassOf, queryOf } from "./views.js";
 
@@ -11,13 +12,6 @@ const FORMATS = [
   ["vti", "VTK (ParaView)"], ["ome-zarr", "OME-Zarr"], ["dicom", "DICOM"],
 ];
 const cards = new Map();
-
-function make(tag, className, text) {
-  const node = document.createElement(tag);
-  if (className) node.className = className;
-  if (text !== undefined) node.textContent = text;
-  return node;
-}
 
 function link(text, address, saveAs) {
   const node = make("a", "", text);
@@ -152,7 +146,10 @@ function planned({ tasks, largest_bytes: bytes, minutes, why }) {
 function facts(job, title, onCancel) {
   const box = make("div");
   const [what, settings] = summaryOf(job);
-  const heading = make("h3", "", what);
+  const heading = make("h2");
+  const name = make("a", "", what);
+  name.href = `#/jobs/${job.id}`;
+  heading.append(name);
   heading.append(make("span", `state ${job.state}`, job.state));
   box.append(heading, make("p", "", title), make("p", "", settings));
   if (job.plan) box.append(planned(job.plan));

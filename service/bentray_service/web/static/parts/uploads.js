@@ -2,7 +2,6 @@
 import { upload } from "./api.js";
 import { at } from "./dom.js";
 
-
 // The drop zone replaces the element prefix-place; its data-prompt and data-formats are the texts, data-accept is that of
 // the file input. An element prefix-own, if any, is opened when a file is rejected. Returns a function that sends the
 // last file again.

@@ -1,0 +1,76 @@
+// Start: upload a scan, and the list of scans.
+import { at, make, showError } from "../parts/dom.js";
+import { go } from "../parts/address.js";
+import { load, titleOf } from "../parts/titles.js";
+import { uploads } from "../parts/uploads.js";
+
+const PAGE = `
+  <h1>Scans</h1>
+  <section aria-labelledby="scan-title" class="panel">
+    <h2 id="scan-title">Upload a scan</h2>
+    <div id="scan-place" data-accept=".h5,.hdf5,.mat,.npz,.zip,application/x-hdf5" data-prompt="Choose a file" data-formats="HDF5 (uct-transmission, zea, openUSCT), MATLAB, NumPy, zip of k-Wave or KIT 3D USCT"></div>
+    <details id="scan-own">
+      <summary>Own variables, units, water</summary>
+      <form id="own">
+        <label><span class="caption">Variables, FIELD=NAME</span>
+          <input name="map" type="text" spellcheck="false" placeholder="element_position=pos, delta_tof=dtof"></label>
+        <div class="numbers">
+          <label><span class="caption">Lengths</span>
+            <select name="unit"><option value="">m</option><option>mm</option><option>cm</option><option value="um">µm</option></select></label>
+          <label><span class="caption">Times</span>
+            <select name="unit"><option value="">s</option><option value="us">µs</option><option>ms</option><option>ns</option></select></label>
+          <label><span class="caption">Water, °C</span>
+            <input name="temperature_c" type="number" step="any"></label>
+          <label><span class="caption">Frequency, Hz</span>
+            <input name="frequency_hz" type="number" step="any"></label>
+        </div>
+        <button id="scan-again" type="submit" class="quiet" disabled>Send the file again</button>
+      </form>
+    </details>
+  </section>
+  <section aria-labelledby="scans-title">
+    <h2 id="scans-title">Scans</h2>
+    <p id="scans-error" class="error" role="alert" hidden></p>
+    <p id="empty" class="empty" hidden>No scan uploaded yet</p>
+    <ul id="scans" class="records"></ul>
+  </section>`;
+
+// What the form states about a file of another program.
+function scanAddress() {
+  const query = new URLSearchParams();
+  for (const [name, value] of new FormData(at("own"))) {
+    for (const one of value.split(",")) {
+      if (one.trim()) query.append(name, one.trim());
+    }
+  }
+  return `/v1/datasets?${query}`;
+}
+
+function entry(scan) {
+  const item = make("li");
+  const link = make("a", "", titleOf(scan));
+  link.href = `#/scans/${scan.id}`;
+  const words = `${scan.ntx} emitters × ${scan.nrx} receivers · ${new Date(scan.created).toLocaleString()}`;
+  item.append(link, make("p", "facts", words));
+  return item;
+}
+
+export function open(root) {
+  root.innerHTML = PAGE;
+  let closed = false;
+  const sendAgain = uploads("scan", scanAddress, "application/x-hdf5", (scan) => closed || go(`/scans/${scan.id}`));
+  at("own").addEventListener("submit", (event) => {
+    event.preventDefault();
+    sendAgain();
+  });
+  load("datasets")
+    .then((scans) => {
+      if (closed) return;
+      at("scans").replaceChildren(...scans.map(entry));
+      at("empty").hidden = scans.length > 0;
+    })
+    .catch((error) => showError("scans-error", error));
+  return () => {
+    closed = true;
+  };
+}

@@ -1,0 +1,18 @@
+// The address of a view: #/path?query. The path names the page, the query its state.
+
+export function parse(hash) {
+  const [path, query = ""] = hash.replace(/^#/, "").split("?");
+  return { path: path || "/", query: new URLSearchParams(query) };
+}
+
+// Open a page, such as "/jobs".
+export function go(path) {
+  location.hash = `#${path}`;
+}
+
+// State the view in the address, without a step in the history and without opening the page again.
+export function keepQuery(query) {
+  const { path } = parse(location.hash);
+  const text = query.toString();
+  history.replaceState(history.state, "", `#${path}${text ? `?${text}` : ""}`);
+}

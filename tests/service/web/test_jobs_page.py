@@ -1,0 +1,65 @@
+"""The page of jobs: what each made."""
+
+import io
+
+import httpx
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from bentray_kernels.phantoms import ONE_HOLE, sampled
+from bentray_service.jobs import kinds
+
+pytestmark = pytest.mark.browser
+
+
+def test_a_turntable_is_shown(page, serve, scan, work, monkeypatch):
+    monkeypatch.setattr(kinds, "draw_turntable", lambda *args, **control: args[3].write_bytes(b"pictures"))
+    address = serve()
+    values = io.BytesIO()
+    np.save(values, sampled(ONE_HOLE, 12))
+    stream = {"Content-Type": "application/octet-stream"}
+    sent = httpx.post(f"{address}/v1/volumes", content=values.getvalue(), headers=stream, timeout=60).json()
+    asked = {
+        "kind": "refraction",
+        "volume": sent["id"],
+        "settings": {"frames": 5, "width": 300, "iso": [0.3, 0.6], "index": [1.3, 1.4]},
+    }
+    httpx.post(f"{address}/v1/jobs", json=asked).raise_for_status()
+    page.goto(f"{address}/#/jobs")
+    job = page.locator(".job")
+    job.get_by_role("heading", name="Turntable").wait_for()
+    job.get_by_text("5 frames of 300").wait_for()
+    link = job.get_by_role("link", name="Frames")
+    link.wait_for()
+    assert link.get_attribute("href").endswith("/animation")
+    image = job.get_by_role("img")
+    image.scroll_into_view_if_needed()
+    expect(image).to_have_js_property("naturalWidth", 300)
+    assert "iso=0.3&iso=0.6&" in image.get_attribute("src")
+
+
+def test_simulated_scan_can_be_reconstructed(page, serve, monkeypatch):
+    made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 16, "ntx": 16}
+    made |= {"nrx": 16, "slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": True}
+    made |= {"water_speed_mps": 1500.0, "bytes": 1, "sha256": "0" * 64}
+
+    def simulate_scan(client, request, target, work_dir, **control):
+        target.write_bytes(b"scan")
+        return made
+
+    monkeypatch.setattr(kinds, "simulate_to_file", simulate_scan)
+    url = serve()
+    asked = {"kind": "simulation", "settings": {"nodes": 16, "elements": 16}}
+    assert httpx.post(f"{url}/v1/jobs", json=asked).status_code == 202
+    page.goto(f"{url}/#/jobs")
+    job = page.locator(".job")
+    job.get_by_role("heading", name="Simulated scan").wait_for()
+    job.get_by_text("succeeded").wait_for()
+    job.get_by_text("A phantom").wait_for()
+    whole = job.get_by_text("the largest (")
+    assert whole.is_hidden()
+    job.get_by_text("Plan: 2 tasks").click()
+    assert whole.is_visible()
+    page.get_by_role("link", name="Scans", exact=True).click()
+    page.get_by_role("link", name="A phantom").wait_for()

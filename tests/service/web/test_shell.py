@@ -1,0 +1,87 @@
+"""The shell of the page: addresses, keys, colours."""
+
+import re
+
+import httpx
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from bentray_service.rows.api_key import ApiKey
+
+pytestmark = pytest.mark.browser
+
+
+def test_page_requests_and_sends_a_key(page, serve, scan, work, tmp_path):
+    key = ApiKey.new()
+    (tmp_path / "key").write_text(key.shown())
+    address = serve(first_key_file=tmp_path / "key")
+    page.goto(address)
+    page.locator("#access").get_by_text("Authentication required").wait_for()
+    page.get_by_label("API key").fill(ApiKey.new().shown())
+    page.get_by_role("button", name="Use key").click()
+    page.locator("#key-error").get_by_text("unknown, revoked or expired").wait_for()
+    page.get_by_label("API key").fill(key.shown())
+    page.get_by_role("button", name="Use key").click()
+    page.get_by_text("Tenant local (metrics, read, write)").wait_for()
+    expect(page.locator("#key")).to_be_hidden()
+    page.set_input_files("#scan-file", scan())
+    page.get_by_text("16 emitters").wait_for()
+    page.get_by_text("Other settings").click()
+    page.get_by_label("Nodes per side").fill("32")
+    page.get_by_role("button", name="Start").click()
+    job = page.locator(".job")
+    job.get_by_text("succeeded").wait_for()
+    image = job.locator("img")
+    image.scroll_into_view_if_needed()
+    expect(image).to_have_attribute("src", re.compile("^blob:"))
+    expect(image).not_to_have_js_property("naturalWidth", 0)
+    with page.expect_download() as saved:
+        job.get_by_text("Download", exact=True).click()
+        job.get_by_role("link", name="NumPy").click()
+    assert np.load(saved.value.path()).shape == (32, 32)
+    assert key.shown() not in page.url + page.content()
+    assert page.evaluate("document.cookie + JSON.stringify(localStorage)") == "{}"
+    page.get_by_role("button", name="Forget key").click()
+    page.get_by_label("API key").wait_for()
+    assert httpx.get(f"{address}/v1/datasets").status_code == 401
+
+
+@pytest.mark.parametrize(
+    ("path", "heading"),
+    [
+        ("/", "Scans"),
+        ("/jobs", "Jobs"),
+        ("/jobs/job-none", "Job"),
+        ("/rendering", "Volume rendering"),
+        ("/surfaces", "Surface rendering"),
+        ("/service", "Service"),
+    ],
+)
+def test_every_page_opens_by_its_address(page, serve, path, heading):
+    page.goto(f"{serve()}/#{path}")
+    page.get_by_role("heading", level=1, name=heading, exact=True).wait_for()
+    assert page.locator("main .error:visible").count() == 0
+
+
+def test_unknown_addresses_are_named(page, serve):
+    address = serve()
+    page.goto(f"{address}/#/nowhere")
+    page.get_by_text("There is no page /nowhere").wait_for()
+    page.goto(f"{address}/#/scans/ds-none")
+    page.get_by_role("alert").get_by_text("ds-none").wait_for()
+
+
+def test_the_colours_are_chosen_and_kept(page, serve):
+    page.emulate_media(color_scheme="light")
+    page.goto(serve())
+    root = page.locator("html")
+    expect(root).to_have_attribute("data-theme", "light")
+    page.get_by_role("button", name="Switch to dark").click()
+    expect(root).to_have_attribute("data-theme", "dark")
+    page.reload()
+    expect(root).to_have_attribute("data-theme", "dark")
+    page.get_by_role("button", name="Switch to light").click()
+    # The choice of the system: the page follows it again.
+    page.emulate_media(color_scheme="dark")
+    expect(root).to_have_attribute("data-theme", "dark")
