@@ -18,6 +18,8 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.cluster.capacities import WorkerCapacity, capacities_by_address
 from bentray_workers.files import volume_export
 from bentray_workers.images import drawing_tasks
+from bentray_workers.images.result_summary import result_summary
+from bentray_workers.images.truth_export import export_truth
 from bentray_workers.reconstruction.quality_report import quality_page, quality_report
 from bentray_workers.rendering import field_picture, picture_cost, refraction
 from bentray_workers.rendering.field_view import FieldView
@@ -129,6 +131,29 @@ class Pictures:
         what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.export_cost(VolumeFile.of(volume))
         how = {"target": target, "name": name, "selection": selection}
         await self._one(tenant, what, path, volume_export.export_volume, how)
+
+    async def export_truth(
+        self,
+        tenant: Tenant,
+        volume: VolumeRow,
+        dataset: DatasetRow,
+        path: Path,
+        scan: Path,
+        target: Path,
+        name: str,
+    ) -> None:
+        """Export the truth of a scan at the nodes of a reconstruction, see ``images.truth_export``."""
+        cost = picture_cost.truth_cost(VolumeFile.of(volume), dataset)
+        how = {"scan": scan, "target": target, "name": name}
+        await self._one(tenant, ("quantity", "truth", cost), path, export_truth, how)
+
+    async def summary(
+        self, tenant: Tenant, volume: VolumeRow, dataset: DatasetRow, path: Path, scan: Path
+    ) -> dict[str, Any]:
+        """Summarise a reconstruction, see ``images.result_summary``."""
+        cost = picture_cost.truth_cost(VolumeFile.of(volume), dataset)
+        what = "volume", f"shape {tuple(volume['shape'])}", cost
+        return dict(await self._one(tenant, what, path, result_summary, {"scan": scan}))
 
     def waiting(self) -> dict[Tenant, int]:
         """Number of waiting tasks by tenant."""

@@ -17,6 +17,7 @@ from ..web.errors import problems
 from ..wiring import CallerTenant, Service, caller_of, parts_of
 from .downloads import download, download_of, file_status, headers_of, tag_of, unchanged, without_length
 from .pictures import while_connected
+from .volume_summaries import scan_of
 
 HDF5 = "application/x-hdf5"
 
@@ -47,8 +48,11 @@ async def volume_data(
         ),
     ] = "hdf5",
     quantity: Annotated[
-        Literal["speed", "attenuation"],
-        Query(description="Quantity of npy, nifti, metaimage and nrrd of a reconstruction."),
+        Literal["speed", "attenuation", "coverage", "recovery", "truth"],
+        Query(
+            description="Quantity of npy, nifti, metaimage and nrrd of a reconstruction; truth: the true "
+            "speed at its nodes, NaN outside, of a scan that has it."
+        ),
     ] = "speed",
     attenuation: Annotated[
         Literal["Np/m", "dB/cm/MHz"],
@@ -73,9 +77,14 @@ async def volume_data(
     # Exports are deleted together with the volume.
     path = await run_in_threadpool(service.files.store.fetch, files.volume(volume["id"]))
     seed = repr((volume["id"], volume["created"], "hdf5" if format == "h5" else format))
-    selection = Selection(quantity, attenuation, None if attenuation == "Np/m" else frequency_hz)
+    of_truth = quantity == "truth"
+    selection = Selection(
+        "speed" if of_truth else quantity, attenuation, None if attenuation == "Np/m" else frequency_hz
+    )
+    if of_truth and "job_id" not in volume:
+        raise InvalidInput("quantity", "truth of an uploaded volume", "none: it has values only")
     if format in ("hdf5", "h5"):
-        if selection != Selection():
+        if selection != Selection() or of_truth:
             field = "quantity" if quantity != "speed" else "attenuation"
             accepted = "speed and Np/m for hdf5, which holds all quantities in SI units"
             raise InvalidInput(field, f"{quantity}, {attenuation}", accepted)
@@ -84,7 +93,7 @@ async def volume_data(
     # Exports are deterministic, so the ETag is computed from the volume.
     which = (
         ""
-        if selection == Selection()
+        if selection == Selection() and not of_truth
         else f"{quantity}-{attenuation.partition('/')[0]}-{selection.frequency_hz}."
     )
     seed = repr((seed, which)) if which else seed
@@ -101,7 +110,11 @@ async def volume_data(
         most = largest_bytes(volume["shape"], uploaded="job_id" not in volume)
         async with service.quota.reserved(tenant, made.name, most):
             try:
-                work = service.pictures.export(tenant, volume, path, made, format, selection)
+                if of_truth:
+                    dataset, scan = await run_in_threadpool(scan_of, service, tenant, volume)
+                    work = service.pictures.export_truth(tenant, volume, dataset, path, scan, made, format)
+                else:
+                    work = service.pictures.export(tenant, volume, path, made, format, selection)
                 await while_connected(request, work)
             except InvalidInput:
                 # Report a volume that was deleted in the meantime as unknown.

@@ -40,8 +40,12 @@ TITLES = {
     SPEED: "Speed of sound, m/s",
     ATTENUATION: "Attenuation, Np/m",
     ATTENUATION_DB: "Attenuation, dB/(cm MHz)",
+    "coverage_m": "Ray length per node, m",
+    "recovery": "Recovered fraction of a checkerboard",
 }
-QUANTITIES = ("speed", "attenuation")
+QUANTITIES = tuple(IMAGES)
+# Formats with one image.
+SINGLE = ("npy", "nifti", "metaimage", "nrrd")
 ATTENUATION_UNITS = ("Np/m", "dB/cm/MHz")
 # Entry of the provenance with the frequency of the attenuation.
 FREQUENCY = "frequency_hz"
@@ -165,7 +169,8 @@ def _reconstructed(volume: Path, chosen: Selection) -> Content:
         }
     selected = next((name for name in images if name.startswith(chosen.quantity)), None)
     if selected is None:
-        raise InvalidInput("quantity", f"{chosen.quantity} of a result without it", "speed")
+        present = ", ".join(name for name in QUANTITIES if any(one.startswith(name) for one in images))
+        raise InvalidInput("quantity", f"{chosen.quantity} of a result without it", present)
     return Content(
         images[selected], own.spacing_m, own.origin_m, TITLES[selected], images, volume.stat().st_mtime
     )

@@ -156,6 +156,15 @@ def export_cost(stored: VolumeFile) -> Cost:
     return Cost(FLOOR_SECONDS + 4 * READ_S * stored.read_bytes, FLOOR_BYTES + 2 * stored.read_bytes)
 
 
+def truth_cost(stored: VolumeFile, dataset: Mapping[str, Any]) -> Cost:
+    """Cost of a comparison with the truth: the volume, and the scan without its traces, are read whole."""
+    scan = 256 * int(dataset["ntx"]) * int(dataset["nrx"]) * int(dataset["slices"])
+    # Without traces the file is mostly the truth, which may be compressed to a tenth.
+    truth = 0 if dataset["has_traces"] else 10 * int(dataset["bytes"])
+    reading = Cost(1.0 + 8 * READ_S * stored.read_bytes, 2 * FLOOR_BYTES + 3 * stored.read_bytes)
+    return Cost(reading.seconds, reading.bytes + scan + truth)
+
+
 @dataclass(frozen=True)
 class VolumeFile:
     """The file of a volume, by its row.

@@ -1,0 +1,38 @@
+"""Models of the summary of a reconstruction."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, Field
+
+
+class CandidateRecord(BaseModel):
+    """A model that auto compared, reconstructed from a part of the pairs."""
+
+    label: str = Field(description="Rays, method and regularisation.")
+    held_out_rms_s: float = Field(description="Rms misfit of the held-out pairs, s.")
+    held_out_mean_s: float | None = Field(
+        description="Mean absolute misfit of the held-out pairs, s; null for results of earlier versions."
+    )
+    training_rms_s: float = Field(description="Rms misfit of the other pairs, s.")
+    chosen: bool
+
+
+class TruthErrors(BaseModel):
+    """Errors of the speed against the truth of the scan."""
+
+    region: str = Field(description="The nodes that count, or why there are no errors.")
+    nodes: int = Field(description="Number of these nodes.")
+    rmse_mps: float | None = Field(description="Root mean square error, m/s.")
+
+
+class SummaryRecord(BaseModel):
+    """What a reconstruction holds, and how its model was chosen."""
+
+    quantities: list[Literal["speed", "coverage", "attenuation", "recovery", "truth"]] = Field(
+        description="Those that can be shown and downloaded."
+    )
+    candidates: list[CandidateRecord] = Field(description="The chosen one first; empty unless auto chose.")
+    reason: str = Field(description="Reason of this choice; empty without candidates.")
+    truth: TruthErrors | None = Field(description="Null for a scan without truth.")

@@ -1,0 +1,48 @@
+"""/v1/volumes/{id}/summary: quantities, choice of the model, and errors of a reconstruction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fastapi import APIRouter, Depends, Request
+from starlette.concurrency import run_in_threadpool
+
+from bentray_kernels.errors import InvalidInput
+
+from ..rows.tenants import Tenant
+from ..rows.typed_rows import DatasetRow, VolumeRow
+from ..web.errors import problems
+from ..wiring import CallerTenant, Parts, Service
+from .models.summary_records import SummaryRecord
+from .pictures import while_connected
+from .quality import check_render_rate
+
+router = APIRouter()
+
+
+def scan_of(service: Parts, tenant: Tenant, volume: VolumeRow) -> tuple[DatasetRow, Path]:
+    """The scan of a reconstruction: its row, and its file, fetched from the store.
+
+    Raises:
+        InvalidInput: naming ``volume``, for an uploaded one.
+    """
+    if "job_id" not in volume:
+        raise InvalidInput("volume", f"{volume['id']}, an upload", "the result of a reconstruction")
+    dataset = service.datasets.get(tenant, volume["dataset_id"])
+    return dataset, service.files.store.fetch(service.files.of(tenant).dataset(dataset["id"]))
+
+
+@router.get(
+    "/{volume_id}/summary",
+    responses=problems(404, 422, 429, 503),
+    dependencies=[Depends(check_render_rate)],
+)
+async def show_summary(
+    volume_id: str, request: Request, service: Service, tenant: CallerTenant
+) -> SummaryRecord:
+    """Summarise a reconstruction on a worker: quantities, what auto compared, errors against the truth."""
+    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
+    dataset, scan = await run_in_threadpool(scan_of, service, tenant, volume)
+    path = service.files.of(tenant).volume(volume["id"])
+    work = service.pictures.summary(tenant, volume, dataset, path, scan)
+    return SummaryRecord.model_validate(await while_connected(request, work))

@@ -1,0 +1,60 @@
+"""Summary of a reconstruction: its quantities, the choice of the model, and the errors against the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ..files.dataset.read import read_dataset
+from ..files.reconstruction import IMAGES, read_reconstruction
+
+
+def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
+    """Task: the summary of a reconstruction as plain values.
+
+    Args:
+        volume: its file.
+        scan: file of its scan.
+
+    Returns:
+        ``quantities``: those in the file, and ``truth`` if the scan has one on comparable axes;
+        ``candidates``: the models that were compared, the chosen one first, each with ``label``,
+        ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s`` and
+        ``chosen``; ``reason``: of this choice, empty without candidates; ``truth``: None without a truth,
+        else ``region``, ``nodes`` and ``rmse_mps``, or ``region`` with the reason why it is not compared.
+
+    Raises:
+        InvalidInput: naming the field of a file.
+    """
+    # Loaded only where it runs.
+    from bentray_kernels.tomography.model_selection.selection import advice_of, label
+
+    from .truth_comparison import NotComparable, compare
+
+    own, dataset = read_reconstruction(volume), read_dataset(scan, traces=False)
+    quantities = [name for name in IMAGES if getattr(own, name) is not None]
+    errors: dict[str, Any] | None = None
+    if dataset.truth is not None:
+        try:
+            found = compare(own, dataset.truth, dataset.roi)
+        except NotComparable as reason:
+            errors = {"region": f"not compared: {reason}", "nodes": 0, "rmse_mps": None}
+        else:
+            quantities.append("truth")
+            nodes = int(found.region.sum())
+            errors = {"region": found.region_choice, "nodes": nodes, "rmse_mps": found.rmse_mps}
+    return {
+        "quantities": quantities,
+        "reason": advice_of(own),
+        "candidates": [
+            {
+                "label": label(trial.settings),
+                "held_out_rms_s": trial.held_out_rms_s,
+                "held_out_mean_s": trial.held_out_mean_s,
+                "training_rms_s": trial.shown_rms_s,
+                "chosen": k == 0,
+            }
+            for k, trial in enumerate(own.trials)
+        ],
+        "truth": errors,
+    }
