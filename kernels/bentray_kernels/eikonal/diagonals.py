@@ -12,6 +12,7 @@ so that they never need an update.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -106,9 +107,25 @@ class Diagonals:
         """Set the values of flat padded ``nodes``."""
         _put(nodes, values, self.shape, self.stored, into)
 
-    def turn(self, source: Floats, into: Floats) -> None:
-        """Copy the diagonals of a grid into those of the grid whose j is flipped."""
-        turn(source, into, self.shape, self.stored)
+    def turn(
+        self, source: Floats, into: Floats, parts: int = 1, at_once: Callable[..., Iterable[Any]] = map
+    ) -> None:
+        """Copy the diagonals of a grid into those of the grid whose j is flipped.
+
+        Args:
+            parts: groups of planes that are copied on their own; fewer where a group has less than three.
+            at_once: a ``map`` that copies them.
+        """
+        planes, nj, nk = self.shape
+        parts = min(parts, (planes + 2) // 3) if planes else 1
+        cuts = [(planes + 2) * part // parts for part in range(parts + 1)]
+
+        def some(first: int, end: int) -> None:
+            # A group is a smaller grid that begins a plane earlier: grids have one there that is not copied.
+            part = slice(first * self.rows * self.width, None)
+            turn(source[part], into[part], (end - first - 2, nj, nk) if planes else self.shape, self.stored)
+
+        list(at_once(some, cuts[:-1], cuts[1:]))
 
     def turn_changed(self, source: Floats, into: Floats, changed: Columns) -> None:
         """As ``turn`` where no other nodes than ``changed`` differ."""

@@ -3,23 +3,39 @@
 The nodes of a diagonal are independent of each other in a sweep, so whole vectors of them are updated at once
 (see ``diagonals``). A node is updated only after a neighbour has received an earlier time (locking: Bak,
 McLaughlin & Renzi 2010); skipped updates would change nothing.
+
+In space several threads can share a sweep: as soon as some diagonals of a block of planes are done, the next
+block may follow on them. The result does not depend on the number of threads.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..atomics import add, wait_for
 from ..compiled import kernel
 from ..errors import InvalidInput
 from ..float32 import higher, lower
 from .diagonals import FIRST, NONE, RUN, Columns, Diagonals, include
 from .problem import PointSource
+
+MOST_THREADS = 64
+
+# Planes of a block that a thread sweeps, and diagonals by which the next thread follows.
+PLANES, STEPS = 8, 32
+
+# Counters this far apart lie in cache lines of their own.
+PROGRESS = 8
+
+# Orders of planes and of diagonals; the other four are those of the grid with flipped j.
+ORDERS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 
 # First and last changed node of a run; first and last node whose change affects the nodes of the previous
 # diagonal, then of the previous plane; whether a change exceeds the tolerance.
@@ -32,7 +48,8 @@ class Grid(NamedTuple):
     Attributes:
         time: s; changed in place.
         crossing: slowness times spacing of each node, s.
-        waiting: nodes to update.
+        waiting: nodes to update because of a neighbour in their plane.
+        across: nodes to update because of a neighbour in another plane.
         changed: nodes that a sweep has changed.
         shape, stored: as in ``Diagonals``.
     """
@@ -40,31 +57,36 @@ class Grid(NamedTuple):
     time: Floats
     crossing: Floats
     waiting: Columns
+    across: Columns
     changed: Columns
     shape: tuple[int, int, int]
     stored: tuple[int, int]
 
 
-def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
+def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12, threads: int = 1) -> Floats:
     """Travel time by sweeps in all 4 (2-D) or 8 (3-D) orders until nothing changes.
 
     Args:
         problem: the checked problem.
         tolerance: sweeps in all orders that lower no time by more than this part of a node's own
             crossing time end the iteration.
+        threads: that share each sweep of a 3-D grid; a 2-D grid is swept by one. From 2 on their number does
+            not change the result; that of 1 is equal up to the tolerance.
 
     Returns:
         (nx, ny[, nz]), s; equal to first-order fast marching up to the tolerance.
 
     Raises:
-        InvalidInput: for a negative tolerance.
+        InvalidInput: for a negative tolerance, or threads that are no whole number from 1 to 64.
     """
     times = np.empty((1, *problem.slowness.shape))
-    fast_sweeping_many([problem], times, tolerance=tolerance)
+    fast_sweeping_many([problem], times, tolerance=tolerance, threads=threads)
     return np.asarray(times[0])
 
 
-def fast_sweeping_many(problems: Iterable[PointSource], times: Floats, *, tolerance: float = 1e-12) -> None:
+def fast_sweeping_many(
+    problems: Iterable[PointSource], times: Floats, *, tolerance: float = 1e-12, threads: int = 1
+) -> None:
     """As ``fast_sweeping`` for problems of one shape, in the same working arrays one after the other.
 
     Sixteen solves in lockstep, one vector lane each, took twice the time at 256²: their arrays do not fit the
@@ -73,11 +95,13 @@ def fast_sweeping_many(problems: Iterable[PointSource], times: Floats, *, tolera
     Args:
         problems: as many as the batch of ``times``.
         times: (batch, nx, ny[, nz]), s, C order; filled.
-        tolerance: as for ``fast_sweeping``.
+        tolerance, threads: as for ``fast_sweeping``.
     """
     if not tolerance >= 0.0:
         raise InvalidInput("tolerance", tolerance, "a number >= 0")
-    sweeper = Sweeper(times.shape[1:])
+    if isinstance(threads, bool) or threads not in range(1, MOST_THREADS + 1):
+        raise InvalidInput("threads", threads, f"a whole number from 1 to {MOST_THREADS}")
+    sweeper = Sweeper(times.shape[1:], threads)
     for problem, into in zip(problems, times, strict=True):
         sweeper.solve(problem, tolerance, into)
 
@@ -85,9 +109,9 @@ def fast_sweeping_many(problems: Iterable[PointSource], times: Floats, *, tolera
 class Sweeper:
     """The arrays of sweeps over grids of one shape, used again for every solve."""
 
-    def __init__(self, shape: tuple[int, ...]) -> None:
+    def __init__(self, shape: tuple[int, ...], threads: int = 1) -> None:
         self._grid = Diagonals.of(shape)
-        self._sweep = _sweep_3d if len(shape) == 3 else _sweep_2d
+        self._threads = threads if len(shape) == 3 else 1
         # One block: the allocator keeps freed blocks of this size, and returns smaller ones to the system.
         arrays = np.empty((5, self._grid.size))
         arrays[:3].fill(-math.inf)
@@ -98,6 +122,7 @@ class Sweeper:
         self._crossings = arrays[3], arrays[4]
         # Nodes waiting for an update, in either grid, and nodes changed by the last sweeps.
         self._waiting = self._grid.no_columns(), self._grid.no_columns()
+        self._across = self._grid.no_columns(), self._grid.no_columns()
         self._changed = self._grid.no_columns()
         # Slowness and spacing of the stored crossing times, in the original and in the flipped grid.
         self._stored: list[tuple[Floats, float] | None] = [None, None]
@@ -126,27 +151,47 @@ class Sweeper:
 
     def _until_settled(self, slowness: Floats, spacing: float, tolerance: float, nodes: Ints) -> int:
         """Sweep until no node is waiting; returns which of the two grids holds the times."""
+        self._grid.neighbours(nodes, self._waiting[0])
+        self._across[0].clear()
+        if self._threads == 1:
+            return self._alternate(slowness, spacing, tolerance, map)
+        with ThreadPoolExecutor(self._threads, "sweep") as pool:
+            return self._alternate(slowness, spacing, tolerance, pool.map)
+
+    def _alternate(
+        self, slowness: Floats, spacing: float, tolerance: float, at_once: Callable[..., Iterable[Any]]
+    ) -> int:
+        """Sweep the original and the flipped grid by turns; returns which of them holds the times."""
         grid = self._grid
-        grid.neighbours(nodes, self._waiting[0])
         quiet = 0
         for turns in itertools.count():
             side = turns % 2
             here, there = self._times[side], self._times[1 - side]
-            waiting = self._waiting[side]
+            waiting, across = self._waiting[side], self._across[side]
             self._changed.clear()
             crossing = self._crossing(side, slowness, spacing)
-            moved = self._sweep(
-                Grid(here, crossing, waiting, self._changed, grid.shape, grid.stored), tolerance
-            )
+            swept = Grid(here, crossing, waiting, across, self._changed, grid.shape, grid.stored)
+            moved = self._sweep(swept, tolerance, at_once)
             quiet = 0 if moved else quiet + 1
-            if quiet == 2 or not waiting.any():
+            if quiet == 2 or not (waiting.any() or across.any()):
                 return side
             if turns == 0:
-                grid.turn(here, there)
+                grid.turn(here, there, self._threads, at_once)
             else:
                 grid.turn_changed(here, there, self._changed)
             grid.flip(waiting, self._waiting[1 - side])
+            grid.flip(across, self._across[1 - side])
         raise AssertionError
+
+    def _sweep(self, grid: Grid, tolerance: float, at_once: Callable[..., Iterable[Any]]) -> int:
+        """Whether a sweep in all orders of one of the two grids lowered a time by more than the tolerance."""
+        if not grid.shape[0]:
+            return int(_sweep_2d(grid, tolerance))
+        if self._threads == 1:
+            return int(_sweep_3d(grid, tolerance))
+        counters = np.zeros(PROGRESS * (2 + len(ORDERS) * -(-grid.shape[0] // PLANES)), np.int64)
+        moved: int = max(at_once(lambda _: _share_sweeps(grid, tolerance, counters), range(self._threads)))
+        return moved
 
     def _crossing(self, side: int, slowness: Floats, spacing: float) -> Floats:
         """Crossing times of the nodes by diagonals; those of the last solve if they are the same."""
@@ -168,82 +213,116 @@ class Sweeper:
 def _sweep_2d(grid: Grid, tolerance: float) -> int:
     moved = 0
     for way in (1, -1):
-        moved |= _sweep_plane(grid, tolerance, 0, way, 0)
+        for step in range(grid.shape[1] + grid.shape[2] - 1):
+            moved |= _update_diagonal(grid, tolerance, 0, step, 0, way)
     return moved
 
 
 @kernel
 def _sweep_3d(grid: Grid, tolerance: float) -> int:
+    planes, nj, nk = grid.shape
     moved = 0
     for up in (1, -1):
-        for step in range(grid.shape[0]):
-            plane = 2 + step if up > 0 else grid.shape[0] + 1 - step
+        for layer in range(planes):
             # Both orders while the plane is in the cache.
             for way in (1, -1):
-                moved |= _sweep_plane(grid, tolerance, plane, way, up)
+                for step in range(nj + nk - 1):
+                    moved |= _update_diagonal(grid, tolerance, layer, step, up, way)
     return moved
 
 
 @kernel
-def _sweep_plane(grid: Grid, tolerance: float, plane: int, way: int, up: int) -> int:
-    """Update the waiting diagonals of a plane, in rising (``way`` 1) or falling (−1) order.
+def _share_sweeps(grid: Grid, tolerance: float, counters: Ints) -> int:
+    """The part of one thread of the sweeps in ``ORDERS``; any number of threads may join.
 
-    Columns that change are added to ``grid.changed``, their later neighbours to ``grid.waiting``.
+    A thread takes the next block of planes and follows the thread before it at a distance of some diagonals.
+    All nodes are updated in the order of a sweep by one thread, up to nodes that do not affect each other.
+
+    Args:
+        counters: zeros: blocks taken, blocks done, then diagonals done of each block, ``PROGRESS`` apart.
+    """
+    planes, nj, nk = grid.shape
+    blocks = (planes + PLANES - 1) // PLANES
+    diagonals = nj + nk - 1
+    moved = 0
+    while True:
+        number = add(counters, 0, 1)
+        if number >= blocks * len(ORDERS):
+            return moved
+        up, way = ORDERS[number // blocks]
+        block = number % blocks
+        wait_for(counters, PROGRESS, number - block)
+        own = PROGRESS * (2 + number)
+        for first in range(0, diagonals, STEPS):
+            if block > 0:
+                wait_for(counters, own - PROGRESS, first + 1)
+            for layer in range(block * PLANES, min(planes, (block + 1) * PLANES)):
+                for step in range(first, min(diagonals, first + STEPS)):
+                    moved |= _update_diagonal(grid, tolerance, layer, step, up, way)
+            add(counters, own, STEPS)
+        add(counters, PROGRESS, 1)
+
+
+@kernel(inline="always")
+def _update_diagonal(grid: Grid, tolerance: float, layer: int, step: int, up: int, way: int) -> int:
+    """Update the waiting nodes of a diagonal of a plane, both counted in the order of the sweep.
+
+    Nodes that change are added to ``grid.changed``, their later neighbours to ``grid.waiting`` and
+    ``grid.across``. Those of other planes are kept apart, so that threads at adjacent planes never write to
+    the same place.
+
+    Args:
+        up: 1 for planes in rising, -1 in falling order, 0 for a grid of two axes.
+        way: 1 for diagonals in rising, -1 in falling order.
     """
     time, crossing, shape = grid.time, grid.crossing, grid.shape
     low, high = grid.waiting
+    low_across, high_across = grid.across
     lowest, highest = grid.changed
-    _, nj, nk = shape
+    planes, nj, nk = shape
+    plane = 0 if up == 0 else (2 + layer if up > 0 else planes + 1 - layer)
+    s = 2 + step if way > 0 else nj + nk - step
+    begin, end = min(low[plane, s], low_across[plane, s]), max(high[plane, s], high_across[plane, s])
+    if begin > end:
+        return 0
+    low[plane, s] = low_across[plane, s] = NONE
+    high[plane, s] = high_across[plane, s] = -1
     rows, width = grid.stored
     base = plane * rows * width
-    moved = 0
-    for step in range(nj + nk - 1):
-        s = 2 + step if way > 0 else nj + nk - step
-        if low[plane, s] > high[plane, s]:
-            continue
-        start = (low[plane, s] - 1) // RUN * RUN
-        count = (high[plane, s] - start + RUN - 1) // RUN * RUN
-        low[plane, s] = NONE
-        high[plane, s] = -1
-        column = base + start + FIRST
-        # Unsigned: with signed indices numba handles negative ones, and the loop is not vectorised.
-        at = np.uint64(s % rows * width + column)
-        before = np.uint64((s - 1) % rows * width + column - 1)
-        after = np.uint64((s + 1) % rows * width + column)
-        behind = np.uint64((s - 2 * way + rows) % rows * width + column - (2 if way > 0 else 0))
-        # The planes below and above; without a third axis they are not read.
-        here = s % rows * width + column
-        below, above = np.uint64(here - up * rows * width), np.uint64(here + up * rows * width)
-        beneath = np.uint64(here - 2 * up * rows * width)
-        if up == 0:
-            outcome = _relax(
-                time, crossing, at, before, after, behind, below, above, beneath, count, tolerance, False
-            )
-        else:
-            outcome = _relax(
-                time, crossing, at, before, after, behind, below, above, beneath, count, tolerance, True
-            )
-        first, last, first_behind, last_behind, first_below, last_below, more = outcome
-        moved |= more
-        k = start + 1
-        if last >= 0:
-            include(lowest, highest, plane, s, k + first, k + last, shape)
-            # Neighbours before have the same column or the next lower one, those after the next higher one.
-            include(low, high, plane, s + way, k + first + min(way, 0), k + last + max(way, 0), shape)
-            if up != 0 and 2 <= plane + up <= shape[0] + 1:
-                include(low, high, plane + up, s, k + first, k + last, shape)
-        if last_behind >= 0:
-            include(
-                low,
-                high,
-                plane,
-                s - way,
-                k + first_behind - max(way, 0),
-                k + last_behind - min(way, 0),
-                shape,
-            )
-        if last_below >= 0 and 2 <= plane - up <= shape[0] + 1:
-            include(low, high, plane - up, s, k + first_below, k + last_below, shape)
+    start = (begin - 1) // RUN * RUN
+    count = (end - start + RUN - 1) // RUN * RUN
+    column = base + start + FIRST
+    # Unsigned: with signed indices numba handles negative ones, and the loop is not vectorised.
+    at = np.uint64(s % rows * width + column)
+    before = np.uint64((s - 1) % rows * width + column - 1)
+    after = np.uint64((s + 1) % rows * width + column)
+    behind = np.uint64((s - 2 * way + rows) % rows * width + column - (2 if way > 0 else 0))
+    # The planes below and above; without a third axis they are not read.
+    here = s % rows * width + column
+    below, above = np.uint64(here - up * rows * width), np.uint64(here + up * rows * width)
+    beneath = np.uint64(here - 2 * up * rows * width)
+    if up == 0:
+        outcome = _relax(
+            time, crossing, at, before, after, behind, below, above, beneath, count, tolerance, False
+        )
+    else:
+        outcome = _relax(
+            time, crossing, at, before, after, behind, below, above, beneath, count, tolerance, True
+        )
+    first, last, first_behind, last_behind, first_below, last_below, moved = outcome
+    k = start + 1
+    if last >= 0:
+        include(lowest, highest, plane, s, k + first, k + last, shape)
+        # Neighbours before have the same column or the next lower one, those after the next higher one.
+        include(low, high, plane, s + way, k + first + min(way, 0), k + last + max(way, 0), shape)
+        if up != 0 and 2 <= plane + up <= planes + 1:
+            include(low_across, high_across, plane + up, s, k + first, k + last, shape)
+    if last_behind >= 0:
+        include(
+            low, high, plane, s - way, k + first_behind - max(way, 0), k + last_behind - min(way, 0), shape
+        )
+    if last_below >= 0 and 2 <= plane - up <= planes + 1:
+        include(low_across, high_across, plane - up, s, k + first_below, k + last_below, shape)
     return moved
 
 

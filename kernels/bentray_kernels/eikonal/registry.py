@@ -82,7 +82,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 1,
                 1,
                 False,
-                "fast sweeping, first order; option tolerance",
+                "fast sweeping, first order; options tolerance, threads",
                 fast_sweeping_many,
             ),
             Method("fim", fast_iterative, 1, 1, False, "fast iterative, first order; option tolerance"),

@@ -10,6 +10,7 @@ from bentray_kernels import eikonal
 from bentray_kernels.eikonal import fast_sweeping
 from bentray_kernels.eikonal.diagonals import Diagonals
 from bentray_kernels.eikonal.problem import PointSource
+from bentray_kernels.errors import InvalidInput
 
 from ...effort import effort
 
@@ -92,13 +93,36 @@ def test_arrays_used_again_change_nothing():
 def test_the_square_root_is_taken_of_vectors():
     """Without it a sweep takes four times as long, and nothing else would tell."""
     # Compiled once more, for cached code cannot be read.
-    fresh = njit(nogil=True, error_model="numpy")(fast_sweeping._sweep_plane.py_func)
-    grid = Diagonals.of((4, 4))
+    fresh = njit(nogil=True, error_model="numpy")(fast_sweeping._sweep_3d.py_func)
+    grid = Diagonals.of((4, 4, 4))
     time, crossing = np.full((2, grid.size), np.inf)
-    waiting, changed = grid.no_columns(), grid.no_columns()
-    fresh(fast_sweeping.Grid(time, crossing, waiting, changed, grid.shape, grid.stored), 0.0, 0, 1, 0)
+    waiting, across, changed = (grid.no_columns() for _ in range(3))
+    fresh(fast_sweeping.Grid(time, crossing, waiting, across, changed, grid.shape, grid.stored), 0.0)
     (assembly,) = fresh.inspect_asm().values()
     if "vsqrt" not in assembly:
         pytest.skip("not a processor with AVX")
-    # Once for two axes, twice for three.
+    # Once in the branch for two axes, twice in that for three.
     assert assembly.count("vsqrtpd") >= 3
+
+
+@pytest.mark.parametrize("shape", [(40, 33, 29), (3, 70, 20), (1, 9, 40), (21, 2, 5)])
+def test_threads_share_a_sweep_and_give_the_same_bits(shape):
+    speed = np.random.default_rng(5).uniform(0.2, 5.0, shape)
+    source = 0.3 * (np.array(shape) - 1)
+    alone = eikonal.solve(speed, 1.0, source, "fsm")
+    shared = eikonal.solve(speed, 1.0, source, "fsm", threads=2)
+    assert np.allclose(shared, alone, rtol=1e-12, atol=0.0)
+    for threads in (2, 3, 7):
+        assert np.array_equal(eikonal.solve(speed, 1.0, source, "fsm", threads=threads), shared)
+
+
+def test_a_plane_is_swept_by_one_thread():
+    speed = np.random.default_rng(6).uniform(0.2, 5.0, (40, 30))
+    alone = eikonal.solve(speed, 1.0, (3.0, 4.0), "fsm")
+    assert np.array_equal(eikonal.solve(speed, 1.0, (3.0, 4.0), "fsm", threads=4), alone)
+
+
+@pytest.mark.parametrize("threads", [0, 65, 1.5, True, "2"])
+def test_numbers_of_threads_are_whole_and_few(threads):
+    with pytest.raises(InvalidInput, match=r"threads.*from 1 to 64"):
+        eikonal.solve(np.ones((4, 4, 4)), 1.0, (0.0, 0.0, 0.0), "fsm", threads=threads)
