@@ -88,10 +88,11 @@ def _supersampled(problem: PointSource, times: int) -> PointSource:
 
 def _first_order(problem: PointSource, nodes: Ints, times: Floats) -> Floats:
     """First-order times from given ones, flat and padded, s."""
-    time = np.full(problem.padded_slowness.size, math.inf)
-    time[nodes] = times
     sweeper = Sweeper(problem.slowness.shape)
-    sweeper.settle(time, problem.slowness, problem.spacing, ORDER_TOLERANCE, nodes)
+    sweeper.start(nodes, times)
+    sweeper.settle(problem.slowness, problem.spacing, ORDER_TOLERANCE)
+    time = np.empty(problem.padded_slowness.size)
+    sweeper.load(time, border=True)
     return time
 
 

@@ -103,9 +103,15 @@ class Diagonals:
         """Copy the diagonals into a flat grid with or without its border."""
         move(plain, source, self.shape, self.stored, flipped, 1.0, border, True)
 
-    def put(self, nodes: Ints, values: Floats, into: Floats) -> None:
-        """Set the values of flat padded ``nodes``."""
-        _put(nodes, values, self.shape, self.stored, into)
+    def put(self, nodes: Ints, values: Floats, into: Floats, flipped: bool = False) -> None:
+        """Set the values of flat padded ``nodes``, which are numbered without the flip."""
+        _exchange(nodes, values, self.shape, self.stored, into, flipped, False)
+
+    def take(self, nodes: Ints, source: Floats, flipped: bool = False) -> Floats:
+        """The values of flat padded ``nodes``, which are numbered without the flip."""
+        values = np.empty(nodes.size)
+        _exchange(nodes, values, self.shape, self.stored, source, flipped, True)
+        return values
 
     def turn(
         self, source: Floats, into: Floats, parts: int = 1, at_once: Callable[..., Iterable[Any]] = map
@@ -139,9 +145,8 @@ class Diagonals:
         _, nj, nk = self.shape
         return Columns(np.full((self.planes, nj + nk + 4), NONE), np.full((self.planes, nj + nk + 4), -1))
 
-    def neighbours(self, nodes: Ints, into: Columns) -> None:
-        """The neighbours of flat padded ``nodes``."""
-        into.clear()
+    def include_neighbours(self, nodes: Ints, into: Columns) -> None:
+        """Add the neighbours of flat padded ``nodes``."""
         _surround(nodes, self.shape, into.low, into.high)
 
     def flip(self, columns: Columns, into: Columns) -> None:
@@ -245,16 +250,28 @@ def _turn_some(
 
 
 @kernel
-def _put(
-    nodes: Ints, values: Floats, shape: tuple[int, int, int], stored: tuple[int, int], into: Floats
+def _exchange(
+    nodes: Ints,
+    values: Floats,
+    shape: tuple[int, int, int],
+    stored: tuple[int, int],
+    diagonals: Floats,
+    flipped: bool,
+    back: bool,
 ) -> None:
+    """As ``put`` or, with ``back``, ``take``."""
     planes, nj, nk = shape
     rows, width = stored
     for which, node in enumerate(nodes):
         k = node % (nk + 2)
-        s = node // (nk + 2) % (nj + 2) + k
+        j = node // (nk + 2) % (nj + 2)
+        s = (nj + 1 - j if flipped else j) + k
         plane = node // ((nk + 2) * (nj + 2)) + 1 if planes else 0
-        into[plane * rows * width + s % rows * width + k + FIRST - 1] = values[which]
+        at = plane * rows * width + s % rows * width + k + FIRST - 1
+        if back:
+            values[which] = diagonals[at]
+        else:
+            diagonals[at] = values[which]
 
 
 @kernel(inline="always")

@@ -10,7 +10,6 @@ block may follow on them. The result does not depend on the number of threads.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -107,7 +106,10 @@ def fast_sweeping_many(
 
 
 class Sweeper:
-    """The arrays of sweeps over grids of one shape, used again for every solve."""
+    """The arrays of sweeps over grids of one shape, used again for every solve.
+
+    A solve is ``start``, ``settle``, and as often as earlier times arrive ``lower`` and ``settle``.
+    """
 
     def __init__(self, shape: tuple[int, ...], threads: int = 1) -> None:
         self._grid = Diagonals.of(shape)
@@ -124,48 +126,84 @@ class Sweeper:
         self._waiting = self._grid.no_columns(), self._grid.no_columns()
         self._across = self._grid.no_columns(), self._grid.no_columns()
         self._changed = self._grid.no_columns()
+        # Which grid holds the times, and whether the other one differs by the changed nodes alone.
+        self._side, self._equal = 0, False
         # Slowness and spacing of the stored crossing times, in the original and in the flipped grid.
         self._stored: list[tuple[Floats, float] | None] = [None, None]
 
+    @property
+    def nbytes(self) -> int:
+        """Memory of the arrays of nodes, bytes."""
+        return 5 * int(self._unknown.nbytes)
+
     def solve(self, problem: PointSource, tolerance: float, into: Floats) -> None:
         """Travel time of a problem of this shape, s, written into (nx, ny[, nz]) in C order."""
-        np.copyto(self._times[0], self._unknown)
-        seeds, times = problem.seeds()
-        self._grid.put(seeds, times, self._times[0])
-        side = self._until_settled(problem.slowness, problem.spacing, tolerance, seeds)
-        self._grid.load(into.reshape(-1), self._times[side], side == 1, border=False)
+        self.start(*problem.seeds())
+        self.settle(problem.slowness, problem.spacing, tolerance)
+        self.load(into)
 
-    def settle(self, time: Floats, slowness: Floats, spacing: float, tolerance: float, nodes: Ints) -> None:
-        """Sweep ``time`` in place until it has converged; its border holds the times outside.
+    def start(self, nodes: Ints, times: Floats) -> None:
+        """Begin a solve, in which only the times of some nodes are known.
 
         Args:
-            time: flat and padded, s; infinity where unknown.
+            nodes: flat indices in the grid padded by one node on each side; those of the padding are never
+                updated.
+            times: of these nodes, s.
+        """
+        np.copyto(self._times[0], self._unknown)
+        self._side, self._equal = 0, False
+        for columns in (self._waiting[0], self._across[0]):
+            columns.clear()
+        self._put(nodes, times)
+
+    def lower(self, nodes: Ints, times: Floats) -> None:
+        """Go on from the present times with earlier ones of some nodes; as ``start``."""
+        grid, side = self._grid, self._side
+        if self._equal:
+            grid.turn_changed(self._times[side], self._times[1 - side], self._changed)
+        if side == 1:
+            grid.flip(self._waiting[1], self._waiting[0])
+            grid.flip(self._across[1], self._across[0])
+        self._changed.clear()
+        self._side = 0
+        self._put(nodes, times)
+
+    def settle(self, slowness: Floats, spacing: float, tolerance: float) -> None:
+        """Sweep until no node is waiting.
+
+        Args:
             slowness: (nx, ny[, nz]), s/m, C order.
             spacing: node spacing, m.
             tolerance: as for ``fast_sweeping``.
-            nodes: flat padded indices of the nodes whose neighbours are updated first.
         """
-        self._grid.store(time, self._times[0], False)
-        side = self._until_settled(slowness, spacing, tolerance, nodes)
-        self._grid.load(time, self._times[side], side == 1)
-
-    def _until_settled(self, slowness: Floats, spacing: float, tolerance: float, nodes: Ints) -> int:
-        """Sweep until no node is waiting; returns which of the two grids holds the times."""
-        self._grid.neighbours(nodes, self._waiting[0])
-        self._across[0].clear()
         if self._threads == 1:
-            return self._alternate(slowness, spacing, tolerance, map)
+            self._alternate(slowness, spacing, tolerance, map)
+            return
         with ThreadPoolExecutor(self._threads, "sweep") as pool:
-            return self._alternate(slowness, spacing, tolerance, pool.map)
+            self._alternate(slowness, spacing, tolerance, pool.map)
+
+    def load(self, into: Floats, *, border: bool = False) -> None:
+        """Write the times, s, into a C-ordered array (nx, ny[, nz]), or into a padded one with ``border``."""
+        self._grid.load(into.reshape(-1), self._times[self._side], self._side == 1, border=border)
+
+    def take(self, nodes: Ints) -> Floats:
+        """Times of flat padded ``nodes``, s."""
+        return self._grid.take(nodes, self._times[self._side], self._side == 1)
+
+    def _put(self, nodes: Ints, times: Floats) -> None:
+        self._grid.put(nodes, times, self._times[0])
+        if self._equal:
+            self._grid.put(nodes, times, self._times[1], True)
+        self._grid.include_neighbours(nodes, self._waiting[0])
 
     def _alternate(
         self, slowness: Floats, spacing: float, tolerance: float, at_once: Callable[..., Iterable[Any]]
-    ) -> int:
-        """Sweep the original and the flipped grid by turns; returns which of them holds the times."""
+    ) -> None:
+        """Sweep the original and the flipped grid by turns."""
         grid = self._grid
         quiet = 0
-        for turns in itertools.count():
-            side = turns % 2
+        while True:
+            side = self._side
             here, there = self._times[side], self._times[1 - side]
             waiting, across = self._waiting[side], self._across[side]
             self._changed.clear()
@@ -174,14 +212,15 @@ class Sweeper:
             moved = self._sweep(swept, tolerance, at_once)
             quiet = 0 if moved else quiet + 1
             if quiet == 2 or not (waiting.any() or across.any()):
-                return side
-            if turns == 0:
-                grid.turn(here, there, self._threads, at_once)
-            else:
+                return
+            if self._equal:
                 grid.turn_changed(here, there, self._changed)
+            else:
+                grid.turn(here, there, self._threads, at_once)
+            self._equal = True
             grid.flip(waiting, self._waiting[1 - side])
             grid.flip(across, self._across[1 - side])
-        raise AssertionError
+            self._side = 1 - side
 
     def _sweep(self, grid: Grid, tolerance: float, at_once: Callable[..., Iterable[Any]]) -> int:
         """Whether a sweep in all orders of one of the two grids lowered a time by more than the tolerance."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..errors import InvalidInput
 from .fast_sweeping import Sweeper
 
@@ -20,65 +21,105 @@ Side = tuple[int, bool]
 Place = tuple[int, ...]
 Box = tuple[slice, ...]
 
-# A block's neighbouring nodes beyond each side, s: (low x, high x, low y, high y[, low z, high z]), each in
-# the block's shape without that axis; None at the boundary of the grid.
+# Times of a block's neighbouring nodes beyond each side, s: (low x, high x, low y, high y[, low z, high z]),
+# each in the block's shape without that axis.
 Faces = Sequence[Floats | None]
 
 
 @dataclass(frozen=True)
-class BlockSweep:
-    """Result of ``sweep_block``.
+class Edges:
+    """What a block tells its neighbours after a sweep.
 
     Attributes:
-        times: (nx, ny[, nz]), s.
-        faces: the block's own outermost times on each side, s, in the order of ``Faces``, for its neighbours.
+        faces: the block's own outermost times on each side, s, in the order of ``Faces``.
         changed: for each side, whether its face has become earlier by more than the tolerance.
     """
 
-    times: Floats
     faces: tuple[Floats, ...]
     changed: tuple[bool, ...]
 
 
-def sweep_block(
-    slowness: Floats, times: Floats, faces: Faces, spacing: float, tolerance: float = 1e-12
-) -> BlockSweep:
-    """Sweep one block until it converges, given the faces of its neighbours; pure, repeatable.
+class Block:
+    """The times of one block of a grid, swept in place from one exchange of faces to the next."""
 
-    Args:
-        slowness: (nx, ny[, nz]), s/m.
-        times: same shape, s; infinity where unknown. They may only be too late.
-        faces: times beyond each side.
-        spacing: node spacing, m.
-        tolerance: as for ``fast_sweeping``.
+    def __init__(self, slowness: Floats, spacing: float, seeds: Mapping[Place, float]) -> None:
+        """Begin a solve.
 
-    Raises:
-        InvalidInput: for shapes that do not match.
-    """
-    if times.shape != slowness.shape:
-        raise InvalidInput("times", f"shape {times.shape}", f"the block's shape, {slowness.shape}")
-    padded = np.pad(times, 1, constant_values=math.inf)
-    for number, (face, (axis, high)) in enumerate(zip(faces, sides(times.ndim), strict=True)):
-        if face is None:
-            continue
-        expected = times.shape[:axis] + times.shape[axis + 1 :]
-        if face.shape != expected:
-            raise InvalidInput(f"faces[{number}]", f"shape {face.shape}", f"{expected}")
-        inside: list[slice | int] = [slice(1, -1)] * times.ndim
-        inside[axis] = -1 if high else 0
-        padded[tuple(inside)] = face
-    flat = padded.ravel()
-    Sweeper(times.shape).settle(
-        flat, np.ascontiguousarray(slowness), spacing, tolerance, np.flatnonzero(flat < math.inf)
-    )
-    new = np.ascontiguousarray(padded[(slice(1, -1),) * times.ndim])
-    changed = []
-    for side in sides(times.ndim):
-        before, after = face_of(times, side), face_of(new, side)
-        earlier = after < before
-        drop = before[earlier] - after[earlier]
-        changed.append(bool((drop > tolerance * spacing * face_of(slowness, side)[earlier]).any()))
-    return BlockSweep(new, tuple(face_of(new, side).copy() for side in sides(times.ndim)), tuple(changed))
+        Args:
+            slowness: (nx, ny[, nz]) of the block, s/m.
+            spacing: node spacing, m.
+            seeds: times of nodes around the source, s, by their position in the block.
+        """
+        self._slowness = np.ascontiguousarray(slowness)
+        self._spacing = spacing
+        self._sweeper = Sweeper(slowness.shape)
+        self._beyond = [_beyond(slowness.shape, side) for side in sides(slowness.ndim)]
+        nodes = [np.ravel_multi_index(tuple(i + 1 for i in node), self._padded) for node in seeds]
+        self._sweeper.start(np.array(nodes, np.int64), np.array(list(seeds.values()), np.float64))
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the arrays, bytes."""
+        return self._slowness.nbytes + self._sweeper.nbytes
+
+    @property
+    def _padded(self) -> tuple[int, ...]:
+        return tuple(n + 2 for n in self._slowness.shape)
+
+    def sweep(self, faces: Faces, sent: Edges | None, tolerance: float = 1e-12) -> Edges:
+        """Sweep until the times have converged; to repeat it changes nothing.
+
+        Args:
+            faces: of the neighbours; None for a side where nothing has changed.
+            sent: what the neighbours know of this block; None: nothing.
+            tolerance: as for ``fast_sweeping``.
+
+        Raises:
+            InvalidInput: for faces of another shape.
+        """
+        for number, (face, (nodes, shape)) in enumerate(zip(faces, self._beyond, strict=True)):
+            if face is None:
+                continue
+            if face.shape != shape:
+                raise InvalidInput(f"faces[{number}]", f"shape {face.shape}", f"{shape}")
+            known = np.isfinite(face.ravel())
+            self._sweeper.lower(nodes[known], face.ravel()[known])
+        self._sweeper.settle(self._slowness, self._spacing, tolerance)
+        own, changed = [], []
+        for number, (side, (nodes, shape)) in enumerate(
+            zip(sides(self._slowness.ndim), self._beyond, strict=True)
+        ):
+            after = self._sweeper.take(_inwards(nodes, self._padded, side)).reshape(shape)
+            before = sent.faces[number] if sent else np.full(shape, math.inf)
+            earlier = after < before
+            drop = before[earlier] - after[earlier]
+            least = tolerance * self._spacing * face_of(self._slowness, side)[earlier]
+            changed.append(bool((drop > least).any()))
+            own.append(after)
+        return Edges(tuple(own), tuple(changed))
+
+    def times(self) -> Floats:
+        """(nx, ny[, nz]), s; infinity where no front has arrived."""
+        times = np.empty(self._slowness.shape)
+        self._sweeper.load(times)
+        return times
+
+
+def _beyond(shape: tuple[int, ...], side: Side) -> tuple[Ints, tuple[int, ...]]:
+    """The nodes beyond a side: flat indices in the padded block, and their shape."""
+    axis, high = side
+    strides = [math.prod(n + 2 for n in shape[number + 1 :]) for number in range(len(shape))]
+    along = [stride * np.arange(1, n + 1) for stride, n in zip(strides, shape, strict=True)]
+    along[axis] = np.array([(shape[axis] + 1) * strides[axis] if high else 0])
+    nodes: Ints = functools.reduce(np.add.outer, along)
+    return nodes.ravel(), shape[:axis] + shape[axis + 1 :]
+
+
+def _inwards(nodes: Ints, padded: tuple[int, ...], side: Side) -> Ints:
+    """The block's own outermost nodes, next to those beyond a side."""
+    axis, high = side
+    stride = math.prod(padded[axis + 1 :])
+    return nodes - stride if high else nodes + stride
 
 
 def cut(shape: tuple[int, ...], blocks: Sequence[int]) -> dict[Place, Box]:

@@ -1,42 +1,37 @@
 """Fast sweeping by subdomains in one process, in the order of the tasks of a cluster."""
 
-import math
-
 import numpy as np
 
-from bentray_kernels.eikonal.subdomains import cut, face_of, neighbours, opposite, sides, sweep_block
+from bentray_kernels.eikonal.subdomains import Block, cut, neighbours, opposite, sides
 
 
 def solve_by_blocks(problem, blocks, tolerance=1e-12):
     """Travel times, (nx, ny[, nz]), s, from blocks that exchange faces until they agree."""
     shape = problem.slowness.shape
     boxes = cut(shape, blocks)
-    start = np.full(problem.padded_slowness.size, math.inf)
-    seeds, times = problem.seeds()
-    start[seeds] = times
-    time = problem.interior(start)
-    held: dict = {}
-    for place in boxes:
-        held[place] = [None for _ in sides(len(shape))]
-    seeded = [place for place, box in boxes.items() if (time[box] < math.inf).any()]
-    waiting = set(seeded)
-    # Seeds at a face are news to the block beyond.
-    for place in seeded:
-        for side, beyond in neighbours(place, boxes):
-            held[beyond][opposite(side)] = face_of(time[boxes[place]], sides(len(shape))[side]).copy()
-            waiting.add(beyond)
+    seeded = np.full(problem.padded_slowness.size, np.inf)
+    nodes, times = problem.seeds()
+    seeded[nodes] = times
+    seeded = problem.interior(seeded)
+    swept, sent, arrived, waiting = {}, {}, {}, set()
+    for place, box in boxes.items():
+        seeds = {tuple(node): seeded[box][tuple(node)] for node in np.argwhere(seeded[box] < np.inf)}
+        swept[place] = Block(problem.slowness[box], problem.spacing, seeds)
+        sent[place] = None
+        arrived[place] = [None for _ in sides(len(shape))]
+        if seeds:
+            waiting.add(place)
     while waiting:
-        sent = {
-            place: sweep_block(
-                problem.slowness[boxes[place]], time[boxes[place]], held[place], problem.spacing, tolerance
-            )
-            for place in sorted(waiting)
-        }
-        waiting = set()
-        for place, swept in sent.items():
-            time[boxes[place]] = swept.times
+        for place in sorted(waiting):
+            sent[place] = swept[place].sweep(arrived[place], sent[place], tolerance)
+            arrived[place] = [None for _ in sides(len(shape))]
+        done, waiting = waiting, set()
+        for place in sorted(done):
             for side, beyond in neighbours(place, boxes):
-                if swept.changed[side]:
-                    held[beyond][opposite(side)] = swept.faces[side]
+                if sent[place].changed[side]:
+                    arrived[beyond][opposite(side)] = sent[place].faces[side]
                     waiting.add(beyond)
+    time = np.empty(shape)
+    for place, box in boxes.items():
+        time[box] = swept[place].times()
     return time

@@ -126,7 +126,8 @@ def test_neighbours_of_a_node_are_those_of_the_grid(shape):
                 near[axis] += step
                 if all(1 <= i <= n for i, n in zip(near, shape, strict=True)):
                     expected.add(int(np.ravel_multi_index(near, padded)))
-        grid.neighbours(np.array([np.ravel_multi_index(node, padded)]), found)
+        found.clear()
+        grid.include_neighbours(np.array([np.ravel_multi_index(node, padded)]), found)
         assert members(grid, *found) == expected
 
 
@@ -137,7 +138,7 @@ def test_flipping_keeps_every_node(shape, seed):
     rng = np.random.default_rng(seed)
     nodes = rng.integers(0, numbered(shape).size, 5)
     near, flipped = grid.no_columns(), grid.no_columns()
-    grid.neighbours(nodes, near)
+    grid.include_neighbours(nodes, near)
     grid.flip(near, flipped)
     _, nj, nk = grid.shape
     turned = members(grid, *flipped)

@@ -64,6 +64,32 @@ def test_blocks_of_a_lost_worker_are_recomputed(tmp_path):
         assert np.array_equal(field.whole(), expected)
 
 
+@pytest.mark.parametrize("at_once", [1, 3, None])
+def test_fields_of_several_sources_come_in_their_order(cluster, at_once):
+    speed = np.random.default_rng(4).uniform(1.0, 2.0, (9, 8, 7))
+    sources = [(1.0, 2.0, 3.0), (8.0, 7.0, 0.0), (4.2, 0.1, 5.0), (0.0, 0.0, 6.0), (3.0, 3.3, 3.6)]
+    found = subdomains.solve_many_in_blocks(cluster.client, speed, 1.0, sources, (2, 1, 2), at_once=at_once)
+    for source, field in zip(sources, found, strict=True):
+        alone = subdomains.solve(cluster.client, speed, 1.0, source, (2, 1, 2))
+        assert np.array_equal(field.whole(), alone)
+
+
+def test_fields_at_once_are_at_least_one(cluster):
+    with pytest.raises(InvalidInput, match=r"at_once.*>= 1"):
+        next(
+            subdomains.solve_many_in_blocks(cluster.client, np.ones((4, 4)), 1.0, [(1, 1)], (2, 2), at_once=0)
+        )
+
+
+def test_a_task_that_runs_again_tells_the_neighbours_again():
+    """Dask may run a task again whose block has been swept already."""
+    before = subdomains.begin(np.ones((4, 4)), 1.0, {(0, 0): 0.0})
+    first = subdomains.sweep(before, [None] * 4, 1e-12)
+    again = subdomains.sweep(before, [None] * 4, 1e-12)
+    assert first.edges.changed == again.edges.changed == (True,) * 4
+    assert all(np.array_equal(a, b) for a, b in zip(first.edges.faces, again.edges.faces, strict=True))
+
+
 def test_cluster_is_empty_afterwards(cluster):
     before = set(cluster.client.futures)
     subdomains.solve(cluster.client, np.ones((6, 6)), 1.0, (2.0, 2.0), (2, 2))

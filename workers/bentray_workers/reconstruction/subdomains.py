@@ -11,26 +11,31 @@ tasks before them again. So there is neither a checkpoint nor cancellation.
 
 from __future__ import annotations
 
+import concurrent.futures
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from dask.sizeof import sizeof
 from distributed import Client, Future
 from numpy.typing import ArrayLike
 
 from bentray_kernels.arrays import Floats
 from bentray_kernels.eikonal.problem import Node, cell_of, placed, straight_times
 from bentray_kernels.eikonal.subdomains import (
-    BlockSweep,
+    Block,
     Box,
+    Edges,
     Place,
     cut,
     neighbours,
     opposite,
-    sweep_block,
 )
 from bentray_kernels.errors import InvalidInput
 
@@ -38,15 +43,23 @@ from ..cluster.connected import connected_workers
 from ..cluster.resources import RECONSTRUCTION
 from ..files.npy_headers import PARSING
 
+# Submits a task about a block to its worker.
+Run = Callable[..., Future]
+
 # A file from which workers read their blocks, or the speed itself.
 Speed = Path | Floats
 
 
-class Edges(NamedTuple):
-    """Faces of a block for its neighbours, and which of them have changed."""
+class Swept(NamedTuple):
+    """Result of a sweep: the block, which later sweeps go on with, and what its neighbours get to know."""
 
-    faces: tuple[Floats, ...]
-    changed: tuple[bool, ...]
+    block: Block
+    edges: Edges | None
+
+
+@sizeof.register(Block)
+def _size(block: Block) -> int:
+    return block.nbytes
 
 
 @dataclass(frozen=True)
@@ -95,7 +108,7 @@ def solve(
             block is sent with its task, so that blocks of a lost worker are computed again elsewhere.
         spacing: node spacing, m.
         source: (ndim,), m, in the grid; node 0 lies at 0.
-        blocks: along each axis, from 1 to the nodes there; a worker holds about three arrays of each block.
+        blocks: along each axis, from 1 to the nodes there; a worker holds about seven arrays of each block.
         tolerance: as for ``eikonal.fast_sweeping``, for every block.
 
     Returns:
@@ -117,14 +130,46 @@ def solve_in_blocks(
     tolerance: float = 1e-12,
 ) -> BlockField:
     """As ``solve``, but the field stays in its blocks, for grids larger than any process."""
+    return next(solve_many_in_blocks(client, speed, spacing, [source], blocks, tolerance=tolerance))
+
+
+def solve_many_in_blocks(
+    client: Client,
+    speed: Path | ArrayLike,
+    spacing: float,
+    sources: Iterable[ArrayLike],
+    blocks: Sequence[int],
+    *,
+    tolerance: float = 1e-12,
+    at_once: int | None = None,
+) -> Iterator[BlockField]:
+    """The fields of several sources, in their order.
+
+    A front crosses the blocks one after the other, so that with one source some workers wait. With several
+    sources they compute those of the others.
+
+    Args:
+        client, speed, spacing, blocks, tolerance: as for ``solve``.
+        sources: (ndim,) each, m.
+        at_once: fields that are computed at the same time; a worker holds about seven arrays of each of its
+            blocks for each of them. None: as many as there are blocks.
+
+    Yields:
+        The converged fields; a field is kept on the workers as long as it is referenced.
+
+    Raises:
+        InvalidInput: as ``solve``; for ``at_once`` below 1.
+    """
     given: Speed = speed if isinstance(speed, Path) else np.asarray(speed, dtype=np.float64)
     array = opened(given)
     if array.ndim not in (2, 3) or array.size == 0:
         raise InvalidInput("speed", f"shape {array.shape}", "a non-empty 2-D or 3-D array")
     if not (math.isfinite(spacing) and spacing > 0.0):
         raise InvalidInput("spacing", spacing, "a finite node spacing > 0 m")
-    seeds = _seeds(array, spacing, placed(source, array.shape, spacing))
     boxes = cut(array.shape, blocks)
+    if at_once is not None and at_once < 1:
+        raise InvalidInput("at_once", at_once, "a number of fields >= 1")
+    all_seeds = (_seeds(array, spacing, placed(source, array.shape, spacing)) for source in sources)
     homes = _homes(client, list(boxes))
 
     def run(place: Place, function: object, *arguments: object) -> Future:
@@ -141,27 +186,53 @@ def solve_in_blocks(
         place: run(place, slowness_of, given if isinstance(given, Path) else array[box], box)
         for place, box in boxes.items()
     }
-    # A block around the source starts from seeds; others start with the first face that arrives.
-    own = {place: _within(seeds, box) for place, box in boxes.items()}
-    swept: dict[Place, Future] = {}
-    held: dict[Place, list[Future | None]] = {place: [None] * (2 * array.ndim) for place in boxes}
-    waiting, rounds = {place for place, found in own.items() if found}, 0
-    while waiting:
-        rounds += 1
-        edges = {}
+
+    def solved(seeds: Mapping[Node, float]) -> BlockField:
+        swept = {
+            place: run(place, begin, slowness[place], spacing, _within(seeds, box))
+            for place, box in boxes.items()
+        }
+        rounds = _exchange(
+            client, run, swept, {place for place, box in boxes.items() if _within(seeds, box)}, tolerance
+        )
+        return BlockField(array.shape, boxes, rounds, swept)
+
+    most = at_once or len(boxes)
+    with ThreadPoolExecutor(most, "blocks") as pool:
+        running: deque[concurrent.futures.Future[BlockField]] = deque()
+        for seeds in all_seeds:
+            running.append(pool.submit(solved, seeds))
+            if len(running) == most:
+                yield running.popleft().result()
+        while running:
+            yield running.popleft().result()
+
+
+def _exchange(
+    client: Client, run: Run, swept: dict[Place, Future], waiting: set[Place], tolerance: float
+) -> int:
+    """Sweep the waiting blocks and give their changed faces to their neighbours, until none has changed.
+
+    Returns:
+        The number of rounds; ``swept`` holds the results of the last sweeps.
+    """
+    axes = len(next(iter(swept)))
+    arrived: dict[Place, list[Future | None]] = {place: [None] * (2 * axes) for place in swept}
+    for rounds in itertools.count():
+        if not waiting:
+            return rounds
+        changed = {}
         for place in sorted(waiting):
-            before = swept.get(place, own[place])
-            swept[place] = run(place, sweep, slowness[place], before, list(held[place]), spacing, tolerance)
-            edges[place] = run(place, _edges, swept[place])
-        changed = {place: run(place, _changed, edge) for place, edge in edges.items()}
-        changes: dict[Place, tuple[bool, ...]] = client.gather(changed)
+            swept[place] = run(place, sweep, swept[place], arrived[place], tolerance)
+            arrived[place] = [None] * (2 * axes)
+            changed[place] = run(place, _changed, swept[place])
         waiting = set()
-        for place, sides in changes.items():
-            for side, beyond in neighbours(place, boxes):
+        for place, sides in client.gather(changed).items():
+            for side, beyond in neighbours(place, swept):
                 if sides[side]:
-                    held[beyond][opposite(side)] = run(beyond, _face, edges[place], side)
+                    arrived[beyond][opposite(side)] = run(place, _face, swept[place], side)
                     waiting.add(beyond)
-    return BlockField(array.shape, boxes, rounds, swept)
+    raise AssertionError
 
 
 def opened(speed: Speed) -> Floats:
@@ -195,38 +266,31 @@ def slowness_of(speed: Speed, box: Box) -> Floats:
     return np.ascontiguousarray(1.0 / part)
 
 
-def sweep(
-    slowness: Floats,
-    before: BlockSweep | Mapping[Node, float],
-    faces: list[Floats | None],
-    spacing: float,
-    tolerance: float,
-) -> BlockSweep:
-    """Task: sweep one block to convergence, from its earlier times or, at first, from the seeds in it."""
-    if isinstance(before, BlockSweep):
-        return sweep_block(slowness, before.times, faces, spacing, tolerance)
-    times = np.full(slowness.shape, math.inf)
-    for node, time in before.items():
-        times[node] = time
-    swept = sweep_block(slowness, times, faces, spacing, tolerance)
-    # The seeds are changes for the neighbours too.
-    return BlockSweep(swept.times, swept.faces, tuple(bool(np.isfinite(face).any()) for face in swept.faces))
+def begin(slowness: Floats, spacing: float, seeds: Mapping[Node, float]) -> Swept:
+    """Task: a block before its first sweep."""
+    return Swept(Block(slowness, spacing, seeds), None)
 
 
-def _edges(swept: BlockSweep) -> Edges:
-    return Edges(swept.faces, swept.changed)
+def sweep(before: Swept, faces: list[Floats | None], tolerance: float) -> Swept:
+    """Task: sweep one block until its times have converged.
+
+    It lowers the times of ``before`` in place, and its result is the same when Dask runs it again.
+    """
+    return Swept(before.block, before.block.sweep(faces, before.edges, tolerance))
 
 
-def _changed(edges: Edges) -> tuple[bool, ...]:
-    return edges.changed
+def _changed(swept: Swept) -> tuple[bool, ...]:
+    assert swept.edges is not None
+    return swept.edges.changed
 
 
-def _face(edges: Edges, side: int) -> Floats:
-    return edges.faces[side]
+def _face(swept: Swept, side: int) -> Floats:
+    assert swept.edges is not None
+    return swept.edges.faces[side]
 
 
-def _times(swept: BlockSweep) -> Floats:
-    return swept.times
+def _times(swept: Swept) -> Floats:
+    return swept.block.times()
 
 
 def _seeds(speed: Floats, spacing: float, source: Floats) -> dict[Node, float]:
