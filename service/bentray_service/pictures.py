@@ -23,6 +23,7 @@ from bentray_workers.images.truth_export import export_truth
 from bentray_workers.reconstruction.quality_report import quality_page, quality_report
 from bentray_workers.rendering import field_picture, picture_cost, refraction
 from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.histogram import volume_histogram
 from bentray_workers.rendering.isosurface_mesh import mesh_volume
 from bentray_workers.rendering.picture_cost import Cost, VolumeFile
 from bentray_workers.rendering.refraction_view import RefractionView
@@ -43,6 +44,8 @@ THREADS = 8
 # Time limit for the list of workers, and interval between checks of a running task, s.
 ASK_S, LOOK_S = 5.0, 5.0
 FULL = (errno.ENOSPC, errno.EDQUOT)
+# Histograms kept, of 10 to 50 kB each.
+MAX_HISTOGRAMS = 256
 # Maximum number of attempts when workers leave.
 MAX_TRIES = 2
 
@@ -68,6 +71,7 @@ class Pictures:
         self._asker = ThreadPoolExecutor(1, "workers")
         self._asking: asyncio.Future[dict[str, WorkerCapacity]] | None = None
         self._queue = PictureQueue(self._workers)
+        self._histograms: dict[tuple[Any, ...], dict[str, Any]] = {}
 
     async def slice_png(self, tenant: Tenant, volume: VolumeRow, path: Path, how: dict[str, Any]) -> bytes:
         """Render one slice of a volume as PNG.
@@ -89,6 +93,23 @@ class Pictures:
         cost = picture_cost.refraction_cost(VolumeFile.of(volume), view)
         what = "volume", f"shape {tuple(volume['shape'])}", cost
         return bytes(await self._made(tenant, what, path, lambda here: refraction.tasks_of(here, view)))
+
+    async def histogram(
+        self, tenant: Tenant, volume: VolumeRow, path: Path, quantity: str, bins: int
+    ) -> dict[str, Any]:
+        """Compute the histogram of a volume, see ``volume_histogram``; recent ones are kept."""
+        key = volume["id"], volume["created"], quantity, bins
+        if key not in self._histograms:
+            what = (
+                "volume",
+                f"shape {tuple(volume['shape'])}",
+                picture_cost.histogram_cost(VolumeFile.of(volume)),
+            )
+            how = {"quantity": quantity, "bins": bins}
+            self._histograms[key] = dict(await self._one(tenant, what, path, volume_histogram, how))
+            while len(self._histograms) > MAX_HISTOGRAMS:
+                del self._histograms[next(iter(self._histograms))]
+        return self._histograms[key]
 
     async def field_png(self, tenant: Tenant, field: FieldRow, folder: Path, view: FieldView) -> bytes:
         """Render a scene with a geometry field."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from .backdrop import Backdrop, Colours, locate
 from .camera import Camera
 from .caster import LOST, allocate_results, cast, medium_of
 from .caster_opencl import OpenCLCaster
+from .coarse_rays import interpolate_rays
 from .scene import Scene
 from .supersampling import averaged, point_colours, post_refraction_colours
 
@@ -36,6 +38,8 @@ class RenderSettings:
         degree: for "prss" as in ``post_refraction_colours``; for "real" rays a pixel along each axis.
         fresnel: whether light is attenuated by reflection at each interface.
         structure, roots, step: as in ``Scene.search``.
+        ray_spacing: pixels between rays along both sides, for a preview: where rays end is interpolated
+            between them, see ``coarse_rays``. 1 with real supersampling.
         seed: of the jitter of real supersampling; None: regular rays.
         threads: number of threads for tiles of rows.
 
@@ -52,15 +56,18 @@ class RenderSettings:
     structure: str = "octree"
     roots: str = "certain"
     step: float = 0.1
+    ray_spacing: int = 1
     seed: int | None = 0
     threads: int = 1
 
     def __post_init__(self) -> None:
-        for name in ("rows", "columns", "depth", "degree", "threads"):
+        for name in ("rows", "columns", "depth", "degree", "ray_spacing", "threads"):
             if getattr(self, name) < 1:
                 raise InvalidInput(name, getattr(self, name), "a whole number >= 1")
         if self.supersampling not in SUPERSAMPLING:
             raise InvalidInput("supersampling", self.supersampling, "one of " + ", ".join(SUPERSAMPLING))
+        if self.ray_spacing > 1 and self.supersampling == "real":
+            raise InvalidInput("ray_spacing", self.ray_spacing, "1 with real supersampling")
 
 
 @dataclass(frozen=True)
@@ -105,8 +112,13 @@ def render(
         pause: called before every tile, possibly in another thread; an exception ends the rendering.
     """
     times = settings.degree if settings.supersampling == "real" else 1
-    rows, columns = times * settings.rows, times * settings.columns
+    spacing = settings.ray_spacing
+    rows, columns = -(-times * settings.rows // spacing), -(-times * settings.columns // spacing)
     places = _places(rows, columns, settings.seed if settings.supersampling == "real" else None)
+    if spacing > 1:
+        # The last ray may lie beyond the edge of the picture.
+        covered = np.array([columns / settings.columns, rows / settings.rows])
+        places = (places + 0.5) * spacing * covered - 0.5
     traced = allocate_results(rows * columns, settings.depth, False)
     plane, where = np.empty(rows * columns, dtype=np.int8), np.empty((rows * columns, 2))
     medium = medium_of(scene, settings.structure)
@@ -125,25 +137,56 @@ def render(
     shape = (rows, columns)
     lost = traced.fate == LOST
     plane[lost], where[lost] = -1, np.nan
-    weight = traced.weight.reshape(shape)
-    light = weight if settings.fresnel else np.ones(shape)
-    grid = (backdrop, plane.reshape(shape), where.reshape(*shape, 2))
-    crossed = traced.crossed.reshape(shape)
-    image = np.empty((*shape, 3), dtype=np.uint8)
+    found = _Found(
+        plane.reshape(shape),
+        where.reshape(*shape, 2),
+        traced.fate.reshape(shape),
+        traced.crossed.reshape(shape),
+        traced.weight.reshape(shape),
+    )
+    if spacing > 1:
+        found = _of_pixels(found, settings)
+    image = np.empty((*found.plane.shape, 3), dtype=np.uint8)
+    light = found.weight if settings.fresnel else np.ones(found.plane.shape)
+    grid = (backdrop, found.plane, found.where)
     if settings.supersampling == "prss":
-        post_refraction_colours(*grid, crossed, light, settings.degree, image)
+        post_refraction_colours(*grid, found.crossed, light, settings.degree, image)
     else:
         point_colours(*grid, light, image)
     # Where there is no plane, any edge leaves NaN what it is.
-    where *= backdrop.edges[plane]
+    position = found.where * backdrop.edges[found.plane]
     return Picture(
         image if times == 1 else averaged(image, times),
-        where.reshape(*shape, 2),
-        plane.reshape(shape),
-        traced.fate.reshape(shape),
-        crossed,
-        weight,
+        position,
+        found.plane,
+        found.fate,
+        found.crossed,
+        found.weight,
     )
+
+
+class _Found(NamedTuple):
+    """What rays meet, as in ``Picture``; ``where`` in edges of the plane."""
+
+    plane: NDArray[np.int8]
+    where: Floats
+    fate: NDArray[np.uint8]
+    crossed: NDArray[np.int16]
+    weight: Floats
+
+
+def _of_pixels(rays: _Found, settings: RenderSettings) -> _Found:
+    """The same of all pixels, between the rays."""
+    shape = settings.rows, settings.columns
+    pixels = _Found(
+        np.empty(shape, dtype=np.int8),
+        np.empty((*shape, 2)),
+        np.empty(shape, dtype=np.uint8),
+        np.empty(shape, dtype=np.int16),
+        np.empty(shape),
+    )
+    interpolate_rays(settings.ray_spacing, *rays, *pixels)
+    return pixels
 
 
 def _tiles(rows: int, columns: int, at_once: int) -> Iterator[slice]:

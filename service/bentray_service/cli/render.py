@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -104,8 +105,8 @@ def render(
         volume = import_volume(input_file(file, ACCEPTED), given, check_size)
     started = time.perf_counter()
     view = view.within(*volume.range())
-    filtered = filter_volume(volume, view.filter, view.smoothing)
-    view = view.filtered_within(*filtered.range)
+    filtered = filter_volume(volume, view)
+    view = replace(view.filtered_within(*filtered.range), smoothing=view.smoothing_for(volume.values.dtype))
     scene = build_scene(filtered, view.layers())
     built = time.perf_counter()
     with progress_bar("Rendering") as step:

@@ -45,7 +45,12 @@ def job_record(row: JobRow) -> JobRecord:
 
 def volume_record(row: VolumeRow) -> VolumeRecord:
     here = f"/v1/volumes/{row['id']}"
-    links = {"self": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
+    links = {
+        "self": here,
+        "image": f"{here}/slice.png",
+        "data": f"{here}/data",
+        "histogram": f"{here}/histogram",
+    }
     with suppress(InvalidInput):
         check_even(tuple(row["shape"]), tuple(row["spacing_m"]))
         links["refraction"] = f"{here}/refraction.png"

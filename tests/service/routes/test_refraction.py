@@ -57,6 +57,7 @@ def test_every_parameter_changes_the_picture_or_its_tag(http):
         "fresnel": True,
         "mode": "shaded",
         "degree": 2,
+        "ray_spacing": 2,
         "depth": 3,
         "azimuth_deg": 5,
         "elevation_deg": 5,
@@ -111,11 +112,24 @@ def test_head_request_does_not_render(http, cluster):
 
 
 def test_without_an_iso_value_the_middle_of_the_range(http):
-    here, middle = put(http), dict(SMALL, iso=0.5)
+    here, middle = put(http), dict(SMALL, iso=0.5, smoothing=0)
     low, high = sampled(ONE_HOLE, 12).min(), sampled(ONE_HOLE, 12).max()
     middle["iso"] = 0.5 * (float(np.float32(low)) + float(np.float32(high)))
-    without = {name: value for name, value in SMALL.items() if name != "iso"}
+    without = {name: value for name, value in middle.items() if name != "iso"}
     assert http.get(here, params=without).headers["etag"] == http.get(here, params=middle).headers["etag"]
+
+
+def test_the_steps_of_8_bit_integers_are_smoothed_unless_requested(http):
+    ball = np.round(40.0 * sampled(ONE_HOLE, 16)).astype(np.uint8)
+    view = {"width": 48, "height": 48, "iso": 20, "supersampling": "none"}
+
+    def picture(of, **more):
+        return http.get(of, params={**view, **more}).content
+
+    whole, real = put(http, ball), put(http, ball.astype(np.float32))
+    assert picture(whole) == picture(whole, smoothing=30) != picture(whole, smoothing=0)
+    assert picture(real) == picture(real, smoothing=0)
+    assert picture(whole, filter="trilinear") == picture(whole, filter="trilinear", smoothing=0)
 
 
 def test_several_surfaces(http):
@@ -162,6 +176,8 @@ def test_large_picture_is_rendered_in_tiles(http, cluster, monkeypatch):
         ("width=4097", "width", "4096"),
         ("height=0", "height", "1"),
         ("width=4096&height=4096&supersampling=real&degree=2", "width, height, degree", "16777216"),
+        ("ray_spacing=0", "ray_spacing", "1 to 8"),
+        ("ray_spacing=2&supersampling=real", "ray_spacing", "1 with real supersampling"),
         ("depth=0", "depth", "1"),
         ("isos=0.5", "isos", "one of iso, index"),
     ],

@@ -12,6 +12,7 @@ from bentray_workers.cluster.dask_settings import NO_DASHBOARD
 from bentray_workers.cluster.task_cancellation import TaskCancelled, cancellation_check
 from bentray_workers.files.volume import Volume
 from bentray_workers.rendering import scene_cache
+from bentray_workers.rendering.refraction_view import RefractionView
 
 BEGUN, ENDED = threading.Event(), []
 PATIENCE_S = 60.0
@@ -63,6 +64,6 @@ def test_abandoned_scene_is_not_built(monkeypatch):
         return check
 
     monkeypatch.setattr(scene_cache, "cancellation_check", nobody)
-    filtered = scene_cache.filter_volume(Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3), "bspline3", 0.0)
+    filtered = scene_cache.filter_volume(Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3), RefractionView())
     with pytest.raises(TaskCancelled):
         scene_cache.build_scene(filtered, Layers((0.5,), (1.0, 1.5)))

@@ -4,13 +4,14 @@ import json
 import math
 from dataclasses import fields
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import ranges_of
-from bentray_workers.rendering.refraction_view import CHOICES, RefractionView, check_even
+from bentray_workers.rendering.refraction_view import CHOICES, SMOOTHING_8_BIT, RefractionView, check_even
 
 WITHIN = {name: (within.least, within.most) for name, within in ranges_of(RefractionView).items()}
 
@@ -20,7 +21,7 @@ def test_every_field_has_a_description():
 
 
 def test_the_default_is_one_surface_of_glass():
-    view = RefractionView().within(0.0, 3.0)
+    view = RefractionView(smoothing=0.0).within(0.0, 3.0)
     assert (view.layers().isos, view.layers().indices) == ((1.5,), (1.0, 1.5))
 
 
@@ -82,6 +83,17 @@ def test_smoothing_leaves_the_iso_value_to_the_range_behind_the_filter():
     assert view.filtered_within(-8.0, 100.0).iso == (46.0,)
     with pytest.raises(InvalidInput, match="accepted: -8 to 100, the range of the volume after smoothing"):
         RefractionView(iso=(127.5,), smoothing=10.0).filtered_within(-8.0, 100.0)
+
+
+def test_the_type_of_the_values_decides_on_smoothing():
+    view = RefractionView().within(0.0, 255.0)
+    assert view.iso == ()
+    assert view.smoothing_for(np.dtype(np.uint8)) == SMOOTHING_8_BIT
+    assert view.smoothing_for(np.dtype(np.uint16)) == view.smoothing_for(np.dtype(np.float32)) == 0.0
+    assert RefractionView(smoothing=2.0).smoothing_for(np.dtype(np.uint8)) == 2.0
+    linear = RefractionView(filter="trilinear")
+    assert linear.smoothing_for(np.dtype(np.uint8)) == 0.0
+    assert linear.within(0.0, 3.0).iso == (1.5,)
 
 
 def test_water_may_lie_between_two_surfaces():

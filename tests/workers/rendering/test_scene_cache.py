@@ -14,9 +14,10 @@ from bentray_kernels.splines import Spline
 from bentray_workers.cluster.memory_cache import MemoryCache
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.files.volume import Volume, write_volume
+from bentray_workers.files.volume_formats import import_volume
 from bentray_workers.rendering import scene_cache
-from bentray_workers.rendering.refraction_view import RefractionView
-from bentray_workers.rendering.scene_cache import check_size, scene_at, stored_shape
+from bentray_workers.rendering.refraction_view import SMOOTHING_8_BIT, RefractionView
+from bentray_workers.rendering.scene_cache import check_size, filter_volume, scene_at, stored_shape
 
 from ..files.reconstructions import made
 
@@ -78,6 +79,29 @@ def test_the_default_surface_of_a_smoothed_volume_lies_within_it(tmp_path):
         scene_at(tmp_path / "cube.h5", RefractionView(iso=(127.5,), smoothing=100.0))
 
 
+def test_8_bit_values_are_smoothed_by_default(tmp_path):
+    """The normals of a ball: the steps of 8-bit values turn them, smoothing turns them back."""
+    x = np.linspace(-1.0, 1.0, 40)
+    radius = np.sqrt(x[:, None, None] ** 2 + x[:, None] ** 2 + x**2)
+    write_volume(
+        tmp_path / "ball.h5", Volume.of(np.round(40.0 - 20.0 * radius).astype(np.uint8), (1e-3,) * 3)
+    )
+    angles = np.random.default_rng(1).normal(size=(500, 3))
+    outwards = angles / np.linalg.norm(angles, axis=1, keepdims=True)
+
+    def tilt_deg(view):
+        spline = filter_volume(import_volume(tmp_path / "ball.h5"), view).spline
+        slopes = spline.gradient(0.5 * 39 * (1.0 + 0.6 * outwards))
+        cosine = -(slopes * outwards).sum(axis=1) / np.linalg.norm(slopes, axis=1)
+        return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).mean()
+
+    scene = scene_at(tmp_path / "ball.h5", RefractionView())
+    asked = scene_at(tmp_path / "ball.h5", RefractionView(smoothing=SMOOTHING_8_BIT))
+    np.testing.assert_array_equal(scene.field.coefficients, asked.field.coefficients)
+    rough, smooth = tilt_deg(RefractionView(smoothing=0.0)), tilt_deg(RefractionView())
+    assert smooth < 3.0 < 4.0 * smooth < rough
+
+
 def test_another_glass_shares_the_octree(path):
     one, two = (scene_at(path, RefractionView(iso=(0.4,), index=(n,))) for n in (1.3, 1.5))
     assert one.octree is two.octree
@@ -126,10 +150,10 @@ def test_the_figures_for_memory_are_no_less_than_what_is_used():
     import tracemalloc
 
     volume = Volume.of(sampled(ONE_HOLE, 64), (1e-3,) * 3)
-    filtered = scene_cache.filter_volume(volume, "bspline3", 0.0)
+    filtered = scene_cache.filter_volume(volume, RefractionView())
     scene_cache.build_scene(filtered, RefractionView(iso=(0.5,)).layers())
     tracemalloc.start()
-    filtered = scene_cache.filter_volume(volume, "bspline3", 0.0)
+    filtered = scene_cache.filter_volume(volume, RefractionView())
     spline = tracemalloc.get_traced_memory()[0]
     scene = scene_cache.build_scene(filtered, RefractionView(iso=(0.5,)).layers())
     kept, peak = tracemalloc.get_traced_memory()

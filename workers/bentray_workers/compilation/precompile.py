@@ -138,10 +138,12 @@ def compile_field(folder: Path) -> None:
 def compile_filter(name: str, _folder: Path) -> None:
     """Render a ball with a filter, refracted and shaded, with all kinds of supersampling."""
     warmup.warm_up_rendering()
-    filtered = filter_volume(Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3), name, 0.0)
+    volume = Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3)
+    filtered = filter_volume(volume, RefractionView(filter=name))
     for view in (
         RefractionView(iso=(0.5,), supersampling="prss", degree=2, width=8, height=8),
         RefractionView(iso=(0.5,), supersampling="real", degree=2, width=8, height=8),
+        RefractionView(iso=(0.5,), ray_spacing=2, width=8, height=8),
         RefractionView(iso=(0.5,), mode="shaded", supersampling="none", width=8, height=8),
     ):
         chosen = replace(view, filter=name)

@@ -82,7 +82,8 @@ def refraction_cost(stored: VolumeFile, view: RefractionView) -> Cost:
     Raises:
         InvalidInput: for a picture that takes more than ``MAX_SECONDS``.
     """
-    rays, depth = _rays(view), 1 if view.mode == "shaded" else view.depth
+    spacing = view.ray_spacing if view.mode == "refract" else 1
+    rays, depth = _rays(view) // spacing**2, 1 if view.mode == "shaded" else view.depth
     # Filters of a higher degree use more nodes per value.
     order = int(view.filter[-1]) if view.filter.startswith("bspline") else 3
     ray_s = (RAY_S + SURFACE_S * depth) * (1.0 + 0.5 * max(0, order - 3))
@@ -101,6 +102,14 @@ def refraction_cost(stored: VolumeFile, view: RefractionView) -> Cost:
 def refraction_bytes(shape: Sequence[int], view: RefractionView) -> int:
     """Memory of a task of that picture; reading the volume takes less than its scene."""
     return _tile_bytes(view) + needed_bytes(shape, BUILDING_BYTES)
+
+
+def histogram_cost(stored: VolumeFile) -> Cost:
+    """Cost of a histogram of a volume, with the filter of a picture of it."""
+    filtered = needed_bytes(stored.shape, BUILDING_BYTES) if len(stored.shape) == 3 else 0
+    # NumPy converts pieces of the values; the mean and deviation take one copy in float64.
+    needed = FLOOR_BYTES + stored.read_bytes + max(REAL * math.prod(stored.shape), filtered)
+    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * math.prod(stored.shape), needed)
 
 
 def field_cost(figures: Mapping[str, Any], view: FieldView) -> Cost:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -35,6 +36,8 @@ from .scene_cache import scene_at
 
 # Width of the view at zoom 1, relative to the longest side of the volume.
 VIEW_MARGIN = 1.25
+# Most threads of one picture.
+MAX_THREADS = 4
 # Distance of the eye from the centre of the volume, in its diagonals.
 EYE_DISTANCE = 2.5
 BEYOND = (90, 90, 90)
@@ -61,7 +64,9 @@ def picture_png(path: Path, view: RefractionView) -> bytes:
     Raises:
         InvalidInput: as ``scene_at``.
     """
-    return png_of(draw_tile(scene_at(path, view), view, 0, view.height).image)
+    # A viewer waits for it; the tiles of large pictures are drawn side by side anyway.
+    threads = min(MAX_THREADS, len(os.sched_getaffinity(0)))
+    return png_of(draw_tile(scene_at(path, view), view, 0, view.height, threads=threads).image)
 
 
 def tile_image(path: Path, view: RefractionView, first: int, last: int) -> Colours:
@@ -74,7 +79,14 @@ def tasks_of(path: Path, view: RefractionView) -> tiles.PictureTasks:
     return tiles.tasks_of(picture_png, tile_image, path, view)
 
 
-def draw_tile(scene: Scene, view: RefractionView, first: int, last: int, card: Colours | None = None) -> Tile:
+def draw_tile(
+    scene: Scene,
+    view: RefractionView,
+    first: int,
+    last: int,
+    card: Colours | None = None,
+    threads: int = 1,
+) -> Tile:
     """Draw rows of a picture.
 
     Args:
@@ -82,6 +94,7 @@ def draw_tile(scene: Scene, view: RefractionView, first: int, last: int, card: C
         view: what to draw.
         first, last: rows, the last one not included.
         card: picture for the backdrop, 8-bit RGB; None: the test card.
+        threads: that trace rays.
     """
     # Post-refraction supersampling uses the adjacent rows.
     margin = 1 if view.supersampling == "prss" else 0
@@ -99,7 +112,9 @@ def draw_tile(scene: Scene, view: RefractionView, first: int, last: int, card: C
         supersampling=view.supersampling,
         degree=view.degree,
         fresnel=view.fresnel,
+        ray_spacing=view.ray_spacing,
         seed=top,
+        threads=threads,
     )
     picture = render(scene, camera, _backdrop(scene, view, card), settings, pause=cancellation_check())
     position = picture.position_m.reshape(rows, view.times, view.width, view.times, 2).mean(axis=(1, 3))

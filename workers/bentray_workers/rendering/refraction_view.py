@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
+import numpy as np
+
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.isosurface.octree import MAX_ISOS
 from bentray_kernels.ranges import Range
@@ -15,6 +17,9 @@ from bentray_kernels.splines import FILTERS
 from bentray_kernels.splines.prefilter import MAX_SMOOTHING
 
 INDEX = Range(0.01, 100.0)
+
+# Of a B-spline through 8-bit integers: their steps, at every node, would scatter refracted rays.
+SMOOTHING_8_BIT = 30.0
 
 CHOICES = {
     "filter": tuple(FILTERS),
@@ -56,10 +61,12 @@ class RefractionView:
         "Filter between the nodes: " + ", ".join(FILTERS) + ".",
         schema={"enum": list(FILTERS)},
     )
-    smoothing: float = setting(
-        0.0,
-        "Smoothing of a B-spline; 0 interpolates the nodes, 10 to 100 removes the steps of 8-bit data.",
+    smoothing: float | None = setting(
+        None,
+        "Smoothing of a B-spline; 0 interpolates the nodes, 10 to 100 removes the steps of 8-bit data. By "
+        f"default {SMOOTHING_8_BIT:g} for volumes of 8-bit integers, else 0.",
         Range(0.0, MAX_SMOOTHING),
+        unset=f"{SMOOTHING_8_BIT:g} for 8-bit volumes, else 0",
     )
     camera: Literal["orthographic", "perspective"] = setting("orthographic", "Kind of camera.")
     azimuth_deg: float = setting(
@@ -86,6 +93,12 @@ class RefractionView:
     degree: int = setting(
         1, "prss: samples between pixels; real: rays along each side of a pixel.", Range(1, 8)
     )
+    ray_spacing: int = setting(
+        1,
+        "Pixels between rays along both sides, for a preview: where rays end is interpolated between them. 1 "
+        "with real supersampling; shaded pictures ignore it.",
+        Range(1, 8),
+    )
     fresnel: bool = setting(False, "Attenuate light by the Fresnel reflection at each surface.")
     mode: Literal["refract", "shaded"] = setting("refract", "refract, or shaded: the first surface, lit.")
     width: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
@@ -108,8 +121,10 @@ class RefractionView:
             raise InvalidInput("surroundings", self.surroundings, f"a layer, 0 to {len(self.index)}")
         if self.iso:
             self.layers()
-        if self.smoothing and not self.filter.startswith("bspline"):
+        if self.smoothing and not self._smooths:
             raise InvalidInput("smoothing", self.smoothing, "0, unless the filter is a B-spline")
+        if self.ray_spacing > 1 and self.supersampling == "real":
+            raise InvalidInput("ray_spacing", self.ray_spacing, "1 with real supersampling")
         rays = self.width * self.height * self.times**2
         if rays > MAX_RAYS:
             raise InvalidInput("width, height, degree", f"{rays} rays", f"at most {MAX_RAYS}")
@@ -126,13 +141,21 @@ class RefractionView:
     def within(self, low: float, high: float) -> RefractionView:
         """The view for a volume with values from ``low`` to ``high``, with the default iso-value filled in.
 
-        With smoothing it is not filled in yet: smoothing changes the range, see ``filtered_within``.
+        With smoothing, or while the type of the values decides on it, it is not filled in yet: smoothing
+        changes the range, see ``filtered_within``.
 
         Raises:
             InvalidInput: for an iso-value out of that range, or a constant volume.
         """
         self._check_range(low, high, "the range of the volume")
-        return self if self.iso or self.smoothing else self._at_middle(low, high)
+        unsmoothed = self.smoothing == 0.0 or not self._smooths
+        return self._at_middle(low, high) if unsmoothed and not self.iso else self
+
+    def smoothing_for(self, dtype: np.dtype[Any]) -> float:
+        """The smoothing of a volume of this type, with the default filled in."""
+        if self.smoothing is not None:
+            return self.smoothing
+        return SMOOTHING_8_BIT if self._smooths and dtype == np.uint8 else 0.0
 
     def filtered_within(self, low: float, high: float) -> RefractionView:
         """As ``within`` for a filtered volume with values from ``low`` to ``high`` at the nodes.
@@ -140,9 +163,14 @@ class RefractionView:
         Raises:
             InvalidInput: as ``within``.
         """
-        words = "the range of the volume after smoothing" if self.smoothing else "the range of the volume"
-        self._check_range(low, high, words)
+        smooth = self._smooths and self.smoothing != 0.0
+        self._check_range(low, high, "the range of the volume" + (" after smoothing" if smooth else ""))
         return self if self.iso else self._at_middle(low, high)
+
+    @property
+    def _smooths(self) -> bool:
+        """Whether the filter takes smoothing."""
+        return self.filter.startswith("bspline")
 
     def _check_range(self, low: float, high: float, words: str) -> None:
         if not low < high:

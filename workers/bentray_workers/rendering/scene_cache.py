@@ -40,7 +40,7 @@ class SceneSource(NamedTuple):
     stamp: int
     size: int
     filter: str
-    smoothing: float
+    smoothing: float | None
 
 
 class FilteredVolume(NamedTuple):
@@ -49,6 +49,7 @@ class FilteredVolume(NamedTuple):
     spline: Spline
     spacing_m: tuple[float, float, float]
     range: tuple[float, float]
+    smoothing: float
 
 
 # One of each per process; a spline serves many iso-values.
@@ -80,15 +81,7 @@ def scene_at(path: Path, view: RefractionView) -> Scene:
         InvalidInput: from the file, for a volume that is too large, and for iso-values out of its range.
     """
     shape = stored_shape(path)
-    check_size(shape)
-    status = path.stat()
-    source = SceneSource(path, status.st_mtime_ns, status.st_size, view.filter, view.smoothing)
-    filtered: FilteredVolume = _SPLINES.get(
-        source,
-        needed_bytes(shape, SPLINE_BYTES),
-        lambda: filter_volume(import_volume(path), view.filter, view.smoothing),
-        needed_bytes(shape, BUILDING_BYTES),
-    )
+    source, filtered = _filtered(path, shape, view)
     layers = view.filtered_within(*filtered.range).layers()
     # The octree depends on iso-values and surroundings alone, so other refractive indices cost nothing.
     scene: Scene = _SCENES.get(
@@ -101,6 +94,30 @@ def scene_at(path: Path, view: RefractionView) -> Scene:
     return replace(scene, layers=layers)
 
 
+def default_surface(path: Path) -> tuple[float, float]:
+    """Iso-value and smoothing of a picture for which none are requested.
+
+    Raises:
+        InvalidInput: from the file, and for a volume that is too large or constant.
+    """
+    _, filtered = _filtered(path, stored_shape(path), RefractionView())
+    return RefractionView().filtered_within(*filtered.range).iso[0], filtered.smoothing
+
+
+def _filtered(path: Path, shape: tuple[int, ...], view: RefractionView) -> tuple[SceneSource, FilteredVolume]:
+    """The filtered volume of a file, cached or new, and its key."""
+    check_size(shape)
+    status = path.stat()
+    source = SceneSource(path, status.st_mtime_ns, status.st_size, view.filter, view.smoothing)
+    filtered: FilteredVolume = _SPLINES.get(
+        source,
+        needed_bytes(shape, SPLINE_BYTES),
+        lambda: filter_volume(import_volume(path), view),
+        needed_bytes(shape, BUILDING_BYTES),
+    )
+    return source, filtered
+
+
 def stored_shape(path: Path) -> tuple[int, ...]:
     """The shape in a volume or reconstruction file, without reading its values."""
     with opened(path, Limits(total_bytes=LARGEST_BYTES)) as reader:
@@ -111,13 +128,15 @@ def stored_shape(path: Path) -> tuple[int, ...]:
     raise InvalidInput("values", "nothing", "(nx, ny, nz) numbers")
 
 
-def filter_volume(volume: Volume, filter_name: str, smoothing: float) -> FilteredVolume:
-    """Filter a volume, after checking its size."""
+def filter_volume(volume: Volume, view: RefractionView) -> FilteredVolume:
+    """Filter a volume as a view requests, after checking its size."""
     check_even(volume.values.shape, volume.spacing_m)
     check_size(volume.values.shape)
-    spline = Spline.of(volume.values, filter_name, smoothing=smoothing)
+    smoothing = view.smoothing_for(volume.values.dtype)
+    spline = Spline.of(volume.values, view.filter, smoothing=smoothing)
     # Without smoothing the filter interpolates the nodes, up to rounding.
-    return FilteredVolume(spline, volume.spacing_m, range_at_nodes(spline) if smoothing else volume.range())
+    values = range_at_nodes(spline) if smoothing else volume.range()
+    return FilteredVolume(spline, volume.spacing_m, values, smoothing)
 
 
 def build_scene(filtered: FilteredVolume, layers: Layers) -> Scene:

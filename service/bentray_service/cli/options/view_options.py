@@ -26,7 +26,10 @@ OPTIONS = {
         "Reconstruction filter: central, trilinear, catmull-rom, bspline2 to bspline6.",
     ),
     "smoothing": Option(
-        "--smoothing", float, "0.0", "Smoothing of a B-spline; 10 to 100 removes 8-bit quantisation steps."
+        "--smoothing",
+        float,
+        "30 for 8-bit volumes, else 0",
+        "Smoothing of a B-spline; 10 to 100 removes 8-bit quantisation steps.",
     ),
     "camera": Option("--camera", str, "orthographic", "Projection: orthographic or perspective."),
     "azimuth_deg": Option("--azimuth", float, "30.0", "Azimuth of the camera about the z axis, degrees."),
@@ -49,6 +52,7 @@ OPTIONS = {
         "--supersampling", str, "prss", "Supersampling: none, prss (after refraction), or real (more rays)."
     ),
     "degree": Option("--degree", int, "1", "Degree of supersampling."),
+    "ray_spacing": Option("--ray-spacing", int, "1", "Pixels between rays, for a preview."),
     "fresnel": Option("--fresnel", bool, "False", "Attenuate light by Fresnel reflection at each surface."),
     "mode": Option("--mode", str, "refract", "refract, or shaded: the first surface, lit."),
     "width": Option("--width", int, "512", "Image width, pixels."),

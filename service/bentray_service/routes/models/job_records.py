@@ -157,6 +157,24 @@ class VolumeRecord(BaseModel):
     links: dict[str, str] = Field(description="refraction is present for 3-D volumes with uniform spacing.")
 
 
+class HistogramRecord(BaseModel):
+    """How often each value of a quantity occurs in a volume."""
+
+    quantity: str
+    unit: str = Field(description="Unit of the quantity; empty for uploads and ratios.")
+    counts: list[int] = Field(description="Nodes in each bin.")
+    edges: list[float] = Field(description="Limits of the bins, one more than bins.")
+    minimum: float
+    maximum: float
+    mean: float
+    deviation: float = Field(description="Standard deviation.")
+    iso: float | None = Field(
+        description="Iso-value of a rendering for which none is requested; null if the volume cannot be "
+        "rendered, and for other quantities."
+    )
+    smoothing: float | None = Field(description="Smoothing of this rendering.")
+
+
 class VolumeList(BaseModel):
     """Volumes, newest first."""
 

@@ -18,7 +18,7 @@ def test_every_field_has_an_option_with_its_default() -> None:
         if field.name == "iso":
             continue
         default = field.default[0] if isinstance(field.default, tuple) else field.default
-        assert OPTIONS[field.name].default == str(default)
+        assert OPTIONS[field.name].default == (field.metadata["unset"] if default is None else str(default))
 
 
 def test_omitted_options_take_defaults() -> None:

@@ -1,0 +1,68 @@
+"""Pictures from fewer rays than pixels: where rays end is interpolated between them, for fast previews."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..compiled import kernel
+
+Planes = NDArray[np.int8]
+Fates = NDArray[np.uint8]
+Crossed = NDArray[np.int16]
+
+
+@kernel
+def interpolate_rays(
+    spacing: int,
+    planes: Planes,
+    places: Floats,
+    fates: Fates,
+    crossed: Crossed,
+    weights: Floats,
+    pixel_planes: Planes,
+    pixel_places: Floats,
+    pixel_fates: Fates,
+    pixel_crossed: Crossed,
+    pixel_weights: Floats,
+) -> None:
+    """The results of all pixels from those of every ``spacing``-th ray along both sides.
+
+    A ray is at the centre of a square of ``spacing`` × ``spacing`` pixels. A pixel takes place and weight
+    bilinearly from the four rays around it that belong to the piece of the picture of its nearest ray, i.e.
+    met as many interfaces and ended on the same plane; all else from its nearest ray.
+
+    Args:
+        spacing: pixels between rays, at least 1.
+        planes, fates, crossed, weights: (n, m) of the rays.
+        places: (n, m, 2) of the rays.
+        pixel_planes, pixel_fates, pixel_crossed, pixel_weights: (rows, columns), at most (n, m)·spacing;
+            filled.
+        pixel_places: (rows, columns, 2), filled.
+    """
+    rows, columns = pixel_planes.shape
+    for i in range(rows):
+        p = i // spacing
+        y = (i + 0.5) / spacing - 0.5
+        above = int(np.floor(y))
+        for j in range(columns):
+            q = j // spacing
+            x = (j + 0.5) / spacing - 0.5
+            left = int(np.floor(x))
+            pixel_planes[i, j], pixel_fates[i, j] = planes[p, q], fates[p, q]
+            pixel_crossed[i, j] = crossed[p, q]
+            total = u = v = weight = 0.0
+            for down in range(2):
+                for right in range(2):
+                    a = min(max(above + down, 0), len(planes) - 1)
+                    b = min(max(left + right, 0), planes.shape[1] - 1)
+                    if planes[a, b] != planes[p, q] or crossed[a, b] != crossed[p, q]:
+                        continue
+                    share = (1.0 - abs(y - above - down)) * (1.0 - abs(x - left - right))
+                    total += share
+                    u += share * places[a, b, 0]
+                    v += share * places[a, b, 1]
+                    weight += share * weights[a, b]
+            pixel_places[i, j, 0], pixel_places[i, j, 1] = u / total, v / total
+            pixel_weights[i, j] = weight / total

@@ -1,0 +1,57 @@
+"""/v1/volumes/{id}/histogram: how often each value occurs in a volume."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends, Query, Request
+from starlette.concurrency import run_in_threadpool
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.rendering.histogram import BINS, DEFAULT_BINS
+
+from ..web.errors import problems
+from ..wiring import CallerTenant, Service
+from .models.job_records import HistogramRecord
+from .pictures import while_connected
+from .quality import check_render_rate
+
+router = APIRouter()
+
+
+@router.get(
+    "/{volume_id}/histogram",
+    responses=problems(404, 422, 429, 503),
+    dependencies=[Depends(check_render_rate)],
+)
+async def show_histogram(
+    volume_id: str,
+    request: Request,
+    service: Service,
+    tenant: CallerTenant,
+    quantity: Annotated[
+        Literal["speed", "coverage", "attenuation", "recovery", "value"] | None,
+        Query(
+            description="Reconstructions: speed (default), coverage, attenuation if the scan has amplitudes, "
+            "recovery if resolution_check was set. Uploads: value."
+        ),
+    ] = None,
+    bins: Annotated[
+        int,
+        Query(
+            ge=BINS.least, le=BINS.most, description="Bins of equal width between least and greatest value."
+        ),
+    ] = DEFAULT_BINS,
+) -> HistogramRecord:
+    """Count the nodes of a volume by value, on a worker; and the surface that a picture shows by default."""
+    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
+    uploaded = "job_id" not in volume
+    chosen = quantity or ("value" if uploaded else "speed")
+    if (chosen == "value") != uploaded:
+        accepted = (
+            "value: this is an uploaded volume" if uploaded else "speed, coverage, attenuation or recovery"
+        )
+        raise InvalidInput("quantity", repr(quantity), accepted)
+    path = service.files.of(tenant).volume(volume["id"])
+    work = service.pictures.histogram(tenant, volume, path, chosen, bins)
+    return HistogramRecord.model_validate(await while_connected(request, work))
