@@ -101,14 +101,14 @@ def ring(nodes: int, count: int) -> Floats:
     return np.asarray(flat * (nodes - 1) * SPACING_M)
 
 
-def solve_all(volume: Floats, sources: Floats, **options: Any) -> None:
+def solve_all(volume: Floats, sources: Floats, method: str = "fsm", **options: Any) -> None:
     """One solve after the other in this process."""
     for source in sources:
-        eikonal.solve(volume, SPACING_M, source, "fsm", **options)
+        eikonal.solve(volume, SPACING_M, source, method, **options)
 
 
 def threads(name: str, volume: Floats, sources: Floats, cores: int) -> Iterable[Row]:
-    """One solve that threads share."""
+    """One solve that threads share; and the published way, each thread a copy and an order."""
     one = least(partial(solve_all, volume, sources), RUNS)
     several = least(partial(solve_all, volume, sources, threads=cores), RUNS)
     yield Row(
@@ -118,6 +118,16 @@ def threads(name: str, volume: Floats, sources: Floats, cores: int) -> Iterable[
         ">=",
         "",
         f"one source; one thread {one:.2f} s, {cores} threads {several:.2f} s; theirs 3.5 on four cores",
+    )
+    alone = least(partial(solve_all, volume, sources, method="fsm-simultaneous"), 1)
+    together = least(partial(solve_all, volume, sources, method="fsm-simultaneous", threads=cores), 1)
+    yield Row(
+        f"FSM {volume.shape[0]}³, {name}, all orders at the same time as published, over shared by threads",
+        together / several,
+        1.0,
+        ">=",
+        "",
+        f"one source, {cores} threads; published: one thread {alone:.2f} s, {cores} threads {together:.2f} s",
     )
 
 

@@ -96,13 +96,18 @@ def fast_sweeping_many(
         times: (batch, nx, ny[, nz]), s, C order; filled.
         tolerance, threads: as for ``fast_sweeping``.
     """
+    check_options(tolerance, threads)
+    sweeper = Sweeper(times.shape[1:], threads)
+    for problem, into in zip(problems, times, strict=True):
+        sweeper.solve(problem, tolerance, into)
+
+
+def check_options(tolerance: float, threads: int) -> None:
+    """Raise ``InvalidInput`` for options that sweeps do not accept."""
     if not tolerance >= 0.0:
         raise InvalidInput("tolerance", tolerance, "a number >= 0")
     if isinstance(threads, bool) or threads not in range(1, MOST_THREADS + 1):
         raise InvalidInput("threads", threads, f"a whole number from 1 to {MOST_THREADS}")
-    sweeper = Sweeper(times.shape[1:], threads)
-    for problem, into in zip(problems, times, strict=True):
-        sweeper.solve(problem, tolerance, into)
 
 
 class Sweeper:
@@ -253,7 +258,7 @@ def _sweep_2d(grid: Grid, tolerance: float) -> int:
     moved = 0
     for way in (1, -1):
         for step in range(grid.shape[1] + grid.shape[2] - 1):
-            moved |= _update_diagonal(grid, tolerance, 0, step, 0, way)
+            moved |= update_diagonal(grid, tolerance, 0, step, 0, way)
     return moved
 
 
@@ -266,7 +271,7 @@ def _sweep_3d(grid: Grid, tolerance: float) -> int:
             # Both orders while the plane is in the cache.
             for way in (1, -1):
                 for step in range(nj + nk - 1):
-                    moved |= _update_diagonal(grid, tolerance, layer, step, up, way)
+                    moved |= update_diagonal(grid, tolerance, layer, step, up, way)
     return moved
 
 
@@ -297,13 +302,13 @@ def _share_sweeps(grid: Grid, tolerance: float, counters: Ints) -> int:
                 wait_for(counters, own - PROGRESS, first + 1)
             for layer in range(block * PLANES, min(planes, (block + 1) * PLANES)):
                 for step in range(first, min(diagonals, first + STEPS)):
-                    moved |= _update_diagonal(grid, tolerance, layer, step, up, way)
+                    moved |= update_diagonal(grid, tolerance, layer, step, up, way)
             add(counters, own, STEPS)
         add(counters, PROGRESS, 1)
 
 
 @kernel(inline="always")
-def _update_diagonal(grid: Grid, tolerance: float, layer: int, step: int, up: int, way: int) -> int:
+def update_diagonal(grid: Grid, tolerance: float, layer: int, step: int, up: int, way: int) -> int:
     """Update the waiting nodes of a diagonal of a plane, both counted in the order of the sweep.
 
     Nodes that change are added to ``grid.changed``, their later neighbours to ``grid.waiting`` and

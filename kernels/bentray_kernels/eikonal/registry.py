@@ -21,6 +21,7 @@ from .fast_marching import fast_marching, first_order_fast_marching, high_accura
 from .fast_marching_untidy import fast_marching_untidy
 from .fast_sweeping import fast_sweeping, fast_sweeping_many
 from .problem import PointSource, SlownessGrid
+from .simultaneous_sweeps import simultaneous_sweeps
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,14 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 False,
                 "fast sweeping, first order; options tolerance, threads",
                 fast_sweeping_many,
+            ),
+            Method(
+                "fsm-simultaneous",
+                simultaneous_sweeps,
+                1,
+                1,
+                False,
+                "fsm with all orders at the same time, as published; options tolerance, threads",
             ),
             Method("fim", fast_iterative, 1, 1, False, "fast iterative, first order; option tolerance"),
             Method(

@@ -164,6 +164,7 @@ class Settings:
         "fmm-untidy",
         "hafmm",
         "fsm",
+        "fsm-simultaneous",
         "fim",
         "fim-opencl",
         "accurate",

@@ -110,10 +110,11 @@ def test_threads_share_a_sweep_and_give_the_same_bits(shape):
     speed = np.random.default_rng(5).uniform(0.2, 5.0, shape)
     source = 0.3 * (np.array(shape) - 1)
     alone = eikonal.solve(speed, 1.0, source, "fsm")
-    shared = eikonal.solve(speed, 1.0, source, "fsm", threads=2)
-    assert np.allclose(shared, alone, rtol=1e-12, atol=0.0)
-    for threads in (2, 3, 7):
-        assert np.array_equal(eikonal.solve(speed, 1.0, source, "fsm", threads=threads), shared)
+    for method in ("fsm", "fsm-simultaneous"):
+        shared = eikonal.solve(speed, 1.0, source, method, threads=2)
+        assert np.allclose(shared, alone, rtol=1e-12, atol=0.0)
+        for threads in (2, 3, 7):
+            assert np.array_equal(eikonal.solve(speed, 1.0, source, method, threads=threads), shared)
 
 
 def test_a_plane_is_swept_by_one_thread():
@@ -122,7 +123,8 @@ def test_a_plane_is_swept_by_one_thread():
     assert np.array_equal(eikonal.solve(speed, 1.0, (3.0, 4.0), "fsm", threads=4), alone)
 
 
+@pytest.mark.parametrize("method", ["fsm", "fsm-simultaneous"])
 @pytest.mark.parametrize("threads", [0, 65, 1.5, True, "2"])
-def test_numbers_of_threads_are_whole_and_few(threads):
+def test_numbers_of_threads_are_whole_and_few(method, threads):
     with pytest.raises(InvalidInput, match=r"threads.*from 1 to 64"):
-        eikonal.solve(np.ones((4, 4, 4)), 1.0, (0.0, 0.0, 0.0), "fsm", threads=threads)
+        eikonal.solve(np.ones((4, 4, 4)), 1.0, (0.0, 0.0, 0.0), method, threads=threads)

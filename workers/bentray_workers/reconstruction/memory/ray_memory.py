@@ -40,9 +40,9 @@ def field_bytes(shape: tuple[int, ...], method: str) -> int:
         method: one of ``eikonal.methods()``.
     """
     nodes = math.prod(n + 2 for n in shape)
-    # Two grids of times and crossings, and the mask of known nodes.
-    swept = 5 * REAL * Diagonals.of(shape).size if method in ("accurate", "fsm") else 0
-    return FIELD_BYTES_PER_NODE * nodes + swept
+    # Two grids of times and crossings, and the mask of known nodes or a copy of the times for each order.
+    arrays = {"accurate": 5, "fsm": 5, "fsm-simultaneous": 4 + 2 ** len(shape)}.get(method, 0)
+    return FIELD_BYTES_PER_NODE * nodes + arrays * REAL * Diagonals.of(shape).size
 
 
 def shape_of(scan: Summary, settings: Settings) -> tuple[int, ...]:
