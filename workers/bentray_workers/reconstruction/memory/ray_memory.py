@@ -42,7 +42,8 @@ def field_bytes(shape: tuple[int, ...], method: str) -> int:
     nodes = math.prod(n + 2 for n in shape)
     # Two grids of times and crossings, and the mask of known nodes or a copy of the times for each order.
     arrays = {"accurate": 5, "fsm": 5, "fsm-simultaneous": 4 + 2 ** len(shape)}.get(method, 0)
-    return FIELD_BYTES_PER_NODE * nodes + arrays * REAL * Diagonals.of(shape).size
+    swept: int = arrays * REAL * Diagonals.of(shape).size
+    return FIELD_BYTES_PER_NODE * nodes + swept
 
 
 def shape_of(scan: Summary, settings: Settings) -> tuple[int, ...]:
