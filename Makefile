@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start hundreds of Python processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint docs bench mutants lock clean
+.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint docs bench bench-device mutants lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -49,6 +49,10 @@ docs: install-docs ## build the documentation into build/docs; warnings are erro
 bench: install ## run the benchmark NAME; NAME=reconstruction ARGS=--quick
 	@mkdir -p build/bench
 	@$(BIN)/bentray bench $(NAME) $(ARGS) --json build/bench/$(NAME).json --pictures build/bench
+
+bench-device: install ## compare each engine on the OpenCL device of this machine with compiled code
+	@mkdir -p build/bench
+	@$(BIN)/bentray bench devices $(ARGS) --json build/bench/devices.json
 
 mutants: install-tests ## plant faults in the numerics one at a time and run the nearest tests (hours); ARGS="--count 20" narrows it
 	@PYTHONPATH=tests $(BIN)/python -m mutation $(ARGS)
