@@ -52,7 +52,6 @@ def test_page_requests_and_sends_a_key(page, serve, scan, work, tmp_path):
     [
         ("/", "Scans"),
         ("/jobs", "Jobs"),
-        ("/jobs/job-none", "Job"),
         ("/rendering", "Volume rendering"),
         ("/surfaces", "Surface rendering"),
         ("/service", "Service"),
@@ -70,6 +69,8 @@ def test_unknown_addresses_are_named(page, serve):
     page.get_by_text("There is no page /nowhere").wait_for()
     page.goto(f"{address}/#/scans/ds-none")
     page.get_by_role("alert").get_by_text("ds-none").wait_for()
+    page.goto(f"{address}/#/jobs/job-none")
+    page.get_by_role("alert").get_by_text("job-none").wait_for()
 
 
 def test_the_colours_are_chosen_and_kept(page, serve):

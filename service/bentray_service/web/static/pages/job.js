@@ -1,10 +1,28 @@
 // One job: its progress, then its result.
+import { request } from "../parts/api.js";
 import { make } from "../parts/dom.js";
 import { jobList } from "../parts/job_list.js";
 
-export function open(root, { id }) {
+export async function open(root, parameters) {
+  const { id } = parameters;
+  const job = await request(`/v1/jobs/${id}`);
+  if (job.kind === "reconstruction" && job.state === "succeeded") return (await import("./result.js")).open(root, parameters);
   document.title = "Job – Bentray";
   root.append(make("h1", "", "Job"));
-  const jobs = jobList(root, { empty: `There is no job ${id}`, wanted: (job) => job.id === id });
-  return jobs.close;
+  let close = () => {};
+  const jobs = jobList(root, {
+    empty: `There is no job ${id}`,
+    wanted: (one) => one.id === id,
+    async onJobs(all) {
+      const mine = all.find((one) => one.id === id);
+      if (mine?.kind !== "reconstruction" || mine.state !== "succeeded") return;
+      jobs.close();
+      root.replaceChildren();
+      close = await (await import("./result.js")).open(root, parameters);
+    },
+  });
+  return () => {
+    jobs.close();
+    close();
+  };
 }

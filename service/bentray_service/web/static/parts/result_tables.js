@@ -1,0 +1,92 @@
+// How a result was made, as tables: what auto compared, the plan, settings and provenance.
+import { make } from "./dom.js";
+import { methodOf } from "./results.js";
+
+const nanoseconds = (seconds) => (seconds === null ? "–" : `${(1e9 * seconds).toFixed(0)} ns`);
+
+export function duration(seconds) {
+  return seconds < 90 ? `${seconds.toFixed(1)} s` : `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+}
+
+// The result in a line.
+export function facts({ job, volume, summary }) {
+  const size = volume.shape.join(" × ");
+  const spacing = volume.spacing_m[0] === null ? "" : ` of ${Number((1e3 * volume.spacing_m[0]).toPrecision(3))} mm`;
+  const parts = [methodOf(job), `${size} nodes${spacing}`, `water ${volume.water_speed_mps.toFixed(1)} m/s`];
+  const residual = job.history.at(-1)?.residual_rms_s;
+  if (residual) parts.push(`residual ${nanoseconds(residual)}`);
+  if (summary.truth?.rmse_mps != null) parts.push(`error ${summary.truth.rmse_mps.toFixed(2)} m/s rms (${summary.truth.region})`);
+  if (job.seconds !== null) parts.push(`took ${duration(job.seconds)}`);
+  return parts.join(" · ");
+}
+
+function section(title, ...content) {
+  const box = make("section", "panel");
+  box.append(make("h2", "", title), ...content);
+  return box;
+}
+
+function scrolled(table) {
+  const box = make("div", "scroll");
+  box.tabIndex = 0;
+  box.append(table);
+  return box;
+}
+
+function pairs(entries) {
+  const table = make("table", "pairs");
+  for (const [name, value] of entries) {
+    const row = table.insertRow();
+    const head = make("th", "", name);
+    head.scope = "row";
+    row.append(head, make("td", "", value));
+  }
+  return table;
+}
+
+// Candidate, held-out misfit, chosen, reason; null where nothing was chosen.
+export function choiceTable({ candidates, reason }, job) {
+  if (!candidates.length) return job.advice ? section("Notes", make("p", "", job.advice)) : null;
+  const table = make("table", "choice-table");
+  const head = table.createTHead().insertRow();
+  for (const name of ["Candidate", "Held-out misfit (mean)", "Held-out misfit (rms)", "Training misfit (rms)", "Chosen"]) {
+    const cell = make("th", "", name);
+    cell.scope = "col";
+    head.append(cell);
+  }
+  const body = table.createTBody();
+  for (const one of candidates) {
+    const row = body.insertRow();
+    const cells = [one.label, nanoseconds(one.held_out_mean_s), nanoseconds(one.held_out_rms_s), nanoseconds(one.training_rms_s), one.chosen ? "chosen" : ""];
+    row.append(...cells.map((cell) => make("td", "", cell)));
+    if (one.chosen) row.className = "chosen";
+  }
+  const area = scrolled(table);
+  area.setAttribute("role", "region");
+  area.setAttribute("aria-label", "Candidates of the automatic choice");
+  return section("Automatic choice", make("p", "", reason), area);
+}
+
+export function planTable({ plan }) {
+  if (!plan) return null;
+  const mebibytes = (bytes) => `${Math.ceil(bytes / 2 ** 20)} MiB`;
+  const rows = [
+    ["Decomposition", plan.decomposition], ["Tasks", plan.tasks], ["Workers", plan.workers],
+    ["Memory of a task", `at most ${mebibytes(plan.largest_bytes)}`],
+  ];
+  if (plan.minutes) rows.push(["Estimated time", duration(60 * plan.minutes)]);
+  return section("Plan", make("p", "", plan.why), pairs(rows));
+}
+
+export function provenanceTable({ job, volume }) {
+  const { advice, ...provenance } = volume.provenance;
+  const text = (value) => (typeof value === "object" && value !== null ? JSON.stringify(value) : String(value));
+  const rows = [
+    ["Job", job.id], ["Volume", volume.id], ["Scan", job.dataset],
+    ["Finished", new Date(job.finished).toLocaleString()],
+    ...Object.entries(provenance),
+  ];
+  const settings = make("details");
+  settings.append(make("summary", "", "Settings"), pairs(Object.entries(job.settings).map(([name, value]) => [name, text(value)])));
+  return section("Provenance", pairs(rows), settings);
+}

@@ -1,0 +1,57 @@
+// Measures of a plane: the profile along a line, statistics of a region, and limits for the colours.
+import { interpolated } from "./field.js";
+
+// Values along a line, by linear interpolation at half the smaller node spacing: { distance (mm), value } arrays.
+export function profileOf(plane, [x0, y0, x1, y1]) {
+  const length = Math.hypot(x1 - x0, y1 - y0);
+  const count = Math.max(2, Math.ceil(length / (0.5 * Math.min(...plane.spacing))) + 1);
+  const share = Array.from({ length: count }, (_, k) => k / (count - 1));
+  return {
+    distance: share.map((one) => one * length),
+    value: share.map((one) => interpolated(plane, x0 + one * (x1 - x0), y0 + one * (y1 - y0))),
+  };
+}
+
+// Nodes in a rectangle, or the ellipse in it: count, area (mm²), mean, standard deviation, minimum, maximum.
+export function regionOf(plane, shape, [x0, y0, x1, y1]) {
+  const [cx, cy, rx, ry] = [(x0 + x1) / 2, (y0 + y1) / 2, Math.abs(x1 - x0) / 2, Math.abs(y1 - y0) / 2];
+  const inside = [];
+  for (let a = 0; a < plane.na; a += 1) {
+    const u = (plane.origin[0] + a * plane.spacing[0] - cx) / rx;
+    if (!(Math.abs(u) <= 1)) continue;
+    for (let b = 0; b < plane.nb; b += 1) {
+      const v = (plane.origin[1] + b * plane.spacing[1] - cy) / ry;
+      const within = shape === "ellipse" ? u * u + v * v <= 1 : Math.abs(v) <= 1;
+      const value = plane.values[a * plane.nb + b];
+      if (within && Number.isFinite(value)) inside.push(value);
+    }
+  }
+  const nodes = inside.length;
+  const mean = inside.reduce((sum, one) => sum + one, 0) / nodes;
+  const deviation = Math.sqrt(inside.reduce((sum, one) => sum + (one - mean) ** 2, 0) / nodes);
+  return {
+    nodes, area: nodes * plane.spacing[0] * plane.spacing[1], mean, deviation,
+    minimum: inside.reduce((least, one) => Math.min(least, one), Infinity),
+    maximum: inside.reduce((most, one) => Math.max(most, one), -Infinity),
+  };
+}
+
+// Values outside the limits at each end, of 1; and values that are looked at.
+const OUTSIDE = 0.001;
+const LOOKED_AT = 200000;
+
+// Limits of the colours of all these arrays, without outliers.
+export function robustLimits(arrays) {
+  const total = arrays.reduce((sum, one) => sum + one.length, 0);
+  const step = Math.max(1, Math.floor(total / LOOKED_AT));
+  const some = [];
+  for (const values of arrays) {
+    for (let k = 0; k < values.length; k += step) if (Number.isFinite(values[k])) some.push(values[k]);
+  }
+  if (!some.length) return [0, 1];
+  const sorted = Float64Array.from(some).sort();
+  const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
+  const [low, high] = [at(OUTSIDE), at(1 - OUTSIDE)];
+  const least = 1e-6 * Math.max(Math.abs(low), Math.abs(high)) || 1;
+  return high - low > least ? [low, high] : [low - least, high + least];
+}

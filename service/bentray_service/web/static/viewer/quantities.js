@@ -1,0 +1,90 @@
+// The quantities of a result: names, units, colours, and where their values come from.
+import { authorization } from "../parts/key.js";
+import { Field } from "./field.js";
+import { parseNpy } from "./npy.js";
+
+// Decibels per centimetre of one neper per metre.
+export const DB_CM_OF_NP_M = 20 / Math.LN10 / 100;
+
+export const QUANTITIES = {
+  speed: { title: "Speed", words: "sound speed", unit: "m/s", map: "viridis", digits: 2, reads: ["speed"] },
+  attenuation: {
+    title: "Attenuation (experimental)", words: "attenuation, experimental", unit: "dB/cm", map: "cividis", digits: 4,
+    reads: ["attenuation"], factor: DB_CM_OF_NP_M,
+  },
+  coverage: { title: "Coverage", words: "ray length per node", unit: "m", map: "magma", digits: 4, reads: ["coverage"], least: 0 },
+  recovery: {
+    title: "Resolution", words: "recovered fraction of a checkerboard", unit: "", map: "bone", digits: 3, reads: ["recovery"],
+    limits: [0, 1],
+  },
+  error: {
+    title: "Difference to truth", words: "speed minus true speed", unit: "m/s", map: "RdBu_r", digits: 2, reads: ["speed", "truth"],
+    symmetric: true,
+  },
+  truth: { title: "Truth", words: "true sound speed", unit: "m/s", map: "viridis", digits: 2, reads: ["truth"] },
+};
+
+// A number with the digits of its quantity.
+export function shown(value, { digits }) {
+  if (!Number.isFinite(value)) return "no value";
+  return Math.abs(value) !== 0 && Math.abs(value) < 10 ** -digits ? value.toExponential(3) : value.toFixed(digits);
+}
+
+// The names of the quantities that a result with these stored quantities has.
+export function shownOf(stored) {
+  return Object.keys(QUANTITIES).filter((name) => QUANTITIES[name].reads.every((one) => stored.includes(one)));
+}
+
+async function bytesOf(address, onProgress) {
+  const response = await fetch(address, { headers: authorization() });
+  if (!response.ok) {
+    const problem = await response.json().catch(() => ({ title: "The values could not be read", detail: `status ${response.status}` }));
+    throw new Error(`${problem.title}: ${problem.detail}`);
+  }
+  const total = Number(response.headers.get("Content-Length")) || 0;
+  if (!total) return response.arrayBuffer();
+  const bytes = new Uint8Array(total);
+  let done = 0;
+  for await (const part of partsOf(response.body.getReader())) {
+    bytes.set(part, done);
+    done += part.length;
+    onProgress(done / total);
+  }
+  return bytes.buffer;
+}
+
+async function* partsOf(reader) {
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) return;
+    yield value;
+  }
+}
+
+// The values of one result, read once each.
+export class Values {
+  constructor(volume) {
+    this.volume = volume;
+    this.read = new Map();
+  }
+
+  stored(name, onProgress) {
+    if (!this.read.has(name)) {
+      const reading = bytesOf(`${this.volume.links.data}?format=npy&quantity=${name}`, onProgress).then(parseNpy);
+      reading.catch(() => this.read.delete(name));
+      this.read.set(name, reading);
+    }
+    return this.read.get(name);
+  }
+
+  // A quantity as a field, in its unit.
+  async field(name, onProgress = () => {}) {
+    const { reads, factor } = QUANTITIES[name];
+    const [first, second] = await Promise.all(reads.map((one) => this.stored(one, onProgress)));
+    let { values } = first;
+    if (second) values = values.map((value, k) => value - second.values[k]);
+    if (factor) values = values.map((value) => value * factor);
+    const millimetres = (lengths) => lengths.map((one) => (one === null ? null : 1e3 * one));
+    return new Field(values, first.shape, millimetres(this.volume.spacing_m), millimetres(this.volume.origin_m));
+  }
+}

@@ -1,0 +1,54 @@
+"""Results with known values, as jobs of a service that a browser visits."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ..conftest import ENDED, PATIENCE_S, FakeWork
+
+SPACING_M, ORIGIN_M = (1e-3, 2e-3, 3e-3), (-0.01, -0.02, 0.005)
+
+
+def known(shape: tuple[int, ...], seed: int = 0) -> NDArray[np.float64]:
+    """Speeds of about 1500 m/s, each node another."""
+    return 1500.0 + 30.0 * np.random.default_rng(seed).standard_normal(shape)
+
+
+def finished(
+    address: str,
+    scan: Callable[..., Path],
+    work: FakeWork,
+    monkeypatch: pytest.MonkeyPatch,
+    speed: NDArray[np.float64],
+    **images: NDArray[np.float64],
+) -> str:
+    """The id of a job that made these images of the scan."""
+    plain = type(work).__call__
+
+    def made(self: FakeWork, *given: Any, **named: Any) -> Any:
+        grid = {"spacing_m": SPACING_M[: speed.ndim], "origin_m": ORIGIN_M[: speed.ndim]}
+        own = {"coverage": np.ones(speed.shape), **images}
+        return replace(plain(self, *given, **named), speed=speed, **own, **grid)
+
+    monkeypatch.setattr(type(work), "__call__", made)
+    with httpx.Client(base_url=address, timeout=60) as http:
+        stream = {"Content-Type": "application/x-hdf5"}
+        sent = http.post("/v1/datasets", content=scan().read_bytes(), headers=stream).json()
+        asked = {"kind": "reconstruction", "dataset": sent["id"], "settings": {"method": "sart", "nodes": 16}}
+        job = http.post("/v1/jobs", json=asked).json()
+        deadline = time.monotonic() + PATIENCE_S
+        while job["state"] not in ENDED and time.monotonic() < deadline:
+            time.sleep(0.02)
+            job = http.get(job["links"]["self"]).json()
+    monkeypatch.setattr(type(work), "__call__", plain)
+    assert job["state"] == "succeeded", job
+    return str(job["id"])

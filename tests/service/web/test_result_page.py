@@ -1,0 +1,260 @@
+"""The page of a result: values, colours, profile and region are those of the arrays; a link restores the view."""
+
+import csv
+import re
+
+import numpy as np
+import pytest
+from matplotlib import colormaps
+from playwright.sync_api import expect
+from scipy.ndimage import map_coordinates
+
+from .finished_results import ORIGIN_M, SPACING_M, finished, known
+
+pytestmark = pytest.mark.browser
+
+SPEED = known((24, 16))
+DX, DY = (1e3 * one for one in SPACING_M[:2])
+X0, Y0 = (1e3 * one for one in ORIGIN_M[:2])
+
+
+@pytest.fixture
+def result(serve, scan, work, monkeypatch):
+    """The address of a result in a plane."""
+    address = serve()
+    more = {
+        "attenuation": np.linspace(0.0, 20.0, SPEED.size).reshape(SPEED.shape),
+        "coverage": SPEED - 1300.0,
+    }
+    return f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, SPEED, **more)}"
+
+
+def ready(page, address):
+    # The whole canvas is in view.
+    page.set_viewport_size({"width": 1400, "height": 1100})
+    page.goto(address)
+    page.locator(".readout").filter(has_text="mm").wait_for()
+
+
+def node_below(page, share_x, share_y, canvas=None):
+    """Put the pointer on a share of the canvas; what the page says: node, value, position in mm."""
+    box = (canvas or page.locator("canvas.plane").first).bounding_box()
+    page.mouse.move(box["x"] + share_x * box["width"], box["y"] + share_y * box["height"])
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    said = page.locator(".readout").evaluate("one => ({...one.dataset})")
+    node = tuple(map(int, said["node"].split(","))) if said["node"] else None
+    return node, float(said["value"]), (float(said["x"]), float(said["y"]))
+
+
+def drawn(page, share_x, share_y, canvas):
+    """The colour on a share of the canvas."""
+    return canvas.evaluate(
+        """(one, [x, y]) => [...one.getContext("2d").getImageData(
+            Math.round(x * one.width), Math.round(y * one.height), 1, 1).data].slice(0, 3)""",
+        [share_x, share_y],
+    )
+
+
+def colour_of(value, low, high, name="viridis"):
+    return list(colormaps[name]((value - low) / (high - low), bytes=True)[:3])
+
+
+def window_of(page):
+    return [float(page.get_by_label(name, exact=True).input_value()) for name in ("from", "to")]
+
+
+def test_the_value_and_the_colour_under_the_pointer_are_those_of_the_array(page, result):
+    ready(page, result + "?window=1430,1570")
+    canvas = page.locator("canvas.plane")
+    assert min(canvas.bounding_box()["width"], canvas.bounding_box()["height"]) >= 600
+    seen = set()
+    for place in ((0.45, 0.3), (0.53, 0.71), (0.61, 0.55)):
+        node, value, (x, y) = node_below(page, *place)
+        assert node == (round((x - X0) / DX), round((y - Y0) / DY))
+        assert value == SPEED[node]
+        assert drawn(page, *place, canvas) == colour_of(value, 1430.0, 1570.0)
+        expect(page.locator(".readout")).to_contain_text(f"{value:.2f} m/s")
+        seen.add(node)
+    assert len(seen) == 3
+    # The middle of the canvas is the middle of the image.
+    _, _, middle = node_below(page, 0.5, 0.5)
+    assert middle == pytest.approx((X0 + 11.5 * DX, Y0 + 7.5 * DY), abs=0.1)
+
+
+def test_the_attenuation_is_in_decibels_per_centimetre(page, result):
+    ready(page, result)
+    page.get_by_role("button", name="Attenuation (experimental)").click()
+    page.locator(".readout").filter(has_text="dB/cm").wait_for()
+    node, value, _ = node_below(page, 0.5, 0.4)
+    assert value == pytest.approx(
+        np.linspace(0.0, 20.0, SPEED.size).reshape(SPEED.shape)[node] * 0.0868588963806
+    )
+
+
+def test_a_link_restores_the_view(page, result, browser):
+    ready(page, result)
+    page.get_by_role("button", name="Coverage").click()
+    page.locator(".colour-bar").get_by_text("ray length per node (m)").wait_for()
+    page.locator("select[name=map]").select_option("inferno")
+    page.get_by_label("from", exact=True).fill("150")
+    page.get_by_label("to", exact=True).fill("260")
+    page.get_by_label("to", exact=True).press("Tab")
+    canvas = page.locator("canvas.plane")
+    canvas.hover(position={"x": 400, "y": 300})
+    page.mouse.wheel(0, -400)
+    canvas.click(position={"x": 350, "y": 250})
+    page.mouse.move(0, 0)
+    page.wait_for_url(re.compile("q=coverage.*window=150%2C260.*at=.*view-z="))
+    said = page.locator(".readout").text_content()
+    with browser.new_context() as other:
+        again = other.new_page()
+        ready(again, page.url)
+        assert again.locator(".readout").text_content() == said
+        expect(again.get_by_role("button", name="Coverage")).to_have_attribute("aria-pressed", "true")
+        expect(again.locator("select[name=map]")).to_have_value("inferno")
+        assert window_of(again) == [150.0, 260.0]
+        shots = [one.locator("canvas.plane").evaluate("one => one.toDataURL()") for one in (page, again)]
+        assert shots[0] == shots[1]
+
+
+def table_of(download):
+    with download.value.path().open(newline="") as file:
+        return list(csv.reader(file))
+
+
+def test_a_profile_is_the_linear_interpolation_of_the_array(page, result):
+    ready(page, result)
+    ends = (-8.0, -15.5, 9.25, 4.0)
+    for name, value in zip(("x from", "y from", "x to", "y to"), ends, strict=True):
+        page.get_by_label(f"Profile: {name}, mm").fill(str(value))
+    page.get_by_label("Profile: y to, mm").press("Tab")
+    page.get_by_role("img", name="Profile of sound speed").wait_for()
+    with page.expect_download() as download:
+        page.locator(".measure.profile").get_by_role("button", name="Save as CSV").click()
+    head, *rows = table_of(download)
+    assert head[0] == "distance_mm"
+    assert head[1].endswith("(m/s)")
+    distance, value = np.array(rows, float).T
+    length = np.hypot(ends[2] - ends[0], ends[3] - ends[1])
+    assert (distance[0], distance[-1]) == (0.0, pytest.approx(length))
+    share = distance / length
+    places = [
+        (ends[0] + share * (ends[2] - ends[0]) - X0) / DX,
+        (ends[1] + share * (ends[3] - ends[1]) - Y0) / DY,
+    ]
+    np.testing.assert_allclose(value, map_coordinates(SPEED, places, order=1), rtol=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["Rectangle", "Ellipse"])
+def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result, shape):
+    ready(page, result)
+    page.get_by_label(shape).check()
+    canvas = page.locator("canvas.plane")
+    box = canvas.bounding_box()
+    page.mouse.move(box["x"] + 0.42 * box["width"], box["y"] + 0.31 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.61 * box["width"], box["y"] + 0.67 * box["height"], steps=3)
+    page.mouse.up()
+    page.get_by_text("Standard deviation").wait_for()
+    with page.expect_download() as download:
+        page.locator(".measure.region").get_by_role("button", name="Save as CSV").click()
+    head, row = table_of(download)
+    said = dict(zip(head, row, strict=True))
+    x0, y0, x1, y1 = (float(said[f"{one}_mm"]) for one in ("x0", "y0", "x1", "y1"))
+    x, y = X0 + DX * np.arange(24)[:, None], Y0 + DY * np.arange(16)[None, :]
+    u, v = (2 * x - x0 - x1) / (x1 - x0), (2 * y - y0 - y1) / (y1 - y0)
+    inside = (u**2 + v**2 <= 1) if shape == "Ellipse" else (abs(u) <= 1) & (abs(v) <= 1)
+    values = SPEED[inside]
+    assert values.size > 20
+    assert int(said["nodes"]) == values.size
+    assert float(said["area_mm2"]) == pytest.approx(values.size * DX * DY)
+    assert float(said["mean"]) == pytest.approx(values.mean(), rel=1e-12)
+    assert float(said["standard_deviation"]) == pytest.approx(values.std(), rel=1e-9)
+    cells = page.locator(".statistics td").all_text_contents()
+    assert cells[0] == f"{values.mean():.2f}"
+
+
+def test_the_image_is_used_by_keys_alone(page, result):
+    ready(page, result)
+    page.locator("#skip").focus()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.className").startswith("plane"):
+            break
+    read = page.locator(".readout")
+    expect(read).to_contain_text("node 12, 8")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowUp")
+    expect(read).to_contain_text("node 13, 9")
+    assert float(read.get_attribute("data-value")) == SPEED[13, 9]
+    before = window_of(page)
+    page.keyboard.press(".")
+    expect(page.get_by_label("from", exact=True)).not_to_have_value(f"{before[0]:g}")
+    page.keyboard.press("a")
+    expect(page.get_by_label("from", exact=True)).to_have_value(f"{before[0]:g}")
+    page.keyboard.press("]")
+    expect(page.get_by_label("to", exact=True)).not_to_have_value(f"{before[1]:g}")
+    page.keyboard.press("a")
+    expect(page.get_by_label("to", exact=True)).to_have_value(f"{before[1]:g}")
+    page.get_by_label("Profile", exact=True).focus()
+    page.keyboard.press("Space")
+    page.locator("canvas.plane").focus()
+    page.keyboard.press("Enter")
+    for _ in range(4):
+        page.keyboard.press("ArrowLeft")
+    page.keyboard.press("Enter")
+    page.get_by_role("img", name="Profile of sound speed over 4 mm").wait_for()
+    page.keyboard.press("+")
+    page.wait_for_url(re.compile("view-z="))
+    page.keyboard.press("0")
+    page.wait_for_url(re.compile("^((?!view-z).)*$"))
+
+
+def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, serve, scan, work, monkeypatch):
+    address = serve()
+    volume = known((8, 6, 5))
+    ready(page, f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, volume)}")
+    slider = page.get_by_label("Slice across z")
+    slider.focus()
+    page.keyboard.press("ArrowRight")
+    page.get_by_text("Slice 3 of 0 to 4, z = 14 mm").wait_for()
+    node, value, _ = node_below(page, 0.45, 0.4)
+    assert value == volume[(*node, 3)]
+    page.get_by_label("Axis across the slice").select_option("x")
+    page.get_by_text("Slice 4 of 0 to 7, x = -6 mm").wait_for()
+    node, value, _ = node_below(page, 0.45, 0.4)
+    assert value == volume[(4, *node)]
+    page.get_by_label("Three planes").check()
+    expect(page.locator("canvas.plane")).to_have_count(3)
+    # A click on the plane across z sets the slices of the two others.
+    node, _, _ = node_below(page, 0.3, 0.3)
+    page.mouse.down()
+    page.mouse.up()
+    page.get_by_text(f"Slice {node[0]} of 0 to 7").wait_for()
+    page.get_by_text(f"Slice {node[1]} of 0 to 5").wait_for()
+
+
+def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, serve, scan, work, monkeypatch):
+    address = serve()
+    ready(page, f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, known((8, 6, 5)))}")
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
+    slider = page.get_by_label("Slice across z")
+    for index in (0, 4, 1):
+        slider.fill(str(index))
+        page.get_by_text(f"Slice {index} of 0 to 4").wait_for()
+    assert asked == []
+
+
+def test_a_result_is_exported_and_deleted(page, result):
+    ready(page, result)
+    page.get_by_text("Export", exact=True).click()
+    page.locator(".export select").select_option("coverage")
+    with page.expect_download() as download:
+        page.locator(".export").get_by_role("link", name="NumPy").click()
+    np.testing.assert_array_equal(np.load(download.value.path()), SPEED - 1300.0)
+    page.on("dialog", lambda dialog: dialog.accept())
+    expect(page.get_by_role("heading", name="Provenance")).to_be_visible()
+    page.get_by_role("button", name="Delete").click()
+    page.get_by_role("heading", name="Jobs").wait_for()
+    page.get_by_text("Nothing has run yet").wait_for()
