@@ -1,4 +1,4 @@
-"""The page of a result: values, colours, profile and region are those of the arrays; a link restores the view."""
+"""The page of a result: values, colours, profile and region are those of the arrays; links keep the view."""
 
 import csv
 import re
