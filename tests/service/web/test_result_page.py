@@ -246,6 +246,17 @@ def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, serve, sca
     assert asked == []
 
 
+def test_a_result_is_run_again_with_changes(page, result, work):
+    ready(page, result)
+    page.get_by_role("link", name="Run again with changes").click()
+    expect(page.get_by_label("Nodes per side")).to_have_value("16")
+    expect(page.get_by_label("SART")).to_be_checked()
+    page.get_by_label("Nodes per side").fill("20")
+    page.get_by_role("button", name="Start").click()
+    page.locator(".job").nth(1).get_by_text("succeeded").wait_for()
+    assert [call[1].nodes for call in work.calls] == [16, 20]
+
+
 def test_a_result_is_exported_and_deleted(page, result):
     ready(page, result)
     page.get_by_text("Export", exact=True).click()

@@ -35,7 +35,8 @@ async function openPage(first) {
   document.title = "Bentray";
   markMenu(found?.[2]);
   const root = make("div", "content");
-  at("page").replaceChildren(root);
+  const waiting = make("p", "loading", "Opening the page");
+  at("page").replaceChildren(waiting, root);
   if (!first) at("page").focus({ preventScroll: true });
   scrollTo(0, 0);
   try {
@@ -52,6 +53,8 @@ async function openPage(first) {
     const message = make("p", "error", error.message);
     message.setAttribute("role", "alert");
     root.replaceChildren(message);
+  } finally {
+    waiting.remove();
   }
 }
 

@@ -75,7 +75,19 @@ function factsOf(scan) {
   return `${scan.ntx} emitters × ${scan.nrx} receivers · ${times}${slices} · water ${scan.water_speed_mps.toFixed(1)} m/s`;
 }
 
-export async function open(root, { id }) {
+// The settings of an earlier job in the form, to run it again with changes.
+async function fillFrom(job) {
+  const { settings } = await request(`/v1/jobs/${job}`);
+  const { method, rays, nodes, iterations } = at("run").elements;
+  method.value = settings.method;
+  if (settings.rays) rays.value = settings.rays;
+  nodes.value = settings.nodes ?? "";
+  iterations.value = settings.iterations;
+  at("run-own").open = true;
+  showMethod();
+}
+
+export async function open(root, { id, query }) {
   const scan = await request(`/v1/datasets/${id}`);
   root.innerHTML = PAGE;
   document.title = `${titleOf(scan)} – Bentray`;
@@ -93,7 +105,8 @@ export async function open(root, { id }) {
   at("run").addEventListener("change", showMethod);
   showMethod();
   fillDefaults(at("run"), "Settings").then(
-    () => {
+    async () => {
+      if (query.has("from") && root.isConnected) await fillFrom(query.get("from")).catch((error) => showError("run-error", error));
       if (root.isConnected) at("start-own").disabled = false;
     },
     (error) => showError("run-error", error),

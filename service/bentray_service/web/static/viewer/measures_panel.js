@@ -36,7 +36,7 @@ export function measuresPanel(root, set) {
   const parts = {};
   for (const [name, title] of [["profile", "Profile"], ["region", "Region"]]) {
     const box = make("section", `measure ${name}`);
-    const head = make("h3", "", title);
+    const head = make("h2", "", title);
     const none = make("p", "facts", "");
     const place = make("div", "place");
     const inputs = ENDS.map((end) => {
