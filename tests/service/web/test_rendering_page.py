@@ -1,6 +1,8 @@
-"""Volume rendering: upload, view, turntable."""
+"""Volume rendering: upload, orbit, histogram, settings, turntable."""
 
 import re
+import time
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
@@ -17,6 +19,27 @@ def saved(tmp_path, values):
     return tmp_path / "ball.npy"
 
 
+def whole(page, **settings):
+    """The canvas with the full picture of a view."""
+    with_all = "".join(f"[data-address*='{name}={value}']" for name, value in settings.items())
+    canvas = page.locator(f"#glass[data-quality=full]{with_all}")
+    canvas.wait_for()
+    return canvas
+
+
+def settings_of(address):
+    return {name: values[0] for name, values in parse_qs(urlsplit(address).query).items()}
+
+
+@pytest.fixture
+def ball(page, serve, tmp_path):
+    page.goto(serve() + "/#/rendering")
+    page.set_input_files("#volume-file", saved(tmp_path, sampled(ONE_HOLE, 12)))
+    page.get_by_text("ball.npy is stored").wait_for()
+    whole(page)
+    return page
+
+
 def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, monkeypatch):
     monkeypatch.setattr(kinds, "draw_turntable", lambda *args, **control: args[3].write_bytes(b"pictures"))
     page.goto(serve() + "/#/rendering")
@@ -25,13 +48,20 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
     page.set_input_files("#volume-file", saved(tmp_path, sampled(ONE_HOLE, 12)))
     page.get_by_text("ball.npy is stored").wait_for()
     page.get_by_text(re.compile("^12 . 12 . 12 nodes")).wait_for()
+    # What is it? A lit surface comes first, glass second.
     image = page.get_by_role("img", name="Volume rendering of ball.npy")
-    expect(image).to_have_js_property("naturalWidth", 512)
-    assert image.get_attribute("src").endswith("/refraction.png?azimuth_deg=30&elevation_deg=20")
-    page.get_by_label("Iso-value").fill("0.4")
-    page.get_by_label("Azimuth").fill("75")
+    expect(image).to_have_attribute("data-address", re.compile("mode=shaded.*&width=512&height=512"))
+    page.get_by_label("Glass").check()
+    page.get_by_label("Iso-value", exact=True).fill("0.4")
+    page.get_by_label("Azimuth, degrees").fill("75")
+    page.get_by_label("Backdrop").select_option("warped picture")
+    page.get_by_label("Supersampling").select_option("real, more rays")
+    page.get_by_label("Smoothing").fill("0.5")
     page.get_by_label("Frames per turn").fill("7")
-    expect(image).to_have_attribute("src", re.compile("iso=0.4&azimuth_deg=75&"))
+    whole(page, mode="refract", iso="0.4", azimuth_deg="75", backdrop="warped-picture")
+    expect(image).to_have_attribute(
+        "data-address", re.compile("smoothing=0.5&.*supersampling=real&degree=2&")
+    )
     turn.click()
     job = page.locator(".job")
     job.get_by_text("7 frames of 512").wait_for()
@@ -43,13 +73,128 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
     assert download.value.path().read_bytes() == b"pictures"
 
 
-def test_display_errors_are_shown_as_text(page, serve, tmp_path):
+def test_the_filter_is_chosen(ball):
+    page = ball
+    page.route("**/*filter=*", lambda route: route.abort())
+    with page.expect_request(re.compile("refraction.png.*filter=catmull-rom&")):
+        page.get_by_label("Filter").select_option("catmull-rom")
+    expect(page.locator("#look-error")).to_have_text("The service does not answer.")
+    page.get_by_label("Filter").select_option("B-spline 3")
+    expect(page.locator("#look-error")).to_be_hidden()
+
+
+def test_dragging_turns_the_view_and_full_quality_follows(ball):
+    page = ball
+    before = whole(page, azimuth_deg="30").evaluate("canvas => canvas.toDataURL()")
+    box = page.locator("#stage").bounding_box()
+    page.mouse.move(box["x"] + 200, box["y"] + 200)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 140, box["y"] + 220)
+    # While the pointer rests on the picture the view rests, too.
+    page.locator("#glass[data-quality=preview], #glass[data-address*='azimuth_deg=60']").wait_for()
+    page.mouse.up()
+    canvas = whole(page, azimuth_deg="60", elevation_deg="30")
+    expect(canvas).to_have_js_property("width", 512)
+    assert canvas.evaluate("canvas => canvas.toDataURL()") != before
+    expect(page.get_by_label("Azimuth, degrees")).to_have_value("60")
+    assert page.get_by_role("img", name="azimuth 60°, elevation 30°").count() == 1
+
+
+def test_the_view_is_turned_by_keyboard_and_kept_in_the_address(ball):
+    page = ball
+    page.locator("#stage").focus()
+    for key in ("ArrowRight", "ArrowRight", "Shift+ArrowUp", "+"):
+        page.keyboard.press(key)
+    whole(page, azimuth_deg="40", elevation_deg="35", zoom="1.15")
+    page.get_by_label("Glass").check()
+    whole(page, mode="refract", azimuth_deg="40")
+    page.wait_for_url(re.compile("mode=refract"))
+    assert "azimuth_deg=40" in page.url
+    page.reload()
+    whole(page, mode="refract", azimuth_deg="40", elevation_deg="35", zoom="1.15")
+    page.locator("#stage").focus()
+    page.keyboard.press("Home")
+    whole(page, mode="refract", azimuth_deg="30", elevation_deg="20", zoom="1")
+
+
+def test_one_request_at_a_time_and_the_newest_view_wins(ball):
+    page = ball
+    requested, under_way, most = [], set(), []
+
+    def begin(request):
+        if "refraction.png" in request.url:
+            requested.append(request.url)
+            # A full picture is cancelled where the view moves on; a preview never is.
+            if "width=256" in request.url:
+                under_way.add(request)
+                most.append(len(under_way))
+
+    def slowly(route):
+        time.sleep(0.05)
+        route.continue_()
+
+    page.route("**/refraction.png*", slowly)
+    page.on("request", begin)
+    for name in ("requestfinished", "requestfailed"):
+        page.on(name, lambda request: under_way.discard(request))
+    page.get_by_label("Glass").check()
+    page.locator("#stage").focus()
+    for _ in range(60):
+        page.keyboard.press("ArrowRight")
+    whole(page, mode="refract", azimuth_deg="330")
+    views = [settings_of(one) for one in requested]
+    previews = [one for one in views if one["width"] == "256"]
+    assert max(most) == 1
+    assert 0 < len(previews) < 60
+    assert all((one["ray_spacing"], one["supersampling"]) == ("2", "none") for one in previews)
+    # Each is of a later view than the one before it, and the last is whole.
+    turned = [float(one["azimuth_deg"]) for one in previews]
+    assert turned == sorted(turned)
+    assert (views[-1]["width"], views[-1]["azimuth_deg"], views[-1]["supersampling"]) == (
+        "512",
+        "330",
+        "prss",
+    )
+
+
+def test_an_iso_value_is_chosen_by_its_histogram(page, serve, tmp_path):
+    values = np.round(200.0 * sampled(ONE_HOLE, 14)).astype(np.uint8)
     page.goto(serve() + "/#/rendering")
-    page.set_input_files("#volume-file", saved(tmp_path, sampled(ONE_HOLE, 12)))
-    page.get_by_text("ball.npy is stored").wait_for()
-    page.get_by_label("Iso-value").fill("7")
-    page.get_by_label("Iso-value").press("Tab")
+    page.set_input_files("#volume-file", saved(tmp_path, values))
+    histogram = page.get_by_role("img", name=re.compile(r"^Histogram of 2,744 nodes from 0 to 200"))
+    histogram.wait_for()
+    steps = histogram.locator("path").get_attribute("d").split("V")[1:-1]
+    counts, _ = np.histogram(values, 256)
+    heights = 60.0 - np.array([float(step.split("H")[0]) for step in steps])
+    expected = 60.0 * np.log1p(counts) / np.log1p(counts.max())
+    np.testing.assert_allclose(heights, expected, atol=0.006)
+    expect(page.get_by_label("Smoothing")).to_have_attribute("placeholder", "automatic: 30")
+    assert histogram.locator("line").count() == 1
+    slider = page.get_by_label("Iso-value by slider")
+    slider.focus()
+    slider.press("Home")
+    for _ in range(100):
+        slider.press("ArrowRight")
+    expect(page.get_by_label("Iso-value", exact=True)).to_have_value("40")
+    whole(page, iso="40")
+    assert float(histogram.locator("line").get_attribute("x1")) == pytest.approx(256 * 40 / 200)
+
+
+def test_no_sideways_scrolling_on_a_telephone(ball):
+    page = ball
+    page.set_viewport_size({"width": 360, "height": 740})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+
+
+def test_display_errors_are_shown_as_text(ball, tmp_path):
+    page = ball
+    page.get_by_label("Iso-value", exact=True).fill("7")
+    page.get_by_label("Iso-value", exact=True).press("Tab")
     expect(page.locator("#look-error")).to_contain_text("iso: found 7; accepted: ")
+    page.get_by_label("Iso-value", exact=True).fill("0.5")
+    page.get_by_label("Iso-value", exact=True).press("Tab")
+    whole(page, iso="0.5")
+    expect(page.locator("#look-error")).to_be_hidden()
     (tmp_path / "notes.txt").write_text("only text")
     page.set_input_files("#volume-file", tmp_path / "notes.txt")
     expect(page.locator("#volume-error")).to_contain_text("NRRD")

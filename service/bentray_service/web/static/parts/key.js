@@ -55,11 +55,12 @@ export function showOnceNear(image, address) {
   near.observe(image);
 }
 
-// A link cannot send a key either: what it leads to is fetched, and saved.
-export function withKey(anchor, address) {
+// A link cannot send a key either: what it leads to is fetched, and saved. Without an address it is that of the link.
+export function withKey(anchor, fixed) {
   anchor.addEventListener("click", async (event) => {
     if (!hasKey()) return;
     event.preventDefault();
+    const address = fixed ?? anchor.getAttribute("href");
     const saving = document.createElement("a");
     try {
       const blob = await blobOf(address);

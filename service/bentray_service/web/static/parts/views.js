@@ -19,6 +19,8 @@ export function glassOf({ water_speed_mps: water, value_range: [lowest, highest]
   };
 }
 
+// Lists repeat their name; what is null is left to the service.
 export function queryOf(view) {
-  return new URLSearchParams(Object.entries(view).flatMap(([name, value]) => [value].flat().map((one) => [name, one])));
+  const given = Object.entries(view).filter(([, value]) => value !== null);
+  return new URLSearchParams(given.flatMap(([name, value]) => [value].flat().map((one) => [name, one])));
 }
