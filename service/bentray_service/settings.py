@@ -119,7 +119,11 @@ class ServiceSettings(BaseSettings):
     requests_per_minute: int = Field(
         1200, ge=0, description="Rate limit per tenant with keys or a proxy; 0: unlimited."
     )
-    renders_per_minute: int = Field(240, ge=0, description="Rate limit for rendered images; 0: unlimited.")
+    renders_per_minute: int = Field(
+        240,
+        ge=0,
+        description="Rate limit for rendered images; those of few rays count less; 0: unlimited.",
+    )
     max_tenant_bytes: int = Field(100 * GIB, gt=0, description="Storage quota per tenant, in bytes.")
     log_format: Literal["text", "json"] = Field(
         "text", description="Log format: warnings as text, or all requests as lines of JSON."

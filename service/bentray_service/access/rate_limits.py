@@ -31,8 +31,8 @@ class RateLimits:
         self._lock = threading.Lock()
         self._buckets: dict[str, _TokenBucket] = {}
 
-    def take(self, tenant: str) -> float:
-        """0 if a request is allowed, else the seconds until the next one is."""
+    def take(self, tenant: str, share: float = 1.0) -> float:
+        """0 if a request is allowed, else the seconds until it is; one of little work counts a share."""
         if not self.per_minute:
             return 0.0
         with self._lock:
@@ -41,9 +41,9 @@ class RateLimits:
                 self._forget(now)
             bucket = self._buckets.setdefault(tenant, _TokenBucket(self.per_minute, now))
             bucket.left, bucket.seen = self._level(bucket, now), now
-            if bucket.left < 1.0:
-                return (1.0 - bucket.left) * 60.0 / self.per_minute
-            bucket.left -= 1.0
+            if bucket.left < share:
+                return (share - bucket.left) * 60.0 / self.per_minute
+            bucket.left -= share
             return 0.0
 
     def _level(self, bucket: _TokenBucket, now: float) -> float:

@@ -98,16 +98,20 @@ class SignIn:
             raise Forbidden("scope", has, f"{needed}, to {SCOPES[needed]}")
         self._take(self._requests, "requests", caller)
 
-    def check_render(self, caller: Caller) -> None:
+    def check_render(self, caller: Caller, share: float = 1.0) -> None:
         """Check the rate limit for rendered images.
+
+        Args:
+            caller: who requests it.
+            share: what it counts, at most 1.
 
         Raises:
             RateLimited: when it is exceeded.
         """
-        self._take(self._renders, "renders", caller)
+        self._take(self._renders, "renders", caller, share)
 
-    def _take(self, rates: RateLimits, what: str, caller: Caller) -> None:
-        wait_s = rates.take(caller.tenant) if caller.how != "open" else 0.0
+    def _take(self, rates: RateLimits, what: str, caller: Caller, share: float = 1.0) -> None:
+        wait_s = rates.take(caller.tenant, share) if caller.how != "open" else 0.0
         if wait_s > 0.0:
             raise RateLimited(
                 what, f"more than {rates.per_minute} per minute", "a lower rate; see Retry-After", wait_s

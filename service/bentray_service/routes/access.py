@@ -26,7 +26,9 @@ class AccessRecord(BaseModel):
     bytes_reserved: int = Field(description="Bytes reserved for uploads and unfinished jobs.")
     bytes_most: int = Field(description="Storage quota of the tenant, bytes.")
     requests_per_minute: int = Field(description="Rate limit of the tenant; 0: unlimited.")
-    renders_per_minute: int = Field(description="Rate limit for rendered images; 0: unlimited.")
+    renders_per_minute: int = Field(
+        description="Rate limit for rendered images; those of few rays count less; 0: unlimited."
+    )
 
 
 @router.get("", responses=problems(503))

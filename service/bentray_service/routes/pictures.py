@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import math
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, TypeVar
 
@@ -16,6 +17,10 @@ from ..wiring import caller_of, parts_of
 from .downloads import headers_of, unchanged, without_length
 
 Made = TypeVar("Made")
+
+# Rays of a picture that counts in full in the rate limit, and what the smallest one counts.
+WHOLE_RAYS = 2**18
+LEAST_SHARE = 0.1
 
 # Responses of a rendered image.
 PICTURE: dict[int | str, dict[str, Any]] = {
@@ -42,8 +47,15 @@ async def picture(
         return response
     if request.method == "HEAD":
         return without_length("image/png", headers_of(tag))
-    parts_of(request).sign_in.check_render(caller_of(request))
+    parts_of(request).sign_in.check_render(caller_of(request), _share(how))
     return Response(await while_connected(request, draw()), media_type="image/png", headers=headers_of(tag))
+
+
+def _share(how: Mapping[str, Any]) -> float:
+    """What a picture counts in the rate limit; a viewer that turns an object requests many small ones."""
+    times = how.get("rays", how.get("degree", 1) if how.get("supersampling") == "real" else 1)
+    rays = how.get("width", math.inf) * how.get("height", math.inf) * (times / how.get("ray_spacing", 1)) ** 2
+    return min(1.0, max(LEAST_SHARE, rays / WHOLE_RAYS))
 
 
 async def while_connected(request: Request, work: Awaitable[Made]) -> Made:

@@ -47,3 +47,12 @@ def test_full_buckets_are_dropped(monkeypatch):
     found.take("new")
     assert found.take("busy") == 0.0
     assert len(found._buckets) == 2
+
+
+def test_what_takes_little_work_counts_a_share():
+    clock = Clock()
+    found = RateLimits(60, clock)
+    assert {found.take("a", 0.125) for _ in range(479)} == {0.0}
+    assert found.take("a") == 0.875, "an eighth is left, and one a second comes"
+    assert found.take("a", 0.125) == 0.0
+    assert found.take("a", 0.125) == 0.125

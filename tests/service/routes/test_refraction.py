@@ -13,6 +13,7 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.result import Reconstruction
 from bentray_service import pictures
 from bentray_service.app import create_app
+from bentray_service.routes import pictures as routes_of_pictures
 from bentray_service.rows.ids import new_id
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
@@ -290,3 +291,14 @@ def test_a_picture_that_no_worker_takes_is_503(tmp_path, monkeypatch):
             answer = http.get(here, params=SMALL)
             assert (answer.status_code, answer.json()["type"]) == (503, "/problems/busy")
             busy.cancel()
+
+
+def test_previews_count_less_in_the_rate_limit(http, monkeypatch):
+    shares = []
+    sign_in = http.app.state.parts.sign_in
+    monkeypatch.setattr(sign_in, "check_render", lambda caller, share: shares.append(share))
+    here, side = put(http), {"iso": 0.5, "width": 64, "height": 64}
+    monkeypatch.setattr(routes_of_pictures, "WHOLE_RAYS", 2 * 64 * 64)
+    for more in ({}, {"supersampling": "real", "degree": 2}, {"ray_spacing": 2}, {"ray_spacing": 8}):
+        assert http.get(here, params={**side, **more}).status_code == 200
+    assert shares == [0.5, 1.0, 0.125, 0.1]
