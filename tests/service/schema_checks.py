@@ -25,6 +25,8 @@ VIEW = {
     "surroundings",
     # Only of B-splines.
     "smoothing",
+    # Not with real supersampling.
+    "ray_spacing",
     # Rays of the whole picture.
     "width, height, degree",
 }
@@ -66,7 +68,7 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
     # Of a reconstruction with attenuation, and of a format with one image.
     "GET /v1/volumes/{volume_id}/data": {422: {"quantity", "attenuation", "volume"}},
     "GET /v1/volumes/{volume_id}/refraction.png": {422: VIEW},
-    "GET /v1/geometry-fields/{field_id}/image.png": {422: {"width, height, rays"}},
+    "GET /v1/geometry-fields/{field_id}/image.png": {422: {"width, height, rays", "positions_m"}},
     # Within the volume's range; one that leaves two nodes.
     "POST /v1/volumes/{volume_id}/mesh": {422: {"iso", "step"}},
 }

@@ -123,13 +123,15 @@ OTHER = {
 
 
 def test_every_parameter_changes_the_tag(http, here):
-    assert set(OTHER) == {field.name for field in fields(FieldView)}
+    assert {*OTHER, "positions_m"} == {field.name for field in fields(FieldView)}
     tags = {http.head(f"{here}/image.png", params=SMALL).headers["etag"]}
     for name, value in OTHER.items():
         answer = http.head(f"{here}/image.png", params={**SMALL, name: value})
         assert answer.status_code == 200, answer.text
         tags.add(answer.headers["etag"])
-    assert len(tags) == len(OTHER) + 1
+    places = {"scene": "two-mirrors", "positions_m": [0.0, 1.0, 2.0, 3.0]}
+    tags.add(http.head(f"{here}/image.png", params={**SMALL, **places}).headers["etag"])
+    assert len(tags) == len(OTHER) + 2
 
 
 def test_published_lookups_are_drawn_or_rejected(http, here, monkeypatch):

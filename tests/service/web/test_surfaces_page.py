@@ -3,14 +3,65 @@
 import re
 from dataclasses import replace
 
+import httpx
+import numpy as np
 import pytest
 import trimesh
 from playwright.sync_api import expect
 
 from bentray_kernels.meshes.example_surfaces import torus
 from bentray_service.jobs import kinds
+from bentray_workers.rendering.field_scenes import PLACES, camera_of
+from bentray_workers.rendering.field_view import FieldView
 
 pytestmark = pytest.mark.browser
+
+
+def seen_at(view, place_m):
+    """u and v of a place in the picture of a view, by the service's own camera."""
+    camera = camera_of(view)
+    to = np.asarray(place_m) - camera.origin[0]
+    along, right, down = np.linalg.solve(camera.direction.T, to)
+    return right / along, down / along
+
+
+def drag_and_turn(page):
+    """Drag the first of two objects from its place over the ground to another one, then turn the view."""
+    view, height = FieldView(scene="two-mirrors"), 0.55
+    (x, y), other = PLACES["two-mirrors"]
+    goal = (-0.9, -0.4)
+    page.locator("#stage").evaluate("stage => stage.scrollIntoView({ block: 'center' })")
+    box = page.locator("#stage").bounding_box()
+
+    def pixel(place):
+        u, v = seen_at(view, (*place, height))
+        return box["x"] + (0.5 + u) * box["width"], box["y"] + (0.5 + v) * box["height"]
+
+    page.mouse.move(*pixel((x, y)))
+    page.mouse.down()
+    page.mouse.move(*pixel((-0.7, -0.1)))
+    page.mouse.move(*pixel(goal))
+    page.mouse.up()
+    for name, place in zip(("x", "y"), goal, strict=True):
+        found = page.get_by_label(f"Object 1, {name}, m").input_value()
+        assert float(found) == pytest.approx(place, abs=0.01)
+        expect(page.get_by_label(f"Object 2, {name}, m")).to_have_value(f"{other[name == 'y']:g}")
+    image = page.locator("#field-picture[data-quality=full][data-address*='positions_m']")
+    image.wait_for()
+    # Beside the objects the pointer turns the view, and keys do.
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 25, box["y"] + 5)
+    page.mouse.up()
+    expect(page.get_by_label("Azimuth, degrees")).to_have_value("-70")
+    page.locator("#stage").focus()
+    page.keyboard.press("ArrowUp")
+    expect(image).to_have_attribute("data-address", re.compile("azimuth_deg=-70&elevation_deg=20&"))
+    page.get_by_label("Object 2, x, m").fill("1.25")
+    page.get_by_label("Object 2, x, m").press("Tab")
+    expect(image).to_have_attribute("data-address", re.compile("positions_m=1.25&positions_m=-0.1&"))
+    page.set_viewport_size({"width": 360, "height": 740})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
 
 
 def test_a_mesh_is_uploaded_and_its_field_looked_at(page, serve, tmp_path, monkeypatch):
@@ -25,7 +76,8 @@ def test_a_mesh_is_uploaded_and_its_field_looked_at(page, serve, tmp_path, monke
     ring = torus(16, 10)
     content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
     (tmp_path / "ring.ply").write_bytes(content)
-    page.goto(serve() + "/#/surfaces")
+    address = serve()
+    page.goto(address + "/#/surfaces")
     make = page.get_by_role("button", name="Build the geometry field")
     expect(make).to_be_disabled()
     page.set_input_files("#mesh-file", tmp_path / "ring.ply")
@@ -37,13 +89,18 @@ def test_a_mesh_is_uploaded_and_its_field_looked_at(page, serve, tmp_path, monke
     job = page.locator(".job")
     job.get_by_role("heading", name="Geometry field").wait_for()
     job.get_by_text("6 samples per edge").wait_for()
-    image = page.get_by_role("img", name="ring.ply, reflect")
-    expect(image).to_have_js_property("naturalWidth", 512)
+    image = page.locator("#field-picture[data-quality=full]")
+    expect(image).to_have_js_property("width", 512)
+    expect(page.get_by_role("img", name="ring.ply, reflect")).to_have_count(1)
     assert job.get_by_role("link", name="Normal map").get_attribute("href").endswith("/normal-map.png")
-    page.get_by_label("Scene").select_option("two-mirrors")
-    page.get_by_label("Material").select_option("glass")
-    image = page.get_by_role("img", name="ring.ply, refract")
-    expect(image).to_have_attribute("src", re.compile("mode=refract&scene=two-mirrors&"))
+    figures = page.get_by_role("row", name="Geometry image off the surface, rms")
+    record = httpx.get(f"{address}/v1/geometry-fields").json()["geometry_fields"][0]
+    rms = float(figures.get_by_role("cell").inner_text().removesuffix(" %"))
+    assert rms == pytest.approx(100.0 * record["errors"]["image_rms"], rel=0.06)
+    page.locator("select[name=scene]").select_option("two-mirrors")
+    page.locator("select[name=mode]").select_option("glass")
+    expect(image).to_have_attribute("data-address", re.compile("mode=refract&scene=two-mirrors&"))
+    drag_and_turn(page)
     (tmp_path / "notes.txt").write_text("only text")
     page.set_input_files("#mesh-file", tmp_path / "notes.txt")
     expect(page.locator("#mesh-error")).to_contain_text("PLY")

@@ -1,7 +1,7 @@
 """Pictures of geometry fields: every scene, material and lookup; tiles; cached scenes."""
 
 import io
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from bentray_workers.files.geometry_image import GeometryMaps, read_geometry_ima
 from bentray_workers.rendering import field_cache, tiles
 from bentray_workers.rendering.field_cache import world_at
 from bentray_workers.rendering.field_picture import map_png, picture_png, tasks_of, tile_image
+from bentray_workers.rendering.field_scenes import PLACES
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.field_view import CHOICES, LOOKUPS, FieldView
 
@@ -44,6 +45,26 @@ def test_every_field_changes_the_picture(folder, name):
     seen = {picture.tobytes() for picture in pictures}
     # Rays that refract walk within the ring: of the lookups only those from outside differ there.
     assert len(seen) >= (2 if name in ("lookup", "eye") else len(values))
+
+
+@pytest.mark.parametrize("scene", ["mirror-ball", "two-mirrors"])
+def test_moved_objects_share_the_tables_and_are_where_they_were_put(folder, scene):
+    still = FieldView(scene=scene)
+    places = tuple(0.5 + place for pair in PLACES[scene] for place in pair)
+    before, after = world_at(folder, still), world_at(folder, replace(still, positions_m=places))
+    assert after.faces is before.faces
+    assert after.known is before.known
+    # All of them by half a metre along x and y, on the same ground; the inverse follows.
+    moved = after.to_world - before.to_world
+    expected = np.zeros_like(moved)
+    expected[:, :2, 3] = 0.5
+    np.testing.assert_allclose(moved, expected, atol=1e-12)
+    back = np.einsum("nij,nj->ni", after.to_local[:, :, :3], after.to_world[:, :, 3])
+    np.testing.assert_allclose(back, -after.to_local[:, :, 3], atol=1e-12)
+    np.testing.assert_array_equal(world_at(folder, still).to_world, before.to_world)
+    same = tuple(place for pair in PLACES[scene] for place in pair)
+    np.testing.assert_array_equal(drawn(folder, scene=scene), drawn(folder, scene=scene, positions_m=same))
+    assert (drawn(folder, scene=scene) != drawn(folder, scene=scene, positions_m=places)).any()
 
 
 def test_the_picture_has_its_size(folder):

@@ -14,6 +14,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables.inner_field import InnerField
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.geometry_field.tables.reference_field import ReferenceField, reference_field
+from bentray_kernels.geometry_field.tracing.moving import moved
 from bentray_kernels.geometry_field.tracing.packed_scene import World, world_of
 from bentray_kernels.geometry_field.tracing.scene import Shape
 from bentray_kernels.meshes.surface import surface_of
@@ -62,9 +63,10 @@ def world_at(folder: Path, view: FieldView) -> World:
     world: World = _WORLDS.get(
         (stamp, appearance),
         entries + surface_bytes + SCENE_BYTES,
-        lambda: world_of(scene_of(made.shape, made.texture, view)),
+        lambda: world_of(scene_of(made.shape, made.texture, replace(view, positions_m=()))),
     )
-    return world
+    # Objects that move share all tables with those that stand still.
+    return moved(world, scene_of(made.shape, made.texture, view)) if view.positions_m else world
 
 
 def _with_reference(files: FieldFiles, stamp: tuple[Path, int], made: Textured, pixels: int) -> Textured:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -22,6 +23,12 @@ CLAY, RED, BLUE, SILVER = (0.85, 0.62, 0.42), (0.85, 0.3, 0.22), (0.28, 0.42, 0.
 DARK = np.full((2, 4, 3), 0.06)
 GROUND = Ground(0.0, 0.5, 7.0, ((0.86, 0.84, 0.79), (0.32, 0.36, 0.42)))
 
+# Of the objects on the ground of each scene, m.
+PLACES = {
+    "object": (),
+    "mirror-ball": ((-0.85, -0.45), (0.85, -0.45), (0.0, 0.65)),
+    "two-mirrors": ((-0.6, 0.1), (0.6, -0.1)),
+}
 # Resolution of the reflecting ball.
 BALL = 96
 VIEW_DEG = 38.0
@@ -56,18 +63,25 @@ def scene_of(shape: Shape, texture: Floats | None, view: FieldView) -> Scene:
         return Scene(instances, DARK if view.mode == "self-only" else landscape())
     # The mesh is the first shape, so its tables are not copied.
     left, right = _material(view, CLAY, texture), _material(view, BLUE, texture)
+    places = places_of(view)
     if view.scene == "two-mirrors":
         pair = (
-            _upright(shape, view, (-0.6, 0.1), 1.1, 0.0, left),
-            _upright(shape, view, (0.6, -0.1), 1.1, 180.0, right),
+            _upright(shape, view, places[0], 1.1, 0.0, left),
+            _upright(shape, view, places[1], 1.1, 180.0, right),
         )
         return Scene(pair, landscape(), GROUND)
-    ball = Instance(_ball(), placed((0.0, 0.65, 0.75), 1.5), Material(colour=SILVER, mirror=0.9))
+    ball = Instance(_ball(), placed((*places[2], 0.75), 1.5), Material(colour=SILVER, mirror=0.9))
     both = (
-        _upright(shape, view, (-0.85, -0.45), 0.85, 0.0, left),
-        _upright(shape, view, (0.85, -0.45), 0.85, 90.0, _material(view, RED, texture)),
+        _upright(shape, view, places[0], 0.85, 0.0, left),
+        _upright(shape, view, places[1], 0.85, 90.0, _material(view, RED, texture)),
     )
     return Scene((*both, ball), landscape(), GROUND)
+
+
+def places_of(view: FieldView) -> Sequence[tuple[float, float]]:
+    """x and y of the objects on the ground, m."""
+    given = view.positions_m
+    return list(zip(given[::2], given[1::2], strict=True)) if given else PLACES[view.scene]
 
 
 def camera_of(view: FieldView) -> Camera:

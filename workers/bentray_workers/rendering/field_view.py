@@ -19,6 +19,11 @@ LOOKUPS = {
     "uv-nearest": "uv-nearest",
     "uv-linear": "uv-linear",
 }
+# Objects on the ground, by scene; a single object hovers.
+OBJECTS = {"object": 0, "mirror-ball": 3, "two-mirrors": 2}
+# Of an object from the centre of the ground, which has a radius of 7 m.
+POSITION_M = Range(-5.0, 5.0, unit="m")
+
 CHOICES = {
     "scene": ("object", "mirror-ball", "two-mirrors"),
     "mode": ("reflect", "refract", "refract-single", "self", "self-only", "diffuse"),
@@ -74,6 +79,13 @@ class FieldView:
     )
     zoom: float = setting(1.0, "1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
     up: Literal["z", "y"] = setting("z", "Axis of the mesh that is up.")
+    positions_m: tuple[float, ...] = setting(
+        (),
+        "x and y of each object on the ground, m, as x1, y1, x2, y2 and so on, the ball last; by default "
+        "those of the scene. A single object cannot be moved.",
+        schema={"items": {"type": "number", **POSITION_M.schema}, "maxItems": 2 * max(OBJECTS.values())},
+        unset="those of the scene",
+    )
     width: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
     height: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
     rays: int = setting(1, "Along each side of a pixel.", Range(1, 8))
@@ -81,6 +93,17 @@ class FieldView:
 
     def __post_init__(self) -> None:
         check(self, CHOICES)
+        numbers = 2 * OBJECTS[self.scene]
+        if len(self.positions_m) not in (0, numbers):
+            found = f"{len(self.positions_m)} numbers"
+            accepted = (
+                f"none, or {numbers}: x and y of each object"
+                if numbers
+                else "none: this scene has one object"
+            )
+            raise InvalidInput("positions_m", found, accepted)
+        for place in self.positions_m:
+            POSITION_M.check("positions_m", place)
         count = self.width * self.height * self.rays**2
         if count > MAX_RAYS:
             raise InvalidInput("width, height, rays", f"{count} rays", f"at most {MAX_RAYS}")
@@ -106,4 +129,4 @@ class FieldView:
 
     def plain(self) -> dict[str, Any]:
         """The fields as JSON values."""
-        return asdict(self)
+        return asdict(self) | {"positions_m": list(self.positions_m)}

@@ -41,6 +41,12 @@ VIEW = {
     "elevation_deg": Option("--elevation", float, "15.0", "Elevation of the camera, degrees."),
     "zoom": Option("--zoom", float, "1.0", "Zoom factor; 1 shows the whole scene."),
     "up": Option("--up", str, "z", "Upward axis of the mesh: z or y."),
+    "positions_m": Option(
+        "--position",
+        list[float],
+        "those of the scene",
+        "x and y of each object on the ground, m, in turn; repeatable.",
+    ),
     "width": Option("--width", int, "512", "Image width, pixels."),
     "height": Option("--height", int, "512", "Image height, pixels."),
     "rays": Option("--rays", int, "1", "Rays per side of a pixel."),
@@ -65,7 +71,10 @@ class FieldOptions:
         """The view; raises InvalidInput naming the first invalid field."""
         from bentray_workers.rendering.field_view import FieldView
 
-        return FieldView(**{name: value for name, value in self.given.items() if name in VIEW})
+        given: dict[str, Any] = {name: value for name, value in self.given.items() if name in VIEW}
+        if "positions_m" in given:
+            given["positions_m"] = tuple(given["positions_m"])
+        return FieldView(**given)
 
 
 with_field_options = with_options(OPTIONS, FieldOptions)

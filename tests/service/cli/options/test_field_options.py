@@ -16,7 +16,7 @@ from bentray_workers.rendering.field_view import CHOICES, FieldView
 def test_every_field_has_an_option_with_its_default(options, kind) -> None:
     assert list(options) == [field.name for field in fields(kind)]
     assert {name: option.default for name, option in options.items()} == {
-        field.name: str(field.default) for field in fields(kind)
+        field.name: field.metadata.get("unset") or str(field.default) for field in fields(kind)
     }
 
 
@@ -30,6 +30,8 @@ def test_each_option_sets_its_own_field() -> None:
     asked = FieldOptions({"samples": 8, "mode": "refract"})
     assert asked.settings() == FieldSettings(samples=8)
     assert asked.view() == FieldView(mode="refract")
+    placed = FieldOptions({"scene": "two-mirrors", "positions_m": [0.0, 1.0, 2.0, 3.0]})
+    assert placed.view().positions_m == (0.0, 1.0, 2.0, 3.0)
 
 
 def test_a_wrong_value_is_named() -> None:

@@ -1,0 +1,51 @@
+// Places on the ground of a scene of geometry fields: where the camera of the service sees a point of a picture.
+
+// As in bentray_workers.rendering.field_scenes: what the camera looks at, m, its angle, and the objects with their sizes, m.
+const VIEW_DEG = 38;
+const FRAMINGS = {
+  "mirror-ball": { centre: [0, 0.1, 0.55], radius: 1.6, objects: [["Object 1", -0.85, -0.45, 0.85], ["Object 2", 0.85, -0.45, 0.85], ["Ball", 0, 0.65, 1.5]] },
+  "two-mirrors": { centre: [0, 0, 0.45], radius: 1.3, objects: [["Object 1", -0.6, 0.1, 1.1], ["Object 2", 0.6, -0.1, 1.1]] },
+};
+
+// The movable objects of a scene: { name, x, y, size }, in the order of positions_m.
+export function objectsOf(scene) {
+  return (FRAMINGS[scene]?.objects ?? []).map(([name, x, y, size]) => ({ name, x, y, size }));
+}
+
+const radians = (degrees) => (degrees * Math.PI) / 180;
+const plus = (a, b, by) => a.map((one, axis) => one + by * b[axis]);
+
+function camera({ scene, azimuth_deg: azimuth, elevation_deg: elevation, zoom }) {
+  const { centre, radius } = FRAMINGS[scene];
+  const [a, e] = [radians(azimuth), radians(elevation)];
+  const towards = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)];
+  const right = [-Math.sin(a), Math.cos(a), 0];
+  const down = [Math.sin(e) * Math.cos(a), Math.sin(e) * Math.sin(a), -Math.cos(e)];
+  const away = radius / Math.sin(radians(VIEW_DEG / 2));
+  return { eye: plus(centre, towards, away), ahead: towards.map((one) => -one), right, down, wide: (2 * Math.tan(radians(VIEW_DEG / 2))) / zoom };
+}
+
+// The place at a height, m, that a point of a square picture shows, u and v from -1/2 to 1/2 right and down; null beyond the
+// horizon.
+export function placeAt(view, u, v, height) {
+  const { eye, ahead, right, down, wide } = camera(view);
+  const along = plus(plus(ahead, right, u * wide), down, v * wide);
+  const far = (height - eye[2]) / along[2];
+  return far > 0 && Number.isFinite(far) ? plus(eye, along, far).slice(0, 2) : null;
+}
+
+// The object nearest to the eye that a point of the picture shows, taken as balls; -1 for none.
+export function objectAt(view, objects, u, v) {
+  const { eye, ahead, right, down, wide } = camera(view);
+  const along = plus(plus(ahead, right, u * wide), down, v * wide);
+  const length = Math.hypot(...along);
+  let found = -1;
+  let nearest = Infinity;
+  objects.forEach(({ x, y, size }, number) => {
+    const to = [x - eye[0], y - eye[1], size / 2 - eye[2]];
+    const far = to.reduce((sum, one, axis) => sum + one * along[axis], 0) / length;
+    const apart = Math.sqrt(Math.max(0, to.reduce((sum, one) => sum + one * one, 0) - far * far));
+    if (apart < size / 2 && far < nearest) [found, nearest] = [number, far];
+  });
+  return found;
+}
