@@ -33,7 +33,8 @@ PACKING = 2
 ACCEPTED = {
     "dataset": "a scan as uct-transmission, zea or openUSCT (HDF5), MATLAB 5 or 7.3, .npz of arrays, or a "
     "zip of k-Wave outputs or of a measurement of KIT 3D USCT",
-    "volume": "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype",
+    "volume": "a volume as NumPy (.npy, .npz), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and "
+    "dtype",
     "mesh": "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB",
 }
 

@@ -125,10 +125,48 @@ def test_rejects_invalid_input_with_a_reason(tmp_path, content, field, found):
     assert error.accepted
 
 
-def test_an_archive_of_arrays_is_rejected(tmp_path):
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_the_volume_of_an_archive(tmp_path, save, order):
+    values = np.asarray(ramp(dtype="<u2"), order=order)
+    save(tmp_path / "v.npz", volume=values, spacing=np.ones(3), note=np.array("a teapot"))
+    volume = import_volume(tmp_path / "v.npz", VolumeMetadata(spacing_m=(2e-3,)))
+    np.testing.assert_array_equal(volume.values, values)
+    assert volume.spacing_m == (2e-3,) * 3
+
+
+@pytest.mark.parametrize(
+    ("members", "field", "found"),
+    [
+        ({}, "file", "0 arrays with three dimensions (shapes none)"),
+        ({"a.txt": b"text"}, "file", "0 arrays"),
+        ({"a.npy": saved(np.ones(3))}, "file", "(shapes (3,))"),
+        ({"a.npy": saved(ramp()), "b.npy": saved(ramp())}, "file", "2 arrays with three dimensions"),
+        ({"a.npy": saved(np.zeros((2, 2, 2), complex))}, "values", "complex"),
+        ({"a.npy": saved(np.array([[[{}] * 2] * 2] * 2))}, "values", "Python objects"),
+        ({"a.npy": saved(ramp())[:-1]}, "file", "59 bytes of values"),
+        ({"a.npy": saved(ramp()) + b"more"}, "file", "more data after the values"),
+        ({"a.npy": HUGE}, "values", "281474976710656 bytes"),
+        ({"a.npy": b"no array"}, "file", "damaged"),
+        ({f"{n}.npy": b"" for n in range(101)}, "file", "101 arrays"),
+    ],
+)
+def test_archives_without_one_volume_are_rejected(tmp_path, members, field, found):
     with zipfile.ZipFile(tmp_path / "v.npz", "w") as archive:
-        archive.writestr("a.npy", saved(ramp()))
-    assert "another kind" in refused(tmp_path / "v.npz").value
+        for name, content in members.items():
+            archive.writestr(name, content)
+        # An empty archive begins with the directory.
+        archive.writestr("last", b"")
+    error = refused(tmp_path / "v.npz")
+    assert (error.field, found in error.value) == (field, True), error
+
+
+def test_a_damaged_archive_is_rejected(tmp_path):
+    np.savez_compressed(tmp_path / "v.npz", volume=np.random.default_rng(0).integers(0, 255, (9, 9, 9)))
+    content = (tmp_path / "v.npz").read_bytes()
+    for damaged in (content[:-40], content[:200] + bytes(50) + content[250:]):
+        (tmp_path / "v.npz").write_bytes(damaged)
+        assert refused(tmp_path / "v.npz").field in ("file", "values")
 
 
 def test_no_file(tmp_path):

@@ -17,11 +17,13 @@ from .damage import rejecting_damage
 from .hdf5_reading import SIGNATURE, Limits, opened, printable
 from .nifti_reading import read_nifti
 from .npy_headers import PARSING
+from .npz_reading import START as NPZ
+from .npz_reading import read_npz
 from .nrrd_reading import read_nrrd
 from .reconstruction_format import FORMAT as RECONSTRUCTION
 from .volume import FORMAT, Volume, volume_in
 
-ACCEPTED = "a volume as NumPy (.npy), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype"
+ACCEPTED = "a volume as NumPy (.npy, .npz), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype"
 
 # Default spacing, m.
 SPACING_M = 1e-3
@@ -82,6 +84,8 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: VolumeMetadata, chec
         return _raw(path, given, check)
     if start.startswith(b"\x93NUMPY"):
         return _numpy(path, file, given, check)
+    if start.startswith(NPZ):
+        return Volume.of(read_npz(file, check), _spacing(given))
     if given.spacing_m is not None:
         raise InvalidInput(
             "spacing_m", given.spacing_m, "nothing: this file contains it, or has no known format"

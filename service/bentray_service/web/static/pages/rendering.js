@@ -33,7 +33,7 @@ const PAGE = `
       <p id="look-error" class="error" role="alert" hidden></p>
     </div>
     <div>
-      <div id="volume-place" data-prompt="Choose a volume" data-formats="NumPy, NRRD, NIfTI or HDF5 of Bentray"></div>
+      <div id="volume-place" data-prompt="Choose a volume" data-formats="NumPy (.npy, .npz), NRRD, NIfTI or HDF5 of Bentray"></div>
       <label for="volume" class="caption">Volume to render</label>
       <select id="volume" disabled><option value="">No 3-D volume yet</option></select>
       <p id="volume-facts" class="facts"></p>
