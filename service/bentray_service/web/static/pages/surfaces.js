@@ -88,7 +88,13 @@ function factsOf({ faces, closed, holes, genus, repairs }) {
   return `${faces} faces · ${form} · ${genus} ${genus === 1 ? "handle" : "handles"}${mended}`;
 }
 
-const percent = (share) => (share === null ? "no ray hits the mesh" : `${Number((100 * share).toPrecision(2))} %`);
+// Below this share rounding decides.
+const SMALLEST = 1e-5;
+
+function percent(share) {
+  if (share === null) return "no ray hits the mesh";
+  return share > 0 && share < SMALLEST ? `below ${100 * SMALLEST} %` : `${Number((100 * share).toPrecision(2))} %`;
+}
 
 // The errors of a field in words, lengths in per cent of the edge of its unit cube.
 function accuracyTable({ errors, sizes, seconds, settings }) {
