@@ -9,7 +9,7 @@ import io
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -169,9 +169,28 @@ def overview() -> Image.Image:
 def viewer(
     scan: Dataset | None = None,
     settings: Mapping[str, Any] = MappingProxyType({"method": "sart", "nodes": 96}),
-    size: tuple[int, int] = (1100, 780),
+    size: tuple[int, int] = (1200, 1180),
 ) -> Image.Image:
-    """The web page with one finished job."""
+    """The page of a result, with a profile and a region."""
+    marks = "profile=-75,0,75,0&ellipse=-12,12,18,44"
+    return _page(scan, [settings], size, lambda jobs: f"#/jobs/{jobs[0]}?{marks}")
+
+
+def comparison() -> Image.Image:
+    """The page that compares straight with bent rays."""
+    ways: list[Mapping[str, Any]] = [
+        {"method": "sart", "nodes": 96, "rays": rays} for rays in ("straight", "curved")
+    ]
+    return _page(None, ways, (1200, 1080), lambda jobs: f"#/compare/{','.join(jobs)}?profile=-75,0,75,0")
+
+
+def _page(
+    scan: Dataset | None,
+    ways: Sequence[Mapping[str, Any]],
+    size: tuple[int, int],
+    address_of: Callable[[list[str]], str],
+) -> Image.Image:
+    """The web page with the results of a scan in these ways."""
     from playwright.sync_api import sync_playwright
 
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
@@ -179,14 +198,13 @@ def viewer(
         usual = SimulationSettings(nodes=96, elements=64, coupling_mps=1375.0)
         write_dataset(file, scan or simulate(usual, lambda _: None))
         with running_service(Path(folder) / "data", Path(folder) / "log") as url, Client(url) as client:
-            client.wait(client.submit(client.upload(file).id, dict(settings)).id)
+            uploaded = client.upload(file).id
+            jobs = [client.wait(client.submit(uploaded, dict(one)).id).id for one in ways]
             browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
             page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-            page.goto(f"{url}/#/jobs")
-            page.get_by_text("succeeded").first.wait_for()
-            image = page.locator("#jobs img").first
-            page.locator("main").evaluate("one => one.scrollIntoView()")
-            page.wait_for_function("one => one.complete && one.naturalWidth > 0", arg=image.element_handle())
+            page.goto(f"{url}/{address_of(jobs)}")
+            page.locator(".readout").filter(has_text="m/s").wait_for()
+            page.get_by_text("ready, ").wait_for()
             shot = page.screenshot()
             browser.close()
     return Image.open(io.BytesIO(shot))
@@ -235,7 +253,7 @@ def _drawn(figure: Figure) -> Image.Image:
 
 
 PICTURES: dict[str, Callable[[], Image.Image]] = {
-    one.__name__: one for one in (overview, fronts, coupling, fresnel, glass, mesh, viewer)
+    one.__name__: one for one in (overview, fronts, coupling, fresnel, glass, mesh, viewer, comparison)
 }
 
 

@@ -101,7 +101,7 @@ export async function admitted(request) {
   try {
     const { tenant, how, scopes } = await request("/v1/access");
     at("access").textContent =
-      how === "open" ? "Open to this machine; no key needed" : `Tenant ${tenant} (${scopes.join(", ")})`;
+      how === "open" ? "Open to this machine" : `Tenant ${tenant} (${scopes.join(", ")})`;
     return true;
   } catch (error) {
     // Other errors than a missing key are shown with their reason.

@@ -64,7 +64,9 @@ export function choiceTable({ candidates, reason }, job) {
   const area = scrolled(table);
   area.setAttribute("role", "region");
   area.setAttribute("aria-label", "Candidates of the automatic choice");
-  return section("Automatic choice", make("p", "", reason), area);
+  const box = section("Automatic choice", make("p", "", reason), area);
+  box.classList.add("whole-row");
+  return box;
 }
 
 export function planTable({ plan }) {
