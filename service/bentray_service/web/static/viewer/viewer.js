@@ -26,7 +26,7 @@ const KEYS = `
 const PAGE = `
   <div class="viewer-bar">
     <div class="choice-bar quantities" role="group" aria-label="Quantity"></div>
-    <div class="choice-bar modes" role="group" aria-label="Comparison" hidden></div>
+    <div class="choice-bar comparison-modes" role="group" aria-label="Comparison" hidden></div>
   </div>
   <p class="error" role="alert" hidden></p>
   <p class="loading" role="status" hidden></p>
@@ -58,7 +58,6 @@ const PAGE = `
 // Returns { close, state }.
 export function viewer(root, panes, state, keep) {
   root.innerHTML = PAGE;
-  root.classList.add("viewer");
   const find = (selector) => root.querySelector(selector);
   const names = shownOf(panes.map((one) => one.stored).reduce((all, mine) => all.filter((one) => mine.includes(one))));
   if (!names.includes(state.quantity)) [state.quantity] = names;
@@ -385,8 +384,8 @@ export function viewer(root, panes, state, keep) {
     load();
   });
   if (panes.length > 1) {
-    find(".modes").hidden = false;
-    choices(find(".modes"), Object.entries(MODES), state.mode, (mode) => {
+    find(".comparison-modes").hidden = false;
+    choices(find(".comparison-modes"), Object.entries(MODES), state.mode, (mode) => {
       Object.assign(state, { mode, window: null, map: null });
       rebuild();
     });
