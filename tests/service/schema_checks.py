@@ -65,6 +65,10 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
         # value, of a reconstruction the others.
         422: {"axis", "index", "low", "high", "size", "quantity"}
     },
+    # Value of an upload, the others of a reconstruction that has them.
+    "GET /v1/volumes/{volume_id}/histogram": {422: {"quantity"}},
+    # Of reconstructions alone.
+    "GET /v1/volumes/{volume_id}/summary": {422: {"volume"}},
     # Of a reconstruction with attenuation, and of a format with one image.
     "GET /v1/volumes/{volume_id}/data": {422: {"quantity", "attenuation", "volume"}},
     "GET /v1/volumes/{volume_id}/refraction.png": {422: VIEW},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import secrets
 import subprocess
@@ -24,6 +25,7 @@ STREAM = {"Content-Type": "application/octet-stream"}
 HERE = Path(__file__).parent
 
 # Every check of schemathesis is on but two, in whose place ours of schema_checks stand.
+METHODS = ("get", "post", "put", "patch", "delete", "head", "options", "trace")
 CONFIG = """
 base-url = "{address}"
 hooks = "schema_checks"
@@ -124,7 +126,11 @@ def test_every_answer_is_one_of_those_described(attack):
     failed, words = attack("--generation-deterministic", f"--max-examples={effort(1, 4)}", more=MANY)
     assert not failed, words
     # Every operation was asked, and what was made was followed by its links: read, deleted, read again.
-    assert "Tested: 39" in words
+    operations = sum(
+        method in METHODS for path in json.loads(description())["paths"].values() for method in path
+    )
+    assert operations > 35
+    assert f"Tested: {operations}" in words
     assert "Stateful" in words
 
 
