@@ -37,6 +37,8 @@ SLOW_S, USUAL_S = 10.0, 0.13
 LONG_S = {
     "faults/test_kills.py": 60.0,
     "deploy/test_installation.py": 40.0,
+    "service/web/test_result_page.py": 25.0,
+    "service/web/test_every_page.py": 20.0,
     "service/web/test_scan_page.py": 15.0,
     "service/web/test_shell.py": 12.0,
     "service/web/test_surfaces_page.py": 10.0,

@@ -1,8 +1,11 @@
 """The page of a result: values, colours, profile and region are those of the arrays; links keep the view."""
 
 import csv
+import io
 import re
+import shlex
 
+import httpx
 import numpy as np
 import pytest
 from matplotlib import colormaps
@@ -255,6 +258,25 @@ def test_a_result_is_run_again_with_changes(page, result, work):
     page.get_by_role("button", name="Start").click()
     page.locator(".job").nth(1).get_by_text("succeeded").wait_for()
     assert [call[1].nodes for call in work.calls] == [16, 20]
+
+
+def test_the_copied_code_reads_the_values(page, result):
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    ready(page, result)
+    page.get_by_role("button", name="Coverage").click()
+    page.locator(".colour-bar").get_by_text("ray length per node (m)").wait_for()
+    page.get_by_role("button", name="Copy as Python").click()
+    page.get_by_role("button", name="Copied").wait_for()
+    names = {}
+    exec(page.evaluate("navigator.clipboard.readText()"), names)
+    np.testing.assert_array_equal(names["values"], SPEED - 1300.0)
+    np.testing.assert_allclose(names["x"], X0 + DX * np.arange(24))
+    page.get_by_role("button", name="Copy as curl").click()
+    page.get_by_role("button", name="Copied").last.wait_for()
+    page.wait_for_function("async () => (await navigator.clipboard.readText()).startsWith('curl')")
+    words = shlex.split(page.evaluate("navigator.clipboard.readText()"))
+    assert words[:3] == ["curl", "-o", "coverage.npy"]
+    np.testing.assert_array_equal(np.load(io.BytesIO(httpx.get(words[3]).content)), SPEED - 1300.0)
 
 
 def test_a_result_is_exported_and_deleted(page, result):
