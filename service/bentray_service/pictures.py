@@ -21,6 +21,7 @@ from bentray_workers.images import drawing_tasks
 from bentray_workers.images.result_summary import result_summary
 from bentray_workers.images.truth_export import export_truth
 from bentray_workers.reconstruction.quality_report import quality_page, quality_report
+from bentray_workers.reconstruction.scan_views import emission_traces, scan_geometry
 from bentray_workers.rendering import field_picture, picture_cost, refraction
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.histogram import volume_histogram
@@ -130,6 +131,18 @@ class Pictures:
         """Render the quality report of a dataset."""
         what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
         return bytes(await self._one(tenant, what, path, quality_page, {"picker": picker}))
+
+    async def scan_geometry(self, tenant: Tenant, dataset: DatasetRow, path: Path) -> dict[str, Any]:
+        """Read the geometry of a dataset, see ``bentray_workers.reconstruction.scan_views``."""
+        what = "dataset", str(dataset["id"]), picture_cost.geometry_cost(dataset)
+        return dict(await self._one(tenant, what, path, scan_geometry, {}))
+
+    async def emission_traces(
+        self, tenant: Tenant, dataset: DatasetRow, path: Path, how: dict[str, Any]
+    ) -> dict[str, Any]:
+        """Read the traces of one emission; ``how``: arguments of ``scan_views.emission_traces``."""
+        what = "dataset", str(dataset["id"]), picture_cost.emission_cost(dataset)
+        return dict(await self._one(tenant, what, path, emission_traces, how))
 
     async def mesh_volume(
         self, tenant: Tenant, volume: VolumeRow, path: Path, iso: float | None, step: int, target: Path

@@ -13,7 +13,7 @@ from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
 from ..files.deletion import StoredItem
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service
-from . import quality
+from . import quality, scan_views
 from .bodies import Limit, accept_media_types
 from .downloads import download, download_of
 from .models.job_records import DatasetList, DatasetRecord
@@ -30,6 +30,7 @@ UNIT = "^(" + "|".join(UNITS) + ")$"
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 router.include_router(quality.router)
+router.include_router(scan_views.router)
 
 
 @router.post(

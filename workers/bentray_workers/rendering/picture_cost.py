@@ -15,6 +15,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..cluster.capacities import MIB, WorkerCapacity
 from ..cluster.resources import RECONSTRUCTION, RENDER
+from ..files.dataset.counts import BLOCK_BYTES
 from .field_tasks import FACE_BYTES
 from .field_view import FieldView
 from .refraction_view import RefractionView
@@ -152,6 +153,19 @@ def quality_cost(dataset: Mapping[str, Any]) -> Cost:
     emission = 16 * traces // max(1, int(dataset["ntx"]) * int(dataset["slices"]))
     seconds = 1.0 + traces / TRACE_BYTES_PER_S + 2e-6 * pairs
     return Cost(seconds, 2 * FLOOR_BYTES + DRAWN_BYTES * USUAL_SIZE**2 + emission + 256 * pairs)
+
+
+def geometry_cost(dataset: Mapping[str, Any]) -> Cost:
+    """Cost of reading a scan without its traces."""
+    pairs = int(dataset["ntx"]) * int(dataset["nrx"]) * int(dataset["slices"])
+    return Cost(FLOOR_SECONDS + 1e-7 * pairs, FLOOR_BYTES + 64 * pairs)
+
+
+def emission_cost(dataset: Mapping[str, Any]) -> Cost:
+    """Cost of the traces of one emission, of which the chunks that hold it are read."""
+    whole = geometry_cost(dataset)
+    emission = int(dataset["bytes"]) // max(1, int(dataset["ntx"]) * int(dataset["slices"]))
+    return Cost(whole.seconds + emission / TRACE_BYTES_PER_S, whole.bytes + 2 * BLOCK_BYTES + 16 * emission)
 
 
 def mesh_cost(stored: VolumeFile) -> Cost:

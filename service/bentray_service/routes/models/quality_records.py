@@ -39,3 +39,49 @@ class QualityRecord(BaseModel):
         {}, description="Checks that do not apply to the array, and the reason of each."
     )
     findings: list[FindingRecord]
+
+
+class GeometryRecord(BaseModel):
+    """Elements, acquisition and water of a scan."""
+
+    array_type: str
+    radius_m: float | None
+    every: int = Field(description="1: all elements are listed; n: every n-th.")
+    position_m: list[list[float]] = Field(description="Positions of the listed elements, m.")
+    emits: list[bool] = Field(description="Whether each of them emits.")
+    receives: list[bool] = Field(description="Whether each of them receives.")
+    slice_z_m: list[float] = Field(description="Heights of the ring, m; empty for a plain scan.")
+    center_frequency_hz: float | None
+    frequency_estimated: bool = Field(description="Whether it was estimated from the traces.")
+    sampling_rate_hz: float | None
+    t0_s: float = Field(description="Time of the first sample after the emission, s.")
+    samples: int = Field(description="Samples of each trace; 0 without traces.")
+    water_speed_mps: float
+    water_temperature_c: float | None
+    water_assumed: bool = Field(description="Whether nobody stated the water.")
+    pairs: int = Field(description="Pairs of different elements, over all slices.")
+    timed_pairs: int | None = Field(
+        description="Pairs with a valid travel time in the file; null for a scan with traces alone."
+    )
+
+
+class EmissionRecord(BaseModel):
+    """Traces of one emission, reduced to the size of a screen, and arrival times."""
+
+    emission: int
+    element: int = Field(description="Index of its element.")
+    slice: int
+    quantity: Literal["object", "water"]
+    receivers: int = Field(description="Traces, of evenly chosen receivers.")
+    samples: int = Field(description="Samples of each trace; each is the largest of a block.")
+    receiver_element: list[int] = Field(description="Indices of the elements of these receivers.")
+    first_s: float = Field(description="Time of the first sample, s.")
+    step_s: float = Field(description="Time between samples, s.")
+    traces: str = Field(
+        description="Base64 of float32, little endian, (receivers, samples); each trace divided by its peak."
+    )
+    straight_s: list[float] = Field(description="Arrivals along a straight line in water, s.")
+    pick_s: list[float | None] | None = Field(
+        description="Arrivals with the object, s; null without an arrival, or without a water shot."
+    )
+    picker: str = Field(description="Picker of these arrivals; empty for times of the file.")

@@ -1,0 +1,53 @@
+"""/v1/datasets/{id}/geometry and /traces: what the page of a scan draws."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends, Query, Request
+from starlette.concurrency import run_in_threadpool
+
+from ..web.errors import problems
+from ..wiring import CallerTenant, Service
+from .models.quality_records import EmissionRecord, GeometryRecord
+from .pictures import while_connected
+from .quality import check_render_rate
+
+router = APIRouter()
+
+
+@router.get(
+    "/{dataset_id}/geometry",
+    responses=problems(404, 422, 429, 503),
+    dependencies=[Depends(check_render_rate)],
+)
+async def show_geometry(
+    dataset_id: str, request: Request, service: Service, tenant: CallerTenant
+) -> GeometryRecord:
+    """Show the elements, the acquisition and the water of a scan, read by a worker."""
+    dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
+    path = service.files.of(tenant).dataset(dataset["id"])
+    work = service.pictures.scan_geometry(tenant, dataset, path)
+    return GeometryRecord.model_validate(await while_connected(request, work))
+
+
+@router.get(
+    "/{dataset_id}/traces", responses=problems(404, 422, 429, 503), dependencies=[Depends(check_render_rate)]
+)
+async def show_traces(
+    dataset_id: str,
+    request: Request,
+    service: Service,
+    tenant: CallerTenant,
+    emission: Annotated[int, Query(ge=0, description="Index of the emission, from 0.")] = 0,
+    slice: Annotated[int, Query(ge=0, description="Index of the slice, from 0.")] = 0,  # noqa: A002
+    quantity: Annotated[
+        Literal["object", "water"], Query(description="Traces with the object, or of the water shot.")
+    ] = "object",
+) -> EmissionRecord:
+    """Show the traces of one emission, at most 512 receivers and 1024 samples, and their picks."""
+    dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
+    path = service.files.of(tenant).dataset(dataset["id"])
+    how = {"emission": emission, "index": slice, "what": quantity}
+    work = service.pictures.emission_traces(tenant, dataset, path, how)
+    return EmissionRecord.model_validate(await while_connected(request, work))

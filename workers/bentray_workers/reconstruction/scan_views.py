@@ -1,0 +1,149 @@
+"""Views of a stored scan for a person: its geometry, and the traces of one emission with their picks."""
+
+from __future__ import annotations
+
+import base64
+import math
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.picking.first_arrivals import reach_of, read_times, screen_times
+from bentray_kernels.arrays import Floats
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.picker_names import DEFAULT_PICKER
+
+from ..files.dataset import read_dataset
+from ..files.dataset.scan import spectrum_of
+from ..files.dataset.traces import open_slice, trace_samples
+
+# Elements of a drawing, and receivers and samples of the traces of a view; of more, every n-th is taken.
+MAX_ELEMENTS, MAX_RECEIVERS, MAX_SAMPLES = 4096, 512, 1024
+
+
+def scan_geometry(path: Path) -> dict[str, Any]:
+    """Task: elements, acquisition and water of a dataset file, as JSON values.
+
+    Raises:
+        InvalidInput: as ``read_dataset``.
+    """
+    scan = read_dataset(path, traces=False)
+    spectrum = None
+    # Traces without a pulse are a finding of the quality report.
+    with suppress(InvalidInput):
+        spectrum = spectrum_of(path, scan)
+    frequency = scan.center_frequency_hz if spectrum is None else spectrum.center_frequency_hz
+    every = max(1, math.ceil(len(scan.element_position_m) / MAX_ELEMENTS))
+    shown = np.arange(0, len(scan.element_position_m), every)
+    same = int((scan.tx[:, None] == scan.rx[None, :]).sum())
+    pairs = scan.slices * (len(scan.tx) * len(scan.rx) - same)
+    return {
+        "array_type": scan.array_type,
+        "radius_m": scan.radius_m,
+        "every": every,
+        "position_m": scan.element_position_m[shown].tolist(),
+        "emits": np.isin(shown, scan.tx).tolist(),
+        "receives": np.isin(shown, scan.rx).tolist(),
+        "slice_z_m": [] if scan.slice_z_m is None else scan.slice_z_m.tolist(),
+        "center_frequency_hz": frequency,
+        "frequency_estimated": spectrum is not None,
+        "sampling_rate_hz": scan.sampling_rate_hz,
+        "t0_s": scan.t0_s,
+        "samples": trace_samples(path),
+        "water_speed_mps": scan.water_speed_mps,
+        "water_temperature_c": scan.water_temperature_c,
+        "water_assumed": scan.water_temperature_assumed,
+        "pairs": pairs,
+        "timed_pairs": int(np.isfinite(scan.differential_tof()).sum()) if scan.picked else None,
+    }
+
+
+def emission_traces(path: Path, *, emission: int, index: int, what: str) -> dict[str, Any]:
+    """Task: the traces of one emission, reduced to a size for a screen, and the arrival times.
+
+    Of several samples that fall on one, the one with the largest magnitude is kept, so that no peak is lost.
+
+    Args:
+        path: of the dataset file.
+        emission: index into ``acquisition/tx``.
+        index: of the slice.
+        what: ``object`` or ``water``.
+
+    Returns:
+        JSON values: ``traces`` is base64 of float32, little endian, (receivers, samples), each trace divided
+        by its peak. ``straight_s`` and ``pick_s``: arrivals in water, and with the object; None without.
+
+    Raises:
+        InvalidInput: naming ``emission``, ``slice`` or ``quantity``; as ``read_dataset``.
+    """
+    scan = read_dataset(path, traces=False)
+    for name, value, count in (("emission", emission, len(scan.tx)), ("slice", index, scan.slices)):
+        if not 0 <= value < count:
+            raise InvalidInput(name, value, f"0 to {count - 1}")
+    with open_slice(path, scan, index) as one:
+        traces = None if one.waveform is None else getattr(one.waveform, what)
+        if traces is None or one.sampling_rate_hz is None:
+            found = f"{what!r}, of which the scan has no traces"
+            raise InvalidInput("quantity", found, "object or water, whichever the scan has; see the geometry")
+        shot = np.asarray(traces[emission], dtype=np.float32)
+        picks, picker = _picks(path, one, emission)
+        rate, first = one.sampling_rate_hz, one.t0_s
+    straight = scan.distance_m()[emission] / scan.water_speed_mps
+    every = max(1, math.ceil(shot.shape[0] / MAX_RECEIVERS))
+    block = max(1, math.ceil(shot.shape[1] / MAX_SAMPLES))
+    receivers = np.arange(0, shot.shape[0], every)
+    reduced = _reduced(shot[receivers], block)
+    return {
+        "emission": emission,
+        "element": int(scan.tx[emission]),
+        "slice": index,
+        "quantity": what,
+        "receiver_element": scan.rx[receivers].tolist(),
+        "receivers": len(receivers),
+        "samples": reduced.shape[1],
+        "first_s": first,
+        # A sample stands for a block that begins at it.
+        "step_s": block / rate,
+        "traces": base64.b64encode(reduced.astype("<f4").tobytes()).decode(),
+        "straight_s": straight[receivers].tolist(),
+        "pick_s": None if picks is None else _numbers((straight + picks)[receivers]),
+        "picker": picker,
+    }
+
+
+def _picks(path: Path, one: Dataset, emission: int) -> tuple[Floats | None, str]:
+    """Object minus water of each receiver, s, NaN without; and the picker, empty for times of the file."""
+    if one.picked:
+        return one.differential_tof()[emission], one.picker
+    if one.center_frequency_hz is None:
+        spectrum = spectrum_of(path, one)
+        one = one if spectrum is None else replace(one, center_frequency_hz=spectrum.center_frequency_hz)
+    if one.waveform is None or one.waveform.water is None or one.center_frequency_hz is None:
+        return None, ""
+    shape = len(one.tx), len(one.rx)
+    reach = reach_of(one, DEFAULT_PICKER)
+    delta, _ = read_times(one, [emission], DEFAULT_PICKER, np.full(shape, np.nan), reach)
+    whole = np.full(shape, np.nan)
+    whole[emission] = delta[0]
+    # Without the comparison with neighbouring emissions, which would read all traces.
+    return screen_times(one, whole, np.zeros(shape), screened=False)[0][emission], DEFAULT_PICKER
+
+
+def _reduced(shot: Any, block: int) -> Any:
+    """(receivers, samples): traces without offset, of each block the sample with the largest magnitude."""
+    shot = np.where(np.isfinite(shot), shot, 0.0)
+    shot = shot - np.median(shot, axis=1, keepdims=True)
+    peak = np.abs(shot).max(axis=1, keepdims=True)
+    shot = np.divide(shot, peak, out=np.zeros_like(shot), where=peak > 0.0)
+    whole = -(-shot.shape[1] // block) * block
+    blocks = np.pad(shot, ((0, 0), (0, whole - shot.shape[1]))).reshape(len(shot), -1, block)
+    largest = np.abs(blocks).argmax(axis=2)
+    return np.take_along_axis(blocks, largest[..., None], axis=2)[..., 0]
+
+
+def _numbers(values: Floats) -> list[float | None]:
+    return [float(value) if math.isfinite(value) else None for value in values]
