@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import httpx
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
+from bentray_workers.files.dataset import write_dataset
+
+from ...kernels.acquisition.traces import scan as trace_scan
 from .finished_results import finished, known
 
 pytestmark = pytest.mark.browser
@@ -23,14 +27,20 @@ SIZES = ((360, 740), (3840, 2160))
 
 
 @pytest.fixture
-def places(serve, scan, work, monkeypatch):
+def places(serve, scan, work, monkeypatch, tmp_path):
     """The address of the service, and every page with a text that is there once it is complete."""
     address = serve()
     plane = [finished(address, scan, work, monkeypatch, known((12, 10), seed)) for seed in (0, 1)]
     volume = finished(address, scan, work, monkeypatch, known((6, 5, 4)))
+    write_dataset(tmp_path / "traced.h5", trace_scan(elements=12))
+    content = (tmp_path / "traced.h5").read_bytes()
+    sent = httpx.post(
+        f"{address}/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"}
+    )
     marks = "profile=-8,-15,0,-5&ellipse=-8,-15,0,-5"
     pages = {
         "/": "Sixteen elements",
+        f"/scans/{sent.json()['id']}": "Receiving element 0",
         f"/jobs/{plane[0]}?{marks}": "node ",
         f"/jobs/{volume}?planes=3": "node ",
         f"/compare/{','.join(plane)}?{marks}": "m/s · B",

@@ -1,15 +1,23 @@
-"""The page of a scan: start a reconstruction, watch it."""
+"""The page of a scan: its geometry, quality and traces; start a reconstruction, watch it."""
 
 from dataclasses import replace
 
+import httpx
 import numpy as np
 import pytest
 from playwright.sync_api import expect
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.settings import Settings
+from bentray_workers.files.dataset import write_dataset
+
+from ...kernels.acquisition.traces import blob_delay
+from ...kernels.acquisition.traces import scan as trace_scan
 
 pytestmark = pytest.mark.browser
+
+# All pixels of a canvas as text.
+PIXELS = "canvas => canvas.toDataURL()"
 
 
 def sent(page, address, scan):
@@ -129,3 +137,80 @@ def test_by_keyboard_alone(page, serve, scan, work):
             break
     page.keyboard.press("Enter")
     page.locator(".job").wait_for()
+
+
+@pytest.fixture
+def traced(page, serve, tmp_path):
+    """The page of a scan with traces, and the scan as the service tells it."""
+    made = trace_scan(blob_delay(12), elements=12, noise=0.01)
+    write_dataset(tmp_path / "traced.h5", made)
+    address = serve(renders_per_minute=0)
+    content = (tmp_path / "traced.h5").read_bytes()
+    sent = httpx.post(
+        f"{address}/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"}
+    )
+    here = f"{address}{sent.json()['links']['self']}"
+    page.goto(f"{address}/#/scans/{sent.json()['id']}")
+    return lambda what: httpx.get(f"{here}/{what}", timeout=60.0).json()
+
+
+def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
+    facts = page.locator("#scan-facts")
+    expect(facts).to_contain_text("8.000 MHz")
+    geometry, report = traced("geometry"), traced("quality")
+    expect(facts).to_contain_text(f"{geometry['center_frequency_hz'] / 1e3:.1f} kHz, stated in the file")
+    expect(facts).to_contain_text(f"{geometry['samples']} samples from {1e6 * geometry['t0_s']:.2f} µs")
+    expect(facts).to_contain_text(f"{geometry['water_speed_mps']:.1f} m/s")
+    usable, pairs = report["usable_pairs"], report["pairs"]
+    quality = page.locator("#quality")
+    expect(quality).to_contain_text(f"{usable} of {pairs} pairs ({100 * usable / pairs:.1f} %)")
+    expect(quality.locator("ul:not(details *) > li")).to_have_count(len(report["findings"]))
+    for finding in report["findings"]:
+        expect(quality).to_contain_text(finding["found"])
+    assert httpx.get(page.get_by_role("link", name="Quality report").evaluate("one => one.href")).is_success
+    drawing = page.get_by_role("img", name="12 elements, 12 emit, 12 receive")
+    expect(drawing.locator(".emitter")).to_have_count(12)
+    expect(drawing.locator(".receiver")).to_have_count(12)
+
+
+def test_the_slider_changes_the_emission(page, traced):
+    told = page.locator("#shot-facts")
+    expect(told).to_contain_text("Emission 0 by element 0")
+    before = page.locator("#shot").evaluate(PIXELS)
+    slider = page.get_by_role("slider", name="Emission")
+    slider.focus()
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    expect(told).to_contain_text("Emission 3 by element 3")
+    expect(page.get_by_label("Emission number")).to_have_value("3")
+    assert page.locator("#shot").evaluate(PIXELS) != before
+    shot = traced("traces?emission=3")
+    known = [pick for pick in shot["pick_s"] if pick is not None]
+    expect(told).to_contain_text(f"arrivals in {len(known)} of 12")
+    page.locator("#shot").focus()
+    for _ in range(8):
+        page.keyboard.press("ArrowRight")
+    pick, straight = shot["pick_s"][8], shot["straight_s"][8]
+    values = page.locator("#shot-values")
+    expect(values).to_contain_text("Receiving element 8")
+    expect(values).to_contain_text(
+        f"straight line {1e6 * straight:.2f} µs, with the object {1e6 * pick:.2f} µs"
+    )
+    page.get_by_label("Emission number").fill("99")
+    page.keyboard.press("Tab")
+    expect(told).to_contain_text("Emission 11 by element 11")
+    water = "traces?emission=11&slice=0&quantity=water"
+    with page.expect_response(lambda answer: answer.url.endswith(water)) as answer:
+        page.locator("#shot-quantity").select_option("water")
+    assert answer.value.ok
+    expect(page.locator("#shot-error")).to_be_hidden()
+    # The element that emits is marked in the drawing.
+    marked = page.locator("#elements .chosen")
+    expect(marked).to_have_attribute("cx", page.locator("#elements .emitter").nth(11).get_attribute("cx"))
+
+
+def test_a_telephone_scrolls_only_down(page, traced):
+    page.set_viewport_size({"width": 360, "height": 740})
+    expect(page.locator("#shot-values")).to_contain_text("Receiving element 0")
+    expect(page.locator("#quality")).to_contain_text("Usable")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360

@@ -1,9 +1,13 @@
-// One scan: what it holds, the reconstruction to start, and the reconstructions of it.
+// One scan: its geometry, facts, quality and traces, the reconstruction to start, and the reconstructions of it.
 import { request } from "../parts/api.js";
 import { fillDefaults } from "../parts/defaults.js";
-import { at, showError } from "../parts/dom.js";
+import { at, make, showError } from "../parts/dom.js";
 import { jobList } from "../parts/job_list.js";
+import { withKey } from "../parts/key.js";
 import { startJob } from "../parts/panel.js";
+import { drawElements, inWordsOf } from "../parts/scan_drawing.js";
+import { factRows, fillFacts, showQuality } from "../parts/scan_facts.js";
+import { openShot } from "../parts/shot.js";
 import { titleOf } from "../parts/titles.js";
 
 const PAGE = `
@@ -51,7 +55,22 @@ const PAGE = `
   </section>
   <section aria-labelledby="jobs-title" id="of-scan">
     <h2 id="jobs-title">Reconstructions of this scan</h2>
-  </section>`;
+  </section>
+  <section aria-labelledby="about-title" class="panel">
+    <h2 id="about-title">Geometry and quality</h2>
+    <div class="about">
+      <figure id="elements" class="figure"></figure>
+      <div>
+        <dl id="scan-facts" class="terms"></dl>
+        <p id="geometry-error" class="error" role="alert" hidden></p>
+        <h3>Quality</h3>
+        <div id="quality"><p class="facts">Checking the scan</p></div>
+        <p><a id="quality-page" target="_blank" rel="noopener">Quality report as an image</a></p>
+        <p id="quality-error" class="error" role="alert" hidden></p>
+      </div>
+    </div>
+  </section>
+  <section aria-labelledby="shot-title" class="panel" id="traces" hidden></section>`;
 
 // Settings of the two buttons. Best may take half an hour of one processor core for full waveforms.
 const PRESETS = { fast: { method: "auto" }, best: { method: "auto", minutes: 30 } };
@@ -87,6 +106,38 @@ async function fillFrom(job) {
   showMethod();
 }
 
+// The elements and the facts; a function that marks the element that emits.
+async function showGeometry(scan) {
+  const geometry = await request(`/v1/datasets/${scan.id}/geometry`);
+  if (!at("elements")) return () => {};
+  const { picture, mark } = drawElements(geometry);
+  const words = make("figcaption", "facts", `${inWordsOf(geometry)}. Circles emit, dots receive.`);
+  at("elements").replaceChildren(picture, words);
+  fillFacts(at("scan-facts"), factRows(geometry));
+  return mark;
+}
+
+async function showReport(scan) {
+  const report = await request(`/v1/datasets/${scan.id}/quality`);
+  if (at("quality")) showQuality(at("quality"), report, scan.slices > 1);
+}
+
+// What workers read from the scan, each part on its own, so that one that fails hides no other. Returns close().
+function showScan(scan) {
+  withKey(at("quality-page")).href = `/v1/datasets/${scan.id}/quality.png`;
+  const drawn = showGeometry(scan).catch((error) => {
+    showError("geometry-error", error);
+    return () => {};
+  });
+  showReport(scan).catch((error) => {
+    at("quality")?.replaceChildren();
+    showError("quality-error", error);
+  });
+  if (!scan.has_traces) return () => {};
+  at("traces").hidden = false;
+  return openShot(at("traces"), scan, (element) => drawn.then((mark) => mark(element)));
+}
+
 export async function open(root, { id, query }) {
   const scan = await request(`/v1/datasets/${id}`);
   root.innerHTML = PAGE;
@@ -111,5 +162,9 @@ export async function open(root, { id, query }) {
     },
     (error) => showError("run-error", error),
   );
-  return jobs.close;
+  const closeShot = showScan(scan);
+  return () => {
+    closeShot();
+    jobs.close();
+  };
 }

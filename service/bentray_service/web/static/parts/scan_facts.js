@@ -1,0 +1,83 @@
+// What is known about a scan, and what is wrong with it, in words.
+import { make } from "./dom.js";
+
+const percent = (part, whole) => (whole ? `${((100 * part) / whole).toFixed(1)} %` : "none");
+
+function frequency({ center_frequency_hz: hertz, frequency_estimated: estimated }) {
+  if (hertz === null) return "not stated";
+  return `${(1e-3 * hertz).toFixed(1)} kHz, ${estimated ? "estimated from the traces" : "stated in the file"}`;
+}
+
+function sampling({ sampling_rate_hz: hertz, samples, t0_s: first }) {
+  if (!samples || hertz === null) return "no traces";
+  return `${(1e-6 * hertz).toFixed(3)} MHz, ${samples} samples from ${(1e6 * first).toFixed(2)} µs`;
+}
+
+function water({ water_speed_mps: speed, water_temperature_c: temperature, water_assumed: assumed }) {
+  const warm = temperature === null ? "" : `, ${temperature.toFixed(1)} °C`;
+  return `${speed.toFixed(1)} m/s${warm}${assumed ? "; assumed, since nobody stated it" : ""}`;
+}
+
+function slices({ slice_z_m: heights }) {
+  const millimetres = heights.map((one) => (1e3 * one).toFixed(1));
+  return `${heights.length}, at z from ${millimetres[0]} to ${millimetres.at(-1)} mm`;
+}
+
+// Terms and values of GET /v1/datasets/{id}/geometry.
+export function factRows(geometry) {
+  const rows = [
+    ["Centre frequency", frequency(geometry)],
+    ["Sampling", sampling(geometry)],
+    ["Water", water(geometry)],
+    ["Pairs of elements", geometry.pairs.toLocaleString("en")],
+  ];
+  if (geometry.slice_z_m.length) rows.splice(3, 0, ["Slices", slices(geometry)]);
+  if (geometry.timed_pairs !== null) {
+    const share = percent(geometry.timed_pairs, geometry.pairs);
+    rows.push(["With a valid travel time", `${geometry.timed_pairs.toLocaleString("en")} (${share})`]);
+  }
+  return rows;
+}
+
+export function fillFacts(list, rows) {
+  for (const [term, value] of rows) list.append(make("dt", "", term), make("dd", "", value));
+}
+
+const VERDICTS = {
+  clean: "No faults found.",
+  usable: "Usable, with the findings below.",
+  refused: "Not usable for a reconstruction, see the findings.",
+};
+
+function sentence({ check, elements, role, slice, found, accepted, action }, several) {
+  const which = elements.length ? ` (${elements.length === 1 ? "element" : "elements"} ${listed(elements)}${role ? `, ${role}` : ""})` : "";
+  const where = several ? `, slice ${slice}` : "";
+  return `${which}${where}: ${found}; accepted: ${accepted}. ${action[0].toUpperCase()}${action.slice(1)}.`.replace(/^/, check);
+}
+
+function listed(elements) {
+  const shown = elements.slice(0, 12).join(", ");
+  return elements.length > 12 ? `${shown} and ${elements.length - 12} more` : shown;
+}
+
+// The report of GET /v1/datasets/{id}/quality in a place: verdict, share of usable pairs, findings.
+export function showQuality(place, report, several) {
+  const share = `${report.usable_pairs.toLocaleString("en")} of ${report.pairs.toLocaleString("en")} pairs`;
+  const picker = report.picker ? `, arrivals by the picker ${report.picker}` : "";
+  const usable = `Usable: ${share} (${percent(report.usable_pairs, report.pairs)})${picker}.`;
+  place.replaceChildren(make("p", "verdict", VERDICTS[report.verdict]), make("p", "usable", usable));
+  if (report.findings.length) {
+    const list = make("ul", "findings");
+    list.append(...report.findings.map((one) => make("li", "", sentence(one, several))));
+    place.append(list);
+  }
+  const skipped = Object.entries(report.not_checked);
+  if (skipped.length) {
+    const more = make("details");
+    more.append(make("summary", "", `${skipped.length} checks do not apply`));
+    const list = make("ul", "findings");
+    list.append(...skipped.map(([check, reason]) => make("li", "", `${check}: ${reason}`)));
+    more.append(list);
+    place.append(more);
+  }
+}
