@@ -47,6 +47,7 @@ from .routes import (
     health,
     jobs,
     meshes,
+    names,
     pages,
     refraction,
     tus,
@@ -122,7 +123,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     app.add_middleware(RequestIds)
     app.state.metrics = Metrics()
     app.add_middleware(app.state.metrics.middleware)
-    for part in (tus, datasets, jobs, events, volumes, refraction, meshes, geometry_fields, access):
+    for part in (tus, datasets, jobs, names, events, volumes, refraction, meshes, geometry_fields, access):
         app.include_router(part.router, **CLOSED)
     app.include_router(health.metrics_router, **CLOSED)
     for public in (health, pages):

@@ -50,7 +50,7 @@ database = "none"
 
 # What deletes makes ids of its own, or takes those of what it made.
 [[operations]]
-include-method-regex = "GET|POST"
+include-method-regex = "GET|POST|PATCH"
 parameters = {{ {ids} }}
 """
 # The systematic requests of these, one a bound of each parameter, are a thousand, or draw large pictures.

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, 
 from ..errors import NoAnimation
 from ..jobs.kinds import KINDS
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service
+from ..wiring import CallerTenant, CurrentCaller, Service
 from .bodies import Limit, SmallBody, accept_media_types
 from .downloads import download, download_of
 from .models.job_records import JobList, JobRecord, State
@@ -48,7 +48,7 @@ def start_job(
     job_request: JobRequest,
     response: Response,
     service: Service,
-    tenant: CallerTenant,
+    caller: CurrentCaller,
     idempotency_key: Annotated[
         str | None,
         Header(
@@ -60,6 +60,7 @@ def start_job(
 ) -> JobRecord:
     """Queue a job. It is stored before the response and survives a restart of the service."""
     kind: str = job_request.kind
+    tenant = caller.tenant
     order = KINDS[kind].plan(job_request, tenant, service)
     row = service.jobs.add(
         tenant,
@@ -70,8 +71,9 @@ def start_job(
         reserve=(order.largest_bytes, service.quota.most_bytes),
         most_queued=service.settings.max_queued_jobs,
         key=idempotency_key,
+        started_by=caller.who,
     )
-    job = job_record(row)
+    job = job_record(row, service.jobs.place(row))
     log.info("%s queued, kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
     service.runner.notify()
     response.headers["Location"] = job.links["self"]
@@ -100,7 +102,8 @@ def list_jobs(
 @router.get("/{job_id}", responses=problems(404))
 def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
     """Show one job: state, progress, and the residual after every iteration."""
-    return job_record(service.jobs.get(tenant, job_id))
+    row = service.jobs.get(tenant, job_id)
+    return job_record(row, service.jobs.place(row))
 
 
 @router.post(

@@ -24,10 +24,11 @@ def dataset_record(row: DatasetRow) -> DatasetRecord:
     links = {"self": here, "file": f"{here}/file"}
     if job is not None:
         links["job"] = f"/v1/jobs/{job}"
-    return DatasetRecord.model_validate({**row, "job": job, "links": links})
+    title = row["name"] or row["title"]
+    return DatasetRecord.model_validate({**row, "title": title, "job": job, "links": links})
 
 
-def job_record(row: JobRow) -> JobRecord:
+def job_record(row: JobRow, ahead: int | None = None) -> JobRecord:
     here = f"/v1/jobs/{row['id']}"
     reads = {what: row[f"{what}_id"] for what in READ}  # type: ignore[literal-required]
     links = {"self": here} | {what: f"/v1/{LISTED[what]}/{name}" for what, name in reads.items() if name}
@@ -40,6 +41,7 @@ def job_record(row: JobRow) -> JobRecord:
     started, progress = row["started"], {**row, "phase": row["phase"] or ""}
     seconds = None if started is None else (row["finished"] or time.time()) - started
     record = {**row, **reads, "field": None, **made, "progress": progress, "seconds": seconds, "links": links}
+    record["ahead"] = ahead
     return JobRecord.model_validate(record)
 
 

@@ -9,22 +9,22 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import cast
 
-from sqlalchemy import Connection, func, insert, select
+from sqlalchemy import Connection, case, func, insert, select
 from sqlalchemy.exc import IntegrityError
 
 from ..errors import JobFinished, KeyReused, QueueFull, UnknownId
 from . import schema, usage
 from .ids import checked, new_id
-from .job_states import append_event, change
+from .job_states import RUNNING, append_event, change
 from .schema import ENDED, jobs
-from .stored_tables import TenantTable
+from .stored_tables import NamedTable
 from .tenants import Tenant
 from .typed_rows import EventRow, JobProgress, JobRow, Plain
 
 BATCH = 500
 
 
-class Jobs(TenantTable[JobRow]):
+class Jobs(NamedTable[JobRow]):
     """Jobs of a tenant; :class:`bentray_service.rows.job_queue.Queue` runs them."""
 
     table, what = jobs, "job"
@@ -43,6 +43,7 @@ class Jobs(TenantTable[JobRow]):
         reserve: tuple[int, int] | None = None,
         most_queued: int | None = None,
         key: str | None = None,
+        started_by: str = "",
     ) -> JobRow:
         """Insert a queued job; it survives a crash once this method returns.
 
@@ -58,6 +59,7 @@ class Jobs(TenantTable[JobRow]):
             reserve: maximum bytes that the job stores while it runs, and the quota of the tenant.
             most_queued: maximum number of queued jobs.
             key: idempotency key of the request.
+            started_by: id of the key, or user of the proxy.
 
         Raises:
             KeyReused: when the key was used with another request.
@@ -101,6 +103,7 @@ class Jobs(TenantTable[JobRow]):
                     tenant=tenant,
                     idempotency_key=key,
                     request_sha256=digest,
+                    started_by=started_by[:200],
                     state="queued",
                     created=time.time(),
                 )
@@ -135,6 +138,34 @@ class Jobs(TenantTable[JobRow]):
         if before is not None:
             query = query.where(jobs.c.number < self.get(tenant, before)["number"])
         return cast(list[JobRow], self._database.rows(query))
+
+    def place(self, job: JobRow) -> int | None:
+        """How many queued jobs of all tenants start before this one if jobs run one at a time.
+
+        The order is that of ``Queue.claim``; None of a job that is not queued.
+        """
+        if job["state"] != "queued":
+            return None
+        tenant, number = job["tenant"], job["number"]
+        queued, running = (
+            func.coalesce(func.sum(case((jobs.c.state.in_(states), 1), else_=0)), 0)
+            for states in (("queued",), RUNNING)
+        )
+        waiting = select(jobs.c.tenant).where(jobs.c.state == "queued")
+        served = func.coalesce(func.max(jobs.c.started), 0.0)
+        oldest = func.min(case((jobs.c.state == "queued", jobs.c.number)))
+        turns = (
+            select(jobs.c.tenant, queued, running, served, oldest)
+            .where(jobs.c.tenant.in_(waiting))
+            .group_by(jobs.c.tenant)
+        )
+        older = jobs.c.tenant == tenant, jobs.c.state == "queued", jobs.c.number < number
+        with self._database.read() as connection:
+            mine = int(connection.execute(select(func.count()).where(*older)).scalar_one())
+            found = {one: (int(count), tuple(turn)) for one, count, *turn in connection.execute(turns)}
+        _, own = found.pop(tenant, (0, ()))
+        # Tenants take turns: one that goes first starts a job more before this one.
+        return mine + sum(min(count, mine + (turn < own)) for count, turn in found.values())
 
     def events(self, tenant: Tenant, job_id: str, after: int = 0) -> list[EventRow]:
         """The events of one job of this tenant after event ``after``, oldest first."""

@@ -118,6 +118,14 @@ def _to_4(connection: Connection) -> None:
     _count_stored_bytes(connection)
 
 
+def _to_5(connection: Connection) -> None:
+    """Version 5: names and notes of datasets and jobs, and who started a job."""
+    for table in ("datasets", "jobs"):
+        connection.execute(text(f"ALTER TABLE {table} ADD COLUMN name VARCHAR(200) NOT NULL DEFAULT ''"))
+        connection.execute(text(f"ALTER TABLE {table} ADD COLUMN notes VARCHAR(4000) NOT NULL DEFAULT ''"))
+    connection.execute(text("ALTER TABLE jobs ADD COLUMN started_by VARCHAR(200) NOT NULL DEFAULT ''"))
+
+
 def _count_stored_bytes(connection: Connection) -> None:
     """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
@@ -128,4 +136,4 @@ def _count_stored_bytes(connection: Connection) -> None:
         connection.execute(text(f"INSERT INTO storage (tenant, name, bytes, reserved) {query}"))
 
 
-STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2, 2: _to_3, 3: _to_4})
+STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5})

@@ -20,7 +20,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 4
+VERSION = 5
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -43,6 +43,15 @@ def uploaded_columns() -> list[Column[Any]]:
         # Of the uploaded file, or of the file created by a job or from a volume.
         Column("sha256", String(64), nullable=False),
         Column("title", String(200), nullable=False),
+    ]
+
+
+def named_columns() -> list[Column[Any]]:
+    """The words of the user about an item; in jobs and datasets."""
+    return [
+        # In place of the title of a file, or of the default heading of a job.
+        Column("name", String(200), nullable=False, server_default=""),
+        Column("notes", String(4000), nullable=False, server_default=""),
     ]
 
 
@@ -79,6 +88,7 @@ datasets = Table(
     # The simulation that created it; not a foreign key, since jobs reference datasets.
     Column("job_id", String(32)),
     _tenant(),
+    *named_columns(),
     Index("datasets_by_tenant", "tenant", "number"),
 )
 
@@ -110,8 +120,10 @@ jobs = Table(
     Column("created", Float, nullable=False),
     Column("started", Float),
     Column("finished", Float),
-    # Owner.
+    # Owner, and who of them started it: the id of a key, or the user of a proxy.
     _tenant(),
+    *named_columns(),
+    Column("started_by", String(200), nullable=False, server_default=""),
     # Idempotency key of the request, and a digest of the request.
     Column("idempotency_key", String(200)),
     Column("request_sha256", String(64)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
-from sqlalchemy import Table, insert, select
+from sqlalchemy import Table, func, insert, select, update
 
 from ..errors import UnknownId
 from . import schema
@@ -56,8 +56,24 @@ class TenantTable(Generic[Record]):
         return self._database.rows(query.order_by(table.number.desc()).limit(limit))
 
 
+class NamedTable(TenantTable[Record]):
+    """A table whose items have a name and notes of the user, ``schema.named_columns``."""
+
+    def describe(self, tenant: Tenant, item: str, **words: str) -> Record:
+        """Replace the ``name`` or the ``notes`` of an item, or both; returns its row.
+
+        Raises:
+            UnknownId: when the tenant has no such item.
+        """
+        mine = self.table.c.tenant == tenant, self.table.c.id == checked(self.what, item)
+        if words:
+            with self._database.write() as connection:
+                connection.execute(update(self.table).where(*mine).values(**words))
+        return self.get(tenant, item)
+
+
 class UploadedTable(TenantTable[Record]):
-    """A table of uploaded items; rows are never changed."""
+    """A table of uploaded items; rows are never changed, except for names and notes."""
 
     def add(self, tenant: Tenant, name: str, *, size: int, sha256: str, summary: Plain) -> Record:
         """Insert a row; ``summary`` holds the columns that describe the content of the file."""
@@ -68,7 +84,7 @@ class UploadedTable(TenantTable[Record]):
         return self.get(tenant, name)
 
 
-class Datasets(UploadedTable[DatasetRow]):
+class Datasets(UploadedTable[DatasetRow], NamedTable[DatasetRow]):
     """Scans, uploaded or simulated."""
 
     table, what = datasets, "dataset"
@@ -93,7 +109,11 @@ class Volumes(UploadedTable[VolumeRow]):
 
     def _select(self, tenant: Tenant, limit: int, name: str | None = None) -> list[Plain]:
         reconstructed: Any = (
-            select(volumes, jobs.c.dataset_id, datasets.c.title)
+            select(
+                volumes,
+                jobs.c.dataset_id,
+                func.coalesce(func.nullif(datasets.c.name, ""), datasets.c.title).label("title"),
+            )
             .join(jobs, jobs.c.id == volumes.c.job_id)
             .join(datasets, datasets.c.id == jobs.c.dataset_id)
         )

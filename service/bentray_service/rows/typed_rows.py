@@ -21,6 +21,8 @@ class StoredRow(TypedDict):
 class DatasetRow(StoredRow):
     """A scan; ``counts`` is None and ``job_id`` set as in ``rows.schema``."""
 
+    name: str
+    notes: str
     number: int
     sha256: str
     title: str
@@ -100,6 +102,9 @@ class JobRow(JobProgress):
 
     number: int
     tenant: Tenant
+    name: str
+    notes: str
+    started_by: str
     kind: str
     dataset_id: str | None
     volume_id: str | None

@@ -42,7 +42,7 @@ VERBS = errors.METHODS
 # What a header that is required holds.
 REQUIRED = {"tus-resumable": "1.0.0", "upload-offset": "0", "upload-length": "4"}
 # Texts that mean nothing to the service, so that anything may be in them.
-FREE = {"title", "idempotency-key", "upload-metadata"}
+FREE = {"title", "name", "notes", "idempotency-key", "upload-metadata"}
 HOSTILE = ("../../../outside", "/etc/passwd\x00", "..%2f..%2foutside")
 
 
@@ -247,8 +247,11 @@ def test_objects_of_other_tenants_are_not_found(place: Place) -> None:
             owner = place.http.request(verb, here, headers=place.auth["acme"]) if verb == "GET" else None
             # What HEAD needs is not described.
             needed = REQUIRED if verb == "HEAD" else asked.headers()
-            headers = {**needed, **place.auth["other"]}
-            theirs = place.http.request(verb, here, headers=headers, content=b"x")
+            headers, content = {**needed, **place.auth["other"]}, b"x"
+            taken = asked.what.get("requestBody", {}).get("content", {}).get("application/json")
+            if taken is not None:
+                content = json.dumps(next(iter(taken["examples"].values()))["value"]).encode()
+            theirs = place.http.request(verb, here, headers=headers, content=content)
             # A path without HEAD has none for anybody.
             expected = (404, 405) if verb == "HEAD" else (404,)
             assert theirs.status_code in expected, (verb, here, theirs.text)
@@ -256,7 +259,7 @@ def test_objects_of_other_tenants_are_not_found(place: Place) -> None:
                 continue
             assert theirs.json()["type"] == "/problems/unknown-id", (verb, here)
             nothing = filled(asked.path, {name: f"{one[:-20]}{'0' * 20}" for name, one in place.ids.items()})
-            unknown = place.http.request(verb, nothing, headers=headers, content=b"x")
+            unknown = place.http.request(verb, nothing, headers=headers, content=content)
             assert alike(theirs.text) == alike(unknown.text)
             if owner is not None:
                 assert "unknown-id" not in owner.text, here
@@ -364,6 +367,10 @@ def strings(place: Place, asked: Asked) -> Iterator[tuple[str, str, str]]:
         if body is None:
             continue
         known = place.http.app.openapi()["components"]["schemas"]
+        if "oneOf" not in body["schema"]:
+            model = known[body["schema"]["$ref"].rpartition("/")[2]]
+            yield from (("body", name, hostile) for name in model["properties"])
+            continue
         for choice in body["schema"]["oneOf"]:
             model = known[choice["$ref"].rpartition("/")[2]]
             kind = model["properties"]["kind"]["const"]
@@ -376,8 +383,10 @@ def strings(place: Place, asked: Asked) -> Iterator[tuple[str, str, str]]:
 
 
 def within(names: list[str], value: str, ids: Mapping[str, str]) -> dict[str, Any]:
-    """A job request of a kind with a value somewhere in it."""
+    """A job request of a kind with a value somewhere in it, or a record of one field."""
     kind, *rest = names
+    if not rest:
+        return {kind: value}
     read = {"reconstruction": "dataset", "refraction": "volume", "geometry-field": "mesh"}.get(kind)
     asked: dict[str, Any] = {"kind": kind} | ({read: ids[f"{read}_id"]} if read else {})
     if len(rest) == 1:

@@ -77,7 +77,8 @@ class StandIn:
             "created": 0.0,
             "links": {"self": "/v1/jobs/job-1"},
         }
-        return JobRecord.model_validate({**dict.fromkeys(JobRecord.model_fields), **given})
+        texts = dict.fromkeys(("name", "notes", "started_by"), "")
+        return JobRecord.model_validate({**dict.fromkeys(JobRecord.model_fields), **texts, **given})
 
 
 PROBLEM = Problem(

@@ -13,7 +13,7 @@ from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id, volume_of
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs
-from bentray_service.rows.stored_tables import Volumes
+from bentray_service.rows.stored_tables import Datasets, Volumes
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.rows.usage import Usage, usage_of
 
@@ -51,7 +51,7 @@ INSERT INTO about VALUES (1, 0.0);
 DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
 
 
-@pytest.fixture(params=[1, 2, 3])
+@pytest.fixture(params=[1, 2, 3, 4])
 def old(request, tmp_path):
     """A database as an older version left it, with a finished and a waiting job."""
     path = tmp_path / "old.sqlite"
@@ -136,6 +136,8 @@ def test_every_row_is_kept(old):
         job = jobs.get(LOCAL, DONE)
         assert (job["number"], job["dataset_id"], job["volume_id"]) == (3, DATASET, None)
         assert (job["settings"], job["done"], job["finished"]) == ({"nodes": 3}, 2, 7.0)
+        assert (job["name"], job["notes"], job["started_by"]) == ("", "", "")
+        assert Datasets(database).get(LOCAL, DATASET)["title"] == "A scan"
         assert [event["note"] for event in jobs.events(LOCAL, WAITING)] == ["a note"]
         assert (volume["dataset_id"], volume["shape"]) == (DATASET, [8, 8])
         database.close()
@@ -146,6 +148,13 @@ def test_a_job_that_waited_is_run(old):
     queue = Queue(database)
     assert queue.claim()["id"] == WAITING
     assert queue.state(WAITING) == "running"
+    database.close()
+
+
+def test_old_jobs_and_scans_can_be_named(old):
+    database = open_database(old)
+    assert Jobs(database).describe(LOCAL, DONE, name="The first")["name"] == "The first"
+    assert Datasets(database).describe(LOCAL, DATASET, notes="Cold")["notes"] == "Cold"
     database.close()
 
 
@@ -165,10 +174,10 @@ def test_keys_hold_afterwards(old):
 
 def test_failed_migration_keeps_the_old_database(old, monkeypatch):
     def broken(connection):
-        migration._to_4(connection)
+        migration._to_5(connection)
         raise RuntimeError("the power went")
 
-    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 3: broken})
+    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 4: broken})
     with pytest.raises(RuntimeError, match="power"):
         open_database(old)
     monkeypatch.undo()
@@ -243,6 +252,12 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         ),
         f"{into} SELECT tenant, result_id, length, true FROM uploads "
         "WHERE state IN ('receiving', 'reading') AND result_id NOT IN (SELECT name FROM storage)",
+        *(
+            f"ALTER TABLE {table} ADD COLUMN {column} NOT NULL DEFAULT ''"
+            for table in ("datasets", "jobs")
+            for column in ("name VARCHAR(200)", "notes VARCHAR(4000)")
+        ),
+        "ALTER TABLE jobs ADD COLUMN started_by VARCHAR(200) NOT NULL DEFAULT ''",
     ]
     assert told.said[-1].startswith("UPDATE about SET version")
 

@@ -291,3 +291,15 @@ def test_a_result_is_exported_and_deleted(page, result):
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("heading", name="Jobs").wait_for()
     page.get_by_text("Nothing has run yet").wait_for()
+
+
+def test_a_result_is_renamed(page, result):
+    ready(page, result)
+    page.get_by_role("button", name="Rename").click()
+    page.get_by_label("Name", exact=True).fill("With the new water speed")
+    page.locator("#rename").get_by_role("button", name="Rename").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("With the new water speed")
+    page.reload()
+    expect(page.get_by_role("heading", level=1)).to_have_text("With the new water speed")
+    page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
+    page.locator(".job").get_by_role("link", name="With the new water speed").wait_for()

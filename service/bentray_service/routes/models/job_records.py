@@ -18,7 +18,8 @@ class DatasetRecord(BaseModel):
     """One scan, uploaded or simulated."""
 
     id: str
-    title: str
+    title: str = Field(description="The name given to it, else the title in the file.")
+    notes: str = Field(description="Notes of the user.")
     source: str
     license: str
     dimension: int = Field(description="Dimension of the element coordinates, 2 or 3.")
@@ -101,7 +102,13 @@ class JobRecord(BaseModel):
 
     id: str
     kind: str
+    name: str = Field(description="The name given to it; empty without one.")
+    notes: str = Field(description="Notes of the user.")
+    started_by: str = Field(description="Id of the key, or user of the proxy, that started it; else empty.")
     state: State
+    ahead: int | None = Field(
+        description="Queued jobs that start before this queued job if jobs run one at a time; null in lists."
+    )
     dataset: str | None = Field(
         description="Id of the input of a reconstruction, or of the result of a simulation."
     )

@@ -11,11 +11,10 @@ export async function open(root, parameters) {
   root.append(make("h1", "", "Job"));
   let close = () => {};
   const jobs = jobList(root, {
-    empty: `There is no job ${id}`,
-    wanted: (one) => one.id === id,
-    async onJobs(all) {
-      const mine = all.find((one) => one.id === id);
-      if (mine?.kind !== "reconstruction" || mine.state !== "succeeded") return;
+    // Alone, since lists do not count the jobs before it.
+    read: async () => [await request(`/v1/jobs/${id}`)],
+    async onJobs([mine]) {
+      if (mine.kind !== "reconstruction" || mine.state !== "succeeded") return;
       jobs.close();
       root.replaceChildren();
       close = await (await import("./result.js")).open(root, parameters);

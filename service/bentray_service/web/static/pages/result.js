@@ -3,7 +3,6 @@ import { go, keepQuery } from "../parts/address.js";
 import { request } from "../parts/api.js";
 import { curlOf, pythonOf } from "../parts/code_snippets.js";
 import { copyButton } from "../parts/copying.js";
-import { description } from "../parts/defaults.js";
 import { make, showError } from "../parts/dom.js";
 import { exportMenu } from "../parts/export_menu.js";
 import { choiceTable, facts, planTable, provenanceTable } from "../parts/result_tables.js";
@@ -114,11 +113,10 @@ export async function open(root, { id, query }) {
     again,
     remove,
   );
-  // A service of an earlier version gives jobs no names.
-  description().then(({ paths }) => paths["/v1/jobs/{job_id}"].patch && remove.before(button("Rename", () => {
+  remove.before(button("Rename", () => {
     rename.hidden = !rename.hidden;
     if (!rename.hidden) rename.elements.name.focus();
-  })), () => {});
+  }));
   compareMenu(job).then((menu) => menu && part("result-actions")?.prepend(menu), () => {});
   part("result-tables").append(...[choiceTable(summary, job), planTable(job), provenanceTable(result)].filter(Boolean));
   return shown.close;

@@ -135,6 +135,11 @@ function summaryOf({ kind, settings }) {
   return [method === "auto" ? "Automatic" : RAYS[rays], `${METHODS[method]}, ${grid}${iterations} iterations`];
 }
 
+function placeInQueue(ahead) {
+  if (!ahead) return "Next in the queue";
+  return ahead === 1 ? "1 job before this one" : `${ahead} jobs before this one`;
+}
+
 // The plan in a line, with details on demand.
 function planned({ tasks, largest_bytes: bytes, minutes, why }) {
   const box = make("details", "plan");
@@ -147,11 +152,12 @@ function facts(job, title, onCancel) {
   const box = make("div");
   const [what, settings] = summaryOf(job);
   const heading = make("h2");
-  const name = make("a", "", what);
+  const name = make("a", "", job.name || what);
   name.href = `#/jobs/${job.id}`;
   heading.append(name);
   heading.append(make("span", `state ${job.state}`, job.state));
-  box.append(heading, make("p", "", title), make("p", "", settings));
+  box.append(heading, make("p", "", title), make("p", "", job.name ? `${what}: ${settings}` : settings));
+  if (job.ahead !== null) box.append(make("p", "", placeInQueue(job.ahead)));
   if (job.plan) box.append(planned(job.plan));
   if (job.advice) box.append(make("p", "", job.advice));
   const { done, total, phase } = job.progress;

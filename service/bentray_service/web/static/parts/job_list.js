@@ -7,8 +7,10 @@ import { loadTitles, titleOfJob } from "./titles.js";
 const BUSY_MS = 700;
 const IDLE_MS = 4000;
 
-// Show the jobs for which wanted(job) is true in root; onJobs(jobs) is called with all. Returns { refresh, close }.
-export function jobList(root, { empty, wanted = () => true, onJobs = () => {} }) {
+const newest = async () => (await request("/v1/jobs")).jobs;
+
+// Show the jobs of read() for which wanted(job) is true in root; onJobs(jobs) is called with all. Returns { refresh, close }.
+export function jobList(root, { empty = "", read = newest, wanted = () => true, onJobs = () => {} }) {
   const error = make("p", "error");
   error.id = "jobs-error";
   error.setAttribute("role", "alert");
@@ -25,7 +27,7 @@ export function jobList(root, { empty, wanted = () => true, onJobs = () => {} })
     clearTimeout(timer);
     let wait = IDLE_MS;
     try {
-      const { jobs } = await request("/v1/jobs");
+      const jobs = await read();
       await loadTitles(jobs);
       if (closed) return;
       const shown = jobs.filter(wanted);
