@@ -128,3 +128,24 @@ def test_names_the_wrong_argument_and_what_is_accepted(tmp_path, wrong, message)
     path = stored(tmp_path, scan(elements=8))
     with pytest.raises(InvalidInput, match=message):
         emission_traces(path, **{"emission": 0, "index": 0, "what": "object", **wrong})
+
+
+def test_slices_without_a_frequency_have_picks(tmp_path):
+    one = scan(blob_delay(16), elements=16, noise=0.01)
+    both = [np.stack([t, t]) for t in (one.waveform.object, one.waveform.water)]
+    made = replace(one, slice_z_m=np.array([0.0, 0.01]), waveform=Waveform(*both), center_frequency_hz=None)
+    path = stored(tmp_path, made)
+    assert scan_geometry(path)["frequency_estimated"]
+    found = emission_traces(path, emission=3, index=1, what="object")["pick_s"]
+    assert sum(one is not None for one in found) >= 12
+
+
+def test_silent_traces_have_no_frequency_and_no_picks(tmp_path):
+    made = scan(elements=8)
+    silent = Waveform(*(np.zeros_like(made.waveform.object) for _ in range(2)))
+    path = stored(tmp_path, replace(made, waveform=silent, center_frequency_hz=None))
+    view = scan_geometry(path)
+    assert (view["center_frequency_hz"], view["frequency_estimated"]) == (None, False)
+    view = emission_traces(path, emission=0, index=0, what="object")
+    assert not decoded(view).any()
+    assert view["pick_s"] is None

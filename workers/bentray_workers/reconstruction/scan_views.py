@@ -19,7 +19,7 @@ from bentray_kernels.picker_names import DEFAULT_PICKER
 
 from ..files.dataset import read_dataset
 from ..files.dataset.scan import spectrum_of
-from ..files.dataset.traces import open_slice, trace_samples
+from ..files.dataset.traces import lacks_water, open_slice, trace_samples
 
 # Elements of a drawing, and receivers and samples of the traces of a view; of more, every n-th is taken.
 MAX_ELEMENTS, MAX_RECEIVERS, MAX_SAMPLES = 4096, 512, 1024
@@ -32,11 +32,7 @@ def scan_geometry(path: Path) -> dict[str, Any]:
         InvalidInput: as ``read_dataset``.
     """
     scan = read_dataset(path, traces=False)
-    spectrum = None
-    # Traces without a pulse are a finding of the quality report.
-    with suppress(InvalidInput):
-        spectrum = spectrum_of(path, scan)
-    frequency = scan.center_frequency_hz if spectrum is None else spectrum.center_frequency_hz
+    frequency = _frequency(path, scan)
     every = max(1, math.ceil(len(scan.element_position_m) / MAX_ELEMENTS))
     shown = np.arange(0, len(scan.element_position_m), every)
     same = int((scan.tx[:, None] == scan.rx[None, :]).sum())
@@ -50,7 +46,7 @@ def scan_geometry(path: Path) -> dict[str, Any]:
         "receives": np.isin(shown, scan.rx).tolist(),
         "slice_z_m": [] if scan.slice_z_m is None else scan.slice_z_m.tolist(),
         "center_frequency_hz": frequency,
-        "frequency_estimated": spectrum is not None,
+        "frequency_estimated": frequency is not None and scan.center_frequency_hz is None,
         "sampling_rate_hz": scan.sampling_rate_hz,
         "t0_s": scan.t0_s,
         "samples": trace_samples(path),
@@ -84,13 +80,15 @@ def emission_traces(path: Path, *, emission: int, index: int, what: str) -> dict
     for name, value, count in (("emission", emission, len(scan.tx)), ("slice", index, scan.slices)):
         if not 0 <= value < count:
             raise InvalidInput(name, value, f"0 to {count - 1}")
+    # The picker alone needs it; its estimate reads traces of other emissions too.
+    frequency = None if scan.picked or lacks_water(path) else _frequency(path, scan)
     with open_slice(path, scan, index) as one:
         traces = None if one.waveform is None else getattr(one.waveform, what)
         if traces is None or one.sampling_rate_hz is None:
             found = f"{what!r}, of which the scan has no traces"
             raise InvalidInput("quantity", found, "object or water, whichever the scan has; see the geometry")
         shot = np.asarray(traces[emission], dtype=np.float32)
-        picks, picker = _picks(path, one, emission)
+        picks, picker = _picks(replace(one, center_frequency_hz=frequency), emission)
         rate, first = one.sampling_rate_hz, one.t0_s
     straight = scan.distance_m()[emission] / scan.water_speed_mps
     every = max(1, math.ceil(shot.shape[0] / MAX_RECEIVERS))
@@ -115,13 +113,19 @@ def emission_traces(path: Path, *, emission: int, index: int, what: str) -> dict
     }
 
 
-def _picks(path: Path, one: Dataset, emission: int) -> tuple[Floats | None, str]:
+def _frequency(path: Path, scan: Dataset) -> float | None:
+    """Centre frequency of the file, Hz, else that of its traces; None without a pulse in them."""
+    # Traces without a pulse are a finding of the quality report.
+    with suppress(InvalidInput):
+        spectrum = spectrum_of(path, scan)
+        return scan.center_frequency_hz if spectrum is None else spectrum.center_frequency_hz
+    return None
+
+
+def _picks(one: Dataset, emission: int) -> tuple[Floats | None, str]:
     """Object minus water of each receiver, s, NaN without; and the picker, empty for times of the file."""
     if one.picked:
         return one.differential_tof()[emission], one.picker
-    if one.center_frequency_hz is None:
-        spectrum = spectrum_of(path, one)
-        one = one if spectrum is None else replace(one, center_frequency_hz=spectrum.center_frequency_hz)
     if one.waveform is None or one.waveform.water is None or one.center_frequency_hz is None:
         return None, ""
     shape = len(one.tx), len(one.rx)

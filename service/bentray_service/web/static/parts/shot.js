@@ -27,7 +27,7 @@ const microseconds = (seconds) => `${(1e6 * seconds).toFixed(2)} µs`;
 
 function legendOf(shot) {
   const of = shot.picker ? `picked by ${shot.picker}` : "of the file";
-  const picks = shot.pick_s ? `arrival with the object, ${of}` : "no arrivals with the object: they need a water shot and a pulse";
+  const picks = shot.pick_s ? `arrival with the object, ${of}` : "no arrivals with the object: these need a water shot and a pulse";
   const marks = [make("span", "line-mark"), make("span", shot.pick_s ? "dot-mark" : "")];
   return [marks[0], " arrival in water along a straight line · ", marks[1], ` ${picks}`];
 }
