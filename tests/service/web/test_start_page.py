@@ -4,6 +4,9 @@ import pytest
 from playwright.sync_api import expect
 from scipy.io import savemat
 
+from bentray_service.jobs import kinds
+from bentray_workers.simulation.waves import WaveSimulationSettings
+
 from ...workers.foreign_scans.scans import delta_tof, positions
 
 pytestmark = pytest.mark.browser
@@ -46,3 +49,87 @@ def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_rejected(pa
     page.get_by_label("Water, °C").fill("24")
     page.get_by_role("button", name="Send the file again").click()
     expect(page.locator("#dataset-facts")).to_contain_text("water 1494")
+
+
+def test_a_sample_scan_is_simulated_and_opened(page, serve, monkeypatch):
+    requests = []
+    made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 64, "ntx": 32}
+    made |= {"nrx": 64, "slices": 1, "has_traces": True, "has_travel_times": False, "has_truth": True}
+    made |= {"water_speed_mps": 1500.0, "bytes": 1, "sha256": "0" * 64}
+
+    def simulate_scan(client, request, target, work_dir, **control):
+        requests.append(request)
+        target.write_bytes(b"scan")
+        return made
+
+    monkeypatch.setattr(kinds, "simulate_to_file", simulate_scan)
+    page.goto(serve())
+    page.get_by_role("button", name="Simulate a sample scan").click()
+    page.get_by_role("heading", name="A phantom").wait_for()
+    assert "#/scans/" in page.url
+    (request,) = requests
+    assert isinstance(request, WaveSimulationSettings)
+    assert (request.elements, request.emissions) == (64, 32)
+
+
+def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, serve, scan):
+    """The first piece arrives, the second breaks off, and the page is loaded again."""
+    where = serve()
+    page.goto(where)
+    # Pieces of a few bytes, as if the file were large.
+    page.route(
+        "**/resumable_upload.js",
+        lambda route: route.fulfill(
+            response=(answer := route.fetch()), body=answer.text().replace("8 * 2 ** 20", "4096")
+        ),
+    )
+    sent: list[int] = []
+
+    def broken(route):
+        sent.append(int(route.request.headers["upload-offset"]))
+        if len(sent) == 2:
+            route.abort()
+        else:
+            route.continue_()
+
+    page.route(
+        "**/v1/uploads/*",
+        lambda route: broken(route) if route.request.method == "PATCH" else route.continue_(),
+    )
+    page.goto(where)
+    page.reload()
+    file = scan()
+    page.set_input_files("#scan-file", file)
+    page.get_by_role("heading", name="Sixteen elements").wait_for()
+    assert file.stat().st_size > 3 * 4096
+    assert sent[:3] == [0, 4096, 4096]
+    assert sent[-1] == (file.stat().st_size - 1) // 4096 * 4096
+
+
+def test_an_upload_that_a_closed_page_left_is_continued(page, serve, scan):
+    where, file = serve(), scan()
+    page.goto(where)
+    offsets: list[int] = []
+
+    def first_piece_only(route):
+        if route.request.method != "PATCH":
+            return route.continue_()
+        offsets.append(int(route.request.headers["upload-offset"]))
+        return route.continue_() if offsets[-1] == 0 or len(offsets) > 2 else None
+
+    page.route(
+        "**/resumable_upload.js",
+        lambda route: route.fulfill(
+            response=(answer := route.fetch()), body=answer.text().replace("8 * 2 ** 20", "4096")
+        ),
+    )
+    page.route("**/v1/uploads/*", first_piece_only)
+    page.reload()
+    page.set_input_files("#scan-file", file)
+    while len(offsets) < 2:
+        page.wait_for_timeout(50)
+    page.reload()
+    page.set_input_files("#scan-file", file)
+    page.get_by_role("heading", name="Sixteen elements").wait_for()
+    assert offsets[:3] == [0, 4096, 4096]
+    assert page.evaluate("localStorage.length") == 0

@@ -274,7 +274,7 @@ export async function open(root, { id, query }) {
     show(true);
   }
 
-  uploads("volume", (file) => `/v1/volumes?${queryOf({ title: file.name.slice(0, 200) })}`, "application/octet-stream", stored);
+  uploads("volume", (file) => ({ kind: "volume", title: file.name.slice(0, 200) }), stored);
   at("volume").addEventListener("change", () => go(`/rendering/${at("volume").value}`));
   form.addEventListener("change", () => show());
   at("iso-slider").addEventListener("input", (event) => {

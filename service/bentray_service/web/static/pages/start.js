@@ -2,6 +2,7 @@
 import { at, make, showError } from "../parts/dom.js";
 import { go } from "../parts/address.js";
 import { load, titleOf } from "../parts/titles.js";
+import { startJob } from "../parts/panel.js";
 import { uploads } from "../parts/uploads.js";
 
 const PAGE = `
@@ -28,6 +29,12 @@ const PAGE = `
       </form>
     </details>
   </section>
+  <section aria-labelledby="sample-title" class="panel">
+    <h2 id="sample-title">No scan at hand?</h2>
+    <p>Simulate a small scan of a 2-D breast phantom, with traces and the truth to compare with.</p>
+    <button id="sample" type="button">Simulate a sample scan <small>seconds</small></button>
+    <p id="sample-error" class="error" role="alert" hidden></p>
+  </section>
   <section aria-labelledby="scans-title">
     <h2 id="scans-title">Scans</h2>
     <p id="scans-error" class="error" role="alert" hidden></p>
@@ -35,15 +42,20 @@ const PAGE = `
     <ul id="scans" class="records"></ul>
   </section>`;
 
+// A scan that is simulated within seconds, with traces, so that both Fast and Best apply.
+const SAMPLE = {
+  kind: "simulation",
+  settings: { phantom: "table6", waveform: true, nodes: 64, elements: 64, emissions: 32, frequency_hz: 300000, side_m: 0.06, snr: 30 },
+};
+
 // What the form states about a file of another program.
-function scanAddress() {
-  const query = new URLSearchParams();
+function metadata() {
+  const stated = { kind: "dataset" };
   for (const [name, value] of new FormData(at("own"))) {
-    for (const one of value.split(",")) {
-      if (one.trim()) query.append(name, one.trim());
-    }
+    const words = value.split(",").map((one) => one.trim()).filter(Boolean);
+    if (words.length) stated[name] = [stated[name], ...words].filter(Boolean).join(",");
   }
-  return `/v1/datasets?${query}`;
+  return stated;
 }
 
 function entry(scan) {
@@ -58,7 +70,8 @@ function entry(scan) {
 export function open(root) {
   root.innerHTML = PAGE;
   let closed = false;
-  const sendAgain = uploads("scan", scanAddress, "application/x-hdf5", (scan) => closed || go(`/scans/${scan.id}`));
+  const sendAgain = uploads("scan", metadata, (scan) => closed || go(`/scans/${scan.id}`));
+  at("sample").addEventListener("click", () => startJob(SAMPLE, "sample-error", (job) => closed || go(`/jobs/${job.id}?then=scan`)));
   at("own").addEventListener("submit", (event) => {
     event.preventDefault();
     sendAgain();

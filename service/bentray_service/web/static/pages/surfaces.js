@@ -281,7 +281,7 @@ export async function open(root, { id, query }) {
     return true;
   }
 
-  uploads("mesh", (file) => `/v1/meshes?${queryOf({ title: file.name.slice(0, 200) })}`, "application/octet-stream", (made) => loadMeshes(made.id));
+  uploads("mesh", (file) => ({ kind: "mesh", title: file.name.slice(0, 200) }), (made) => loadMeshes(made.id));
   at("mesh").addEventListener("change", () => go(`/surfaces/${at("mesh").value}`));
   form.addEventListener("change", () => show());
   orbit(at("stage"), { turn, zoom, reset, dragged: drag });

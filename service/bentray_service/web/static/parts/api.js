@@ -24,21 +24,3 @@ export async function request(path, options = {}) {
   if (!response.ok) throw new Error(inWords(body));
   return body;
 }
-
-// fetch() cannot tell how much of a body has been sent; XMLHttpRequest can.
-export function upload(address, mediaType, file, onProgress) {
-  return new Promise((resolve, reject) => {
-    const sender = new XMLHttpRequest();
-    sender.open("POST", address);
-    sender.setRequestHeader("Content-Type", mediaType);
-    for (const [name, value] of Object.entries(authorization())) sender.setRequestHeader(name, value);
-    sender.responseType = "json";
-    sender.upload.onprogress = (event) => event.lengthComputable && onProgress(event.loaded / event.total);
-    sender.onerror = () => reject(new Error("The upload failed: the service did not accept it or does not answer."));
-    sender.onload = () => {
-      if (sender.status === 201) resolve(sender.response);
-      else reject(new Error(sender.response ? inWords(sender.response) : `The service answered ${sender.status}.`));
-    };
-    sender.send(file);
-  });
-}

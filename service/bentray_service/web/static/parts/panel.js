@@ -49,8 +49,8 @@ export function imageFrame(id, errorId) {
 export async function startJob(job, errorId, onStarted) {
   showError(errorId, null);
   try {
-    await request("/v1/jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(job) });
-    await onStarted();
+    const started = await request("/v1/jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(job) });
+    await onStarted(started);
   } catch (error) {
     showError(errorId, error);
   }

@@ -1,11 +1,11 @@
 // A drop zone for files: uploads one, and shows progress and errors.
-import { upload } from "./api.js";
 import { at } from "./dom.js";
+import { resumableUpload } from "./resumable_upload.js";
 
-// The drop zone replaces the element prefix-place; its data-prompt and data-formats are the texts, data-accept is that of
+// metadataOf(file): see resumableUpload. The drop zone replaces the element prefix-place; its data-prompt and data-formats are the texts, data-accept is that of
 // the file input. An element prefix-own, if any, is opened when a file is rejected. Returns a function that sends the
 // last file again.
-export function uploads(prefix, addressOf, mediaType, onStored) {
+export function uploads(prefix, metadataOf, onStored) {
   const part = (name) => at(`${prefix}-${name}`);
   const place = part("place");
   place.outerHTML = `
@@ -30,20 +30,24 @@ export function uploads(prefix, addressOf, mediaType, onStored) {
     part("name").textContent = `Sending ${file.name}`;
     part("bar").value = 0;
     try {
-      const stored = await upload(addressOf(file), mediaType, file, (share) => {
+      const stored = await resumableUpload(file, metadataOf(file), (share, words) => {
+        // The page may be left meanwhile; the upload goes on.
+        if (!part("bar")) return;
         part("bar").value = share;
-        if (share === 1) part("name").textContent = `Checking ${file.name}`;
+        part("name").textContent = words;
       });
+      if (!part("bar")) return;
       part("name").textContent = `${file.name} is stored`;
       part("bar").hidden = true;
       await onStored(stored);
     } catch (error) {
+      if (!part("bar")) return;
       part("upload").hidden = true;
       part("error").textContent = error.message;
       part("error").hidden = false;
       if (part("own")) part("own").open = true;
     } finally {
-      part("file").value = "";
+      if (part("file")) part("file").value = "";
     }
   }
 
