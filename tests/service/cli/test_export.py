@@ -58,7 +58,10 @@ def test_bad_input_is_named(bentray: Callable[..., Result], folder: Path) -> Non
     for words, said in (
         ((folder, "-o", folder / "image.tif"), "a name ending in .h5, .hdf5, .npy"),
         ((folder / "none.h5", "-o", folder / "image.nii"), "no such file"),
-        ((folder, "-o", folder / "image.nii", "--quantity", "density"), "one of speed, attenuation"),
+        (
+            (folder, "-o", folder / "image.nii", "--quantity", "density"),
+            "one of speed, coverage, attenuation, recovery",
+        ),
         ((folder, "-o", folder / "image.h5", "--attenuation", "dB/cm/MHz"), "Np/m, which HDF5 results hold"),
         ((folder, "-o", folder / "reconstruction.h5", "--force"), "the same file"),
     ):

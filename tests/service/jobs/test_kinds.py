@@ -89,17 +89,21 @@ def test_three_pictures(serving, until, form, media):
         assert not list(http.app.state.parts.files.scratch.iterdir())
 
 
-def test_without_settings_the_middle_of_the_range(serving, until, monkeypatch):
+def test_without_an_iso_value_the_middle_of_the_range_once_the_smoothing_is_known(
+    serving, until, monkeypatch
+):
+    """Smoothing changes the range; the worker, which knows the type of the values, decides on it."""
     asked = []
     draw = lambda *given, **control: asked.append(given) or given[3].write_bytes(b"")  # noqa: E731
     monkeypatch.setattr(kinds, "draw_turntable", draw)
     with serving() as http:
         volume = put(http)
-        job = http.post("/v1/jobs", json={"kind": "refraction", "volume": volume}).json()
-        assert until(http, job["id"])["state"] == "succeeded"
+        for settings in ({"smoothing": 0.0}, {}):
+            started = {"kind": "refraction", "volume": volume, "settings": settings}
+            assert until(http, http.post("/v1/jobs", json=started).json()["id"])["state"] == "succeeded"
         low, high = http.get(f"/v1/volumes/{volume}").json()["value_range"]
-    assert asked[0][2].iso == (0.5 * (low + high),)
-    assert asked[0][2].frames == 36
+    assert [one[2].iso for one in asked] == [(0.5 * (low + high),), ()]
+    assert [one[2].frames for one in asked] == [36, 36]
 
 
 def test_cancel_between_pictures(serving, until):
