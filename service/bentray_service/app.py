@@ -41,6 +41,7 @@ from .pictures import Pictures
 from .readiness import Readiness
 from .routes import (
     access,
+    cluster_health,
     datasets,
     events,
     geometry_fields,
@@ -123,7 +124,19 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     app.add_middleware(RequestIds)
     app.state.metrics = Metrics()
     app.add_middleware(app.state.metrics.middleware)
-    for part in (tus, datasets, jobs, names, events, volumes, refraction, meshes, geometry_fields, access):
+    for part in (
+        tus,
+        datasets,
+        jobs,
+        names,
+        events,
+        volumes,
+        refraction,
+        meshes,
+        geometry_fields,
+        access,
+        cluster_health,
+    ):
         app.include_router(part.router, **CLOSED)
     app.include_router(health.metrics_router, **CLOSED)
     for public in (health, pages):

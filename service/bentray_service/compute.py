@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from bentray_kernels.tomography.settings import Settings
 from bentray_workers.cluster.capacities import WorkerCapacity, capacities_of, probed_capacities
+from bentray_workers.cluster.worker_health import WorkerHealth, health_of
 from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.files.dataset.summary import counts_in
 from bentray_workers.reconstruction import planning
@@ -61,6 +62,13 @@ class Compute:
             return int(self._cluster.describe()["workers"])
         except (OSError, TimeoutError):
             return 0
+
+    def health(self) -> tuple[WorkerHealth, ...]:
+        """The health of the connected workers; none without scheduler."""
+        try:
+            return health_of(self.client)
+        except (OSError, TimeoutError):
+            return ()
 
     def plan(self, counts: dict[str, Any] | None, path: Path, settings: Settings) -> dict[str, Any]:
         """Plan the reconstruction of a dataset on the connected workers.

@@ -1,12 +1,15 @@
-"""/v1/access: identity, permissions and storage usage of the caller."""
+"""/v1/access: identity, permissions, storage and keys of the caller."""
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Literal
 
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
+from ..rows.keys import Keys
+from ..rows.storage_kinds import StoredKind, usage_by_kind
 from ..web.errors import problems
 from ..wiring import CurrentCaller, Service
 
@@ -31,6 +34,47 @@ class AccessRecord(BaseModel):
     )
 
 
+class StorageRecord(BaseModel):
+    """Stored items of one kind."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    kind: StoredKind = Field(
+        description="results: volumes of reconstructions; volumes: uploaded ones; jobs: space for unfinished "
+        "jobs, and turntables; uploads: unfinished ones."
+    )
+    items: int = Field(description="Number of stored items.")
+    stored: int = Field(description="Bytes stored.")
+    reserved: int = Field(description="Bytes reserved.")
+
+
+class StorageList(BaseModel):
+    """Storage of the tenant by kind, without kinds that it has nothing of."""
+
+    storage: list[StorageRecord]
+    bytes_most: int = Field(description="Storage quota of the tenant, bytes.")
+
+
+class OwnKey(BaseModel):
+    """One API key of the tenant; its secret is not stored."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    id: str
+    name: str
+    scopes: list[str]
+    created: datetime
+    expires: datetime | None = Field(description="Null: it does not expire.")
+    revoked: datetime | None
+    used: datetime | None = Field(description="Last use, to the minute.")
+
+
+class OwnKeyList(BaseModel):
+    """The API keys of the tenant, oldest first."""
+
+    keys: list[OwnKey]
+
+
 @router.get("", responses=problems(503))
 def show_access(service: Service, caller: CurrentCaller) -> AccessRecord:
     """Show the identity, permissions and storage usage of the caller."""
@@ -47,3 +91,20 @@ def show_access(service: Service, caller: CurrentCaller) -> AccessRecord:
         requests_per_minute=settings.requests_per_minute if limited else 0,
         renders_per_minute=settings.renders_per_minute if limited else 0,
     )
+
+
+@router.get("/storage", responses=problems(503))
+def show_storage(service: Service, caller: CurrentCaller) -> StorageList:
+    """Show the storage of the tenant by kind."""
+    found = usage_by_kind(service.database, caller.tenant)
+    return StorageList(
+        storage=[StorageRecord.model_validate(one) for one in found],
+        bytes_most=service.settings.max_tenant_bytes,
+    )
+
+
+@router.get("/keys", responses=problems(503))
+def list_keys(service: Service, caller: CurrentCaller) -> OwnKeyList:
+    """List the API keys of the tenant; `bentray keys` creates and revokes them."""
+    rows = Keys(service.database).all(caller.tenant)
+    return OwnKeyList(keys=[OwnKey.model_validate(row) for row in rows])

@@ -9,7 +9,7 @@ import time
 from collections.abc import Collection
 from typing import Any, cast
 
-from sqlalchemy import ColumnElement, Connection, and_, func, insert, or_, select, update
+from sqlalchemy import ColumnElement, Connection, and_, case, func, insert, or_, select, update
 
 from . import schema, usage
 from .database import Database
@@ -52,6 +52,18 @@ class Queue:
             by_state = {state: int(count) for state, count in counts}
             waiting = select(func.min(jobs.c.created)).where(jobs.c.state == "queued")
             return by_state, connection.execute(waiting).scalar_one()
+
+    def lengths(self, tenant: Tenant) -> dict[str, tuple[int, int]]:
+        """The numbers of queued and of running jobs: those of a tenant, and of all tenants together."""
+        mine = func.sum(case((jobs.c.tenant == tenant, 1), else_=0))
+        active = select(jobs.c.state, mine, func.count()).where(jobs.c.state.not_in(ENDED))
+        found = {"queued": (0, 0), "running": (0, 0)}
+        with self._database.read() as connection:
+            for state, own, everyone in connection.execute(active.group_by(jobs.c.state)):
+                name = "queued" if state == "queued" else "running"
+                before = found[name]
+                found[name] = before[0] + int(own), before[1] + int(everyone)
+        return found
 
     def unfinished(self) -> set[str]:
         """The ids of all jobs that have not ended."""

@@ -1,0 +1,64 @@
+"""/v1/cluster: health of the workers, and lengths of the queues."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.concurrency import run_in_threadpool
+
+from ..web.errors import problems
+from ..wiring import CallerTenant, Service
+
+router = APIRouter(prefix="/v1/cluster", tags=["cluster"])
+
+
+class WorkerRecord(BaseModel):
+    """One worker at its last heartbeat."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    threads: int | None = Field(description="Threads that run tasks.")
+    memory_bytes: int | None = Field(description="Resident memory; null before the first heartbeat.")
+    memory_limit_bytes: int = Field(description="Its limit; 0: none.")
+    cpu_percent: float | None = Field(description="Of one processor core; null before the first heartbeat.")
+    running_tasks: int = Field(description="Tasks of all tenants that run now.")
+    paused: bool = Field(description="Whether it accepts no tasks, because its memory is nearly used up.")
+    opencl: bool = Field(
+        description="Whether an OpenCL device passed its self-test. Workers of the service itself test at "
+        "the first job that needs a device."
+    )
+
+
+class QueueRecord(BaseModel):
+    """Jobs that have not ended: of the tenant, and of all tenants together."""
+
+    queued: int = Field(description="Queued jobs of the tenant.")
+    running: int = Field(description="Running jobs of the tenant.")
+    all_queued: int = Field(description="Queued jobs of all tenants.")
+    all_running: int = Field(description="Running jobs of all tenants.")
+    waiting_images: int = Field(description="Images of the tenant that wait for a worker.")
+
+
+class ClusterRecord(BaseModel):
+    """Workers and queues; it names no host and no job of another tenant."""
+
+    workers: list[WorkerRecord]
+    queue: QueueRecord
+
+
+@router.get("", responses=problems(503))
+async def show_cluster(service: Service, tenant: CallerTenant) -> ClusterRecord:
+    """Show the health of the workers and the lengths of the queues."""
+    workers = await run_in_threadpool(service.compute.health)
+    lengths = await run_in_threadpool(service.queue.lengths, tenant)
+    (queued, all_queued), (running, all_running) = lengths["queued"], lengths["running"]
+    return ClusterRecord(
+        workers=[WorkerRecord.model_validate(one) for one in workers],
+        queue=QueueRecord(
+            queued=queued,
+            running=running,
+            all_queued=all_queued,
+            all_running=all_running,
+            waiting_images=service.pictures.waiting().get(tenant, 0),
+        ),
+    )

@@ -1,0 +1,68 @@
+"""GET of /v1/access/storage and /v1/access/keys: of the own tenant only, and never a secret."""
+
+import time
+
+import pytest
+
+from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import Tenant
+
+HDF5 = {"Content-Type": "application/x-hdf5"}
+
+
+@pytest.fixture
+def http(start):
+    return start()
+
+
+@pytest.fixture
+def tenants(http):
+    """Headers by tenant, and the keys."""
+    store, made = Keys(http.app.state.parts.database), {}
+    for tenant in ("acme", "other"):
+        token = ApiKey.new()
+        store.add(token, Tenant(tenant), f"scanner of {tenant}", ("read", "write"), time.time() + 3600.0)
+        made[tenant] = {"Authorization": f"Bearer {token.shown()}"}, token
+    return made
+
+
+def test_storage_by_kind_is_that_of_the_tenant(http, tenants, scan):
+    (mine, _), (theirs, _) = tenants["acme"], tenants["other"]
+    for headers in (mine, mine, theirs):
+        answer = http.post("/v1/datasets", content=scan().read_bytes(), headers={**HDF5, **headers})
+        assert answer.status_code == 201
+    found = http.get("/v1/access/storage", headers=mine).json()
+    whole = http.get("/v1/access", headers=mine).json()
+    assert [(one["kind"], one["items"], one["reserved"]) for one in found["storage"]] == [("scans", 2, 0)]
+    assert found["storage"][0]["stored"] == whole["bytes_stored"] > 0
+    assert found["bytes_most"] == whole["bytes_most"]
+    assert http.get("/v1/access/storage", headers=theirs).json()["storage"][0]["items"] == 1
+
+
+def test_keys_are_listed_without_secrets(http, tenants):
+    headers, token = tenants["acme"]
+    store = Keys(http.app.state.parts.database)
+    store.revoke(store.add(ApiKey.new(), Tenant("acme"), "old", ("read",))["id"])
+    answer = http.get("/v1/access/keys", headers=headers)
+    scanner, old = answer.json()["keys"]
+    assert set(scanner) == {"id", "name", "scopes", "created", "expires", "revoked", "used"}
+    assert (scanner["id"], scanner["name"], scanner["scopes"]) == (
+        token.id,
+        "scanner of acme",
+        ["read", "write"],
+    )
+    assert scanner["revoked"] is None
+    assert scanner["used"] is not None
+    assert scanner["expires"] > scanner["created"]
+    assert (old["name"], old["used"], old["expires"]) == ("old", None, None)
+    assert old["revoked"] is not None
+    everything = answer.text
+    for _, one in tenants.values():
+        assert one.shown() not in everything
+        assert one.digest() not in everything
+    assert "other" not in everything
+
+
+def test_without_keys_there_are_none(http):
+    assert http.get("/v1/access/keys").json() == {"keys": []}

@@ -1,0 +1,58 @@
+"""Health of workers: memory, threads and load of each, without addresses."""
+
+from dataclasses import asdict
+
+import pytest
+
+from bentray_workers.cluster.worker_health import health_of
+
+
+class Scheduler:
+    """A client that knows these workers."""
+
+    def __init__(self, record):
+        self._record = record
+
+    def scheduler_info(self, n_workers):
+        assert n_workers == -1
+        return self._record
+
+
+def of(**workers):
+    return health_of(Scheduler({"workers": workers}))
+
+
+def test_embedded_workers_report_themselves(cluster):
+    found = health_of(cluster.client)
+    assert len(found) == 2
+    assert all(one.threads >= 1 and one.memory_bytes > 0 and not one.paused for one in found)
+
+
+def test_a_worker_in_full():
+    metrics = {"memory": 5, "cpu": 180.0, "task_counts": {"executing": 2, "ready": 7}}
+    worker = {"nthreads": 2, "memory_limit": 9, "resources": {"opencl": 1.0}, "metrics": metrics}
+    (one,) = of(here={**worker, "status": "paused"})
+    assert asdict(one) == {
+        "threads": 2,
+        "memory_bytes": 5,
+        "memory_limit_bytes": 9,
+        "cpu_percent": 180.0,
+        "running_tasks": 2,
+        "paused": True,
+        "opencl": True,
+    }
+
+
+def test_a_worker_before_its_first_heartbeat():
+    (one,) = of(here={"resources": {"opencl": 0}})
+    assert (one.threads, one.memory_bytes, one.memory_limit_bytes, one.cpu_percent) == (None, None, 0, None)
+    assert (one.running_tasks, one.paused, one.opencl) == (0, False, False)
+
+
+def test_the_order_is_that_of_the_addresses():
+    assert [one.threads for one in of(b={"nthreads": 2}, a={"nthreads": 1})] == [1, 2]
+
+
+def test_without_a_scheduler():
+    with pytest.raises(ConnectionError, match="not available"):
+        health_of(Scheduler({}))
