@@ -12,7 +12,7 @@ from .settings import ServiceSettings
 def description() -> str:
     """The OpenAPI document as text; it is the same on every machine."""
     document = create_app(ServiceSettings.model_construct()).openapi()
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(document, indent=1, ensure_ascii=False) + "\n"
 
 
 if __name__ == "__main__":
