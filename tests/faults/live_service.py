@@ -22,7 +22,7 @@ class LiveService:
 
     Args:
         folder: for data and logs.
-        tenants: each of whom is given a key.
+        tenants: each of whom is given a key; without any, none is asked for.
         environment: of the service, beside where its data are.
 
     Attributes:
@@ -36,8 +36,13 @@ class LiveService:
         self.data, self.log = folder / "data", folder / "service.log"
         given = {name: value for name, value in os.environ.items() if not name.startswith("BENTRAY_")}
         self._environment = {**given, "BENTRAY_DATA_DIR": str(self.data), **environment}
+        self._workers = workers
         self.keys = {tenant: self._key(tenant) for tenant in tenants}
-        command = self._command("serve", "--port", "0", "--workers", str(workers), "--json")
+        self.start(0)
+
+    def start(self, port: int) -> None:
+        """Start it on a port, any with 0, and wait until it listens."""
+        command = self._command("serve", "--port", str(port), "--workers", str(self._workers), "--json")
         with self.log.open("ab") as log:
             self.process = subprocess.Popen(
                 command, env=self._environment, stdout=subprocess.PIPE, stderr=log, start_new_session=True
@@ -73,7 +78,7 @@ class LiveService:
         return [sys.executable, "-m", "bentray_service.cli", *words]
 
     def _key(self, tenant: str) -> str:
-        command = self._command("keys", "create", "--tenant", tenant, "--name", "soak", "--json")
+        command = self._command("keys", "create", "--tenant", tenant, "--name", "test", "--json")
         made = subprocess.run(
             command, env=self._environment, capture_output=True, check=True, timeout=PATIENCE_S
         )

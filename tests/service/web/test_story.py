@@ -1,0 +1,115 @@
+"""From a dropped file to an export in a browser, with a service and a worker as processes of their own."""
+
+import base64
+
+import httpx
+import nibabel
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.tomography import Settings, reconstruct
+from bentray_workers.files.dataset import write_dataset
+
+from ...faults.live_service import LiveService
+from ...faults.machine import wait_until
+from .conftest import PATIENCE_MS
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+ELEMENTS = 32
+# So many iterations that the service can be killed between two of them.
+SETTINGS = Settings.of(method="sart", nodes=64, iterations=120)
+
+# Drops a file on an element, as if from the desktop.
+DROP = """([text, name]) => {
+    const bytes = Uint8Array.from(atob(text), one => one.charCodeAt(0));
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([bytes], name));
+    const drop = new DragEvent("drop", { dataTransfer, bubbles: true });
+    document.getElementById("scan-drop").dispatchEvent(drop);
+}"""
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory):
+    made = LiveService(tmp_path_factory.mktemp("story"), ("north", "south"), workers=1)
+    yield made
+    made.kill()
+
+
+@pytest.fixture(scope="module")
+def breast():
+    """Travel times of a ring about the 2-D breast phantom."""
+    ring, emitters = Ring(ELEMENTS, 0.08), np.arange(ELEMENTS)
+    delta = TravelTimeScan(table6(1500.0), ring, TABLE6_SIDE_M, nodes=32).delta_tof(emitters)
+    return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta)
+
+
+def enter(page, service, tenant):
+    page.goto(service.url)
+    page.get_by_label("API key").fill(service.keys[tenant])
+    page.get_by_role("button", name="Use key").click()
+    page.get_by_text(f"Tenant {tenant} (").wait_for()
+
+
+def dropped(page, scan, folder):
+    write_dataset(folder / "breast.h5", scan)
+    page.locator("#scan-drop").wait_for()
+    page.evaluate(DROP, [base64.b64encode((folder / "breast.h5").read_bytes()).decode(), "breast.h5"])
+    page.wait_for_url("**/#/scans/*")
+
+
+def test_from_a_dropped_file_over_a_killed_service_to_an_export(page, service, breast, tmp_path):
+    enter(page, service, "north")
+    dropped(page, breast, tmp_path)
+    page.get_by_text("Other settings").click()
+    page.get_by_label("one emitter after another").check()
+    page.get_by_label("Nodes per side").fill(str(SETTINGS.nodes))
+    page.get_by_label("Iterations").fill(str(SETTINGS.iterations))
+    page.get_by_role("button", name="Start").click()
+    page.locator(".job h2 a").click()
+    http = httpx.Client(headers={"Authorization": f"Bearer {service.keys['north']}"}, timeout=60.0)
+    job = f"{service.url}/v1/jobs/{page.url.rpartition('/')[2]}"
+    wait_until(lambda: http.get(job).json()["history"])
+    service.kill()
+    assert page.locator("canvas.plane").count() == 0
+    service.start(service.port)
+    # Nobody touches the page: it finds the service again, and shows the result when it is there.
+    page.locator(".readout").filter(has_text="mm").wait_for()
+    assert len(http.get(job).json()["history"]) == SETTINGS.iterations
+    canvas = page.locator("canvas.plane")
+    box = canvas.bounding_box()
+    page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 0.6 * box["height"])
+    page.wait_for_function("() => document.querySelector('.readout').dataset.node")
+    said = page.locator(".readout").evaluate("one => ({...one.dataset})")
+    undisturbed = reconstruct(breast, SETTINGS).speed
+    node = tuple(map(int, said["node"].split(",")))
+    assert float(said["value"]) == pytest.approx(undisturbed[node], rel=1e-6)
+    page.get_by_text("Export", exact=True).click()
+    with page.expect_download() as download:
+        page.locator(".export").get_by_role("link", name="NIfTI").click()
+    download.value.save_as(tmp_path / "speed.nii")
+    np.testing.assert_allclose(
+        np.squeeze(nibabel.load(tmp_path / "speed.nii").get_fdata()), undisturbed, rtol=1e-6
+    )
+
+
+def test_two_tenants_see_nothing_of_each_other(page, browser, service, breast, tmp_path):
+    enter(page, service, "north")
+    dropped(page, breast, tmp_path)
+    own = page.url
+    with browser.new_context() as context:
+        other = context.new_page()
+        other.set_default_timeout(PATIENCE_MS)
+        enter(other, service, "south")
+        other.get_by_text("No scan uploaded yet").wait_for()
+        other.goto(own)
+        other.get_by_role("alert").get_by_text(own.rpartition("/")[2]).wait_for()
+        other.goto(f"{service.url}/#/jobs")
+        other.get_by_text("Nothing has run yet").wait_for()
+    page.goto(service.url)
+    expect(page.locator("#scans li")).not_to_have_count(0)
