@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,6 +26,9 @@ from .caster import (
     unit_normal,
 )
 from .scene import Scene
+
+# Rows of the image shaded in one call.
+TILE_ROWS = 16
 
 
 class Light(NamedTuple):
@@ -61,7 +66,15 @@ class Shaded:
     distance_m: Floats
 
 
-def shade(scene: Scene, camera: Camera, light: Light, rows: int, columns: int) -> Shaded:
+def shade(
+    scene: Scene,
+    camera: Camera,
+    light: Light,
+    rows: int,
+    columns: int,
+    threads: int = 1,
+    pause: Callable[[], None] = lambda: None,
+) -> Shaded:
     """The first surface that each pixel's ray meets.
 
     Args:
@@ -69,6 +82,8 @@ def shade(scene: Scene, camera: Camera, light: Light, rows: int, columns: int) -
         camera: of the image.
         light: light and surface properties.
         rows, columns: pixels, at least 1.
+        threads: number of threads for tiles of rows.
+        pause: called before every tile, possibly in another thread; an exception ends the rendering.
 
     Raises:
         InvalidInput: for no pixels.
@@ -78,7 +93,15 @@ def shade(scene: Scene, camera: Camera, light: Light, rows: int, columns: int) -
     image = np.empty((rows, columns, 3), dtype=np.uint8)
     normal, distance = np.full((rows, columns, 3), np.nan), np.full((rows, columns), np.nan)
     medium, search = medium_of(scene, "octree"), scene.search()
-    _shade(medium, search, (camera.origin, camera.direction), light, image, normal, distance)
+    rays = camera.origin, camera.direction
+
+    def tile(first: int) -> None:
+        pause()
+        own = slice(first, first + TILE_ROWS)
+        _shade(medium, search, rays, light, first, rows, image[own], normal[own], distance[own])
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(tile, range(0, rows, TILE_ROWS)))
     return Shaded(image, normal, distance)
 
 
@@ -88,14 +111,16 @@ def _shade(
     search: Search,
     camera: tuple[Floats, Floats],
     light: Light,
+    first: int,
+    rows: int,
     image: Colours,
     normals: Floats,
     distances: Floats,
 ) -> None:
-    rows, columns = distances.shape
-    for i in range(rows):
+    columns = distances.shape[1]
+    for i in range(len(distances)):
         for j in range(columns):
-            u, v = (j + 0.5) / columns - 0.5, (i + 0.5) / rows - 0.5
+            u, v = (j + 0.5) / columns - 0.5, (first + i + 0.5) / rows - 0.5
             origin, ahead = affine(camera[0], u, v), affine(camera[1], u, v)
             length = math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
             direction = (ahead[0] / length, ahead[1] / length, ahead[2] / length)

@@ -68,3 +68,14 @@ def test_an_oblique_view_is_shaded_by_phongs_model(sign):
 def test_no_pixels_are_rejected():
     with pytest.raises(InvalidInput, match="rows, columns"):
         shade(ball(1.0), CAMERA, Light((0.0, 0.0, -1.0)), 0, 4)
+
+
+def test_threads_shade_the_same_picture_and_are_paused():
+    light = Light((0.0, 0.6, -0.8))
+    whole = shade(ball(1.0), CAMERA, light, 41, 37)
+    pauses = []
+    threaded = shade(ball(1.0), CAMERA, light, 41, 37, threads=3, pause=lambda: pauses.append(1))
+    np.testing.assert_array_equal(threaded.image, whole.image)
+    np.testing.assert_array_equal(threaded.normal, whole.normal)
+    np.testing.assert_array_equal(threaded.distance_m, whole.distance_m)
+    assert len(pauses) == 3

@@ -79,6 +79,11 @@ def test_the_accurate_lookup_is_nearly_exact(folder, scene, mode):
     assert (off > 16).mean() < 0.03
 
 
+def test_threads_draw_the_same_picture(folder):
+    view = FieldView(**SIZE, scene="mirror-ball", mode="self")
+    np.testing.assert_array_equal(tile_image(folder, view, 0, 40, threads=3), tile_image(folder, view, 0, 40))
+
+
 def test_tiles_equal_parts_of_the_whole(folder, cluster, monkeypatch):
     view = FieldView(**SIZE, rays=2)
     whole = picture_png(folder, view)

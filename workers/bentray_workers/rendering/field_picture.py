@@ -18,8 +18,14 @@ from .field_view import LOOKUPS, FieldView
 from .refraction import part_of
 
 
-def tile_image(folder: Path, view: FieldView, first: int, last: int) -> Colours:
+def tile_image(folder: Path, view: FieldView, first: int, last: int, threads: int = 1) -> Colours:
     """Task: rows of the picture of a field, the last one not included.
+
+    Args:
+        folder: of the field.
+        view: what to draw.
+        first, last: rows.
+        threads: that trace rays.
 
     Raises:
         InvalidInput: as ``world_at``.
@@ -30,6 +36,7 @@ def tile_image(folder: Path, view: FieldView, first: int, last: int) -> Colours:
         depth=view.depth,
         way=LOOKUPS[view.lookup],
         eye=LOOKUPS[view.eye],
+        threads=threads,
     )
     camera = part_of(camera_of(view), first / view.height, last / view.height)
     return averaged(trace(world_at(folder, view), camera, settings, cancellation_check()), view.rays)
@@ -37,12 +44,17 @@ def tile_image(folder: Path, view: FieldView, first: int, last: int) -> Colours:
 
 def picture_png(folder: Path, view: FieldView) -> bytes:
     """Task: the whole picture, as PNG."""
-    return png_of(tile_image(folder, view, 0, view.height))
+    return png_of(viewer_tile(folder, view, 0, view.height))
+
+
+def viewer_tile(folder: Path, view: FieldView, first: int, last: int) -> Colours:
+    """Task: as ``tile_image``, in threads."""
+    return tile_image(folder, view, first, last, tiles.viewer_threads())
 
 
 def tasks_of(folder: Path, view: FieldView) -> tiles.PictureTasks:
     """The picture of the field in a folder as tasks."""
-    return tiles.tasks_of(picture_png, tile_image, folder, view)
+    return tiles.tasks_of(picture_png, viewer_tile, folder, view)
 
 
 def map_png(folder: Path, quantity: str) -> bytes:

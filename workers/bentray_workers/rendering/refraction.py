@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -36,8 +35,6 @@ from .scene_cache import scene_at
 
 # Width of the view at zoom 1, relative to the longest side of the volume.
 VIEW_MARGIN = 1.25
-# Most threads of one picture.
-MAX_THREADS = 4
 # Distance of the eye from the centre of the volume, in its diagonals.
 EYE_DISTANCE = 2.5
 BEYOND = (90, 90, 90)
@@ -64,9 +61,12 @@ def picture_png(path: Path, view: RefractionView) -> bytes:
     Raises:
         InvalidInput: as ``scene_at``.
     """
-    # A viewer waits for it; the tiles of large pictures are drawn side by side anyway.
-    threads = min(MAX_THREADS, len(os.sched_getaffinity(0)))
-    return png_of(draw_tile(scene_at(path, view), view, 0, view.height, threads=threads).image)
+    return png_of(viewer_tile(path, view, 0, view.height))
+
+
+def viewer_tile(path: Path, view: RefractionView, first: int, last: int) -> Colours:
+    """Task: as ``tile_image``, in threads."""
+    return draw_tile(scene_at(path, view), view, first, last, threads=tiles.viewer_threads()).image
 
 
 def tile_image(path: Path, view: RefractionView, first: int, last: int) -> Colours:
@@ -76,7 +76,7 @@ def tile_image(path: Path, view: RefractionView, first: int, last: int) -> Colou
 
 def tasks_of(path: Path, view: RefractionView) -> tiles.PictureTasks:
     """The picture of a file as tasks."""
-    return tiles.tasks_of(picture_png, tile_image, path, view)
+    return tiles.tasks_of(picture_png, viewer_tile, path, view)
 
 
 def draw_tile(
@@ -103,7 +103,8 @@ def draw_tile(
     rows = bottom - top
     own = slice(first - top, last - top)
     if view.mode == "shaded":
-        shaded = shade(scene, camera, _light(view), rows * view.times, view.width * view.times)
+        size = rows * view.times, view.width * view.times
+        shaded = shade(scene, camera, _light(view), *size, threads, cancellation_check())
         return Tile(averaged(shaded.image, view.times)[own], None)
     settings = RenderSettings(
         rows=rows,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -14,6 +15,8 @@ from ..images.png import Colours, png_of
 
 # Rays of one task: about a second of work.
 TASK_RAYS = 2**19
+# Most threads of one picture that a viewer waits for.
+MAX_THREADS = 4
 
 
 class View(Protocol):
@@ -36,6 +39,11 @@ def tile_rows(view: View) -> list[tuple[int, int]]:
     """First and last row, the last one not included, of each tile."""
     rows = max(1, TASK_RAYS // (view.width * view.times**2))
     return [(first, min(first + rows, view.height)) for first in range(0, view.height, rows)]
+
+
+def viewer_threads() -> int:
+    """Threads that trace the rays of a picture that a viewer waits for."""
+    return min(MAX_THREADS, len(os.sched_getaffinity(0)))
 
 
 class PictureTasks(NamedTuple):

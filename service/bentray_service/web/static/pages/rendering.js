@@ -8,7 +8,7 @@ import { jobList } from "../parts/job_list.js";
 import { withKey } from "../parts/key.js";
 import { orbit } from "../parts/orbit.js";
 import { fillSelect, startJob } from "../parts/panel.js";
-import { pictureStream } from "../parts/picture_stream.js";
+import { pictureStream, rateOf } from "../parts/picture_stream.js";
 import { load, titleOf } from "../parts/titles.js";
 import { uploads } from "../parts/uploads.js";
 import { glassOf, queryOf } from "../parts/views.js";
@@ -110,16 +110,12 @@ export async function open(root, { id, query }) {
   let bars = null;
   let histogram = null;
   let counted = "";
-  let lastShown = 0;
 
   const stream = pictureStream(at("glass"), {
-    onShown({ quality }) {
+    onShown({ quality, rate }) {
       at("stage-hint").hidden = true;
-      const now = performance.now();
-      const rate = quality === "preview" && now - lastShown < 1000 ? ` · ${Math.round(1000 / (now - lastShown))} frames/s` : "";
-      lastShown = now;
       const turned = `azimuth ${rounded(Number(field("azimuth_deg").value))}°, elevation ${rounded(Number(field("elevation_deg").value))}°`;
-      at("view-facts").textContent = `${turned}${quality === "full" ? "" : ` · preview${rate}`}`;
+      at("view-facts").textContent = `${turned}${quality === "full" ? "" : rateOf(rate)}`;
       at("glass").setAttribute("aria-label", `Volume rendering of ${titleOf(chosen())}, ${turned}`);
       showHistogram();
     },

@@ -7,7 +7,7 @@ import { objectAt, objectsOf, placeAt } from "../parts/ground.js";
 import { jobList } from "../parts/job_list.js";
 import { orbit } from "../parts/orbit.js";
 import { fillSelect, startJob } from "../parts/panel.js";
-import { pictureStream } from "../parts/picture_stream.js";
+import { pictureStream, rateOf } from "../parts/picture_stream.js";
 import { load, titleOf } from "../parts/titles.js";
 import { uploads } from "../parts/uploads.js";
 import { queryOf } from "../parts/views.js";
@@ -134,10 +134,10 @@ export async function open(root, { id, query }) {
   let measured = "";
   let keeping = 0;
   const stream = pictureStream(at("field-picture"), {
-    onShown({ quality }) {
+    onShown({ quality, rate }) {
       at("stage-hint").hidden = true;
       const turned = `azimuth ${value("azimuth_deg")}°, elevation ${value("elevation_deg")}°`;
-      at("view-facts").textContent = quality === "full" ? turned : `${turned} · preview`;
+      at("view-facts").textContent = `${turned}${quality === "full" ? "" : rateOf(rate)}`;
       at("field-picture").setAttribute("aria-label", `${titleOf(meshes.get(at("mesh").value))}, ${value("mode")}, ${turned}`);
     },
     onError: (error) => showError("field-error", error),
