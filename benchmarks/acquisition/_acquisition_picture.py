@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -33,7 +33,7 @@ def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str
         seconds: what they are seconds of.
     """
     with drawing():
-        figure = new_figure(15.0, 3.1 * len(scans) + 0.4)
+        figure = new_figure(15.0, 3.3 * len(scans) + 0.6)
         figure.suptitle(f"Images from raw traces; {seconds}")
         widths = [GATHER_WIDTH, *(1.0 for _ in range(1 + len(SHOWN)))]
         panels = figure.subplots(len(scans), len(widths), squeeze=False, width_ratios=widths)
@@ -55,11 +55,26 @@ def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str
             ]
             for axes, way in zip(row[2:], SHOWN, strict=True):
                 one = images[way]
-                title = f"{way}: {one.rms:.1f} m/s, {one.seconds:.0f} s"
+                title = f"{way}\n{one.rms:.1f} m/s, {one.seconds:.0f} s"
                 grid = (one.result.spacing_m, one.result.origin_m)
                 maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
             draw_bar(maps, "speed (m/s)")
+            same_extent(row[1:])
+        # One for all gathers, outside the data.
+        marks = panels[-1][0].legend(
+            loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, frameon=False, title="picks"
+        )
+        for mark in marks.legend_handles:
+            mark.set_markersize(5.0)
         return figure_png(figure)
+
+
+def same_extent(panels: Sequence[Axes]) -> None:
+    """All panels show what is in each of them."""
+    left, right = zip(*(axes.get_xlim() for axes in panels), strict=True)
+    low, high = zip(*(axes.get_ylim() for axes in panels), strict=True)
+    for axes in panels:
+        axes.set(xlim=(max(left), min(right)), ylim=(max(low), min(high)))
 
 
 def gather(axes: Axes, name: str, dataset: Dataset) -> None:
@@ -92,10 +107,6 @@ def gather(axes: Axes, name: str, dataset: Dataset) -> None:
     axes.set_xlabel("receiver")
     axes.set_ylabel("time less that in water (µs)")
     axes.set_ylim(1e6 * late[0], 1e6 * late[-1])
-    legend = axes.legend(fontsize=6, loc="upper left", ncols=3, framealpha=0.9)
-    legend.get_frame().set_facecolor("white")
-    for mark in legend.legend_handles:
-        mark.set_markersize(4.0)
 
 
 def first_emission(dataset: Dataset) -> Dataset:
