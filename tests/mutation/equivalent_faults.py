@@ -27,7 +27,7 @@ EQUIVALENT: dict[str, str] = {
     "acquisition/reference/reference_shot.py _Fit.__init__: frequency * period_s <= HIGHEST -> frequency * "
     "period_s < HIGHEST": "one bin at the edge of the band",
     "isosurface/cell_weights.py _extremes: flat < stop -> flat <= stop": "the end itself is in the list",
-    "refraction/supersampling.py _filter_patterns: a + b > 0 -> a + b >= 0": "at no distance the "
+    "refraction/supersampling.py _sample_evenly: a + b > 0 -> a + b >= 0": "at no distance the "
     "sample is the pixel's own place",
     "refraction/relief.py meet_relief: across <= down -> across < down": "at a corner the other "
     "line follows after a step of 0",

@@ -7,29 +7,44 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..compiled import kernel
 from .backdrop import Backdrop, Colours
-from .texels import STEPS, WHOLE, Texels, packed_colour, unpacked
+from .texels import STEP_BITS, STEPS, WHOLE, Texels, between_texels, reduced, unpacked
 
 Planes = NDArray[np.int8]
 Crossed = NDArray[np.int16]
 States = NDArray[np.uint8]
+Pairs = NDArray[np.uint64]
 
 # Of a corner: the four pixels about it belong to different pieces of the picture; to one; to one, and to the
 # same copy of the picture.
 APART, TOGETHER, ALONE = 0, 1, 3
 
-# A place is kept as a number of ninths of this part of a step: the weights of the nine samples are ninths.
-FINE_BITS = 10
-FINE = 1 << FINE_BITS
+# A place between pixels is a pair of numbers in one: the place down, ``PLACE_BITS`` above the place across,
+# both in texels with ``PART_BITS`` behind the point. That of a pixel is in ninths of it: the weights of the
+# nine samples are ninths.
+PLACE_BITS, PART_BITS = 32, 16
+PARTS = 1 << PART_BITS
+# Most texels along a side of a picture for such places.
+MOST_TEXELS = PARTS - 2
+
+TWO, THREE = np.uint64(2), np.uint64(3)
+FINE_ACROSS, ACROSS = np.uint64(PART_BITS - STEP_BITS), np.uint64(PART_BITS)
+FINE_DOWN, DOWN = np.uint64(PLACE_BITS + PART_BITS - STEP_BITS), np.uint64(PLACE_BITS + PART_BITS)
+STEP_MASK, TEXEL_MASK = np.uint64(STEPS - 1), np.uint64(PARTS - 1)
 
 
 class Texture(NamedTuple):
-    """One interpolated picture for compiled functions."""
+    """One interpolated picture for compiled functions.
+
+    Attributes:
+        texels: from its first on.
+        rows, columns: without the frame.
+        repeats: as in ``Plane``.
+    """
 
     texels: Texels
-    start: int
     rows: int
     columns: int
     repeats: float
@@ -57,34 +72,27 @@ def filter_picture(
     """
     rows, columns = planes.shape
     table = backdrop.tables[plane]
-    texture = Texture(backdrop.texels, table[8], table[1], table[2], backdrop.repeats[plane])
+    texture = Texture(backdrop.texels[table[8] :], table[1], table[2], backdrop.repeats[plane])
     # Of three rows, in turn.
-    across, down = np.empty((3, columns), dtype=np.int64), np.empty((3, columns), dtype=np.int64)
-    piece = np.empty((3, columns), dtype=np.int32)
-    _place(texture, plane, planes[0], places[0], crossed[0], across[0], down[0], piece[0])
+    pairs, piece = np.empty((3, columns), dtype=np.uint64), np.empty((3, columns), dtype=np.int32)
+    _place(texture, plane, planes[0], places[0], crossed[0], pairs[0], piece[0])
+    # Thirds of the places between a row and the one above it, of the row itself, and towards the one below.
+    thirds = np.empty((3, columns), dtype=np.uint64)
     # Of the corners above and below a row.
     state = np.zeros((2, columns + 1), dtype=np.uint8)
     for i in range(rows):
-        above, below, after = i % 2, 1 - i % 2, (i + 1) % 3
+        above, below, before, after = i % 2, 1 - i % 2, (i + 2) % 3, (i + 1) % 3
         if i + 1 < rows:
-            _place(
-                texture,
-                plane,
-                planes[i + 1],
-                places[i + 1],
-                crossed[i + 1],
-                across[after],
-                down[after],
-                piece[after],
-            )
+            _place(texture, plane, planes[i + 1], places[i + 1], crossed[i + 1], pairs[after], piece[after])
             _join(piece[i % 3], piece[after], state[below])
         else:
             state[below] = APART
+        if degree == 1:
+            _mix(pairs[before], pairs[i % 3], pairs[after], thirds)
         for j in range(columns):
             common = state[0, j] & state[0, j + 1] & state[1, j] & state[1, j + 1]
             if degree == 1 and common == ALONE:
-                total = _nine(texture, across, down, i, j)
-                red, green, blue = unpacked(total)
+                red, green, blue = unpacked(_nine(texture, thirds, np.uint64(j)))
                 scale = weights[i, j] / (9 * WHOLE)
                 image[i, j, 0] = np.uint8(red * scale + 0.5)
                 image[i, j, 1] = np.uint8(green * scale + 0.5)
@@ -100,22 +108,33 @@ def _place(
     planes: Planes,
     places: Floats,
     crossed: Crossed,
-    across: Ints,
-    down: Ints,
+    pairs: Pairs,
     piece: NDArray[np.int32],
 ) -> None:
     """Places of a row in the first copy of the picture, and numbers of its pieces.
 
-    In another copy the number is even, in the first one odd; −1 is no piece.
+    In another copy the number is even, in the first one odd; −1 is no piece. A picture with too many texels
+    counts as another copy.
     """
-    ninth = STEPS * FINE / 9.0
+    ninth = PARTS / 9.0
     wide, high = texture.columns * ninth, texture.rows * ninth
+    small = max(texture.columns, texture.rows) <= MOST_TEXELS
     for j in range(len(planes)):
         x, y = (places[j, 0] + 0.5) * texture.repeats, (places[j, 1] + 0.5) * texture.repeats
-        first = (x >= 0.0) & (x <= 1.0) & (y >= 0.0) & (y <= 1.0)
-        across[j] = int(x * wide + 0.5 * ninth) if first else 0
-        down[j] = int(y * high + 0.5 * ninth) if first else 0
+        first = small & (x >= 0.0) & (x <= 1.0) & (y >= 0.0) & (y <= 1.0)
+        across = int(x * wide + 0.5 * ninth) if first else 0
+        down = int(y * high + 0.5 * ninth) if first else 0
+        pairs[j] = np.uint64(down << PLACE_BITS | across)
         piece[j] = 2 * np.int32(crossed[j]) + np.int32(first) if planes[j] == plane else -1
+
+
+@kernel(inline="always")
+def _mix(above: Pairs, own: Pairs, below: Pairs, thirds: Pairs) -> None:
+    """Three times the places of a row, and those a third of the way to its neighbours."""
+    for j in range(len(own)):
+        thirds[0, j] = TWO * own[j] + above[j]
+        thirds[1, j] = THREE * own[j]
+        thirds[2, j] = TWO * own[j] + below[j]
 
 
 @kernel(inline="always")
@@ -128,32 +147,24 @@ def _join(upper: NDArray[np.int32], lower: NDArray[np.int32], state: States) -> 
 
 
 @kernel(inline="always")
-def _nine(texture: Texture, across: Ints, down: Ints, i: int, j: int) -> np.uint64:
-    """Sum of the samples of degree 1 among pixels of one piece."""
-    own = i % 3
-    x, y = across[own, j], down[own, j]
-    total = _at(texture, 9 * x, 9 * y)
-    for k in range(2):
-        # The row above, then the one below.
-        p = (i + 2 - k) % 3
-        total += _at(texture, 6 * x + 3 * across[p, j], 6 * y + 3 * down[p, j])
-        q = j - 1 + 2 * k
-        total += _at(texture, 6 * x + 3 * across[own, q], 6 * y + 3 * down[own, q])
-        for m in range(2):
-            q = j - 1 + 2 * m
-            total += _at(
-                texture,
-                4 * x + 2 * (across[p, j] + across[own, q]) + across[p, q],
-                4 * y + 2 * (down[p, j] + down[own, q]) + down[p, q],
-            )
-    return total
+def _nine(texture: Texture, thirds: Pairs, j: np.uint64) -> np.uint64:
+    """Sum of the samples of degree 1 of a pixel among pixels of one piece."""
+    stride = np.uint64(texture.columns + 2)
+    total = reduced(_at(texture.texels, stride, THREE * thirds[1, j]))
+    for k in range(3):
+        left = _at(texture.texels, stride, TWO * thirds[k, j] + thirds[k, j - np.uint64(1)])
+        right = _at(texture.texels, stride, TWO * thirds[k, j] + thirds[k, j + np.uint64(1)])
+        total += reduced(left + right)
+    upper = _at(texture.texels, stride, THREE * thirds[0, j])
+    return total + reduced(upper + _at(texture.texels, stride, THREE * thirds[2, j]))
 
 
 @kernel(inline="always")
-def _at(texture: Texture, across: int, down: int) -> np.uint64:
-    """Colour at a place in parts of a step."""
-    return packed_colour(
-        texture.texels, texture.start, texture.columns, across >> FINE_BITS, down >> FINE_BITS
+def _at(texels: Texels, stride: np.uint64, pair: np.uint64) -> np.uint64:
+    """Colour at a place."""
+    first = (pair >> DOWN) * stride + (pair >> ACROSS & TEXEL_MASK)
+    return between_texels(
+        texels, first, stride, pair >> FINE_ACROSS & STEP_MASK, pair >> FINE_DOWN & STEP_MASK
     )
 
 
@@ -161,9 +172,11 @@ def _at(texture: Texture, across: int, down: int) -> np.uint64:
 def _colour(texture: Texture, u: float, v: float) -> np.uint64:
     x, y = (u + 0.5) * texture.repeats, (v + 0.5) * texture.repeats
     # In steps from the middle of the frame's first texel.
-    across = (x - np.floor(x)) * (texture.columns * STEPS) + STEPS / 2
-    down = (y - np.floor(y)) * (texture.rows * STEPS) + STEPS / 2
-    return packed_colour(texture.texels, texture.start, texture.columns, int(across), int(down))
+    across = np.uint64((x - np.floor(x)) * (texture.columns * STEPS) + STEPS / 2)
+    down = np.uint64((y - np.floor(y)) * (texture.rows * STEPS) + STEPS / 2)
+    bits, stride = np.uint64(STEP_BITS), np.uint64(texture.columns + 2)
+    first = (down >> bits) * stride + (across >> bits)
+    return reduced(between_texels(texture.texels, first, stride, across & STEP_MASK, down & STEP_MASK))
 
 
 @kernel(inline="always")

@@ -14,10 +14,11 @@ LANE = 21
 # Steps of a place between two texels.
 STEP_BITS = 6
 STEPS = 1 << STEP_BITS
-# Of a colour, a channel has 8 bits and 8 more behind the point.
+# Of a reduced colour, a channel has 8 bits and 8 more behind the point.
 WHOLE = 256
 ONE, FULL, SHIFT = np.uint64(1), np.uint64(STEPS), np.uint64(4)
-COLOUR = np.uint64(sum(0xFFFF << (LANE * channel) for channel in range(3)))
+# Of two colours: a bit more.
+PAIR = np.uint64(sum(0x1FFFF << (LANE * channel) for channel in range(3)))
 CHANNEL = np.uint64((1 << LANE) - 1)
 SECOND, THIRD = np.uint64(LANE), np.uint64(2 * LANE)
 
@@ -37,28 +38,33 @@ def packed(picture: NDArray[np.uint8], repeated: bool) -> Texels:
 
 
 @kernel(inline="always")
-def packed_colour(texels: Texels, start: int, columns: int, across: int, down: int) -> np.uint64:
-    """Colour at a place of a picture, bilinear.
+def between_texels(
+    texels: Texels, first: np.uint64, stride: np.uint64, right: np.uint64, lower: np.uint64
+) -> np.uint64:
+    """Colour between four texels, bilinear.
 
     Args:
-        texels: pictures as ``packed`` returns them, one after the other.
-        start: place of the first texel of the frame.
-        columns: of the picture, without the frame.
-        across, down: place in ``STEPS`` a texel from the middle of the frame's first texel, within the frame.
+        texels: as ``packed`` returns them, in one dimension.
+        first: place of the upper left texel.
+        stride: texels in a row, with the frame.
+        right, lower: steps from there, below ``STEPS``.
 
     Returns:
-        three channels of 0 to 255 · ``WHOLE``, ``LANE`` bits apart; 32 of them have a sum without overflow.
+        three channels of 0 to 255 · ``STEPS``², ``LANE`` bits apart; two of them have a sum without overflow.
     """
-    right, lower = np.uint64(across & (STEPS - 1)), np.uint64(down & (STEPS - 1))
-    # Unsigned, as a negative index would be counted from the end.
-    first = np.uint64(start + (down >> STEP_BITS) * (columns + 2) + (across >> STEP_BITS))
-    second = first + np.uint64(columns + 2)
+    second = first + stride
     # Differences of channels may be negative; the weighted sums are not, and whole numbers wrap around.
     a, b = texels[first], texels[second]
     a = a * FULL + right * (texels[first + ONE] - a)
     b = b * FULL + right * (texels[second + ONE] - b)
-    colour: np.uint64 = (a * FULL + lower * (b - a)) >> SHIFT & COLOUR
+    colour: np.uint64 = a * FULL + lower * (b - a)
     return colour
+
+
+@kernel(inline="always")
+def reduced(colours: np.uint64) -> np.uint64:
+    """One colour of ``between_texels``, or a sum of two, in ``WHOLE``; 32 colours then have a sum."""
+    return colours >> SHIFT & PAIR
 
 
 @kernel(inline="always")
