@@ -43,8 +43,8 @@ class Deletion:
     """Deletes datasets, volumes, meshes and jobs of a tenant.
 
     A dataset is deleted with the simulation that created it, its jobs and their volumes; a volume with its
-    job, turntables and exports; a mesh with its jobs and their fields. Meshes of iso-surfaces are kept. Other
-    jobs, e.g. failed simulations, are deleted separately.
+    job, turntables and exports; a mesh with its jobs and their fields; a job with what it made, except for a
+    simulated scan. Meshes of iso-surfaces are kept.
 
     Open files can still be read. If the service dies in between, files without rows remain; see ``Orphans``.
     """
@@ -169,6 +169,7 @@ def _forget(
         connection.execute(delete(table).where(table.c.id.in_(names)))
     connection.execute(delete(uploads).where(uploads.c.result_id.in_(names), uploads.c.state == "done"))
     connection.execute(update(meshes).where(meshes.c.volume_id.in_(names)).values(volume_id=None))
+    connection.execute(update(datasets).where(datasets.c.job_id.in_(gone)).values(job_id=None))
 
 
 _TABLES = {

@@ -1,4 +1,4 @@
-"""/v1/jobs: start, list, show and cancel jobs."""
+"""/v1/jobs: start, list, show, cancel and delete jobs."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 
 from ..errors import NoAnimation
+from ..files.deletion import StoredItem
 from ..jobs.kinds import KINDS
 from ..web.errors import problems
 from ..wiring import CallerTenant, CurrentCaller, Service
 from .bodies import Limit, SmallBody, accept_media_types
 from .downloads import download, download_of
 from .models.job_records import JobList, JobRecord, State
+from .models.name_changes import TEXT
 from .record_conversion import job_record
 
 log = logging.getLogger("bentray.jobs")
@@ -26,7 +28,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], route_class=SmallBody)
 
 
 if TYPE_CHECKING:
-    from ..jobs.kind import JobRequest
+    from ..jobs.kind import JobRequest as JobRequest
 
     JobKind = str
 else:
@@ -88,13 +90,22 @@ def list_jobs(
     state: Annotated[State | None, Query(description="Only these.")] = None,
     kind: Annotated[JobKind | None, Query(description="Only these.")] = None,
     before: Annotated[str | None, Query(description="Only jobs older than this job.")] = None,
+    text: Annotated[
+        str | None,
+        Query(
+            max_length=200,
+            pattern=TEXT,
+            description="Only jobs with this text in their id, name, notes or owner, or in the title of "
+            "their scan, volume or mesh, in capitals or small letters.",
+        ),
+    ] = None,
 ) -> JobList:
     """List jobs, newest first; `next` is the address of the next page."""
-    rows = service.jobs.newest(tenant, limit + 1, state, kind, before)
+    rows = service.jobs.newest(tenant, limit + 1, state, kind, before, text)
     shown = [job_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
         return JobList(jobs=shown, next=None)
-    filters = {"limit": limit, "state": state, "kind": kind, "before": shown[-1].id}
+    filters = {"limit": limit, "state": state, "kind": kind, "text": text, "before": shown[-1].id}
     query = urlencode({name: value for name, value in filters.items() if value is not None})
     return JobList(jobs=shown, next=f"/v1/jobs?{query}")
 
@@ -114,6 +125,15 @@ def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
 def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
     """Cancel a job. A queued job ends at once, a running one within a second or so."""
     return job_record(service.jobs.request_cancel(tenant, job_id))
+
+
+@router.delete("/{job_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
+def delete_job(job_id: str, service: Service, tenant: CallerTenant) -> None:
+    """Delete a job that has ended, with the volume, animation or geometry field that it made.
+
+    A simulated scan stays, and so does a geometry field that another job made too.
+    """
+    service.deletion.delete(StoredItem(tenant, "job", job_id))
 
 
 @router.head("/{job_id}/animation", include_in_schema=False)

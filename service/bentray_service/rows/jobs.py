@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import cast
 
-from sqlalchemy import Connection, case, func, insert, select
+from sqlalchemy import Connection, case, func, insert, or_, select
 from sqlalchemy.exc import IntegrityError
 
 from ..errors import JobFinished, KeyReused, QueueFull, UnknownId
-from . import schema, usage
+from . import job_search, schema, usage
 from .ids import checked, new_id
 from .job_states import RUNNING, append_event, change
 from .schema import ENDED, jobs
@@ -118,6 +119,7 @@ class Jobs(NamedTable[JobRow]):
         state: str | None = None,
         kind: str | None = None,
         before: str | None = None,
+        text: str | None = None,
     ) -> list[JobRow]:
         """Up to ``limit`` jobs of this tenant, newest first.
 
@@ -126,6 +128,7 @@ class Jobs(NamedTable[JobRow]):
             limit: maximum number.
             state, kind: only jobs with these values.
             before: only jobs older than the job with this id.
+            text: only jobs that ``job_search.matches``.
 
         Raises:
             UnknownId: when the tenant has no such job.
@@ -135,6 +138,8 @@ class Jobs(NamedTable[JobRow]):
             query = query.where(jobs.c.state == state)
         if kind is not None:
             query = query.where(jobs.c.kind == kind)
+        if text:
+            query = query.where(job_search.matches(tenant, text))
         if before is not None:
             query = query.where(jobs.c.number < self.get(tenant, before)["number"])
         return cast(list[JobRow], self._database.rows(query))
@@ -146,7 +151,14 @@ class Jobs(NamedTable[JobRow]):
         """
         if job["state"] != "queued":
             return None
-        tenant, number = job["tenant"], job["number"]
+        return self._place(job["tenant"], job["number"])
+
+    def next_place(self, tenant: Tenant) -> int:
+        """The ``place`` of a job that this tenant would submit now."""
+        return self._place(tenant, None)
+
+    def _place(self, tenant: Tenant, number: int | None) -> int:
+        """The place of a queued job of a tenant, or without a number of one after all others."""
         queued, running = (
             func.coalesce(func.sum(case((jobs.c.state.in_(states), 1), else_=0)), 0)
             for states in (("queued",), RUNNING)
@@ -156,16 +168,33 @@ class Jobs(NamedTable[JobRow]):
         oldest = func.min(case((jobs.c.state == "queued", jobs.c.number)))
         turns = (
             select(jobs.c.tenant, queued, running, served, oldest)
-            .where(jobs.c.tenant.in_(waiting))
+            .where(or_(jobs.c.tenant == tenant, jobs.c.tenant.in_(waiting)))
             .group_by(jobs.c.tenant)
         )
-        older = jobs.c.tenant == tenant, jobs.c.state == "queued", jobs.c.number < number
+        older = [jobs.c.tenant == tenant, jobs.c.state == "queued"]
+        if number is not None:
+            older.append(jobs.c.number < number)
         with self._database.read() as connection:
             mine = int(connection.execute(select(func.count()).where(*older)).scalar_one())
-            found = {one: (int(count), tuple(turn)) for one, count, *turn in connection.execute(turns)}
-        _, own = found.pop(tenant, (0, ()))
+            found = {
+                one: (int(count), (int(busy), float(last), math.inf if first is None else first))
+                for one, count, busy, last, first in connection.execute(turns)
+            }
+        # A tenant without any job is served first of those without a running one, its job is the newest.
+        _, own = found.pop(tenant, (0, (0, 0.0, math.inf)))
         # Tenants take turns: one that goes first starts a job more before this one.
         return mine + sum(min(count, mine + (turn < own)) for count, turn in found.values())
+
+    def durations(self, tenant: Tenant, kind: str, limit: int) -> list[tuple[Plain, float]]:
+        """Plan and running time, s, of up to ``limit`` successful jobs of this tenant, the newest first."""
+        query = (
+            select(jobs.c.plan, jobs.c.started, jobs.c.finished)
+            .where(jobs.c.tenant == tenant, jobs.c.kind == kind, jobs.c.state == "succeeded")
+            .where(jobs.c.started.is_not(None), jobs.c.finished.is_not(None))
+            .order_by(jobs.c.number.desc())
+            .limit(limit)
+        )
+        return [(row["plan"] or {}, row["finished"] - row["started"]) for row in self._database.rows(query)]
 
     def events(self, tenant: Tenant, job_id: str, after: int = 0) -> list[EventRow]:
         """The events of one job of this tenant after event ``after``, oldest first."""

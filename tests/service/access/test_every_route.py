@@ -42,7 +42,7 @@ VERBS = errors.METHODS
 # What a header that is required holds.
 REQUIRED = {"tus-resumable": "1.0.0", "upload-offset": "0", "upload-length": "4"}
 # Texts that mean nothing to the service, so that anything may be in them.
-FREE = {"title", "name", "notes", "idempotency-key", "upload-metadata"}
+FREE = {"title", "name", "notes", "text", "idempotency-key", "upload-metadata"}
 HOSTILE = ("../../../outside", "/etc/passwd\x00", "..%2f..%2foutside")
 
 

@@ -251,3 +251,60 @@ def test_pages_lead_to_every_job_once(http, dataset, until):
     assert http.get(f"/v1/jobs?before=job-{20 * '0'}").status_code == 404
     for wrong in ("state=lost", "kind=cake", "limit=0", "before=../x"):
         assert http.get(f"/v1/jobs?{wrong}").status_code in (404, 422)
+
+
+def found(http, **query):
+    return [job["id"] for job in http.get("/v1/jobs", params=query).json()["jobs"]]
+
+
+def test_text_filters_by_name_scan_and_owner(http, dataset):
+    plain, named, noted = (ask(http, dataset, {"nodes": 16}).json()["id"] for _ in range(3))
+    http.patch(f"/v1/jobs/{named}", json={"name": "Left 100 %_ Übung\\"})
+    http.patch(f"/v1/jobs/{noted}", json={"notes": "water at 31 °C"})
+    assert found(http, text="left") == found(http, text="LEFT 100") == [named]
+    assert found(http, text="31 °") == [noted]
+    assert found(http, text=plain) == [plain]
+    # No character is a pattern, and what is found is what was written, also beyond ASCII.
+    for words, expected in (("%", [named]), ("_", [named]), ("\\", [named]), ("Übung", [named]), ("%%", [])):
+        assert found(http, text=words) == expected, words
+    assert found(http, text="") == [noted, named, plain]
+    assert found(http, text="sixteen ELEMENTS") == [noted, named, plain]
+    http.patch(f"/v1/datasets/{dataset}", json={"title": "Right breast"})
+    assert found(http, text="right breast", kind="reconstruction") == [noted, named, plain]
+    assert found(http, text="right breast", kind="simulation") == []
+    page = http.get("/v1/jobs", params={"text": "right", "limit": 2}).json()
+    assert [job["id"] for job in page["jobs"]] == [noted, named]
+    assert [job["id"] for job in http.get(page["next"]).json()["jobs"]] == [plain]
+
+
+@pytest.mark.parametrize(
+    "text", ["\0", "x" * 201, "' OR 1=1 --", "\\\\'", "%' ESCAPE '", "\N{PILE OF POO}", "a\nb"]
+)
+def test_hostile_text_finds_nothing(http, dataset, text):
+    ask(http, dataset, {"nodes": 16})
+    answer = http.get("/v1/jobs", params={"text": text})
+    if text == "\0" or len(text) > 200:
+        assert (answer.status_code, problem(answer)["field"]) == (422, "text")
+    else:
+        assert (answer.status_code, answer.json()) == (200, {"jobs": [], "next": None})
+
+
+def test_a_deleted_job_is_gone_with_its_volume(http, dataset, work, until):
+    done = until(http, ask(http, dataset, {"nodes": 16}).json()["id"])
+    other = until(http, ask(http, dataset, {"nodes": 16}).json()["id"])
+    assert http.delete(done["links"]["self"]).status_code == 204
+    for gone in (done["links"]["self"], done["links"]["volume"]):
+        assert http.get(gone).status_code == 404
+    assert http.delete(done["links"]["self"]).status_code == 404
+    assert [found(http), http.get(other["links"]["volume"]).status_code] == [[other["id"]], 200]
+    assert http.get(f"/v1/datasets/{dataset}").status_code == 200
+
+
+def test_a_running_job_is_not_deleted(http, dataset, work, until):
+    work.hold.clear()
+    job = ask(http, dataset, {"nodes": 16}).json()
+    until(http, job["id"], "running")
+    answer = http.delete(job["links"]["self"])
+    assert (answer.status_code, problem(answer)["type"]) == (409, "/problems/in-use")
+    work.hold.set()
+    until(http, job["id"], "succeeded")

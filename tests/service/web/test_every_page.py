@@ -45,7 +45,7 @@ def places(serve, scan, work, monkeypatch, tmp_path):
         f"/jobs/{volume}?planes=3": "node ",
         f"/compare/{','.join(plane)}?{marks}": "m/s · B",
         f"/compare/{','.join(plane)}?mode=swipe": "m/s · B",
-        "/jobs": "succeeded",
+        "/jobs": "Sixteen elements",
         "/rendering": "Volume rendering",
         "/surfaces": "Surface rendering",
         "/service": "worker",

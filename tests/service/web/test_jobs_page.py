@@ -1,4 +1,4 @@
-"""The page of jobs: what each made."""
+"""The page of one job: what it made, and its place in the queue."""
 
 import io
 
@@ -25,8 +25,8 @@ def test_a_turntable_is_shown(page, serve, scan, work, monkeypatch):
         "volume": sent["id"],
         "settings": {"frames": 5, "width": 300, "iso": [0.3, 0.6], "index": [1.3, 1.4]},
     }
-    httpx.post(f"{address}/v1/jobs", json=asked).raise_for_status()
-    page.goto(f"{address}/#/jobs")
+    made = httpx.post(f"{address}/v1/jobs", json=asked).json()
+    page.goto(f"{address}/#/jobs/{made['id']}")
     job = page.locator(".job")
     job.get_by_role("heading", name="Turntable").wait_for()
     job.get_by_text("5 frames of 300").wait_for()
@@ -51,8 +51,8 @@ def test_simulated_scan_can_be_reconstructed(page, serve, monkeypatch):
     monkeypatch.setattr(kinds, "simulate_to_file", simulate_scan)
     url = serve()
     asked = {"kind": "simulation", "settings": {"nodes": 16, "elements": 16}}
-    assert httpx.post(f"{url}/v1/jobs", json=asked).status_code == 202
-    page.goto(f"{url}/#/jobs")
+    job = httpx.post(f"{url}/v1/jobs", json=asked).json()
+    page.goto(f"{url}/#/jobs/{job['id']}")
     job = page.locator(".job")
     job.get_by_role("heading", name="Simulated scan").wait_for()
     job.get_by_text("succeeded").wait_for()

@@ -1,10 +1,10 @@
-// All jobs, newest first.
+// All jobs in a table, newest first.
 import { make } from "../parts/dom.js";
-import { jobList } from "../parts/job_list.js";
+import { jobTable } from "../parts/job_table.js";
 
-export function open(root) {
+export async function open(root, { query }) {
   document.title = "Jobs – Bentray";
+  root.classList.add("wide");
   root.append(make("h1", "", "Jobs"));
-  const jobs = jobList(root, { empty: "Nothing has run yet. Upload a scan and press Fast or Best." });
-  return jobs.close;
+  return (await jobTable(root, query)).close;
 }

@@ -1,12 +1,9 @@
 // How a result was made, as tables: what auto compared, the plan, settings and provenance.
 import { make } from "./dom.js";
+import { duration } from "./job_words.js";
 import { methodOf } from "./results.js";
 
 const nanoseconds = (seconds) => (seconds === null ? "–" : `${(1e9 * seconds).toFixed(0)} ns`);
-
-export function duration(seconds) {
-  return seconds < 90 ? `${seconds.toFixed(1)} s` : `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
-}
 
 // The result in a line.
 export function facts({ job, volume, summary }) {
