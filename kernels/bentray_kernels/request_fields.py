@@ -22,8 +22,11 @@ def setting(
     schema: Mapping[str, Any] | None = None,
     *,
     unset: str = "",
+    label: str = "",
+    unit: str = "",
+    words: Mapping[str, str] | None = None,
 ) -> Any:
-    """A field of a dataclass with the metadata that OpenAPI, the command line and the documentation show.
+    """A field of a dataclass with the metadata for OpenAPI, the command line, the web page and the documents.
 
     Args:
         default: of the field.
@@ -31,11 +34,17 @@ def setting(
         within: the range of its numbers, checked by ``check``.
         schema: without a range, what JSON Schema states beside the type; the class itself checks it.
         unset: what holds where the value is None.
+        label: short name on a form.
+        unit: of its numbers, on a form.
+        words: accepted values on a form, where they are not as in the file.
     """
-    more = {"description": description, "unset": unset}
-    if within is None:
-        return field(default=default, metadata={**more, "json_schema_extra": schema})
-    return ranged(default, within, **more)
+    shown = {"x-label": label, "x-unit": unit, "x-unset": unset, "x-words": dict(words or {})}
+    extra = {
+        **((schema or {}) if within is None else within.schema),
+        **{name: value for name, value in shown.items() if value},
+    }
+    more = {"description": description, "unset": unset, "json_schema_extra": extra or None}
+    return field(default=default, metadata=more) if within is None else ranged(default, within, **more)
 
 
 @cache

@@ -34,17 +34,22 @@ class SartSettings:
         0.1,
         "Relaxation factor λ of an update (chapter 6, equation 1).",
         Range(0.0, 2.0, above=True, below=True),
+        label="Relaxation factor λ",
     )
     smoothing_nodes: float = setting(
         1.0,
         "Standard deviation of the Gaussian filter on each update, nodes; 0 for none.",
         Range(0.0, 32.0),
+        label="Smoothing of updates",
+        unit="nodes",
     )
     speed_range_mps: tuple[float, float] | None = setting(
         None,
         "Lowest and highest speed known in the object, m/s. The image is stretched to this range before the "
         "wave front is tracked (data-driven speed, chapter 6, equation 6).",
         unset="the image as it is",
+        label="Known speed range",
+        unit="m/s",
     )
 
     def __post_init__(self) -> None:
@@ -62,18 +67,23 @@ class GaussNewtonSettings:
     penalty: Literal["total-variation", "laplacian", "tikhonov"] = setting(
         "total-variation",
         "total-variation preserves edges, laplacian prefers smooth images, tikhonov images near the first.",
+        label="Penalty",
+        words={"total-variation": "Total variation", "laplacian": "Laplacian", "tikhonov": "Tikhonov"},
     )
     penalty_strength: float = setting(
         0.3,
         "Weight of the penalty relative to the rms residual; 0 for none. The attenuation, by either method, "
         "is regularised by it as well.",
         Range(0.0, 10.0),
+        label="Strength of the penalty",
     )
     edge_mps: float = setting(
         0.0,
         "With total variation: differences between neighbouring nodes above this cost no more, m/s, for "
         "objects of flat parts with sharp edges, as phantoms; 0: every difference costs.",
         Range(0.0, 1000.0, unit="m/s"),
+        label="Edges above",
+        unit="m/s",
     )
 
     def __post_init__(self) -> None:
@@ -87,13 +97,14 @@ class PickingSettings:
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
     picker: PickerName = setting(  # noqa: RUF009 - a string, by its alias
-        DEFAULT_PICKER, "How the first arrival of a trace is picked."
+        DEFAULT_PICKER, "How the first arrival of a trace is picked.", label="Picker"
     )
     examine: bool = setting(
         True,
         "Check the quality of the scan first: swapped or inverted channels and a wrong time zero are "
         "corrected, dead elements, broken traces and contradicting times are left out, and the result states "
         "both. An unusable scan is rejected.",
+        label="Check the scan first",
     )
 
     def __post_init__(self) -> None:
@@ -110,21 +121,27 @@ class AttenuationSettings:
         True,
         "Reconstruct the attenuation too (experimental), where there are amplitudes; with method waveform "
         "from the traces.",
+        label="Reconstruct the attenuation",
     )
     amplitudes: Literal["recorded", "ratio", "spectrum"] = setting(
         "recorded",
         "recorded: amplitudes of the file; read from the traces, ratio: height of the first pulse relative "
         "to water, or spectrum: loss of high frequencies relative to low ones.",
+        label="Amplitudes",
+        words={"recorded": "Recorded", "ratio": "Pulse height", "spectrum": "Spectrum"},
     )
     attenuation_solver: Literal["penalised", "sart"] = setting(
         "penalised",
         "penalised: all rays at once, with the penalty_strength of gauss_newton; sart: one emitter after the "
         "other with the settings of sart, without a penalty (chapter 6).",
+        label="Solver",
+        words={"penalised": "Penalised", "sart": "SART"},
     )
     focusing: bool = setting(
         False,
         "Correct amplitudes for focusing by refraction, by the spreading of ray tubes in the speed image; "
         "needs the frequency of the amplitudes.",
+        label="Correct for focusing",
     )
 
     def __post_init__(self) -> None:
@@ -132,6 +149,11 @@ class AttenuationSettings:
         if self.amplitudes == "spectrum" and self.focusing:
             accepted = f"false: amplitudes {self.amplitudes} do not depend on focusing"
             raise InvalidInput("attenuation.focusing", True, accepted)
+
+
+def _record(label: str, description: str) -> dict[str, Any]:
+    """The metadata of a record of settings."""
+    return {"description": description, "json_schema_extra": {"x-label": label}}
 
 
 @dataclass(frozen=True)
@@ -151,11 +173,20 @@ class Settings:
         "auto: method, rays and coarser grids are chosen by held-out validation; sart: one emitter after the "
         "other; gauss-newton: all emitters at once, regularised; waveform: full-waveform refinement of the "
         "image of auto, for slices with traces.",
+        label="Method",
+        words={
+            "auto": "Automatic (recommended)",
+            "sart": "SART",
+            "gauss-newton": "Gauss-Newton",
+            "waveform": "Full waveform",
+        },
     )
     rays: Literal["curved", "straight"] = setting(
         "curved",
         "curved: corrected for refraction; straight: without refraction. Method auto compares both, unless "
         "straight is requested.",
+        label="Rays",
+        words={"curved": "Bent", "straight": "Straight"},
     )
     eikonal: Literal[
         "deviation",
@@ -171,11 +202,14 @@ class Settings:
     ] = setting(
         DEVIATION,
         "Eikonal solver for curved rays. deviation: SART on slices; accurate replaces it elsewhere.",
+        label="Eikonal solver",
     )
     decomposition: Literal["slices", "volume"] | None = setting(
         None,
         "slices: each height of the ring by itself; volume: all heights together, in 3-D.",
         unset="volume for elements in 3-D that are not rings at several heights, else slices",
+        label="Decomposition",
+        words={"slices": "Slices", "volume": "Volume"},
     )
     opening_angle_deg: float | None = setting(
         None,
@@ -183,30 +217,47 @@ class Settings:
         "whose path leaves this cone at either end are left out.",
         Range(0.0, 180.0, above=True, unit="degrees"),
         unset="every direction",
+        label="Opening angle",
+        unit="degrees",
     )
     nodes: int | None = setting(
         None,
         "Nodes along each side of the image.",
         Range(MIN_NODES, 2048),
         unset="from the width of the array, the pitch of its elements and the wavelength",
+        label="Nodes per side",
     )
     side_m: float | None = setting(
-        None, "Side of the image, m.", Range(1e-4, 100.0, unit="m"), unset="the array and a margin"
+        None,
+        "Side of the image, m.",
+        Range(1e-4, 100.0, unit="m"),
+        unset="the array and a margin",
+        label="Side of the image",
+        unit="m",
     )
     iterations: int = setting(
         5,
         "Iterations, each over all emitters. gauss-newton stops earlier once nothing is gained.",
         Range(1, 1000),
+        label="Iterations",
     )
     speed_bounds_mps: tuple[float, float] = setting(
         (1300.0, 1800.0),
         "Lowest and highest speed of a node, m/s.",
         schema={"prefixItems": [SPEED, SPEED]},
+        label="Speed bounds",
+        unit="m/s",
     )
-    roi: bool = setting(False, "Only the region of interest of the file may change (mask/roi).")
-    seed: int = setting(0, "Seed of the random order of emitters.", SEED)
+    roi: bool = setting(
+        False,
+        "Only the region of interest of the file may change (mask/roi).",
+        label="Region of interest only",
+    )
+    seed: int = setting(0, "Seed of the random order of emitters.", SEED, label="Random seed")
     resolution_check: bool = setting(
-        False, "Also reconstruct a checkerboard along the same rays, and report its recovery at each node."
+        False,
+        "Also reconstruct a checkerboard along the same rays, and report its recovery at each node.",
+        label="Resolution check",
     )
     minutes: float | None = setting(
         None,
@@ -215,20 +266,22 @@ class Settings:
         "and keeps the refined image if it predicts held-out emitters clearly better.",
         Range(0.0, 1e6, unit="minutes"),
         unset="waveform: no limit; auto: no refinement",
+        label="Time for full waveforms",
+        unit="minutes of one core",
     )
     sart: SartSettings = field(
-        default=SartSettings(), metadata={"description": "For method sart, and the attenuation by it."}
+        default=SartSettings(), metadata=_record("SART", "For method sart, and the attenuation by it.")
     )
     gauss_newton: GaussNewtonSettings = field(
         default=GaussNewtonSettings(),
-        metadata={"description": "For gauss-newton, and the attenuation."},
+        metadata=_record("Gauss-Newton", "For gauss-newton, and the attenuation."),
     )
     picking: PickingSettings = field(
-        default=PickingSettings(), metadata={"description": "For scans with traces."}
+        default=PickingSettings(), metadata=_record("Picking", "For scans with traces.")
     )
     attenuation: AttenuationSettings = field(
         default=AttenuationSettings(),
-        metadata={"description": "For scans with amplitudes or traces; experimental."},
+        metadata=_record("Attenuation", "For scans with amplitudes or traces; experimental."),
     )
 
     def __post_init__(self) -> None:

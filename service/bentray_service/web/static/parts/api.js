@@ -1,4 +1,4 @@
-// Requests to the service; every failure is an Error whose message can be shown as it is.
+// Requests to the service; every failure is an Error whose message can be shown as it is, a refusal has its problem.
 
 import { authorization } from "./key.js";
 
@@ -21,6 +21,6 @@ export async function request(path, options = {}) {
   }
   const body = await response.json().catch(() => ({ title: "The service failed", detail: `status ${response.status}` }));
   if (response.status === 401) document.dispatchEvent(new CustomEvent("locked", { detail: inWords(body) }));
-  if (!response.ok) throw new Error(inWords(body));
+  if (!response.ok) throw Object.assign(new Error(inWords(body)), { problem: body });
   return body;
 }
