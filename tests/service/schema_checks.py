@@ -60,6 +60,7 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
     "PATCH /v1/uploads/{upload_id}": {413: {"body"}, 460: {"body"}, 400: {"Upload-Checksum"}},
     # A volume, or a mesh, that the job can be done with.
     "POST /v1/jobs": {422: {*(f"settings.{name}" for name in SETTINGS), "settings", "volume", "mesh"}},
+    "POST /v1/plans": {422: {*(f"settings.{name}" for name in SETTINGS), "settings", "volume", "mesh"}},
     # An emission and a slice that the scan has; traces that it has.
     "GET /v1/datasets/{dataset_id}/traces": {422: {"emission", "slice", "quantity"}},
     "GET /v1/volumes/{volume_id}/slice.png": {

@@ -253,7 +253,7 @@ def test_a_result_is_run_again_with_changes(page, result, work):
     ready(page, result)
     page.get_by_role("link", name="Run again with changes").click()
     expect(page.get_by_label("Nodes per side")).to_have_value("16")
-    expect(page.get_by_label("SART")).to_be_checked()
+    expect(page.get_by_label("Method", exact=True)).to_have_value("sart")
     page.get_by_label("Nodes per side").fill("20")
     page.get_by_role("button", name="Start").click()
     page.locator(".job").nth(1).get_by_text("succeeded").wait_for()

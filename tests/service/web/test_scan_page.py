@@ -1,5 +1,6 @@
 """The page of a scan: its geometry, quality and traces; start a reconstruction, watch it."""
 
+import re
 from dataclasses import replace
 
 import httpx
@@ -8,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
-from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_workers.files.dataset import write_dataset
 
 from ...kernels.acquisition.traces import blob_delay
@@ -30,15 +31,15 @@ def sent(page, address, scan):
 def test_the_form_starts_with_the_defaults(page, serve, scan):
     sent(page, serve(), scan)
     page.get_by_text("Nothing has run yet").wait_for()
-    page.get_by_text("Other settings").click()
+    page.get_by_text("All settings").click()
     expect(page.get_by_label("Iterations")).to_have_value(str(Settings(method="sart").iterations))
 
 
 def test_upload_start_watch(page, serve, scan, work):
     sent(page, serve(), scan)
-    page.get_by_text("Other settings").click()
-    page.get_by_label("one emitter after another").check()
-    page.get_by_label("Straight").check()
+    page.get_by_text("All settings").click()
+    page.get_by_label("Method", exact=True).select_option("SART")
+    page.get_by_label("Rays", exact=True).select_option("Straight")
     page.get_by_label("Nodes per side").fill("32")
     work.hold.clear()
     page.get_by_role("button", name="Start").click()
@@ -56,29 +57,89 @@ def test_upload_start_watch(page, serve, scan, work):
     assert page.get_by_text("Nothing has run yet").is_hidden()
 
 
-def test_automatic_method_hides_the_ray_choice(page, serve, scan, work):
+def test_only_changed_settings_are_sent(page, serve, scan, work):
     sent(page, serve(), scan)
-    page.get_by_text("Other settings").click()
-    expect(page.get_by_label("Straight")).to_be_disabled()
+    page.get_by_text("All settings").click()
+    page.get_by_label("Iterations").fill("2")
+    page.get_by_label("Relaxation factor").fill("0.25")
+    page.get_by_label("Speed bounds, highest").fill("1700")
+    page.get_by_label("Check the scan first").uncheck()
+    page.get_by_label("Random seed").fill("")
+    with page.expect_request("**/v1/jobs") as asked:
+        page.get_by_role("button", name="Start").click()
+    assert asked.value.post_data_json["settings"] == {
+        "iterations": 2,
+        "sart": {"relaxation": 0.25},
+        "speed_bounds_mps": [1300, 1700],
+        "picking": {"examine": False},
+    }
+    page.locator(".job").get_by_text("succeeded").wait_for()
+    settings = work.calls[0][1]
+    assert (settings.method, settings.iterations, settings.sart.relaxation) == ("auto", 2, 0.25)
+
+
+def test_every_setting_has_a_field_with_its_default(page, serve, scan):
+    sent(page, serve(), scan)
+    page.get_by_text("All settings").click()
+    page.get_by_label("Iterations").wait_for()
+    for place in PLACES.values():
+        record, _, leaf = place.rpartition(".")
+        value = getattr(getattr(Settings(), record) if record else Settings(), leaf)
+        if isinstance(value, tuple):
+            for end, one in enumerate(value):
+                expect(page.locator(f'[name="{place}.{end}"]')).to_have_value(f"{one:g}")
+        elif isinstance(value, bool):
+            expect(page.locator(f'[name="{place}"]')).to_be_checked(checked=value)
+        elif place != "sart.speed_range_mps":
+            shown = "" if value is None else f"{value:g}" if isinstance(value, int | float) else value
+            expect(page.locator(f'[name="{place}"]')).to_have_value(shown)
+    assert page.locator("#run-settings :is(input, select)").count() == len(PLACES) + 2
+
+
+def test_a_refused_setting_is_told_at_its_field(page, serve, scan, work):
+    sent(page, serve(), scan)
+    page.get_by_text("All settings").click()
+    nodes = page.get_by_label("Nodes per side")
+    nodes.fill("3")
+    field = page.locator(".setting", has=nodes)
+    # Before anything is started, by the plan.
+    expect(field.get_by_role("alert")).to_have_text("Found 3; accepted: a number from 16 to 2048.")
     page.get_by_role("button", name="Start").click()
-    job = page.locator(".job")
-    job.get_by_text("succeeded").wait_for()
-    assert job.get_by_role("heading", name="Automatic").is_visible()
-    assert work.calls[0][1].method == "auto"
-    expect(job.locator("img")).to_have_count(1)
-    page.get_by_label("all emitters at once").check()
-    expect(page.get_by_label("Straight")).to_be_enabled()
-    page.get_by_label("Straight").check()
+    expect(nodes).to_be_focused()
+    expect(nodes).to_have_attribute("aria-invalid", "true")
+    assert page.locator("#run-error").is_hidden()
+    nodes.fill("16")
+    expect(field.get_by_role("alert")).to_be_hidden()
+    lowest = page.get_by_label("Known speed range, lowest")
+    lowest.fill("1400")
+    page.get_by_label("Known speed range, highest").fill("1600")
+    # Which the service knows, and the form does not.
+    expect(page.locator(".setting", has=lowest).get_by_role("alert")).to_contain_text("method sart")
+    page.get_by_label("Method", exact=True).select_option("SART")
+    page.get_by_text("16 nodes per side").wait_for()
     page.get_by_role("button", name="Start").click()
-    page.get_by_role("heading", name="Straight rays").wait_for()
-    expect(page.get_by_text("succeeded")).to_have_count(2)
-    assert (work.calls[1][1].method, work.calls[1][1].rays) == ("gauss-newton", "straight")
+    page.locator(".job").get_by_text("succeeded").wait_for()
+    assert work.calls[0][1].sart.speed_range_mps == (1400.0, 1600.0)
+    assert len(work.calls) == 1
+
+
+def test_the_buttons_tell_their_time(page, serve, scan, work):
+    sent(page, serve(), scan)
+    expect(page.get_by_role("button", name="Fast")).to_contain_text(re.compile(r"about \d+ s, rough"))
+    for done in (1, 2, 3):
+        page.get_by_role("button", name="Fast").click()
+        expect(page.locator(".job").get_by_text("succeeded")).to_have_count(done)
+    page.reload()
+    fast = page.get_by_role("button", name="Fast")
+    expect(fast).to_contain_text(re.compile(r"about \d+ s$"))
+    # No traces, no waves: Best is the same work.
+    expect(page.get_by_role("button", name="Best")).to_contain_text(re.compile(r"about \d+ s$"))
 
 
 def test_the_residual_curve_shows_where_a_stage_begins(page, serve, scan, work):
     work.stages = 2
     sent(page, serve(), scan)
-    page.get_by_text("Other settings").click()
+    page.get_by_text("All settings").click()
     page.get_by_label("Iterations").fill("3")
     page.get_by_role("button", name="Start").click()
     curve = page.get_by_role("img", name="Residual of 6 iterations in 2 stages")

@@ -27,7 +27,7 @@ def test_page_requests_and_sends_a_key(page, serve, scan, work, tmp_path):
     expect(page.locator("#key")).to_be_hidden()
     page.set_input_files("#scan-file", scan())
     page.get_by_text("16 emitters").wait_for()
-    page.get_by_text("Other settings").click()
+    page.get_by_text("All settings").click()
     page.get_by_label("Nodes per side").fill("32")
     page.get_by_role("button", name="Start").click()
     job = page.locator(".job")

@@ -66,8 +66,8 @@ def dropped(page, scan, folder):
 def test_from_a_dropped_file_over_a_killed_service_to_an_export(page, service, breast, tmp_path):
     enter(page, service, "north")
     dropped(page, breast, tmp_path)
-    page.get_by_text("Other settings").click()
-    page.get_by_label("one emitter after another").check()
+    page.get_by_text("All settings").click()
+    page.get_by_label("Method", exact=True).select_option("SART")
     page.get_by_label("Nodes per side").fill(str(SETTINGS.nodes))
     page.get_by_label("Iterations").fill(str(SETTINGS.iterations))
     page.get_by_role("button", name="Start").click()

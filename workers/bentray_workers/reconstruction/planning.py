@@ -10,7 +10,7 @@ from typing import Any, Literal
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import WIDTH_M
 from bentray_kernels.tomography.directivity import check_normals
-from bentray_kernels.tomography.model_selection.selection import CANDIDATES, final_settings
+from bentray_kernels.tomography.model_selection.selection import CANDIDATES, final_settings, label
 from bentray_kernels.tomography.requirements import check_waveform
 from bentray_kernels.tomography.settings import MIN_NODES, Settings
 from bentray_kernels.tomography.stage_graphs import BATCH
@@ -31,6 +31,7 @@ from .memory.ray_memory import (
     state_bytes,
 )
 from .memory.waveform_memory import budgeted, wave_task_bytes, wave_tasks
+from .reconstruction_cost import reconstruction_cost
 
 Decomposition = Literal["slices", "emitters", "volume"]
 
@@ -55,6 +56,9 @@ class Plan:
         field_bytes, rows_bytes, state_bytes: of a travel time; of all rays of an image; of the state between
             two tasks.
         stored_bytes: largest disk space of result and checkpoints.
+        nodes: along each side of the image.
+        methods: the method and rays, or the candidates of auto, in words.
+        work_class, work_s, speed_known: see ``reconstruction_cost.ReconstructionCost``.
         why: summary in a sentence.
     """
 
@@ -67,6 +71,11 @@ class Plan:
     rows_bytes: int
     state_bytes: int
     stored_bytes: int
+    nodes: int
+    methods: tuple[str, ...]
+    work_class: str
+    work_s: float
+    speed_known: bool
     why: str
 
     @property
@@ -76,7 +85,8 @@ class Plan:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        return {**asdict(self), "call_bytes": dict(self.call_bytes), "largest_bytes": self.largest[1]}
+        lists = {"call_bytes": dict(self.call_bytes), "methods": list(self.methods)}
+        return {**asdict(self), **lists, "largest_bytes": self.largest[1]}
 
 
 def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]) -> Plan:
@@ -138,6 +148,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         tasks = tasks * (1 + settings.numerics.guided_rounds) + picking_tasks(
             scan.traces, scan.slices, settings
         )
+    cost = reconstruction_cost(scan, settings, len(able))
     return Plan(
         decomposition,
         lane,
@@ -148,6 +159,11 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         max(rows_bytes(scan, method, rays_of(scan, method)) for method in methods),
         state_bytes(shape, settings),
         _stored_bytes(scan, settings, shape),
+        settings.grid_nodes,
+        _methods(settings),
+        cost.work_class,
+        cost.seconds,
+        cost.speed_known,
         _why(scan, settings, decomposition, lane, tasks, (name, size), capacities, able),
     )
 
@@ -162,6 +178,14 @@ def _decomposition(settings: Settings) -> Decomposition:
     if settings.decomposition == "volume":
         return "volume"
     return "slices" if settings.method == "sart" else "emitters"
+
+
+def _methods(settings: Settings) -> tuple[str, ...]:
+    """The candidates of auto with the requested rays, or the one method, in words."""
+    if not settings.selects_model:
+        return (label({"rays": settings.rays, "method": settings.method}),)
+    tried = [one for one in CANDIDATES if settings.rays == "curved" or one["rays"] == "straight"]
+    return tuple(dict.fromkeys(label(one) for one in tried))
 
 
 def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:

@@ -94,7 +94,37 @@ class PlanRecord(BaseModel):
     minutes: float | None = Field(
         None, description="Estimated time of a simulation on these workers, without other jobs."
     )
+    nodes: int | None = Field(None, description="Nodes along each side of the image of a reconstruction.")
+    methods: list[str] | None = Field(
+        None, description="Method and rays of a reconstruction; with method auto, its candidates."
+    )
+    work_class: str | None = Field(
+        None, description="Reconstructions of one class take times in proportion to `work_s`."
+    )
+    work_s: float | None = Field(
+        None, description="Time of the counted work of a reconstruction on as many cores of 2020, s."
+    )
+    speed_known: bool | None = Field(
+        None,
+        description="Whether the speed of this class was measured on that core; else `work_s` only counts.",
+    )
     why: str = Field(description="Summary of the plan in one sentence.")
+
+
+class EstimateRecord(BaseModel):
+    """What a job would be, if it were started now."""
+
+    plan: PlanRecord | None = Field(description="Null for kinds of job that are not planned.")
+    minutes: float | None = Field(
+        description="Estimated time from its start to its end, without other jobs; null if there is no sound "
+        "estimate yet."
+    )
+    rough: bool = Field(
+        description="Whether fewer than three jobs of the tenant support it: an order of magnitude."
+    )
+    compared: int = Field(description="Finished jobs of the tenant, of the same class, that it is based on.")
+    basis: str = Field(description="Where the estimate comes from, in words.")
+    ahead: int = Field(description="Queued jobs that would start before it if jobs run one at a time.")
 
 
 class JobRecord(BaseModel):

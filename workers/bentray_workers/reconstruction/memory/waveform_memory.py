@@ -49,6 +49,20 @@ def wave_tasks(traces: Traces | None, width_m: float, settings: Settings) -> int
     return sum(band.evaluations(held_out) + band.iterations + 2 for band in plan)
 
 
+def wave_minutes(traces: Traces | None, width_m: float, slices: int, settings: Settings) -> float:
+    """Estimated CPU time of the refinement of all slices, minutes of one core; 0 without a refinement.
+
+    Args:
+        traces: of the dataset.
+        width_m: of the array.
+        slices: their number.
+        settings: with the bands of the time budget, see ``budgeted``.
+    """
+    if not refines(settings) or traces is None:
+        return 0.0
+    return _scale(traces, width_m, slices).minutes(settings)
+
+
 def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -> dict[str, int]:
     """Memory of each kind of task over all bands, and of the validation of candidates, bytes.
 

@@ -1,12 +1,13 @@
 // One scan: its geometry, facts, quality and traces, the reconstruction to start, and the reconstructions of it.
 import { request } from "../parts/api.js";
-import { fillDefaults } from "../parts/defaults.js";
 import { at, make, showError } from "../parts/dom.js";
 import { jobList } from "../parts/job_list.js";
 import { withKey } from "../parts/key.js";
 import { startJob } from "../parts/panel.js";
+import { planInWords, planOf, queueInWords, timeInWords } from "../parts/plan_estimate.js";
 import { drawElements, inWordsOf } from "../parts/scan_drawing.js";
 import { factRows, fillFacts, showQuality } from "../parts/scan_facts.js";
+import { settingsForm } from "../parts/settings_form.js";
 import { openShot } from "../parts/shot.js";
 import { titleOf } from "../parts/titles.js";
 
@@ -15,39 +16,19 @@ const PAGE = `
   <p id="dataset-facts" class="facts"></p>
   <section aria-labelledby="run-title" class="panel">
     <h2 id="run-title">Reconstruction</h2>
-    <form id="run">
+    <form id="run" novalidate>
       <div class="presets">
-        <button id="start" type="submit" value="fast" formnovalidate>Fast
-          <small>rays and method chosen automatically; seconds to a minute</small></button>
-        <button id="best" type="submit" value="best" formnovalidate>Best
-          <small>then full waveform, where it predicts unused traces better; minutes</small></button>
+        <button id="start" type="submit" value="fast">Fast
+          <small>rays and method chosen automatically</small>
+          <small class="time" id="fast-time">…</small></button>
+        <button id="best" type="submit" value="best">Best
+          <small>then full waveform, where it predicts unused traces better</small>
+          <small class="time" id="best-time">…</small></button>
       </div>
       <details id="run-own">
-      <summary>Other settings</summary>
-      <fieldset class="choice">
-        <legend class="caption">Method</legend>
-        <label><input type="radio" name="method" value="auto" checked>
-          <span><strong>Automatic (recommended)</strong><small>rays and method by held-out validation</small></span></label>
-        <label><input type="radio" name="method" value="sart">
-          <span><strong>SART</strong><small>one emitter after another; seconds</small></span></label>
-        <label><input type="radio" name="method" value="gauss-newton">
-          <span><strong>Gauss–Newton</strong><small>all emitters at once, regularised</small></span></label>
-        <label><input type="radio" name="method" value="waveform">
-          <span><strong>Full waveform</strong><small>refined by simulated traces; minutes</small></span></label>
-      </fieldset>
-      <fieldset class="choice" id="rays" disabled>
-        <legend class="caption">Rays</legend>
-        <label><input type="radio" name="rays" value="curved" checked>
-          <span><strong>Bent</strong><small>corrected for refraction</small></span></label>
-        <label><input type="radio" name="rays" value="straight">
-          <span><strong>Straight</strong><small>no correction; faster</small></span></label>
-      </fieldset>
-      <div class="numbers">
-        <label><span class="caption">Nodes per side</span>
-          <input name="nodes" type="number" min="16" max="2048" placeholder="automatic"></label>
-        <label><span class="caption">Iterations</span>
-          <input name="iterations" type="number" min="1" max="1000" required></label>
-      </div>
+      <summary>All settings</summary>
+      <div id="run-settings"><p class="facts">Reading the settings</p></div>
+      <p id="own-plan" class="facts" role="status"></p>
       <button id="start-own" type="submit" value="own" disabled>Start</button>
       </details>
       <p id="run-error" class="error" role="alert" hidden></p>
@@ -74,19 +55,7 @@ const PAGE = `
 
 // Settings of the two buttons. Best may take half an hour of one processor core for full waveforms.
 const PRESETS = { fast: { method: "auto" }, best: { method: "auto", minutes: 30 } };
-
-function ownSettings(element) {
-  const form = new FormData(element);
-  const settings = { method: form.get("method"), iterations: Number(form.get("iterations")) };
-  if (form.get("nodes")) settings.nodes = Number(form.get("nodes"));
-  // The method auto chooses the rays itself.
-  if (form.has("rays")) settings.rays = form.get("rays");
-  return settings;
-}
-
-function showMethod() {
-  at("rays").disabled = new FormData(at("run")).get("method") === "auto";
-}
+const PLAN_MS = 400;
 
 function factsOf(scan) {
   const times = scan.has_travel_times ? "travel times" : "raw traces";
@@ -94,16 +63,62 @@ function factsOf(scan) {
   return `${scan.ntx} emitters × ${scan.nrx} receivers · ${times}${slices} · water ${scan.water_speed_mps.toFixed(1)} m/s`;
 }
 
-// The settings of an earlier job in the form, to run it again with changes.
-async function fillFrom(job) {
-  const { settings } = await request(`/v1/jobs/${job}`);
-  const { method, rays, nodes, iterations } = at("run").elements;
-  method.value = settings.method;
-  if (settings.rays) rays.value = settings.rays;
-  nodes.value = settings.nodes ?? "";
-  iterations.value = settings.iterations;
-  at("run-own").open = true;
-  showMethod();
+// The time of each button, by a plan of the service; a plan that is refused says why.
+function showTimes(scan) {
+  for (const [name, settings] of Object.entries(PRESETS)) {
+    planOf(scan.id, settings).then(
+      (estimate) => {
+        const words = [timeInWords(estimate), queueInWords(estimate)].filter(Boolean).join(", ");
+        if (at(`${name}-time`)) Object.assign(at(`${name}-time`), { textContent: words, title: estimate.basis });
+      },
+      (error) => {
+        if (at(`${name}-time`)) at(`${name}-time`).textContent = error.message;
+      },
+    );
+  }
+}
+
+// All settings as a form, those of an earlier job in it to run it again with changes. Returns close() and own().
+async function showSettings(scan, from) {
+  const form = await settingsForm();
+  const earlier = from && (await request(`/v1/jobs/${from}`).catch((error) => showError("run-error", error)));
+  if (!at("run-settings")) return { close() {} };
+  at("run-settings").replaceChildren(form.node);
+  if (earlier) {
+    form.fill(earlier.settings);
+    at("run-own").open = true;
+  }
+  let timer = 0;
+  let number = 0;
+  // A setting that the service refuses is told at its field before anything is started.
+  const plan = async () => {
+    const mine = ++number;
+    const settings = form.changed(false);
+    if (!settings) {
+      at("own-plan").textContent = "";
+      return;
+    }
+    let words = "";
+    let refused = null;
+    try {
+      const estimate = await planOf(scan.id, settings);
+      words = `${planInWords(estimate)}. ${estimate.basis}`;
+    } catch (error) {
+      refused = error;
+    }
+    if (mine !== number || !at("own-plan")) return;
+    at("own-plan").textContent = words;
+    if (refused && !form.refuse(refused.problem ?? {}, false)) at("own-plan").textContent = refused.message;
+  };
+  const later = () => {
+    clearTimeout(timer);
+    timer = setTimeout(plan, PLAN_MS);
+  };
+  form.node.addEventListener("input", later);
+  at("run-own").addEventListener("toggle", () => at("run-own")?.open && later());
+  if (earlier) later();
+  at("start-own").disabled = false;
+  return { form, close: () => clearTimeout(timer) };
 }
 
 // The elements and the facts; a function that marks the element that emits.
@@ -148,22 +163,27 @@ export async function open(root, { id, query }) {
     empty: "Nothing has run yet. Press Fast or Best. The image appears here.",
     wanted: (job) => job.dataset === id && job.kind === "reconstruction",
   });
+  let own = { close() {} };
   at("run").addEventListener("submit", (event) => {
     event.preventDefault();
-    const preset = PRESETS[event.submitter?.value ?? "fast"];
-    startJob({ kind: "reconstruction", dataset: id, settings: preset ?? ownSettings(event.target) }, "run-error", jobs.refresh);
+    const settings = PRESETS[event.submitter?.value ?? "fast"] ?? own.form.changed(true);
+    if (!settings) return;
+    const refused = (error) => event.submitter?.value === "own" && own.form.refuse(error.problem ?? {}, true);
+    startJob({ kind: "reconstruction", dataset: id, settings }, "run-error", jobs.refresh, refused);
   });
-  at("run").addEventListener("change", showMethod);
-  showMethod();
-  fillDefaults(at("run"), "Settings").then(
-    async () => {
-      if (query.has("from") && root.isConnected) await fillFrom(query.get("from")).catch((error) => showError("run-error", error));
-      if (root.isConnected) at("start-own").disabled = false;
+  showTimes(scan);
+  let closed = false;
+  showSettings(scan, query.get("from")).then(
+    (made) => {
+      own = made;
+      if (closed) own.close();
     },
     (error) => showError("run-error", error),
   );
   const closeShot = showScan(scan);
   return () => {
+    closed = true;
+    own.close();
     closeShot();
     jobs.close();
   };

@@ -46,12 +46,13 @@ export function imageFrame(id, errorId) {
   };
 }
 
-export async function startJob(job, errorId, onStarted) {
+// refused(error) may show an error elsewhere; it returns whether it did.
+export async function startJob(job, errorId, onStarted, refused = () => false) {
   showError(errorId, null);
   try {
     const started = await request("/v1/jobs", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(job) });
     await onStarted(started);
   } catch (error) {
-    showError(errorId, error);
+    if (!refused(error)) showError(errorId, error);
   }
 }

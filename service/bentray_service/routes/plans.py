@@ -1,0 +1,38 @@
+"""/v1/plans: what a job would be, and how long it would take, without starting it."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Depends
+
+from ..jobs.estimate import READ, estimate
+from ..jobs.kinds import KINDS
+from ..web.errors import problems
+from ..wiring import CallerTenant, Service
+from .bodies import SmallBody, accept_media_types
+from .jobs import JobRequest
+from .models.job_records import EstimateRecord, PlanRecord
+
+router = APIRouter(prefix="/v1/plans", tags=["jobs"], route_class=SmallBody)
+
+
+@router.post(
+    "",
+    dependencies=[Depends(accept_media_types("application/json"))],
+    responses=problems(400, 404, 413, 415, 422, 503),
+)
+def plan_job(job_request: JobRequest, service: Service, tenant: CallerTenant) -> EstimateRecord:
+    """Plan a job without starting it: method, nodes, tasks, memory, estimated time and place in the queue.
+
+    A job that would be rejected is rejected here with the same error.
+    """
+    kind: str = job_request.kind
+    plan = KINDS[kind].plan(job_request, tenant, service).plan
+    found = estimate(plan, service.jobs.durations(tenant, kind, READ))
+    return EstimateRecord(
+        plan=None if plan is None else PlanRecord.model_validate(plan),
+        minutes=found.minutes,
+        rough=found.rough,
+        compared=found.compared,
+        basis=found.basis,
+        ahead=service.jobs.next_place(tenant),
+    )

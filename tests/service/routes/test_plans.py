@@ -1,0 +1,128 @@
+"""POST /v1/plans: what a job would be, its time from jobs of the tenant, its place in the queue."""
+
+import pytest
+
+from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import Tenant
+
+from ..conftest import HDF5
+
+ASKED = {"method": "sart", "nodes": 32, "iterations": 3}
+
+
+def planned(http, dataset, settings=None, **more):
+    body = {"kind": "reconstruction", "dataset": dataset, "settings": settings or ASKED}
+    return http.post("/v1/plans", json=body, **more)
+
+
+def submit(http, dataset, **more):
+    body = {"kind": "reconstruction", "dataset": dataset, "settings": ASKED}
+    return http.post("/v1/jobs", json=body, **more).json()["id"]
+
+
+def done_in(http, job, seconds):
+    """Let a job have taken this long."""
+    with http.app.state.parts.database.write() as connection:
+        connection.exec_driver_sql(f"UPDATE jobs SET finished = started + {seconds} WHERE id = '{job}'")
+
+
+def test_nothing_is_started(start, uploaded, work):
+    http = start()
+    found = planned(http, uploaded(http))
+    assert found.status_code == 200
+    record = found.json()
+    assert http.get("/v1/jobs").json()["jobs"] == []
+    assert work.calls == []
+    plan = record["plan"]
+    assert (plan["nodes"], plan["methods"], plan["workers"]) == (32, ["bent rays, SART"], 1)
+    assert plan["largest_bytes"] == max(plan["call_bytes"].values()) > 0
+    assert (record["rough"], record["compared"], record["ahead"]) == (True, 0, 0)
+    assert record["minutes"] > 0.0
+    candidates = planned(http, http.get("/v1/datasets").json()["datasets"][0]["id"], {"method": "auto"})
+    assert len(candidates.json()["plan"]["methods"]) > 2
+
+
+def test_finished_jobs_of_the_same_method_correct_the_estimate(start, uploaded, work, until):
+    http = start()
+    dataset = uploaded(http)
+    for seconds in (60.0, 60.0, 60.0):
+        job = submit(http, dataset)
+        until(http, job)
+        done_in(http, job, seconds)
+    same = planned(http, dataset).json()
+    assert (same["minutes"], same["rough"], same["compared"]) == (pytest.approx(1.0), False, 3)
+    # In proportion to the work, of which the overhead of any job is a part.
+    more = planned(http, dataset, {**ASKED, "iterations": 1000}).json()
+    assert more["minutes"] == pytest.approx(more["plan"]["work_s"] / same["plan"]["work_s"], rel=1e-6)
+    assert more["minutes"] > 1.2
+    other = planned(http, dataset, {**ASKED, "method": "gauss-newton"}).json()
+    assert (other["rough"], other["compared"]) == (True, 0)
+
+
+def test_no_number_without_a_sound_estimate(start, uploaded):
+    http = start()
+    dataset = uploaded(http)
+    found = planned(http, dataset, {**ASKED, "decomposition": "volume"}).json()
+    assert (found["minutes"], found["compared"]) == (None, 0)
+    assert found["basis"].startswith("No estimate yet")
+
+
+def test_a_tenant_learns_nothing_of_the_jobs_of_another(start, scan, until, work):
+    http = start()
+    parts = http.app.state.parts
+    auth = {}
+    for name in ("acme", "other"):
+        token = ApiKey.new()
+        Keys(parts.database).add(token, Tenant(name), name, ("read", "write"))
+        auth[name] = {"Authorization": f"Bearer {token.shown()}"}
+    content = scan().read_bytes()
+    scans = {
+        name: http.post("/v1/datasets", content=content, headers={**HDF5, **key}).json()["id"]
+        for name, key in auth.items()
+    }
+    before = planned(http, scans["other"], headers=auth["other"]).json()
+    for _ in range(3):
+        job = submit(http, scans["acme"], headers=auth["acme"])
+        http.headers.update(auth["acme"])
+        until(http, job, "succeeded")
+        http.headers.pop("authorization")
+        done_in(http, job, 3600.0)
+    assert planned(http, scans["other"], headers=auth["other"]).json() == before
+    mine = planned(http, scans["acme"], headers=auth["acme"]).json()
+    assert (mine["minutes"], mine["compared"]) == (pytest.approx(60.0), 3)
+    refused = planned(http, scans["acme"], headers=auth["other"])
+    assert (refused.status_code, refused.json()["field"]) == (404, "dataset")
+
+
+def test_the_place_in_the_queue(start, uploaded):
+    # Jobs stay where they are: no disk has so much room.
+    http = start(min_free_bytes=2**60)
+    dataset = uploaded(http)
+    for ahead in range(3):
+        assert planned(http, dataset).json()["ahead"] == ahead
+        job = submit(http, dataset)
+        assert http.get(f"/v1/jobs/{job}").json()["ahead"] == ahead
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ('{"nodes": 1}', "settings.nodes"),
+        ('{"nodes": 1e400}', "settings.nodes"),
+        ('{"nodes": "\' OR 1=1 --"}', "settings.nodes"),
+        ('{"iterations": 99999999999999999999999999}', "settings.iterations"),
+        ('{"sart": {"relaxation": 2}}', "settings.sart.relaxation"),
+        ('{"eikonal": "fim-opencl"}', "eikonal"),
+        ("[]", "settings"),
+    ],
+)
+def test_what_a_job_is_refused_for_a_plan_is_too(start, uploaded, settings, field):
+    http = start()
+    body = f'{{"kind": "reconstruction", "dataset": "{uploaded(http)}", "settings": {settings}}}'
+    headers = {"Content-Type": "application/json"}
+    plan, job = (http.post(f"/v1/{what}", content=body, headers=headers) for what in ("plans", "jobs"))
+    assert (plan.status_code, plan.json()["field"]) == (422, field)
+    assert plan.headers["content-type"] == "application/problem+json"
+    told = [(one.json()["type"], one.json()["found"], one.json()["accepted"]) for one in (plan, job)]
+    assert told[0] == told[1]
