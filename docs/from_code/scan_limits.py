@@ -28,6 +28,7 @@ MEANING = {
     "ATTENUATION_NP_M": "attenuation",
     "LOG_RATIO_NP": "logarithm of an amplitude ratio",
     "TEMPERATURE_C": "temperature of the water",
+    "WATER_C": "the same where the speed of sound follows from it",
     "SCALE": "absolute scale of the traces",
     "PRESSURE": "sample of a trace times its scale",
 }

@@ -38,6 +38,8 @@ FREQUENCY_HZ = Range(1e3, 1e10, unit="Hz")
 ATTENUATION_NP_M = Range(0.0, 1e6, unit="Np/m")
 LOG_RATIO_NP = Range(-1e3, 1e3, unit="Np")
 TEMPERATURE_C = Range(-50.0, 150.0, unit="°C")
+# Of water whose speed follows from it, see ``acquisition.water``.
+WATER_C = Range(0.0, 95.0, unit="°C")
 # Of pressures in any unit: their squares and sums stay numbers.
 PRESSURE = Range(-1e30, 1e30)
 SCALE = Range(1e-30, 1e30)

@@ -125,24 +125,26 @@ class Pictures:
     async def quality(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> dict[str, Any]:
         """Create the quality report of a dataset, see ``bentray_workers.reconstruction.quality_report``."""
         what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
-        return dict(await self._one(tenant, what, path, quality_report, {"picker": picker}))
+        return dict(
+            await self._one(tenant, what, path, quality_report, {"picker": picker, **_water(dataset)})
+        )
 
     async def quality_png(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> bytes:
         """Render the quality report of a dataset."""
         what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
-        return bytes(await self._one(tenant, what, path, quality_page, {"picker": picker}))
+        return bytes(await self._one(tenant, what, path, quality_page, {"picker": picker, **_water(dataset)}))
 
     async def scan_geometry(self, tenant: Tenant, dataset: DatasetRow, path: Path) -> dict[str, Any]:
         """Read the geometry of a dataset, see ``bentray_workers.reconstruction.scan_views``."""
         what = "dataset", str(dataset["id"]), picture_cost.geometry_cost(dataset)
-        return dict(await self._one(tenant, what, path, scan_geometry, {}))
+        return dict(await self._one(tenant, what, path, scan_geometry, _water(dataset)))
 
     async def emission_traces(
         self, tenant: Tenant, dataset: DatasetRow, path: Path, how: dict[str, Any]
     ) -> dict[str, Any]:
         """Read the traces of one emission; ``how``: arguments of ``scan_views.emission_traces``."""
         what = "dataset", str(dataset["id"]), picture_cost.emission_cost(dataset)
-        return dict(await self._one(tenant, what, path, emission_traces, how))
+        return dict(await self._one(tenant, what, path, emission_traces, {**how, **_water(dataset)}))
 
     async def mesh_volume(
         self, tenant: Tenant, volume: VolumeRow, path: Path, iso: float | None, step: int, target: Path
@@ -259,6 +261,12 @@ class Pictures:
             async with asyncio.timeout(ASK_S):
                 return await asyncio.shield(self._asking)
         return {}
+
+
+def _water(dataset: DatasetRow) -> dict[str, float]:
+    """The water that the user states for a scan, as an argument of tasks; else nothing."""
+    stated = dataset["water_temperature_c"]
+    return {} if stated is None else {"water_temperature_c": stated}
 
 
 class _Run:

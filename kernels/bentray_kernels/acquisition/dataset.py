@@ -20,6 +20,7 @@ from ..limits import (
 from ..ranges import check_ranges, ranged
 from . import rules
 from .simulation.phantom_truth import Truth
+from .water import speed_from_temperature
 from .waveform import Waveform
 
 __all__ = ["Dataset", "Truth", "Waveform"]
@@ -228,6 +229,21 @@ class Dataset:
         """The same scan in water of a measured speed, m/s."""
         return replace(
             self, water_speed_mps=speed_mps, water_temperature_c=None, water_temperature_assumed=False
+        )
+
+    def in_water_of(self, temperature_c: float | None) -> Dataset:
+        """The same scan in water of a stated temperature, °C; None: in the water of the scan.
+
+        Raises:
+            InvalidInput: for a temperature outside 0 to 95 °C.
+        """
+        if temperature_c is None:
+            return self
+        return replace(
+            self,
+            water_speed_mps=speed_from_temperature(temperature_c),
+            water_temperature_c=temperature_c,
+            water_temperature_assumed=False,
         )
 
     def differential_tof(self) -> Floats:

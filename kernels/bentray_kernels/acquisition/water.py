@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 from ..errors import InvalidInput
+from ..limits import WATER_C
 
 # W. Marczak, "Water as a standard in the measurements of speed of sound in liquids",
 # J. Acoust. Soc. Am. 102 (1997) 2776-2779, table II: powers 0 to 5 of the temperature in °C.
 MARCZAK = (1.402385e3, 5.038813, -5.799136e-2, 3.287156e-4, -1.398845e-6, 2.787860e-9)
 
 # The fit is valid from 0 to 95 °C; the speed rises up to 74.1 °C and falls above.
-RANGE_C = (0.0, 95.0)
+RANGE_C = (WATER_C.least, WATER_C.most)
 FASTEST_C = 74.0
 
 # Errors that are not faults: of a thermometer, °C, and of the size of an array, as a part.
@@ -76,5 +77,6 @@ def describe_assumption(temperature_c: float) -> str:
     slope = speed_from_temperature(temperature_c + 1.0) - speed
     return (
         f"The water temperature is not stated in the scan: {temperature_c:g} °C ({speed:.1f} m/s) is "
-        f"assumed; one degree more raises every speed by {slope:.0f} m/s. State it by --temperature."
+        f"assumed; one degree more raises every speed by {slope:.0f} m/s. State it by the setting "
+        "water_temperature_c, on the page of the scan, or by --temperature."
     )

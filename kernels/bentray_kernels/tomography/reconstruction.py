@@ -61,6 +61,7 @@ def reconstruct(
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it.
     """
+    dataset = dataset.in_water_of(settings.water_temperature_c)
     if settings.reads_amplitudes and dataset.waveform is not None:
         dataset = with_log_ratios(dataset, settings.attenuation.amplitudes)
 

@@ -22,7 +22,7 @@ def check_scan(dataset: Dataset, settings: Settings, samples: int) -> None:
     Raises:
         InvalidInput: naming the setting or the field of the file.
     """
-    water = dataset.water_speed_mps
+    water = dataset.in_water_of(settings.water_temperature_c).water_speed_mps
     low, high = settings.speed_bounds_mps
     if not low <= water <= high:
         raise InvalidInput(

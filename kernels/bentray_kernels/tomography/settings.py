@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal
 
 from ..errors import InvalidInput
-from ..limits import SPEED_MPS
+from ..limits import SPEED_MPS, WATER_C
 from ..picker_names import DEFAULT_PICKER, PickerName
 from ..ranges import SEED, Range
 from ..request_fields import check, setting
@@ -219,6 +219,15 @@ class Settings:
         unset="every direction",
         label="Opening angle",
         unit="degrees",
+    )
+    water_temperature_c: float | None = setting(
+        None,
+        "Temperature of the water, °C, in place of that of the scan; its speed of sound follows (Marczak "
+        "1997). The file stays as it is, and the result states both.",
+        WATER_C,
+        unset="as the scan states it",
+        label="Water temperature",
+        unit="°C",
     )
     nodes: int | None = setting(
         None,

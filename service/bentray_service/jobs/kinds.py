@@ -30,7 +30,7 @@ from ..files.tenant_files import TenantFiles
 from ..rows import schema
 from ..rows.ids import dataset_of, field_of, volume_of
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import JobRow, Plain
+from ..rows.typed_rows import DatasetRow, JobRow, Plain
 from .kind import JobRequest, JobRun, Kind, Order, Sources
 
 DEFAULTS = "Omitted settings take their defaults."
@@ -61,8 +61,9 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
     def plan(self, request: ReconstructionRequest, tenant: Tenant, sources: Sources) -> Order:
         dataset = sources.datasets.get(tenant, request.dataset)
         path = sources.files.of(tenant).dataset(dataset["id"])
-        plan = sources.compute.plan(dataset["counts"], path, request.settings)
-        return Order(request.settings.to_dict(), plan["stored_bytes"], {"dataset_id": dataset["id"]}, plan)
+        settings = in_stated_water(request.settings, dataset)
+        plan = sources.compute.plan(dataset["counts"], path, settings)
+        return Order(settings.to_dict(), plan["stored_bytes"], {"dataset_id": dataset["id"]}, plan)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
         return files.dataset(job["dataset_id"] or "")
@@ -87,6 +88,14 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
         volume = volume_of(job["id"])
         here = f"/v1/volumes/{volume}"
         return {"volume": volume}, {"volume": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
+
+
+def in_stated_water(settings: Settings, dataset: DatasetRow) -> Settings:
+    """The settings with the temperature that the user states for the scan, unless they have their own."""
+    stated = dataset["water_temperature_c"]
+    if stated is None or settings.water_temperature_c is not None:
+        return settings
+    return settings.changed(water_temperature_c=stated)
 
 
 class SimulationRequest(JobRequest):

@@ -1,4 +1,4 @@
-"""PATCH of /v1/datasets and /v1/jobs: names and notes of the user."""
+"""PATCH of /v1/datasets and /v1/jobs: names, notes and stated water."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from .record_conversion import dataset_record, job_record
 
 JSON = [Depends(accept_media_types("application/json"))]
 REFUSALS = problems(400, 404, 413, 415, 422)
-OF_A_SCAN: dict[str, Example] = {"named": {"value": {"title": "Left breast", "notes": "Water at 31 °C."}}}
+OF_A_SCAN: dict[str, Example] = {
+    "named": {"value": {"title": "Left breast", "notes": "Second visit.", "water_temperature_c": 31.2}}
+}
 OF_A_JOB: dict[str, Example] = {"named": {"value": {"name": "With the new water speed"}}}
 
 router = APIRouter(prefix="/v1", route_class=SmallBody)
@@ -34,9 +36,11 @@ def change_dataset(
     service: Service,
     tenant: CallerTenant,
 ) -> DatasetRecord:
-    """Change the name or the notes of a scan; its file stays as it is."""
+    """Change the name, the notes or the stated water of a scan; its file stays as it is."""
     words = {"name": changes.title, "notes": changes.notes}
-    given = {name: value for name, value in words.items() if value is not None}
+    given: dict[str, str | float | None] = {k: value for k, value in words.items() if value is not None}
+    if "water_temperature_c" in changes.model_fields_set:
+        given["water_temperature_c"] = changes.water_temperature_c
     return dataset_record(service.datasets.describe(tenant, dataset_id, **given))
 
 

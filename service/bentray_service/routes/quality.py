@@ -50,7 +50,7 @@ async def quality_png(
     """The quality report as an image: gathers with picks, matrix of times, findings."""
     dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
     path = service.files.of(tenant).dataset(dataset["id"])
-    how = {"picker": picker, "what": "quality"}
+    how = {"picker": picker, "what": "quality", "water_temperature_c": dataset["water_temperature_c"]}
     return await picture(
         request, dataset, how, lambda: service.pictures.quality_png(tenant, dataset, path, picker)
     )

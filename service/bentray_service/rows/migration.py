@@ -126,6 +126,11 @@ def _to_5(connection: Connection) -> None:
     connection.execute(text("ALTER TABLE jobs ADD COLUMN started_by VARCHAR(200) NOT NULL DEFAULT ''"))
 
 
+def _to_6(connection: Connection) -> None:
+    """Version 6: the temperature of the water of a dataset, as the user states it."""
+    connection.execute(text("ALTER TABLE datasets ADD COLUMN water_temperature_c FLOAT"))
+
+
 def _count_stored_bytes(connection: Connection) -> None:
     """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
@@ -136,4 +141,6 @@ def _count_stored_bytes(connection: Connection) -> None:
         connection.execute(text(f"INSERT INTO storage (tenant, name, bytes, reserved) {query}"))
 
 
-STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType({1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5})
+STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType(
+    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6}
+)

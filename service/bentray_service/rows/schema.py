@@ -20,7 +20,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 5
+VERSION = 6
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -85,6 +85,8 @@ datasets = Table(
     Column("water_speed_mps", Float, nullable=False),
     # Numbers for planning; null for datasets from before version 4.
     Column("counts", JSON(none_as_null=True)),
+    # In place of that of the file, °C, by the user; null: as the file states it.
+    Column("water_temperature_c", Float),
     # The simulation that created it; not a foreign key, since jobs reference datasets.
     Column("job_id", String(32)),
     _tenant(),

@@ -59,8 +59,8 @@ class TenantTable(Generic[Record]):
 class NamedTable(TenantTable[Record]):
     """A table whose items have a name and notes of the user, ``schema.named_columns``."""
 
-    def describe(self, tenant: Tenant, item: str, **words: str) -> Record:
-        """Replace the ``name`` or the ``notes`` of an item, or both; returns its row.
+    def describe(self, tenant: Tenant, item: str, **words: str | float | None) -> Record:
+        """Replace the ``name``, the ``notes`` or other statements of the user; returns the row.
 
         Raises:
             UnknownId: when the tenant has no such item.

@@ -37,6 +37,7 @@ class DatasetRow(StoredRow):
     has_travel_times: bool
     has_truth: bool
     water_speed_mps: float
+    water_temperature_c: float | None
     counts: Plain | None
     job_id: str | None
 

@@ -51,7 +51,7 @@ INSERT INTO about VALUES (1, 0.0);
 DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
 
 
-@pytest.fixture(params=[1, 2, 3, 4])
+@pytest.fixture(params=[1, 2, 3, 4, 5])
 def old(request, tmp_path):
     """A database as an older version left it, with a finished and a waiting job."""
     path = tmp_path / "old.sqlite"
@@ -174,10 +174,10 @@ def test_keys_hold_afterwards(old):
 
 def test_failed_migration_keeps_the_old_database(old, monkeypatch):
     def broken(connection):
-        migration._to_5(connection)
+        migration._to_6(connection)
         raise RuntimeError("the power went")
 
-    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 4: broken})
+    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 5: broken})
     with pytest.raises(RuntimeError, match="power"):
         open_database(old)
     monkeypatch.undo()
@@ -258,6 +258,7 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
             for column in ("name VARCHAR(200)", "notes VARCHAR(4000)")
         ),
         "ALTER TABLE jobs ADD COLUMN started_by VARCHAR(200) NOT NULL DEFAULT ''",
+        "ALTER TABLE datasets ADD COLUMN water_temperature_c FLOAT",
     ]
     assert told.said[-1].startswith("UPDATE about SET version")
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
+from bentray_kernels.acquisition import speed_from_temperature
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_workers.files.dataset import write_dataset
@@ -129,6 +130,7 @@ def test_the_buttons_tell_their_time(page, serve, scan, work):
     for done in (1, 2, 3):
         page.get_by_role("button", name="Fast").click()
         expect(page.locator(".job").get_by_text("succeeded")).to_have_count(done)
+    page.reload()
     fast = page.get_by_role("button", name="Fast")
     expect(fast).to_contain_text(re.compile(r"about \d+ s$"))
     # No traces, no waves: Best is the same work.
@@ -211,7 +213,7 @@ def traced(page, serve, tmp_path):
     )
     here = f"{address}{sent.json()['links']['self']}"
     page.goto(f"{address}/#/scans/{sent.json()['id']}")
-    return lambda what: httpx.get(f"{here}/{what}", timeout=60.0).json()
+    return lambda what: httpx.get(f"{here}/{what}".rstrip("/"), timeout=60.0).json()
 
 
 def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
@@ -274,3 +276,58 @@ def test_a_telephone_scrolls_only_down(page, traced):
     expect(page.locator("#shot-values")).to_contain_text("Receiving element 0")
     expect(page.locator("#quality")).to_contain_text("Usable")
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
+
+
+def test_name_notes_and_water_are_edited(page, traced, work):
+    expect(page.locator("#shot-values")).to_contain_text("Receiving element 0")
+    straight = traced("traces?emission=0")["straight_s"][5]
+    # No name is left behind by notes alone.
+    page.get_by_role("button", name="Edit name").click()
+    page.get_by_label("Notes").fill("Second visit.\nLeft.")
+    page.get_by_role("button", name="Save").click()
+    expect(page.locator("#scan-notes")).to_have_text("Second visit.\nLeft.")
+    kept = traced("")
+    assert (kept["title"], kept["notes"]) == ("", "Second visit.\nLeft.")
+    expect(page.get_by_role("heading", level=1)).to_have_text(kept["id"])
+    page.get_by_role("button", name="Edit name").click()
+    page.get_by_label("Name", exact=True).fill("Left, warm")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Left, warm")
+    page.get_by_role("button", name="Correct the water temperature").click()
+    expect(page.locator("#edit-form").get_by_label("Water temperature (°C)")).to_be_focused()
+    page.keyboard.type("31.5")
+    page.keyboard.press("Enter")
+    facts = page.locator("#scan-facts")
+    expect(facts).to_contain_text(
+        f"{speed_from_temperature(31.5):.1f} m/s, 31.5 °C, stated on this page; in the file: "
+    )
+    expect(page.locator("#dataset-facts")).to_contain_text("water 31.5 °C, stated here")
+    # The straight line arrives earlier in warmer water.
+    earlier = traced("traces?emission=0")["straight_s"][5]
+    assert earlier < straight
+    expect(page.locator("#shot-values")).to_contain_text("Receiving element 0")
+    page.get_by_label("Receiver, from 0").fill("5")
+    page.keyboard.press("Tab")
+    expect(page.locator("#shot-values")).to_contain_text(f"straight line {1e6 * earlier:.2f} µs")
+    page.get_by_role("button", name="Fast").click()
+    page.locator(".job").get_by_text("succeeded").wait_for()
+    assert [call[1].water_temperature_c for call in work.calls] == [31.5]
+    page.reload()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Left, warm")
+    page.get_by_role("button", name="Edit name").click()
+    page.locator("#edit-form").get_by_label("Water temperature (°C)").fill("")
+    page.get_by_role("button", name="Save").click()
+    expect(facts).not_to_contain_text("stated on this page")
+    assert traced("")["water_temperature_c"] is None
+
+
+def test_without_a_water_shot_there_is_none_to_choose(page, serve, tmp_path):
+    made = trace_scan(blob_delay(12), elements=12, noise=0.01)
+    write_dataset(tmp_path / "bare.h5", replace(made, waveform=replace(made.waveform, water=None)))
+    address = serve(renders_per_minute=0)
+    stream = {"Content-Type": "application/x-hdf5"}
+    content = (tmp_path / "bare.h5").read_bytes()
+    sent = httpx.post(f"{address}/v1/datasets", content=content, headers=stream).json()
+    page.goto(f"{address}/#/scans/{sent['id']}")
+    expect(page.locator("#shot-legend")).to_contain_text("the scan has no water shot")
+    expect(page.locator("#shot-quantity")).to_be_hidden()

@@ -44,6 +44,7 @@ class FileWaveScan(NamedTuple):
     Attributes:
         findings: the file of findings in the scan; faulty traces are corrected or left out. Tasks end within
             a second once its folder, that of the job, is removed.
+        water_temperature_c: in place of that of the file, °C.
     """
 
     path: Path
@@ -51,6 +52,7 @@ class FileWaveScan(NamedTuple):
     plan: WaveSettings
     slice: int
     findings: Path
+    water_temperature_c: float | None = None
 
     def settings(self) -> WaveSettings:
         return self.plan
@@ -61,19 +63,25 @@ class FileWaveScan(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _stages(scan: FileScan) -> tuple[Settings, ...]:
-    return stages(read_once(scan.path, scan.stamp), scan.settings)
+    return stages(read_once(scan.path, scan.stamp, scan.settings.water_temperature_c), scan.settings)
 
 
 @lru_cache(maxsize=8)
 def _problem(scan: FileScan, index: int, stage: int) -> Problem:
-    dataset = part_of(read_once(scan.path, scan.stamp), scan.part)
+    dataset = part_of(read_once(scan.path, scan.stamp, scan.settings.water_temperature_c), scan.part)
     return problem_of(dataset, scan.stages()[stage], index)
 
 
 @lru_cache(maxsize=2)
-def read_once(path: Path, stamp: int) -> Dataset:
-    """A dataset without its traces; ``stamp`` distinguishes a rewritten file from the old one."""
-    return read_scan(path)
+def read_once(path: Path, stamp: int, water_temperature_c: float | None = None) -> Dataset:
+    """A dataset without its traces.
+
+    Args:
+        path: of its file.
+        stamp: distinguishes a rewritten file from the old one.
+        water_temperature_c: in place of that of the file, °C; a file picked from it states it already.
+    """
+    return read_scan(path).in_water_of(water_temperature_c)
 
 
 # Two jobs may alternate; more would cost memory, since a problem holds the traces of the object.
@@ -81,6 +89,7 @@ def read_once(path: Path, stamp: int) -> Dataset:
 def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
     faults = read_findings(scan.findings).of_traces(scan.slice)
     poll = partial(check_job_active, scan.findings.parent)
-    with open_slice(scan.path, read_once(scan.path, scan.stamp), scan.slice, poll) as one:
+    recorded = read_once(scan.path, scan.stamp, scan.water_temperature_c)
+    with open_slice(scan.path, recorded, scan.slice, poll) as one:
         whole = with_reference(apply(one, faults), scan.findings.parent, scan.slice)
         return prepare(whole, scan.plan, number, poll=poll)

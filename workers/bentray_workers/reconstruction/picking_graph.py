@@ -116,6 +116,7 @@ class PickingSource(NamedTuple):
         examine: whether the scan is examined first.
         amplitudes: their source, see ``Settings``.
         waves: whether traces are compared with simulated ones after picking.
+        water_temperature_c: in place of that of the file, °C.
     """
 
     path: Path
@@ -125,11 +126,12 @@ class PickingSource(NamedTuple):
     examine: bool
     amplitudes: str = "recorded"
     waves: bool = False
+    water_temperature_c: float | None = None
 
     @property
     def dataset(self) -> Dataset:
         """The scan without its traces."""
-        return read_once(self.path, self.stamp)
+        return read_once(self.path, self.stamp, self.water_temperature_c)
 
     @property
     def examines_times(self) -> bool:

@@ -80,6 +80,7 @@ def examine_file(
     picker: str = DEFAULT_PICKER,
     progress: OnEmission | None = None,
     largest_bytes: int | None = None,
+    water_temperature_c: float | None = None,
 ) -> Quality:
     """Examine a dataset file.
 
@@ -88,13 +89,14 @@ def examine_file(
         picker: for datasets without travel times.
         progress: called after each emission, in each pass over the traces.
         largest_bytes: of traces; None: no limit, since they are never all in memory.
+        water_temperature_c: in place of that of the file, °C.
 
     Raises:
         InvalidInput: from the file, for an unknown picker, or for more traces than allowed.
     """
     if largest_bytes is not None:
         _check_size(path, largest_bytes)
-    return _examined(path, read_scan(path), picker, progress)
+    return _examined(path, read_scan(path).in_water_of(water_temperature_c), picker, progress)
 
 
 def _examined(path: Path, whole: Dataset, picker: str, progress: OnEmission | None) -> Quality:
@@ -128,20 +130,20 @@ def _slices(path: Path, whole: Dataset) -> Iterator[Dataset]:
             yield one
 
 
-def quality_report(path: Path, picker: str) -> dict[str, Any]:
+def quality_report(path: Path, picker: str, water_temperature_c: float | None = None) -> dict[str, Any]:
     """Task: the report alone."""
-    return _cancellable(path, picker).report
+    return _cancellable(path, picker, water_temperature_c).report
 
 
-def quality_page(path: Path, picker: str) -> bytes:
+def quality_page(path: Path, picker: str, water_temperature_c: float | None = None) -> bytes:
     """Task: the page alone."""
-    return _cancellable(path, picker).page
+    return _cancellable(path, picker, water_temperature_c).page
 
 
-def _cancellable(path: Path, picker: str) -> Quality:
+def _cancellable(path: Path, picker: str, water_temperature_c: float | None) -> Quality:
     """An examination that ends early when its task is cancelled."""
     check = cancellation_check()
-    return examine_file(path, picker, lambda done, total: check(), LARGEST_BYTES)
+    return examine_file(path, picker, lambda done, total: check(), LARGEST_BYTES, water_temperature_c)
 
 
 def _check_size(path: Path, largest_bytes: int) -> None:

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 from distributed import Client
 
-from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED, water_summary
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED, replaced_water, water_summary
 from bentray_kernels.acquisition.water import describe_assumption
 from bentray_kernels.task_graph import Pool, run, run_resumable
 from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
@@ -79,14 +80,18 @@ def reconstruct(
         path, findings, chosen, trials = _pick_with_guides(job, settings, progress)
         result = _reconstruct_picked(job, path, chosen, progress)
         result = replace(result, trials=trials or result.trials)
-        estimated = _estimated(job, findings, attenuation=result.attenuation is not None)
+        estimated = _estimated(
+            job, findings, settings.water_temperature_c, attenuation=result.attenuation is not None
+        )
     if settings.picking.examine or findings.findings:
         estimated["quality"] = findings.words(stacked=result.speed.ndim == 3)
     return replace(result, provenance={**result.provenance, **estimated})
 
 
-def _estimated(job: _Job, findings: ScanFindings, *, attenuation: bool) -> dict[str, str]:
-    """Entries of the provenance about the scan: frequency, and what was estimated of water and pulse."""
+def _estimated(
+    job: _Job, findings: ScanFindings, water_temperature_c: float | None, *, attenuation: bool
+) -> dict[str, str]:
+    """Entries of the provenance about the scan: frequency, what was estimated of the pulse, and the water."""
     scan = read_dataset(job.scan, traces=False)
     estimated = {}
     frequency = scan.amplitude_frequency_hz or scan.center_frequency_hz
@@ -97,17 +102,25 @@ def _estimated(job: _Job, findings: ScanFindings, *, attenuation: bool) -> dict[
     if attenuation and frequency is not None:
         # For exports in dB/cm/MHz.
         estimated[FREQUENCY] = repr(float(frequency))
+    used = scan.in_water_of(water_temperature_c)
+    replaced = "" if used is scan else replaced_water(scan, used)
+    if water := " ".join(part for part in (replaced, _water(job, findings, used)) if part):
+        estimated["water"] = water
+    return estimated
+
+
+def _water(job: _Job, findings: ScanFindings, scan: Dataset) -> str:
+    """What was estimated or assumed about the water of a scan; empty for water that is stated."""
     shot = reference_path(job.folder, 0)
     if shot.exists():
         reference = read_reference(shot)
-        estimated["water"] = water_summary(scan, reference.speed_mps, reference.speed_sigma_mps)
-    else:
-        of_water = next((one for one in findings.findings if one.check == WATER_SPEED), None)
-        if of_water is not None:
-            estimated["water"] = f"{of_water.found}, {of_water.action}"
-        elif scan.water_temperature_assumed and scan.water_temperature_c is not None:
-            estimated["water"] = describe_assumption(scan.water_temperature_c)
-    return estimated
+        return water_summary(scan, reference.speed_mps, reference.speed_sigma_mps)
+    of_water = next((one for one in findings.findings if one.check == WATER_SPEED), None)
+    if of_water is not None:
+        return f"{of_water.found}, {of_water.action}"
+    if scan.water_temperature_assumed and scan.water_temperature_c is not None:
+        return describe_assumption(scan.water_temperature_c)
+    return ""
 
 
 class _Job(NamedTuple):
@@ -138,6 +151,7 @@ def _pick_with_guides(
         settings.picking.examine,
         amplitudes,
         settings.method == "waveform",
+        settings.water_temperature_c,
     )
     path, findings = _pick(job, source, PickingFiles.of(job.folder), None, progress)
     rounds = 0 if source.dataset.picked else settings.numerics.guided_rounds
@@ -207,12 +221,17 @@ def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _Jo
             report()
 
     return run_reconstruction(
-        read_scan(path),
+        read_scan(path).in_water_of(settings.water_temperature_c),
         settings,
         lambda plan, part: FileScan(path, stamp, plan, part),
         run_graphs,
         lambda plan, index: FileWaveScan(
-            job.scan, recorded, replace(plan, estimates_source=lacking), index, faults
+            job.scan,
+            recorded,
+            replace(plan, estimates_source=lacking),
+            index,
+            faults,
+            settings.water_temperature_c,
         ),
         0 if bare else trace_samples(job.scan),
     )

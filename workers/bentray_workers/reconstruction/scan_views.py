@@ -13,6 +13,7 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.picking.first_arrivals import reach_of, read_times, screen_times
+from bentray_kernels.acquisition.quality.water_speed import stated_water
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.picker_names import DEFAULT_PICKER
@@ -25,13 +26,18 @@ from ..files.dataset.traces import lacks_water, open_slice, trace_samples
 MAX_ELEMENTS, MAX_RECEIVERS, MAX_SAMPLES = 4096, 512, 1024
 
 
-def scan_geometry(path: Path) -> dict[str, Any]:
+def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> dict[str, Any]:
     """Task: elements, acquisition and water of a dataset file, as JSON values.
+
+    Args:
+        path: of the dataset file.
+        water_temperature_c: in place of that of the file, °C.
 
     Raises:
         InvalidInput: as ``read_dataset``.
     """
-    scan = read_dataset(path, traces=False)
+    recorded = read_dataset(path, traces=False)
+    scan = recorded.in_water_of(water_temperature_c)
     frequency = _frequency(path, scan)
     every = max(1, math.ceil(len(scan.element_position_m) / MAX_ELEMENTS))
     shown = np.arange(0, len(scan.element_position_m), every)
@@ -50,15 +56,19 @@ def scan_geometry(path: Path) -> dict[str, Any]:
         "sampling_rate_hz": scan.sampling_rate_hz,
         "t0_s": scan.t0_s,
         "samples": trace_samples(path),
+        "water_shot": trace_samples(path) > 0 and not lacks_water(path),
         "water_speed_mps": scan.water_speed_mps,
         "water_temperature_c": scan.water_temperature_c,
         "water_assumed": scan.water_temperature_assumed,
+        "water_in_file": stated_water(recorded),
         "pairs": pairs,
         "timed_pairs": int(np.isfinite(scan.differential_tof()).sum()) if scan.picked else None,
     }
 
 
-def emission_traces(path: Path, *, emission: int, index: int, what: str) -> dict[str, Any]:
+def emission_traces(
+    path: Path, *, emission: int, index: int, what: str, water_temperature_c: float | None = None
+) -> dict[str, Any]:
     """Task: the traces of one emission, reduced to a size for a screen, and the arrival times.
 
     Of several samples that fall on one, the one with the largest magnitude is kept, so that no peak is lost.
@@ -68,6 +78,7 @@ def emission_traces(path: Path, *, emission: int, index: int, what: str) -> dict
         emission: index into ``acquisition/tx``.
         index: of the slice.
         what: ``object`` or ``water``.
+        water_temperature_c: in place of that of the file, °C.
 
     Returns:
         JSON values: ``traces`` is base64 of float32, little endian, (receivers, samples), each trace divided
@@ -76,7 +87,7 @@ def emission_traces(path: Path, *, emission: int, index: int, what: str) -> dict
     Raises:
         InvalidInput: naming ``emission``, ``slice`` or ``quantity``; as ``read_dataset``.
     """
-    scan = read_dataset(path, traces=False)
+    scan = read_dataset(path, traces=False).in_water_of(water_temperature_c)
     for name, value, count in (("emission", emission, len(scan.tx)), ("slice", index, scan.slices)):
         if not 0 <= value < count:
             raise InvalidInput(name, value, f"0 to {count - 1}")

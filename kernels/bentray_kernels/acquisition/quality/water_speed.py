@@ -74,6 +74,19 @@ def water_summary(dataset: Dataset, speed_mps: float, sigma_mps: float) -> str:
     return f"{assumed} Chords that miss the object say {fitted}, {more}."
 
 
+def replaced_water(recorded: Dataset, used: Dataset) -> str:
+    """The water that a setting states in place of that of the scan, in one line.
+
+    Args:
+        recorded: as in the file.
+        used: in the water of the setting.
+    """
+    return (
+        f"Water of {used.water_speed_mps:.1f} m/s ({used.water_temperature_c:.1f} °C), by the setting "
+        f"water_temperature_c. In the scan: {stated_water(recorded)}."
+    )
+
+
 def stated_water(dataset: Dataset) -> str:
     """The water as stated or assumed: temperature, if known, and speed."""
     speed, celsius = dataset.water_speed_mps, dataset.water_temperature_c

@@ -12,7 +12,7 @@ from bentray_kernels.tomography.settings import PLACES, Settings
 from .option_tables import Command, Option, with_options
 
 # Left off the name of an option: ``--side`` is in metres, as its help says.
-UNITS = ("_mps", "_m", "_nodes", "_deg")
+UNITS = ("_mps", "_m", "_nodes", "_deg", "_c")
 
 
 @dataclass(frozen=True)

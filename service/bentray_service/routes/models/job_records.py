@@ -30,7 +30,11 @@ class DatasetRecord(BaseModel):
     has_traces: bool
     has_travel_times: bool
     has_truth: bool = Field(description="Whether the file contains the ground truth, as for a phantom.")
-    water_speed_mps: float
+    water_speed_mps: float = Field(description="As in the file, m/s.")
+    water_temperature_c: float | None = Field(
+        description="Temperature of the water, °C, that the user states in place of that of the file. "
+        "Reconstructions take it where their settings state none."
+    )
     job: str | None = Field(description="Id of the simulation that created it.")
     bytes: int = Field(description="Size of the uploaded or simulated file.")
     sha256: str = Field(description="SHA-256 of this file.")

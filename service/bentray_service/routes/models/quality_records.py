@@ -56,9 +56,11 @@ class GeometryRecord(BaseModel):
     sampling_rate_hz: float | None
     t0_s: float = Field(description="Time of the first sample after the emission, s.")
     samples: int = Field(description="Samples of each trace; 0 without traces.")
-    water_speed_mps: float
-    water_temperature_c: float | None
+    water_shot: bool = Field(description="Whether there are traces of the water alone.")
+    water_speed_mps: float = Field(description="Of the water that reconstructions use, m/s.")
+    water_temperature_c: float | None = Field(description="Of the same water, °C; null for another medium.")
     water_assumed: bool = Field(description="Whether nobody stated the water.")
+    water_in_file: str = Field(description="What the file states of the water, in words.")
     pairs: int = Field(description="Pairs of different elements, over all slices.")
     timed_pairs: int | None = Field(
         description="Pairs with a valid travel time in the file; null for a scan with traces alone."

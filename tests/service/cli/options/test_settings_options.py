@@ -23,6 +23,7 @@ CHOICES = [
     (["--eikonal", "fsm"], "eikonal", "fsm"),
     (["--decomposition", "volume"], "decomposition", "volume"),
     (["--opening-angle", "60"], "opening_angle_deg", 60.0),
+    (["--water-temperature", "31.5"], "water_temperature_c", 31.5),
     (["--nodes", "64"], "nodes", 64),
     (["--side", "0.25"], "side_m", 0.25),
     (["--iterations", "7"], "iterations", 7),

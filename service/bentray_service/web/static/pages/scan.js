@@ -6,6 +6,7 @@ import { withKey } from "../parts/key.js";
 import { startJob } from "../parts/panel.js";
 import { planInWords, planOf, queueInWords, timeInWords } from "../parts/plan_estimate.js";
 import { drawElements, inWordsOf } from "../parts/scan_drawing.js";
+import { correctButton, scanEditor } from "../parts/scan_edit.js";
 import { factRows, fillFacts, showQuality } from "../parts/scan_facts.js";
 import { settingsForm } from "../parts/settings_form.js";
 import { openShot } from "../parts/shot.js";
@@ -14,6 +15,7 @@ import { titleOf } from "../parts/titles.js";
 const PAGE = `
   <h1 id="scan-name"></h1>
   <p id="dataset-facts" class="facts"></p>
+  <div id="scan-editor"></div>
   <section aria-labelledby="run-title" class="panel">
     <h2 id="run-title">Reconstruction</h2>
     <form id="run" novalidate>
@@ -60,24 +62,24 @@ const PLAN_MS = 400;
 function factsOf(scan) {
   const times = scan.has_travel_times ? "travel times" : "raw traces";
   const slices = scan.slices > 1 ? ` · ${scan.slices} slices` : "";
-  return `${scan.ntx} emitters × ${scan.nrx} receivers · ${times}${slices} · water ${scan.water_speed_mps.toFixed(1)} m/s`;
+  const stated = scan.water_temperature_c;
+  const water = stated === null ? `water ${scan.water_speed_mps.toFixed(1)} m/s` : `water ${stated} °C, stated here`;
+  return `${scan.ntx} emitters × ${scan.nrx} receivers · ${times}${slices} · ${water}`;
 }
 
 // The time of each button, by a plan of the service; a plan that is refused says why.
-function presetTimes(scan) {
-  let number = 0;
-  return () => {
-    const mine = ++number;
-    for (const [name, settings] of Object.entries(PRESETS)) {
-      const show = (textContent, title = "") => {
-        if (mine === number && at(`${name}-time`)) Object.assign(at(`${name}-time`), { textContent, title });
-      };
-      planOf(scan.id, settings).then(
-        (estimate) => show([timeInWords(estimate), queueInWords(estimate)].filter(Boolean).join(", "), estimate.basis),
-        (error) => show(error.message),
-      );
-    }
-  };
+function showTimes(scan) {
+  for (const [name, settings] of Object.entries(PRESETS)) {
+    planOf(scan.id, settings).then(
+      (estimate) => {
+        const words = [timeInWords(estimate), queueInWords(estimate)].filter(Boolean).join(", ");
+        if (at(`${name}-time`)) Object.assign(at(`${name}-time`), { textContent: words, title: estimate.basis });
+      },
+      (error) => {
+        if (at(`${name}-time`)) at(`${name}-time`).textContent = error.message;
+      },
+    );
+  }
 }
 
 // All settings as a form, those of an earlier job in it to run it again with changes. Returns close() and own().
@@ -124,53 +126,59 @@ async function showSettings(scan, from) {
 }
 
 // The elements and the facts; a function that marks the element that emits.
-async function showGeometry(scan) {
-  const geometry = await request(`/v1/datasets/${scan.id}/geometry`);
-  if (!at("elements")) return () => {};
+function showGeometry(scan, geometry, correctWater) {
   const { picture, mark } = drawElements(geometry);
   const words = make("figcaption", "facts", `${inWordsOf(geometry)}. Circles emit, dots receive.`);
   at("elements").replaceChildren(picture, words);
-  fillFacts(at("scan-facts"), factRows(geometry));
+  fillFacts(at("scan-facts"), factRows(geometry, scan));
+  at("scan-facts").querySelector("[data-term=Water]").append(" ", correctButton(correctWater));
   return mark;
 }
 
-async function showReport(scan) {
-  const report = await request(`/v1/datasets/${scan.id}/quality`);
-  if (at("quality")) showQuality(at("quality"), report, scan.slices > 1);
-}
-
 // What workers read from the scan, each part on its own, so that one that fails hides no other. Returns close().
-function showScan(scan) {
-  withKey(at("quality-page")).href = `/v1/datasets/${scan.id}/quality.png`;
-  const drawn = showGeometry(scan).catch((error) => {
-    showError("geometry-error", error);
-    return () => {};
-  });
-  showReport(scan).catch((error) => {
-    at("quality")?.replaceChildren();
-    showError("quality-error", error);
-  });
-  if (!scan.has_traces) return () => {};
-  at("traces").hidden = false;
-  return openShot(at("traces"), scan, (element) => drawn.then((mark) => mark(element)));
+function showScan(scan, correctWater) {
+  at("quality-page").href = `/v1/datasets/${scan.id}/quality.png`;
+  at("quality").replaceChildren(make("p", "facts", "Checking the scan"));
+  for (const id of ["geometry-error", "quality-error"]) showError(id, null);
+  // What arrives after the page, or this view of the scan, was closed is left out.
+  let closed = false;
+  const unless = (show) => (found) => (closed ? () => {} : show(found));
+  const geometry = request(`/v1/datasets/${scan.id}/geometry`);
+  const drawn = geometry.then(unless((found) => showGeometry(scan, found, correctWater))).catch(
+    unless((error) => {
+      showError("geometry-error", error);
+      return () => {};
+    }),
+  );
+  request(`/v1/datasets/${scan.id}/quality`).then(
+    unless((report) => showQuality(at("quality"), report, scan.slices > 1)),
+    unless((error) => {
+      at("quality").replaceChildren();
+      showError("quality-error", error);
+    }),
+  );
+  let closeShot = () => {};
+  if (scan.has_traces) {
+    at("traces").hidden = false;
+    closeShot = openShot(at("traces"), scan, geometry, (element) => drawn.then((mark) => mark(element)));
+  }
+  return () => {
+    closed = true;
+    closeShot();
+  };
 }
 
 export async function open(root, { id, query }) {
   const scan = await request(`/v1/datasets/${id}`);
   root.innerHTML = PAGE;
-  document.title = `${titleOf(scan)} – Bentray`;
-  at("scan-name").textContent = titleOf(scan);
-  at("dataset-facts").textContent = factsOf(scan);
-  const showTimes = presetTimes(scan);
-  showTimes();
-  let states = null;
+  withKey(at("quality-page"));
+  const entitle = (shown) => {
+    document.title = `${titleOf(shown)} – Bentray`;
+    at("scan-name").textContent = titleOf(shown);
+    at("dataset-facts").textContent = factsOf(shown);
+  };
+  entitle(scan);
   const jobs = jobList(at("of-scan"), {
-    // A job that ends changes the estimates, one that waits the place in the queue.
-    onJobs(all) {
-      const now = all.map((job) => job.id + job.state).join();
-      if (states !== null && states !== now) showTimes();
-      states = now;
-    },
     empty: "Nothing has run yet. Press Fast or Best. The image appears here.",
     wanted: (job) => job.dataset === id && job.kind === "reconstruction",
   });
@@ -182,6 +190,7 @@ export async function open(root, { id, query }) {
     const refused = (error) => event.submitter?.value === "own" && own.form.refuse(error.problem ?? {}, true);
     startJob({ kind: "reconstruction", dataset: id, settings }, "run-error", jobs.refresh, refused);
   });
+  showTimes(scan);
   let closed = false;
   showSettings(scan, query.get("from")).then(
     (made) => {
@@ -190,7 +199,15 @@ export async function open(root, { id, query }) {
     },
     (error) => showError("run-error", error),
   );
-  const closeShot = showScan(scan);
+  let water = scan.water_temperature_c;
+  const correctWater = scanEditor(at("scan-editor"), scan, (changed) => {
+    entitle(changed);
+    if (changed.water_temperature_c === water) return;
+    water = changed.water_temperature_c;
+    closeShot();
+    closeShot = showScan(changed, correctWater);
+  });
+  let closeShot = showScan(scan, correctWater);
   return () => {
     closed = true;
     own.close();

@@ -1,4 +1,4 @@
-// How a result was made, as tables: what auto compared, the plan, settings and provenance.
+// How a result was made, as tables: what auto compared, and the plan.
 import { make } from "./dom.js";
 import { duration } from "./job_words.js";
 import { methodOf } from "./results.js";
@@ -75,17 +75,4 @@ export function planTable({ plan }) {
   ];
   if (plan.minutes) rows.push(["Estimated time", duration(60 * plan.minutes)]);
   return section("Plan", make("p", "", plan.why), pairs(rows));
-}
-
-export function provenanceTable({ job, volume }) {
-  const { advice, ...provenance } = volume.provenance;
-  const text = (value) => (typeof value === "object" && value !== null ? JSON.stringify(value) : String(value));
-  const rows = [
-    ["Job", job.id], ["Volume", volume.id], ["Scan", job.dataset],
-    ["Finished", new Date(job.finished).toLocaleString()],
-    ...Object.entries(provenance),
-  ];
-  const settings = make("details");
-  settings.append(make("summary", "", "Settings"), pairs(Object.entries(job.settings).map(([name, value]) => [name, text(value)])));
-  return section("Provenance", pairs(rows), settings);
 }

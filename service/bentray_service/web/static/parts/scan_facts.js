@@ -13,9 +13,10 @@ function sampling({ sampling_rate_hz: hertz, samples, t0_s: first }) {
   return `${(1e-6 * hertz).toFixed(3)} MHz, ${samples} samples from ${(1e6 * first).toFixed(2)} µs`;
 }
 
-function water({ water_speed_mps: speed, water_temperature_c: temperature, water_assumed: assumed }) {
+function water({ water_speed_mps: speed, water_temperature_c: temperature, water_assumed: assumed, water_in_file: file }, stated) {
   const warm = temperature === null ? "" : `, ${temperature.toFixed(1)} °C`;
-  return `${speed.toFixed(1)} m/s${warm}${assumed ? "; assumed, since nobody stated it" : ""}`;
+  const origin = stated ? `, stated on this page; in the file: ${file}` : assumed ? "; assumed, since nobody stated it" : "";
+  return `${speed.toFixed(1)} m/s${warm}${origin}`;
 }
 
 function slices({ slice_z_m: heights }) {
@@ -23,12 +24,12 @@ function slices({ slice_z_m: heights }) {
   return `${heights.length}, at z from ${millimetres[0]} to ${millimetres.at(-1)} mm`;
 }
 
-// Terms and values of GET /v1/datasets/{id}/geometry.
-export function factRows(geometry) {
+// Terms and values of GET /v1/datasets/{id}/geometry, and of the scan itself.
+export function factRows(geometry, scan) {
   const rows = [
     ["Centre frequency", frequency(geometry)],
     ["Sampling", sampling(geometry)],
-    ["Water", water(geometry)],
+    ["Water", water(geometry, scan.water_temperature_c !== null)],
     ["Pairs of elements", geometry.pairs.toLocaleString("en")],
   ];
   if (geometry.slice_z_m.length) rows.splice(3, 0, ["Slices", slices(geometry)]);
@@ -40,7 +41,12 @@ export function factRows(geometry) {
 }
 
 export function fillFacts(list, rows) {
-  for (const [term, value] of rows) list.append(make("dt", "", term), make("dd", "", value));
+  list.replaceChildren();
+  for (const [term, value] of rows) {
+    const described = make("dd", "", value);
+    described.dataset.term = term;
+    list.append(make("dt", "", term), described);
+  }
 }
 
 const VERDICTS = {

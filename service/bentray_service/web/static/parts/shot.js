@@ -9,7 +9,7 @@ const SHOT = `
     <label class="shot-slider"><span class="caption">Emission</span><input id="shot-slider" type="range" min="0" step="1" value="0"></label>
     <label><span class="caption">Emission number</span><input id="shot-number" type="number" min="0" step="1" value="0"></label>
     <label id="shot-slices" hidden><span class="caption">Slice</span><input id="shot-slice" type="number" min="0" step="1" value="0"></label>
-    <label><span class="caption">Traces</span><select id="shot-quantity">
+    <label id="shot-shots" hidden><span class="caption">Traces</span><select id="shot-quantity">
       <option value="object">with the object</option><option value="water">of the water shot</option></select></label>
   </div>
   <canvas id="shot" class="shot" tabindex="0" role="application" aria-roledescription="image" aria-describedby="shot-keys"></canvas>
@@ -25,9 +25,13 @@ const WAIT_MS = 80;
 
 const microseconds = (seconds) => `${(1e6 * seconds).toFixed(2)} µs`;
 
-function legendOf(shot) {
+const NO_SHOT = "no arrivals here: the scan has no water shot. A reconstruction estimates one from the paths that miss the object, "
+  + "and picks the arrivals against it; the quality report as an image shows them";
+const NO_PULSE = "no arrivals here: the traces have no pulse to pick";
+
+function legendOf(shot, hasWater) {
   const of = shot.picker ? `picked by ${shot.picker}` : "of the file";
-  const picks = shot.pick_s ? `arrival with the object, ${of}` : "no arrivals with the object: these need a water shot and a pulse";
+  const picks = shot.pick_s ? `arrival with the object, ${of}` : hasWater ? NO_PULSE : NO_SHOT;
   const marks = [make("span", "line-mark"), make("span", shot.pick_s ? "dot-mark" : "")];
   return [marks[0], " arrival in water along a straight line · ", marks[1], ` ${picks}`];
 }
@@ -49,14 +53,19 @@ function valuesOf(shot, receiver) {
   return `${words}, with the object ${microseconds(pick)}, difference ${microseconds(pick - straight)}`;
 }
 
-// Open in a section; onEmission(element) is told which element emits. Returns close().
-export function openShot(section, scan, onEmission) {
+// Open in a section; geometry: a promise of GET /v1/datasets/{id}/geometry; onEmission(element) is told which element emits.
+// Returns close().
+export function openShot(section, scan, geometry, onEmission) {
   section.innerHTML = SHOT;
   const canvas = new ShotCanvas(at("shot"));
   const [slider, number, slice, receiver] = ["shot-slider", "shot-number", "shot-slice", "shot-receiver"].map(at);
   for (const one of [slider, number]) one.max = scan.ntx - 1;
   slice.max = scan.slices - 1;
   at("shot-slices").hidden = scan.slices < 2;
+  const water = geometry.then(({ water_shot: has }) => has, () => false);
+  water.then((has) => {
+    if (at("shot-shots")) at("shot-shots").hidden = !has;
+  });
   let [wanted, timer] = ["", 0];
 
   function tell() {
@@ -69,14 +78,14 @@ export function openShot(section, scan, onEmission) {
     if (address === wanted) return;
     wanted = address;
     try {
-      const shot = await request(address);
+      const [shot, hasWater] = await Promise.all([request(address), water]);
       // The reader may have moved on, or closed the page.
       if (address !== wanted || !section.isConnected) return;
       showError("shot-error", null);
       canvas.show(shot);
       receiver.max = shot.receivers - 1;
       at("shot").setAttribute("aria-label", `Traces of emission ${shot.emission}: ${shot.receivers} receivers over time`);
-      at("shot-legend").replaceChildren(...legendOf(shot));
+      at("shot-legend").replaceChildren(...legendOf(shot, hasWater));
       at("shot-facts").textContent = factsOf(shot);
       tell();
       onEmission(shot.element);

@@ -1,0 +1,98 @@
+// Provenance, settings and numerical parameters of a result as tables in words, and all of it as JSON to copy.
+import { copyButton } from "./copying.js";
+import { make } from "./dom.js";
+
+const SOFTWARE = { bentray: "Bentray", python: "Python", numpy: "NumPy", numba: "Numba", scipy: "SciPy" };
+const SAID = {
+  water: "Water", pulse: "Pulse", quality: "Quality of the scan", geometry: "Geometry", waveform: "Full waveform", attenuation: "Attenuation",
+  frequency_hz: "Centre frequency", amplitudes: "Amplitudes",
+};
+// What a parameter of no value means: the automatic decision, unless stated here.
+const NUMERICS = {
+  axial_margin_nodes: ["Axial margin", "nodes", "everywhere"],
+  straight_iterations: ["Iterations with straight rays first"],
+  coarser_grids: ["Coarser grids first"],
+  stop_rms_s: ["Stop at a residual of", "s", "not early"],
+  front_smoothing_nodes: ["Smoothing for the wave front", "nodes"],
+  ray_width_m: ["Width of rays", "m"],
+  ray_gradient: ["Gradient along rays"],
+  relaxation_decay: ["Decay of the relaxation per iteration"],
+  subset: ["Emitters per update"],
+  huber_scale: ["Residuals are weighed linearly beyond", "standard deviations"],
+  reciprocity: ["Reverse pairs fill missing ones"],
+  guided_rounds: ["Arrivals picked again"],
+  bands: ["Frequency bands"],
+  emitters: ["Emitters per band"],
+};
+const UNITS = { mps: "m/s", s: "s", m: "m", hz: "Hz", deg: "°", c: "°C", nodes: "nodes" };
+
+// "speed_bounds_mps" is "Speed bounds" and the unit m/s.
+function named(name) {
+  const [, stem, ending] = /^(.*?)(?:_(mps|s|m|hz|deg|c|nodes))?$/.exec(name);
+  const words = stem.replaceAll("_", " ");
+  return [words[0].toUpperCase() + words.slice(1), UNITS[ending] ?? ""];
+}
+
+// A value in words; without one, what that means.
+export function inWords(value, unit = "", unset = "automatic") {
+  if (value === null) return unset;
+  if (typeof value === "boolean") return value ? "yes" : "no";
+  const number = (one) => (typeof one === "number" ? String(Number(one.toPrecision(6))) : String(one));
+  const text = Array.isArray(value) ? value.map(number).join(" to ") : number(value);
+  return unit && typeof value !== "string" ? `${text} ${unit}` : text;
+}
+
+function pairs(entries) {
+  const table = make("table", "pairs");
+  const body = table.createTBody();
+  for (const [name, value] of entries) {
+    const row = body.insertRow();
+    const head = make("th", "", name);
+    head.scope = "row";
+    row.append(head, make("td", "", value));
+  }
+  return table;
+}
+
+function folded(title, ...content) {
+  const box = make("details");
+  box.append(make("summary", "", title), ...content);
+  return box;
+}
+
+// Rows of settings: those of nested records below the name of the record.
+function settingRows(settings, before = "") {
+  return Object.entries(settings).flatMap(([name, value]) => {
+    if (value !== null && typeof value === "object" && !Array.isArray(value)) return settingRows(value, `${before}${named(name)[0]}: `);
+    const [words, unit] = named(name);
+    return [[before ? `${before}${words.toLowerCase()}` : words, inWords(value, unit)]];
+  });
+}
+
+const fixed = (numerics) => Object.entries(numerics).map(([name, value]) => {
+  const [words, unit, unset] = NUMERICS[name] ?? named(name);
+  return [words, inWords(value, unit, unset)];
+});
+
+// The provenance of a result in a section of its own.
+export function provenanceTable({ job, volume }) {
+  const { advice, numerics: stored, ...provenance } = volume.provenance;
+  const numerics = stored ? JSON.parse(stored) : null;
+  const frequency = (hertz) => `${(1e-3 * Number(hertz)).toFixed(1)} kHz`;
+  const said = Object.entries(provenance).filter(([name]) => !(name in SOFTWARE));
+  const versions = Object.entries(SOFTWARE).filter(([name]) => name in provenance).map(([name, words]) => `${words} ${provenance[name]}`);
+  const rows = [
+    ["Job", job.id], ["Volume", volume.id], ["Scan", job.dataset],
+    ["Finished", new Date(job.finished).toLocaleString()],
+    ["Speed in water", `${volume.water_speed_mps.toFixed(1)} m/s${job.settings.water_temperature_c == null ? "" : `, ${job.settings.water_temperature_c} °C by the user`}`],
+    ...said.map(([name, value]) => [SAID[name] ?? named(name)[0], name === "frequency_hz" ? frequency(value) : String(value)]),
+    ["Software", versions.join(", ")],
+  ];
+  const box = make("section", "panel provenance");
+  const head = make("div", "section-head");
+  const everything = { job: job.id, volume: volume.id, scan: job.dataset, finished: job.finished, settings: job.settings, numerics, provenance };
+  head.append(make("h2", "", "Provenance"), copyButton("Copy JSON", () => `${JSON.stringify(everything, null, 2)}\n`));
+  box.append(head, pairs(rows), folded("Settings", pairs(settingRows(job.settings))));
+  if (numerics) box.append(folded("Numerical parameters, chosen automatically", pairs(fixed(numerics))));
+  return box;
+}
