@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import re
 import shlex
 
@@ -303,3 +304,22 @@ def test_a_result_is_renamed(page, result):
     expect(page.get_by_role("heading", level=1)).to_have_text("With the new water speed")
     page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
     page.locator(".job").get_by_role("link", name="With the new water speed").wait_for()
+
+
+def test_provenance_is_told_in_words_and_copied_as_json(page, result):
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    ready(page, result)
+    box = page.locator(".provenance")
+    job = httpx.get(result.replace("/#/jobs/", "/v1/jobs/")).json()
+    volume = httpx.get(result.partition("/#/")[0] + job["links"]["volume"]).json()
+    box.get_by_text("Settings", exact=True).click()
+    rows = {row.locator("th").inner_text(): row.locator("td").inner_text() for row in box.locator("tr").all()}
+    assert (rows["Job"], rows["Scan"], rows["Speed in water"]) == (job["id"], job["dataset"], "1500.0 m/s")
+    assert (rows["Method"], rows["Side"], rows["Roi"]) == ("sart", "automatic", "no")
+    assert (rows["Speed bounds"], rows["Sart: relaxation"]) == ("1300 to 1800 m/s", "0.1")
+    assert "{" not in box.inner_text()
+    box.get_by_role("button", name="Copy JSON").click()
+    box.get_by_role("button", name="Copied").wait_for()
+    copied = json.loads(page.evaluate("navigator.clipboard.readText()"))
+    assert copied["settings"] == job["settings"]
+    assert copied["provenance"] == volume["provenance"]
