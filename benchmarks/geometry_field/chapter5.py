@@ -18,6 +18,7 @@ from bentray_service.cli.output.benchmark_row import Row
 
 from ..shared._contact_sheet import Panel, sheet
 from ._geometry_scenes import SCENES, glass, self_reflection
+from ._inner_lookups import inner_rows
 from ._lookup_figure import lookup_panels
 
 # Of the pictures.
@@ -29,7 +30,7 @@ ODD = {"body refracting twice": 3.0}
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
-    """Pixels that fields change, scene by scene, and Figures 25 to 27."""
+    """Pixels that fields change, scene by scene, rays that leave a surface, and Figures 25 to 27."""
     pixels = 176 if context.quick else 352
     panels: dict[str, Panel] = {}
     for k, (name, make) in enumerate(SCENES.items()):
@@ -41,6 +42,8 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         off = np.abs(image.astype(int) - exact).max(axis=2) > 8
         detail = "pixels of the averaged picture off by more than 8 of 255 against no fields at all"
         yield Row(f"Figure 26, 27: {name}", 100.0 * off.mean(), ODD.get(name, 1.0), "<=", "%", detail)
+    context.progress(len(SCENES), len(SCENES), "the published inner field")
+    yield from inner_rows(context.quick)
     lookups = "Figure 25: ways to look up"
     context.save_picture("figure25.png", lambda: sheet([(lookups, lookup_panels(pixels))], COLOURS))
     mirrors = [panels[name] for name in list(SCENES)[:4]]

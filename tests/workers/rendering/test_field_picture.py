@@ -145,15 +145,17 @@ def test_published_tables_are_made_where_a_view_reads_them(folder, monkeypatch):
     for name in ("_WORLDS", "_SHAPES"):
         monkeypatch.setattr(field_cache, name, field_cache.MemoryCache(2**30))
     plain = world_at(folder, FieldView(scene="two-mirrors"))
-    assert plain.uv.size == plain.images.size == 1
+    assert plain.uv.size == plain.images.size == plain.inner_uv.size == 1
     before = field_cache._SHAPES.held()
     one, other = (
         world_at(folder, FieldView(scene=scene, eye="uv-linear")) for scene in ("two-mirrors", "object")
     )
     assert one.uv.size == 2 * (6 * 100) ** 2
     assert one.images.size == 6 * 65**2
+    assert one.inner_uv.size == 2 * one.inner_faces.size
     assert np.shares_memory(one.uv, other.uv)
-    assert field_cache._SHAPES.held() == before + one.uv.nbytes + one.images.nbytes
+    made = one.uv.nbytes + one.images.nbytes + one.inner_uv.nbytes
+    assert field_cache._SHAPES.held() == before + made
 
 
 def test_published_lookups_of_a_mesh_are_nearly_exact(folder):
@@ -161,6 +163,14 @@ def test_published_lookups_of_a_mesh_are_nearly_exact(folder):
     off = {name: np.abs(drawn(folder, mode="diffuse", eye=name) - exact).max(axis=2) for name in LOOKUPS}
     assert (off["uv-linear"] > 16).mean() < 0.2
     assert (off["accurate"] > 16).mean() < (off["uv-linear"] > 16).mean()
+
+
+@pytest.mark.parametrize("mode", ["refract", "self"])
+def test_published_lookups_serve_rays_that_leave_the_mesh(folder, mode):
+    pictures = {name: drawn(folder, mode=mode, lookup=name) for name in ("exact", "uv-nearest", "uv-linear")}
+    off = {name: np.abs(one - pictures["exact"]).max(axis=2) > 16 for name, one in pictures.items()}
+    for name in ("uv-nearest", "uv-linear"):
+        assert 0.0 < off[name].mean() < 0.5
 
 
 def test_oversize_entries_are_not_cached(folder, monkeypatch):

@@ -73,17 +73,18 @@ def _with_reference(files: FieldFiles, stamp: tuple[Path, int], made: Textured, 
     """A shape with the published tables too, made where a view reads them.
 
     Raises:
-        InvalidInput: for a field with too many samples for them.
+        InvalidInput: for a field with too many samples or points for them.
     """
-    outer = made.shape.outer
-    if outer is None:
+    outer, inner = made.shape.outer, made.shape.inner
+    if outer is None or inner is None:
         return made
 
     def make() -> ReferenceField:
         maps = read_geometry_image(files.image)
-        return reference_field(made.shape.surface, outer, maps.positions, maps.normals, maps.valid)
+        rays = inner, mapped(files.points)
+        return reference_field(made.shape.surface, outer, maps.positions, maps.normals, maps.valid, rays)
 
-    size = 8 * len(outer.faces) ** 2 + 24 * pixels**2
+    size = 8 * len(outer.faces) ** 2 + 24 * pixels**2 + 8 * inner.faces.size
     reference: ReferenceField = _SHAPES.get((*stamp, "reference"), size, make, 2 * size)
     return made._replace(shape=replace(made.shape, reference=reference))
 

@@ -12,15 +12,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Flags, Float32s
+from ...arrays import Flags, Float32s, Int32s
 from ...compiled import kernel
 from ...errors import InvalidInput
 from ...float32 import higher, lower, real, whole
 from ...meshes.face_plane import meet_plane
 from ...meshes.surface import Surface
 from .cube import samples
+from .inner_field import InnerField
 from .outer_field import OuterField
 from .quadrilinear import Corner, lerp4
+from .reference_inner_field import inner_uv_table
 
 # The dissertation's textures end here; the table of 24 takes 96 MB of memory, that of 48 1.5 GB.
 MAX_REFERENCE_SAMPLES = 24
@@ -37,11 +39,14 @@ class ReferenceField(NamedTuple):
         uv: (6n², 6n², 2) float32 by entry and exit; NaN where the ray meets nothing.
         image: (pixels, pixels, 6) float32, axes (u, v): position in the unit cube and unit normal; NaN where
             a pixel represents no point of the surface.
+        inner_uv: (points, 6m², 2) float32 by point and exit, see ``inner_uv_table``; None where rays that
+            leave the surface are to be found by ``InnerField`` or exactly, and then read from the image.
     """
 
     samples: int
     uv: Float32s
     image: Float32s
+    inner_uv: Float32s | None = None
 
 
 def reference_field(
@@ -50,6 +55,7 @@ def reference_field(
     positions: NDArray[np.floating],
     normals: NDArray[np.floating],
     valid: Flags,
+    inner: tuple[InnerField, Int32s] | None = None,
 ) -> ReferenceField:
     """The published tables of a surface.
 
@@ -58,9 +64,12 @@ def reference_field(
         field: its outer field.
         positions, normals, valid: (pixels, pixels, 3), the same and (pixels, pixels), of the geometry image
             of the same chart.
+        inner: its inner field, and the points of ``spread_points`` from which its rays start; None for a
+            reference field without ``inner_uv``.
 
     Raises:
-        InvalidInput: for a field of more than 24 samples, and an image that is not square.
+        InvalidInput: for a field of more than 24 samples, an image that is not square, and from
+            ``inner_uv_table``.
     """
     if field.samples > MAX_REFERENCE_SAMPLES:
         accepted = f"at most {MAX_REFERENCE_SAMPLES}, for lookups of (u, v)"
@@ -70,7 +79,8 @@ def reference_field(
         raise InvalidInput("positions", f"shape {positions.shape}", "(pixels, pixels, 3)")
     image = np.concatenate([positions, normals], axis=2, dtype=np.float32)
     image[~valid] = np.nan
-    return ReferenceField(field.samples, uv_table(surface, field), image)
+    inner_uv = inner_uv_table(surface, *inner) if inner else None
+    return ReferenceField(field.samples, uv_table(surface, field), image, inner_uv)
 
 
 def uv_table(surface: Surface, field: OuterField) -> Float32s:

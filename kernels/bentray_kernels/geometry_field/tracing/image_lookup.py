@@ -1,4 +1,4 @@
-"""Hits read from the geometry image at the (u, v) of the outer field: the tracer of the dissertation.
+"""Hits read from the geometry image at the (u, v) of both fields: the tracer of the dissertation.
 
 Section 5.3.2: the (u, v) of the entries is looked up in the geometry image, which gives position and normal
 of the hit. The next ray starts at that position, which is not exactly on the ray.
@@ -13,6 +13,7 @@ from ...compiled import kernel
 from ..tables.cube import number_at
 from ..tables.quadrilinear import corner_of, nearest_of
 from ..tables.reference_field import image_at, linear_uv_at
+from ..tables.reference_inner_field import linear_exit_uv
 from .appearance import to_world_normal, uv_of
 from .packed_scene import Hit, World
 
@@ -60,6 +61,49 @@ def from_the_image(
     if x != x:
         return none
     return face, along / square, float(u), float(v), True
+
+
+@kernel(inline="always")
+def next_on_the_image(
+    world: World,
+    shape: int,
+    linear: bool,
+    origin: Vector,
+    direction: Vector,
+    left: int,
+    leaving: tuple[int, float, float],
+) -> Hit:
+    """The next point of a shape on a ray that leaves it, by the published inner field.
+
+    The recorded point is taken wherever it lies; its distance from the origin is its depth.
+
+    Args:
+        world: ``world_of``.
+        shape: which of its shapes; its reference field has ``inner_uv``.
+        linear: whether (u, v) is averaged over four exits; else that of the nearest one.
+        origin, direction: in the shape's unit cube.
+        left: the face that the ray leaves.
+        leaving: face, x and y where the ray leaves the cube, see ``cube.line_of``.
+    """
+    n, pixels = world.shapes[shape, 3], world.references[shape, 2]
+    first = world.starts[left] * (6 * n * n)
+    place = number_at(*leaving, n)
+    row = world.inner_uv[world.references[shape, 3] + 2 * first :]
+    # The face serves the next ray; the position is read from the image.
+    face = world.inner_faces[world.shapes[shape, 4] + first + place]
+    none = (-1, np.inf, 0.0, 0.0, False)
+    if face < 0:
+        return none
+    u, v = row[2 * place], row[2 * place + 1]
+    if linear:
+        u, v = linear_exit_uv(row, n, *leaving)
+    x, y, z = image_at(world.images, world.references[shape, 1], pixels, u, v, POSITION)
+    square = direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2
+    away = (x - origin[0]) ** 2 + (y - origin[1]) ** 2 + (z - origin[2]) ** 2
+    # Not true of NaN either.
+    if not away > 0.0:
+        return none
+    return face, float(np.sqrt(away / square)), float(u), float(v), True
 
 
 @kernel(inline="always")

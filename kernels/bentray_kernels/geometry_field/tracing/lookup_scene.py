@@ -13,7 +13,7 @@ from ..tables.agreement import AGREE
 from ..tables.cube import line_of, number_at
 from ..tables.outer_field import boundary_face
 from ..tables.quadrilinear import corner_of, lerp4
-from .image_lookup import from_the_image, on_the_image
+from .image_lookup import from_the_image, next_on_the_image, on_the_image
 from .packed_scene import Hit, World
 
 # Lookup methods: distance of the entry nearest to the ray; the same, averaged where the entries around the
@@ -111,14 +111,21 @@ def from_the_surface(
     """The next face of the same shape on a ray that leaves one of its faces.
 
     Args:
-        world, shape, way, waiting: as in ``from_outside``; any way but "exact" walks from the entry's face,
-            since a ray that starts on the surface has no room for the error of the other ways. Those of
-            (u, v) then read the geometry image.
+        world, shape, way, waiting: as in ``from_outside``; those of (u, v) read the published inner field,
+            and any other way but "exact" walks from the entry's face, since a ray that starts on the surface
+            has no room for the error of the other ways. Without a published inner field those of (u, v) walk
+            too, and then read the geometry image.
         origin, direction: in the shape's unit cube.
         left: the face that the ray leaves.
         side: 1 for rays outside the body, −1 inside.
     """
     published = way > EXACT and world.references[shape, 2] > 0
+    if published and world.references[shape, 3] >= 0:
+        _, _, _, _, _, t, tx, ty = line_of(
+            origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]
+        )
+        linear = way == UV_LINEAR
+        return next_on_the_image(world, shape, linear, origin, direction, left, (t, tx, ty))
     known = EXACT if way > EXACT and not published else way
     hit = _next_face(world, shape, known, waiting, origin, direction, left, side)
     return on_the_image(world, shape, hit) if published else hit

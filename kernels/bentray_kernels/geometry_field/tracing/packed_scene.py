@@ -32,9 +32,10 @@ class World(NamedTuple):
         known: ``tables.agreement.agreement`` of them.
         inner_faces: all inner tables.
         starts: (faces,) row of the inner table in which rays that leave a face are.
-        references: (shapes, 3): place of the first number of the table of (u, v), and of the geometry image;
-            pixels along a side of it, 0 for no reference field.
-        uv, images: all tables of (u, v), and all geometry images.
+        references: (shapes, 4): place of the first number of the table of (u, v), and of the geometry image;
+            pixels along a side of it, 0 for no reference field; place of the first number of the inner table
+            of (u, v), −1 for none.
+        uv, images, inner_uv: all tables of (u, v), all geometry images, and all inner tables of (u, v).
         to_local: (instances, 3, 4) from m to the unit cube.
         to_world: (instances, 3, 4) from the unit cube to m.
         instances: (instances, 3): shape; texture, −1 for none; flags.
@@ -56,6 +57,7 @@ class World(NamedTuple):
     references: Ints
     uv: Float32s
     images: Float32s
+    inner_uv: Float32s
     to_local: Floats
     to_world: Floats
     instances: Ints
@@ -73,16 +75,19 @@ def world_of(scene: Scene) -> World:
     first_face = np.cumsum([0] + [len(shape.surface.triangles) for shape in shapes])
     first_node = np.cumsum([0] + [len(shape.surface.nodes) for shape in shapes])
     table, outer, inner = [], 0, 0
-    references, of_uv, of_images = [], 0, 0
+    references, of_uv, of_images, of_inner_uv = [], 0, 0, 0
     for shape, node in zip(shapes, first_node, strict=False):
         of_outer = (shape.outer.samples, outer) if shape.outer else (0, 0)
         of_inner = (shape.inner.samples, inner) if shape.inner else (0, 0)
         table.append((node, *of_outer, *of_inner))
         outer += shape.outer.faces.size if shape.outer else 0
         inner += shape.inner.faces.size if shape.inner else 0
-        references.append((of_uv, of_images, len(shape.reference.image) if shape.reference else 0))
+        within = shape.reference.inner_uv if shape.reference else None
+        pixels = len(shape.reference.image) if shape.reference else 0
+        references.append((of_uv, of_images, pixels, -1 if within is None else of_inner_uv))
         of_uv += shape.reference.uv.size if shape.reference else 0
         of_images += shape.reference.image.size if shape.reference else 0
+        of_inner_uv += 0 if within is None else within.size
     numbers = {id(shape): number for number, shape in enumerate(shapes)}
     textures: list[Any] = []
     instances = []
@@ -119,6 +124,14 @@ def world_of(scene: Scene) -> World:
         references=np.array(references, dtype=np.int64),
         uv=_joined([shape.reference.uv for shape in shapes if shape.reference], np.float32),
         images=_joined([shape.reference.image for shape in shapes if shape.reference], np.float32),
+        inner_uv=_joined(
+            [
+                shape.reference.inner_uv
+                for shape in shapes
+                if shape.reference and shape.reference.inner_uv is not None
+            ],
+            np.float32,
+        ),
         to_local=np.concatenate([back, -back @ to_world[:, :, 3:]], axis=2),
         to_world=to_world,
         instances=np.array(instances, dtype=np.int64),

@@ -29,7 +29,8 @@ class Shape:
             where these are to be intersected exactly.
 
     Raises:
-        InvalidInput: for a reference field of other samples than those of the outer field.
+        InvalidInput: for a reference field of other samples than those of the outer field, or of other rows
+            than those of the inner one.
     """
 
     surface: Surface
@@ -41,6 +42,10 @@ class Shape:
         samples = self.outer.samples if self.outer else 0
         if self.reference and self.reference.samples != samples:
             raise InvalidInput("reference", f"{self.reference.samples} samples", f"those of outer, {samples}")
+        within = self.reference.inner_uv if self.reference else None
+        entries = self.inner.faces.shape if self.inner else (0, 0)
+        if within is not None and within.shape[:2] != entries:
+            raise InvalidInput("reference", f"inner_uv {within.shape}", f"entries as inner has, {entries}")
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.image.geometry_image import geometry_image
 from bentray_kernels.geometry_field.layout.parameterisation import parameterise
+from bentray_kernels.geometry_field.tables.inner_field import spread_points
 from bentray_kernels.geometry_field.tables.reference_field import reference_field
 from bentray_kernels.geometry_field.tracing.lookup_scene import UV_WAYS, WAYS
 from bentray_kernels.geometry_field.tracing.packed_scene import world_of
@@ -241,6 +242,18 @@ def published_shape() -> Shape:
     return Shape(surface, outer, reference=reference)
 
 
+@cache
+def wholly_published_shape() -> Shape:
+    """The same with both inner fields."""
+    shape, chart = published_shape(), parameterise(turned(octahedron(4))).chart
+    image, points = geometry_image(chart, 129), spread_points(shape.surface, 12)[0]
+    inner = inner_of(shape.surface, 12, 12)
+    reference = reference_field(
+        shape.surface, shape.outer, image.positions, image.normals, image.valid, (inner, points)
+    )
+    return Shape(shape.surface, shape.outer, inner, reference)
+
+
 def published(material: Material, **reference) -> Scene:
     """The ball on a checkerboard, with arrays of its reference field replaced."""
     shape = published_shape()
@@ -248,6 +261,10 @@ def published(material: Material, **reference) -> Scene:
     ground = Ground(-0.6, 0.4, 5.0)
     place = placed((0.1, 0.2, 0.0), 1.2, (0.2, 0.1, 1.0), 25.0)
     return Scene((Instance(shape, place, material),), striped(), ground)
+
+
+# Out of sight.
+AWAY = Instance(round_shape(), placed((0.0, 0.0, 90.0), 1.0))
 
 
 def test_published_lookups_make_nearly_the_exact_picture():
@@ -311,6 +328,28 @@ def test_rays_within_a_body_leave_it_by_the_image(way):
     assert np.mean((plain != other).any(axis=2)) > 0.05
 
 
+@pytest.mark.parametrize("way", UV_WAYS)
+def test_rays_that_leave_the_surface_use_the_published_inner_field(way):
+    shape, scene = wholly_published_shape(), published(Material(glass=1.0))
+
+    def drawn(**arrays) -> np.ndarray:
+        changed = replace(shape, reference=shape.reference._replace(**arrays))
+        body = replace(scene.instances[0], shape=changed)
+        return picture(replace(scene, instances=(body,)), way=way)
+
+    plain, walked = drawn(), drawn(inner_uv=None)
+    exact = picture(scene, way="exact")
+    # Coarser than the walk, but a picture of the same refraction.
+    off = [(np.abs(one - exact).max(axis=2) > 16).mean() for one in (plain, walked)]
+    assert off[1] < off[0] < 0.5
+    # Each ray ends at the recorded point: one and the same for all rays, and none at all.
+    body = (picture(scene, depth=0) != picture(replace(scene, instances=(AWAY,)), depth=0)).any(axis=2)
+    one_point = drawn(inner_uv=np.full_like(shape.reference.inner_uv, 0.25))
+    nowhere = drawn(inner_uv=np.full_like(shape.reference.inner_uv, np.nan))
+    assert (plain != one_point).any(axis=2)[body].mean() > 0.2
+    assert (nowhere != one_point).any(axis=2)[body].mean() > 0.2
+
+
 def test_pictures_do_not_depend_on_threads_or_runs():
     one = picture(crowded())
     np.testing.assert_array_equal(one, picture(crowded(), threads=2))
@@ -362,6 +401,7 @@ def test_rays_that_start_in_the_cube_of_another_body_see_it():
         ("light", lambda: Scene((Instance(round_shape(), np.eye(4)[:3]),), WHITE, light=(0.0, 0.0, 0.0))),
         ("ambient", lambda: Scene((Instance(round_shape(), np.eye(4)[:3]),), WHITE, ambient=-1.0)),
         ("reference", lambda: Shape(round_shape().surface, reference=published_shape().reference)),
+        ("reference", lambda: replace(wholly_published_shape(), inner=None)),
         ("depth", lambda: TraceSettings(depth=-1)),
         ("rows", lambda: TraceSettings(rows=0)),
         ("way", lambda: TraceSettings(way="furthest")),
