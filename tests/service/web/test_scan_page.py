@@ -130,7 +130,6 @@ def test_the_buttons_tell_their_time(page, serve, scan, work):
     for done in (1, 2, 3):
         page.get_by_role("button", name="Fast").click()
         expect(page.locator(".job").get_by_text("succeeded")).to_have_count(done)
-    page.reload()
     fast = page.get_by_role("button", name="Fast")
     expect(fast).to_contain_text(re.compile(r"about \d+ s$"))
     # No traces, no waves: Best is the same work.

@@ -68,18 +68,20 @@ function factsOf(scan) {
 }
 
 // The time of each button, by a plan of the service; a plan that is refused says why.
-function showTimes(scan) {
-  for (const [name, settings] of Object.entries(PRESETS)) {
-    planOf(scan.id, settings).then(
-      (estimate) => {
-        const words = [timeInWords(estimate), queueInWords(estimate)].filter(Boolean).join(", ");
-        if (at(`${name}-time`)) Object.assign(at(`${name}-time`), { textContent: words, title: estimate.basis });
-      },
-      (error) => {
-        if (at(`${name}-time`)) at(`${name}-time`).textContent = error.message;
-      },
-    );
-  }
+function presetTimes(scan) {
+  let number = 0;
+  return () => {
+    const mine = ++number;
+    for (const [name, settings] of Object.entries(PRESETS)) {
+      const show = (textContent, title = "") => {
+        if (mine === number && at(`${name}-time`)) Object.assign(at(`${name}-time`), { textContent, title });
+      };
+      planOf(scan.id, settings).then(
+        (estimate) => show([timeInWords(estimate), queueInWords(estimate)].filter(Boolean).join(", "), estimate.basis),
+        (error) => show(error.message),
+      );
+    }
+  };
 }
 
 // All settings as a form, those of an earlier job in it to run it again with changes. Returns close() and own().
@@ -178,7 +180,16 @@ export async function open(root, { id, query }) {
     at("dataset-facts").textContent = factsOf(shown);
   };
   entitle(scan);
+  const showTimes = presetTimes(scan);
+  showTimes();
+  let states = null;
   const jobs = jobList(at("of-scan"), {
+    // A job that ends changes the estimates, one that waits the place in the queue.
+    onJobs(all) {
+      const now = all.map((job) => job.id + job.state).join();
+      if (states !== null && states !== now) showTimes();
+      states = now;
+    },
     empty: "Nothing has run yet. Press Fast or Best. The image appears here.",
     wanted: (job) => job.dataset === id && job.kind === "reconstruction",
   });
@@ -190,7 +201,6 @@ export async function open(root, { id, query }) {
     const refused = (error) => event.submitter?.value === "own" && own.form.refuse(error.problem ?? {}, true);
     startJob({ kind: "reconstruction", dataset: id, settings }, "run-error", jobs.refresh, refused);
   });
-  showTimes(scan);
   let closed = false;
   showSettings(scan, query.get("from")).then(
     (made) => {
