@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from fastapi import FastAPI
 
 from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography.result import Iteration, Progress, Reconstruction, Trial
@@ -282,15 +283,16 @@ def until() -> Callable[..., dict[str, Any]]:
 @pytest.fixture
 def serve(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., str]]:
     """Start the service behind a real socket; returns its address."""
-    running: list[tuple[Server, threading.Thread]] = []
+    running: list[tuple[FastAPI, Server, threading.Thread]] = []
 
     def go(**settings: Any) -> str:
         given = ServiceSettings(data_dir=tmp_path / "served", **settings)
-        server, listening = Server(create_app(given, cluster), given), Listening()
+        app = create_app(given, cluster)
+        server, listening = Server(app, given), Listening()
         listening.bind(("127.0.0.1", 0))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
         thread.start()
-        running.append((server, thread))
+        running.append((app, server, thread))
         deadline = time.monotonic() + PATIENCE_S
         while not server.started:
             assert thread.is_alive()
@@ -299,7 +301,9 @@ def serve(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., str]]:
         return f"http://127.0.0.1:{listening.getsockname()[1]}"
 
     yield go
-    for server, thread in running:
+    for app, server, thread in running:
+        # As ``bentray serve`` does: streams of events end first.
+        app.state.leaving.set()
         server.should_exit = True
         thread.join(PATIENCE_S)
         assert not thread.is_alive()

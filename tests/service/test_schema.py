@@ -97,6 +97,8 @@ def attack(serve, scan, tmp_path) -> Callable[..., tuple[int, str]]:
         }
         found["job_id"] = http.post("/v1/jobs", json=asked).json()["id"]
     ids = ", ".join(f'"path.{name}" = "{value}"' for name, value in found.items())
+    # Of streams of events.
+    ids += ', "query.seconds" = 1'
     given = CONFIG.format(address=address, key=token.shown(), ids=ids)
     schema = tmp_path / "openapi.json"
     schema.write_text(description())

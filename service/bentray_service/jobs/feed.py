@@ -1,4 +1,4 @@
-"""Job events for all event streams, polled by one database query."""
+"""Job events for all event streams, polled from the database by one thread."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import chain
+from typing import TypeVar
 
 import anyio
 from sqlalchemy.exc import SQLAlchemyError
@@ -14,7 +16,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from ..errors import DatabaseUnavailable, TooManyStreams
 from ..rows.jobs import Jobs
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import EventRow, JobProgress
+from .watched import Watched, WatchedJob, WatchedTenant
 
 log = logging.getLogger("bentray.jobs")
 
@@ -25,46 +27,12 @@ SOONEST_SECONDS = 0.05
 OF_TENANT = 64
 IN_ALL = 256
 
-
-class WatchedJob:
-    """A job with at least one event stream.
-
-    Attributes:
-        row: its state and progress; None before the first query.
-        gone: whether it has been deleted.
-        events: all its events, oldest first.
-        watchers: number of streams.
-    """
-
-    def __init__(self) -> None:
-        self.row: JobProgress | None = None
-        self.gone = False
-        self.events: list[EventRow] = []
-        self.watchers = 0
-        self._news = asyncio.Event()
-
-    async def wait_for_change(self, seconds: float) -> None:
-        """Wait until the state, the progress or the events change, at most ``seconds``."""
-        with suppress(TimeoutError):
-            async with asyncio.timeout(seconds):
-                await self._news.wait()
-
-    def notify(self) -> None:
-        """Wake all waiting streams."""
-        self._news.set()
-        self._news = asyncio.Event()
-
-    def update(self, row: JobProgress | None, events: list[EventRow]) -> None:
-        """Store the result of a query."""
-        changed = row != self.row or bool(events) or (row is None) != self.gone
-        self.row, self.gone = row, row is None
-        self.events += events
-        if changed:
-            self.notify()
+Key = TypeVar("Key", bound=str)
+Seen = TypeVar("Seen", bound=Watched)
 
 
 class EventFeed:
-    """Polls the watched jobs while there are any; it must be used from the event loop only."""
+    """Polls the watched jobs and tenants while there are any; it must be used from the event loop only."""
 
     def __init__(self, jobs: Jobs, leaving: Callable[[], bool]) -> None:
         """Args:
@@ -74,6 +42,7 @@ class EventFeed:
         self._jobs = jobs
         self.leaving = leaving
         self._watched: dict[str, WatchedJob] = {}
+        self._tenants: dict[Tenant, WatchedTenant] = {}
         self._streams: Counter[Tenant] = Counter()
         self._polling: asyncio.Task[None] | None = None
         self._asked = asyncio.Event()
@@ -85,16 +54,34 @@ class EventFeed:
         Raises:
             TooManyStreams: when too many streams are open, of the tenant or in total.
         """
-        accepted = f"at most {OF_TENANT} per tenant and {IN_ALL} in total; poll GET /v1/jobs/{job_id} instead"
+        with self._stream(tenant, self._watched, job_id, WatchedJob, f"/v1/jobs/{job_id}") as watched:
+            yield watched
+
+    @contextmanager
+    def watch_tenant(self, tenant: Tenant) -> Iterator[WatchedTenant]:
+        """Watch all jobs of a tenant in a ``with`` block.
+
+        Raises:
+            TooManyStreams: as ``watch``.
+        """
+        with self._stream(tenant, self._tenants, tenant, WatchedTenant, "/v1/jobs") as watched:
+            yield watched
+
+    @contextmanager
+    def _stream(
+        self, tenant: Tenant, table: dict[Key, Seen], key: Key, kind: Callable[[], Seen], instead: str
+    ) -> Iterator[Seen]:
+        accepted = f"at most {OF_TENANT} per tenant and {IN_ALL} in total; poll GET {instead} instead"
         if self._streams[tenant] >= OF_TENANT:
             raise TooManyStreams("event streams", f"{OF_TENANT} streams of this tenant are open", accepted)
         if self._streams.total() >= IN_ALL:
             raise TooManyStreams("event streams", f"{IN_ALL} streams are open", accepted)
         self._streams[tenant] += 1
-        watched = self._watched.setdefault(job_id, WatchedJob())
-        watched.watchers += 1
-        if watched.row is None:
+        if key not in table:
+            table[key] = kind()
             self._asked.set()
+        watched = table[key]
+        watched.watchers += 1
         if self._polling is None:
             self._polling = asyncio.create_task(self._poll())
         try:
@@ -102,7 +89,7 @@ class EventFeed:
         finally:
             watched.watchers -= 1
             if not watched.watchers:
-                del self._watched[job_id]
+                del table[key]
             self._streams[tenant] -= 1
             if not self._streams[tenant]:
                 del self._streams[tenant]
@@ -111,23 +98,15 @@ class EventFeed:
         # A thread of its own, so that polling does not wait for other work.
         limiter = anyio.CapacityLimiter(1)
         try:
-            while self._watched:
+            while self._watched or self._tenants:
                 self._asked.clear()
-                watched = dict(self._watched)
-                known = {
-                    job_id: one.events[-1]["number"] if one.events else 0 for job_id, one in watched.items()
-                }
                 try:
-                    progress, events = await anyio.to_thread.run_sync(
-                        self._jobs.updates, known, limiter=limiter
-                    )
+                    await self._poll_jobs(limiter)
+                    await self._poll_tenants(limiter)
                 except (SQLAlchemyError, DatabaseUnavailable) as error:
                     log.warning("watched jobs could not be read: %s", error)
-                else:
-                    for job_id, one in watched.items():
-                        one.update(progress.get(job_id), events.get(job_id, []))
                 if self.leaving():
-                    for one in self._watched.values():
+                    for one in chain(self._watched.values(), self._tenants.values()):
                         one.notify()
                 await asyncio.sleep(min(SOONEST_SECONDS, INTERVAL_SECONDS))
                 with suppress(TimeoutError):
@@ -135,3 +114,17 @@ class EventFeed:
                         await self._asked.wait()
         finally:
             self._polling = None
+
+    async def _poll_jobs(self, limiter: anyio.CapacityLimiter) -> None:
+        watched = dict(self._watched)
+        if not watched:
+            return
+        known = {job_id: one.events[-1]["number"] if one.events else 0 for job_id, one in watched.items()}
+        progress, events = await anyio.to_thread.run_sync(self._jobs.updates, known, limiter=limiter)
+        for job_id, one in watched.items():
+            one.update(progress.get(job_id), events.get(job_id, []))
+
+    async def _poll_tenants(self, limiter: anyio.CapacityLimiter) -> None:
+        for tenant, one in tuple(self._tenants.items()):
+            known = one.newest, one.unfinished()
+            one.update(*await anyio.to_thread.run_sync(self._jobs.changes, tenant, *known, limiter=limiter))

@@ -1,38 +1,59 @@
-"""/v1/jobs/{id}/events: state and progress of a job as server-sent events."""
+"""/v1/jobs/{id}/events and /v1/events: state and progress of jobs as server-sent events."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractContextManager
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Generic, TypeVar
 
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from ..jobs.feed import EventFeed, WatchedJob
+from ..jobs.feed import EventFeed
+from ..jobs.watched import Watched, WatchedJob, WatchedTenant
 from ..rows.schema import ENDED
-from ..rows.tenants import Tenant
+from ..rows.typed_rows import JobProgress
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/v1", tags=["jobs"])
 
 # Interval between comments that keep proxies from closing an idle connection, s.
 SILENCE_SECONDS = 15.0
 
+KEEP_ALIVE = ": keep-alive\n\n"
+
 MEDIA_TYPE = "text/event-stream"
+STREAM = {"content": {MEDIA_TYPE: {}}, "description": "The events."}
+
+Seen = TypeVar("Seen", bound=Watched)
+
+
+@router.get("/events", response_class=StreamingResponse, responses={200: STREAM, **problems(404, 422, 429)})
+def all_events(
+    service: Service,
+    tenant: CallerTenant,
+    seconds: Annotated[int, Query(ge=1, le=3600, description="The stream ends after this time, s.")] = 600,
+) -> Response:
+    """Stream the changes of all jobs: first one event for each unfinished job, then one for each change.
+
+    A `job` event has the id, the state and the progress of a job. The limits are those of the events of one
+    job.
+    """
+    feed = service.feed
+    return _Stream(
+        lambda: feed.watch_tenant(tenant), lambda jobs: _of_tenant(feed, jobs, time.monotonic() + seconds)
+    )
 
 
 @router.get(
-    "/{job_id}/events",
+    "/jobs/{job_id}/events",
     response_class=StreamingResponse,
-    responses={
-        200: {"content": {MEDIA_TYPE: {}}, "description": "The events."},
-        **problems(404, 422, 429),
-    },
+    responses={200: STREAM, **problems(404, 422, 429)},
 )
 def job_events(
     job_id: str,
@@ -48,26 +69,51 @@ def job_events(
     64 open streams; further ones are rejected with 429.
     """
     service.jobs.get(tenant, job_id)
-    return _Stream(service.feed, tenant, job_id, last_event_id)
+    feed = service.feed
+    return _Stream(lambda: feed.watch(tenant, job_id), lambda job: _of_job(feed, job, last_event_id))
 
 
-class _Stream(Response):
+class _Stream(Response, Generic[Seen]):
     """The response; it holds its place among the open streams while it is sent."""
 
-    def __init__(self, feed: EventFeed, tenant: Tenant, job_id: str, last: int) -> None:
+    def __init__(
+        self,
+        watch: Callable[[], AbstractContextManager[Seen]],
+        generate: Callable[[Seen], AsyncIterator[str]],
+    ) -> None:
         super().__init__(media_type=MEDIA_TYPE)
-        self._feed = feed
-        self._of = tenant, job_id
-        self._last = last
+        self._watch = watch
+        self._generate = generate
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        with self._feed.watch(*self._of) as job:
-            sent = _generate(self._feed, job, self._last)
+        with self._watch() as watched:
+            sent = self._generate(watched)
             stream = StreamingResponse(sent, media_type=MEDIA_TYPE, headers={"Cache-Control": "no-store"})
             await stream(scope, receive, send)
 
 
-async def _generate(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[str]:
+async def _of_tenant(feed: EventFeed, jobs: WatchedTenant, end: float) -> AsyncIterator[str]:
+    last, spoken = 0, time.monotonic()
+    while not feed.leaving():
+        last, rows = jobs.since(last)
+        if rows:
+            yield "".join(_event("job", _progress_of(row)) for row in rows)
+        elif time.monotonic() >= end:
+            return
+        elif time.monotonic() - spoken > SILENCE_SECONDS:
+            yield KEEP_ALIVE
+        else:
+            await jobs.wait_for_change(min(SILENCE_SECONDS, max(0.0, end - time.monotonic())))
+            continue
+        spoken = time.monotonic()
+
+
+def _progress_of(row: JobProgress) -> dict[str, Any]:
+    progress = {"done": row["done"], "total": row["total"], "phase": row["phase"] or ""}
+    return {"id": row["id"], "state": row["state"], "progress": progress}
+
+
+async def _of_job(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[str]:
     sent: dict[str, Any] = {}
     spoken = time.monotonic()
     while not feed.leaving() and not job.gone:
@@ -85,7 +131,7 @@ async def _generate(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterato
             messages.append(_event("progress", progress))
             sent = progress
         if not messages and time.monotonic() - spoken > SILENCE_SECONDS:
-            messages.append(": keep-alive\n\n")
+            messages.append(KEEP_ALIVE)
         if messages:
             spoken = time.monotonic()
             yield "".join(messages)

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import cast
 
@@ -17,7 +17,7 @@ from ..errors import JobFinished, KeyReused, QueueFull, UnknownId
 from . import job_search, schema, usage
 from .ids import checked, new_id
 from .job_states import RUNNING, append_event, change
-from .schema import ENDED, jobs
+from .schema import ENDED, UNFINISHED, jobs
 from .stored_tables import NamedTable
 from .tenants import Tenant
 from .typed_rows import EventRow, JobProgress, JobRow, Plain
@@ -239,6 +239,38 @@ class Jobs(NamedTable[JobRow]):
                     if row["number"] > known[row["job_id"]]:
                         events.setdefault(row["job_id"], []).append(cast(EventRow, dict(row)))
         return progress, events
+
+    def changes(
+        self, tenant: Tenant, newest: int | None, unfinished: Collection[str]
+    ) -> tuple[int, list[JobProgress]]:
+        """The progress of the unfinished jobs of this tenant, and of those that may have ended since.
+
+        Args:
+            tenant: owner.
+            newest: number of the newest job at the last call; None at the first.
+            unfinished: ids of the jobs that were unfinished at the last call.
+
+        Returns:
+            the number of the newest job; the jobs, oldest first.
+        """
+        columns = jobs.c.number, jobs.c.id, jobs.c.state, jobs.c.done, jobs.c.total, jobs.c.phase
+        mine = select(*columns).where(jobs.c.tenant == tenant)
+        with self._database.read() as connection:
+            last = connection.execute(select(func.max(jobs.c.number)).where(jobs.c.tenant == tenant))
+            number = last.scalar_one() or 0
+            rows = connection.execute(mine.where(jobs.c.state.in_(UNFINISHED))).mappings().all()
+            found = {row["id"]: row for row in rows}
+            if newest is not None and newest < number:
+                # A job may begin and end between two calls.
+                later = connection.execute(mine.where(jobs.c.number > newest)).mappings()
+                found.update({row["id"]: row for row in later})
+            for ids in _batches([one for one in unfinished if one not in found]):
+                ended = connection.execute(mine.where(jobs.c.id.in_(ids))).mappings()
+                found.update({row["id"]: row for row in ended})
+        ordered = sorted(found.values(), key=lambda row: int(row["number"]))
+        return number, [
+            cast(JobProgress, {name: row[name] for name in row if name != "number"}) for row in ordered
+        ]
 
     def request_cancel(self, tenant: Tenant, job_id: str) -> JobRow:
         """Cancel a job: a queued one ends at once, a running one after its next poll.

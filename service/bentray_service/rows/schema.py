@@ -24,6 +24,7 @@ VERSION = 6
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
+UNFINISHED = ("queued", "running", "cancelling")
 
 metadata = MetaData()
 

@@ -1,4 +1,4 @@
-"""/v1/jobs/{id}/events: every change once, in order, from where the client was, and an end."""
+"""/v1/jobs/{id}/events and /v1/events: every change once, in order, from where the client was, and an end."""
 
 import json
 import threading
@@ -11,6 +11,7 @@ from sqlalchemy.exc import OperationalError
 
 from bentray_service.jobs import feed
 from bentray_service.routes import events
+from bentray_service.rows.tenants import LOCAL, Tenant
 
 
 @pytest.fixture(autouse=True)
@@ -166,3 +167,71 @@ def test_unavailable_database_ends_no_stream(start, uploaded, submitted, until, 
 def test_no_such_job(start, work):
     http = start()
     assert http.get(f"/v1/jobs/job-{20 * '0'}/events").status_code == 404
+
+
+def changes_in(answer):
+    return [json.loads(one["data"]) for one in parsed(answer.text)]
+
+
+def test_all_jobs_from_one_stream(start, uploaded, submitted, until, work):
+    http = start()
+    work.hold.clear()
+    dataset = uploaded(http)
+    first, second = (submitted(http, dataset)["id"] for _ in range(2))
+    until(http, first, "running")
+    told = {}
+    listener = threading.Thread(target=lambda: told.update(all=http.get("/v1/events?seconds=3")))
+    listener.start()
+    wait_until(lambda: http.app.state.parts.feed._tenants)
+    time.sleep(0.3)
+    third = submitted(http, dataset)["id"]
+    work.hold.set()
+    for job in (first, second, third):
+        until(http, job)
+    listener.join(20.0)
+    answer = told["all"]
+    assert answer.headers["content-type"].startswith("text/event-stream")
+    assert answer.headers["cache-control"] == "no-store"
+    changes = changes_in(answer)
+    assert {one["id"] for one in changes} == {first, second, third}
+    for job in (first, second, third):
+        mine = [one for one in changes if one["id"] == job]
+        assert mine[-1] == {
+            "id": job,
+            "state": "succeeded",
+            "progress": {"done": 24, "total": 24, "phase": ""},
+        }
+        assert mine == [one for k, one in enumerate(mine) if not k or one != mine[k - 1]]
+    # What is over is not listed to who comes later.
+    assert changes_in(http.get("/v1/events?seconds=1")) == []
+
+
+def test_a_job_between_two_queries_is_not_missed(start, uploaded, submitted, until, work, monkeypatch):
+    monkeypatch.setattr(feed, "INTERVAL_SECONDS", 2.0)
+    http = start()
+    dataset = uploaded(http)
+    told = {}
+    listener = threading.Thread(target=lambda: told.update(all=http.get("/v1/events?seconds=4")))
+    listener.start()
+    parts = http.app.state.parts
+    wait_until(lambda: any(one.newest is not None for one in parts.feed._tenants.values()))
+    job = submitted(http, dataset)["id"]
+    until(http, job)
+    listener.join(20.0)
+    assert changes_in(told["all"])[-1]["state"] == "succeeded"
+
+
+def test_jobs_of_another_tenant_are_not_in_the_stream(start, uploaded, submitted, work):
+    http = start()
+    work.hold.clear()
+    job = submitted(http, uploaded(http))["id"]
+    parts = http.app.state.parts
+    assert [row["id"] for row in parts.jobs.changes(LOCAL, None, [])[1]] == [job]
+    assert parts.jobs.changes(Tenant("other"), None, [job]) == (0, [])
+    work.hold.set()
+
+
+@pytest.mark.parametrize("seconds", ["0", "3601", "x"])
+def test_a_wrong_time_is_rejected(start, seconds):
+    answer = start().get(f"/v1/events?seconds={seconds}")
+    assert (answer.status_code, answer.json()["field"]) == (422, "seconds")

@@ -1,6 +1,7 @@
 """The page of one job: what it made, and its place in the queue."""
 
 import io
+import time
 
 import httpx
 import numpy as np
@@ -78,3 +79,47 @@ def test_a_queued_job_tells_its_place(page, serve, scan):
     page.get_by_text("2 jobs before this one").wait_for()
     httpx.post(f"{address}{made[0]['links']['cancel']}").raise_for_status()
     page.get_by_text("1 job before this one").wait_for()
+
+
+def submit(address, scan):
+    stream = {"Content-Type": "application/x-hdf5"}
+    sent = httpx.post(
+        f"{address}/v1/datasets", content=scan().read_bytes(), headers=stream, timeout=60
+    ).json()
+    asked = {"kind": "reconstruction", "dataset": sent["id"], "settings": {"method": "sart", "nodes": 16}}
+    return httpx.post(f"{address}/v1/jobs", json=asked, timeout=60).json()["id"]
+
+
+def test_events_take_the_place_of_polling(page, serve, scan, work):
+    address = serve()
+    work.hold.clear()
+    submit(address, scan)
+    asked = []
+    page.on("request", lambda request: asked.append(request.url) if "/v1/jobs" in request.url else None)
+    page.goto(f"{address}/#/jobs")
+    job = page.locator(".job")
+    job.get_by_text("running", exact=True).wait_for()
+    # Quiet for two seconds while nothing happens; a page that polls never is.
+    deadline, quiet = time.monotonic() + 60, 0
+    while quiet < 4:
+        before = len(asked)
+        page.wait_for_timeout(500)
+        quiet = quiet + 1 if len(asked) == before else 0
+        assert time.monotonic() < deadline
+    work.hold.set()
+    job.get_by_text("succeeded").wait_for()
+    # A job that another program starts appears too.
+    submit(address, scan)
+    job.nth(1).get_by_text("succeeded").wait_for()
+
+
+def test_without_a_stream_the_page_polls(page, serve, scan, work):
+    address = serve()
+    page.route("**/v1/events*", lambda route: route.abort())
+    work.hold.clear()
+    submit(address, scan)
+    page.goto(f"{address}/#/jobs")
+    job = page.locator(".job")
+    job.get_by_text("running", exact=True).wait_for()
+    work.hold.set()
+    job.get_by_text("succeeded").wait_for()

@@ -167,7 +167,7 @@ def test_a_volume_in_space_is_shown_as_glass(page, serve, scan, work, monkeypatc
     sent(page, serve(), scan)
     page.get_by_role("button", name="Fast").click()
     page.get_by_role("img", name="Sound speed, Sixteen elements").wait_for()
-    page.wait_for_load_state("networkidle")
+    page.get_by_text("Sound speed, 1500 (dark) to").wait_for()
     expect(page.get_by_text("Volume rendering", exact=True).and_(page.locator("#jobs *"))).to_have_count(0)
     monkeypatch.setattr(type(work), "__call__", in_space)
     page.get_by_role("button", name="Fast").click()

@@ -1,0 +1,75 @@
+// Changes of jobs as they happen: one stream of server-sent events, opened again when it ends.
+import { authorization } from "./key.js";
+
+const STREAM = "/v1/events";
+const SOON_MS = 200;
+const LATER_MS = 5000;
+const LATEST_MS = 60000;
+
+// The data of events named "job" in a body, as they arrive.
+async function* changesIn(body) {
+  const reader = body.pipeThrough(new TextDecoderStream()).getReader();
+  let rest = "";
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) return;
+    const blocks = (rest + value).split("\n\n");
+    rest = blocks.pop();
+    for (const block of blocks) {
+      const lines = block.split("\n");
+      const data = lines.find((line) => line.startsWith("data: "));
+      if (data && lines.includes("event: job")) yield JSON.parse(data.slice(6));
+    }
+  }
+}
+
+// Calls onChange({ id, state, progress }) for each change of a job, and onOpen(open) when the stream opens and when it cannot
+// be opened. A hidden tab holds no connection. Returns close(). An EventSource could not send the key.
+export function jobEvents({ onChange, onOpen }) {
+  let controller = null;
+  let timer = 0;
+  let wait = LATER_MS;
+  let closed = false;
+
+  async function connect() {
+    clearTimeout(timer);
+    if (closed || document.hidden || controller) return;
+    const mine = new AbortController();
+    controller = mine;
+    let opened = false;
+    try {
+      const response = await fetch(STREAM, { headers: authorization(), signal: mine.signal, cache: "no-store" });
+      if (!response.ok) throw new Error(`status ${response.status}`);
+      opened = true;
+      wait = LATER_MS;
+      onOpen(true);
+      for await (const change of changesIn(response.body)) if (!mine.signal.aborted) onChange(change);
+    } catch {
+      if (!mine.signal.aborted) opened = false;
+    }
+    if (mine.signal.aborted) return;
+    controller = null;
+    if (!opened) onOpen(false);
+    timer = setTimeout(connect, opened ? SOON_MS : wait);
+    if (!opened) wait = Math.min(2 * wait, LATEST_MS);
+  }
+
+  function drop() {
+    clearTimeout(timer);
+    controller?.abort();
+    controller = null;
+  }
+
+  function follow() {
+    if (document.hidden) drop();
+    else connect();
+  }
+
+  document.addEventListener("visibilitychange", follow);
+  connect();
+  return () => {
+    closed = true;
+    document.removeEventListener("visibilitychange", follow);
+    drop();
+  };
+}
