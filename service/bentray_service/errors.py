@@ -166,6 +166,14 @@ class NoAnimation(Rejection):
         super().__init__("job", f"{job_id}, {kind}, {state}", "a successful job of kind refraction")
 
 
+class NoPreview(Rejection):
+    """The job has no image to preview: it has another kind, does not run, or has not got that far."""
+
+    def __init__(self, job_id: str, kind: str, found: str) -> None:
+        accepted = "a running job of kind reconstruction, after its first iteration"
+        super().__init__("job", f"{job_id}, {kind}, {found}", accepted)
+
+
 class StorageFull(InvalidInput):
     """The disk of the service is full."""
 

@@ -17,6 +17,8 @@ KINDS = ("incoming", "uploads", "datasets", "volumes", "exports", "animations", 
 KEPT = ("datasets", "volumes", "animations", "meshes", "fields")
 # File extensions of turntables, as in bentray_workers.rendering.turntable, whose import is slow.
 ANIMATIONS = ("zip", "apng")
+# Folder of a reconstruction in its work folder, as in bentray_workers.reconstruction.reconstruction_run.
+CHECKPOINTS = "checkpoints"
 
 
 class TenantFiles:
@@ -91,6 +93,10 @@ class TenantFiles:
         folder = self.root / "work" / checked("job", job_id)
         folder.mkdir(exist_ok=True)
         return folder
+
+    def checkpoints(self, job_id: str) -> Path:
+        """The folder where a reconstruction keeps its checkpoints; it may be absent."""
+        return self.root / "work" / checked("job", job_id) / CHECKPOINTS
 
     def drop_work(self, job_id: str) -> None:
         """Delete the work folder of a job, even if its tasks are still running."""

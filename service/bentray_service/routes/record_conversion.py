@@ -36,6 +36,8 @@ def job_record(row: JobRow, ahead: int | None = None) -> JobRecord:
     if row["state"] == "succeeded":
         made, more = KINDS[row["kind"]].results(row)
         links |= more
+    if row["kind"] == "reconstruction" and row["state"] in ("running", "cancelling"):
+        links["preview"] = f"{here}/preview"
     if row["state"] in ("queued", "running"):
         links["cancel"] = f"{here}/cancel"
     started, progress = row["started"], {**row, "phase": row["phase"] or ""}

@@ -75,6 +75,7 @@ PROBLEMS: Mapping[type[Exception], ProblemType] = {
     errors.QuotaExceeded: ProblemType(507, "quota-used-up", "Storage quota exceeded"),
     errors.RangeNotSatisfiable: ProblemType(416, "no-such-part", "Range not satisfiable"),
     errors.NoAnimation: ProblemType(409, "no-animation", "No animation"),
+    errors.NoPreview: ProblemType(409, "no-preview", "No preview"),
     errors.StorageFull: ProblemType(507, "storage-full", "Disk full"),
     errors.StorageUnavailable: ProblemType(503, "storage-away", "Storage unavailable"),
     errors.DatabaseUnavailable: ProblemType(503, "database-away", "Database unavailable"),

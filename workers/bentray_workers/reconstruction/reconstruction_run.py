@@ -39,6 +39,9 @@ from .picking_graph import PickingFiles, PickingGraph, PickingGuide, PickingSour
 # Phase of the progress of a job, after those of ``picking_graph``.
 RECONSTRUCTING = "reconstructing"
 
+# Folder of the checkpoints in the work folder.
+CHECKPOINTS = "checkpoints"
+
 
 def reconstruct(
     client: Client | None,
@@ -74,7 +77,7 @@ def reconstruct(
     with _folder(work_dir) as folder:
         resources = RECONSTRUCTION if client is None else resources_for(client, settings)
         pool = open_pool(client, folder, share, placement=lambda: {"resources": resources}, threads=1)
-        checkpoints = Checkpoints(folder / "checkpoints", on_saved or (lambda: None))
+        checkpoints = Checkpoints(folder / CHECKPOINTS, on_saved or (lambda: None))
         job = _Job(pool, stop, dataset_path, folder, checkpoints, count())
         progress = _JobProgress(on_progress)
         path, findings, chosen, trials = _pick_with_guides(job, settings, progress)
