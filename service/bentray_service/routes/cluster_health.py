@@ -27,6 +27,7 @@ class WorkerRecord(BaseModel):
         description="Whether an OpenCL device passed its self-test. Workers of the service itself test at "
         "the first job that needs a device."
     )
+    compiling: bool = Field(description="Whether it compiles kernels, once for each kind of processor.")
 
 
 class QueueRecord(BaseModel):

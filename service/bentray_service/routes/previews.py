@@ -15,9 +15,7 @@ from .quality import check_render_rate
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 
-@router.get(
-    "/{job_id}/preview", responses=problems(404, 409, 429), dependencies=[Depends(check_render_rate)]
-)
+@router.get("/{job_id}/preview", responses=problems(404, 409, 429), dependencies=[Depends(check_render_rate)])
 def show_preview(job_id: str, response: Response, service: Service, tenant: CallerTenant) -> PreviewRecord:
     """Show the image that a running reconstruction has reached, reduced to at most 256 nodes along a side.
 

@@ -58,6 +58,7 @@ def test_workers_are_named_by_nothing(http, cluster):
             "running_tasks": 1,
             "paused": False,
             "opencl": False,
+            "compiling": False,
         }
     ]
     assert not [name for name in ("10.1.2.3", "hospital", "scratch") if name in answer.text]

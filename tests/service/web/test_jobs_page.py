@@ -97,7 +97,7 @@ def test_events_take_the_place_of_polling(page, serve, scan, work):
     asked = []
     page.on("request", lambda request: asked.append(request.url) if "/v1/jobs" in request.url else None)
     page.goto(f"{address}/#/jobs")
-    job = page.locator(".job")
+    job = page.locator(".job-table tbody tr")
     job.get_by_text("running", exact=True).wait_for()
     # Quiet for two seconds while nothing happens; a page that polls never is.
     deadline, quiet = time.monotonic() + 60, 0
@@ -110,7 +110,7 @@ def test_events_take_the_place_of_polling(page, serve, scan, work):
     job.get_by_text("succeeded").wait_for()
     # A job that another program starts appears too.
     submit(address, scan)
-    job.nth(1).get_by_text("succeeded").wait_for()
+    expect(job.get_by_text("succeeded")).to_have_count(2)
 
 
 def test_without_a_stream_the_page_polls(page, serve, scan, work):
@@ -119,7 +119,7 @@ def test_without_a_stream_the_page_polls(page, serve, scan, work):
     work.hold.clear()
     submit(address, scan)
     page.goto(f"{address}/#/jobs")
-    job = page.locator(".job")
+    job = page.locator(".job-table tbody tr")
     job.get_by_text("running", exact=True).wait_for()
     work.hold.set()
     job.get_by_text("succeeded").wait_for()

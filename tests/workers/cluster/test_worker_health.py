@@ -30,6 +30,7 @@ def test_embedded_workers_report_themselves(cluster):
 
 def test_a_worker_in_full():
     metrics = {"memory": 5, "cpu": 180.0, "task_counts": {"executing": 2, "ready": 7}}
+    metrics["compiling"] = True
     worker = {"nthreads": 2, "memory_limit": 9, "resources": {"opencl": 1.0}, "metrics": metrics}
     (one,) = of(here={**worker, "status": "paused"})
     assert asdict(one) == {
@@ -40,13 +41,14 @@ def test_a_worker_in_full():
         "running_tasks": 2,
         "paused": True,
         "opencl": True,
+        "compiling": True,
     }
 
 
 def test_a_worker_before_its_first_heartbeat():
     (one,) = of(here={"resources": {"opencl": 0}})
     assert (one.threads, one.memory_bytes, one.memory_limit_bytes, one.cpu_percent) == (None, None, 0, None)
-    assert (one.running_tasks, one.paused, one.opencl) == (0, False, False)
+    assert (one.running_tasks, one.paused, one.opencl, one.compiling) == (0, False, False, False)
 
 
 def test_the_order_is_that_of_the_addresses():

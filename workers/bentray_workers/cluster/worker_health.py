@@ -9,6 +9,9 @@ from distributed import Client
 
 from .connected import connected_workers
 
+# Metric of workers.
+COMPILING = "compiling"
+
 
 @dataclass(frozen=True)
 class WorkerHealth:
@@ -22,6 +25,7 @@ class WorkerHealth:
         running_tasks: tasks of all tenants that it runs now.
         paused: whether it accepts no tasks, because its memory is nearly used up.
         opencl: whether an OpenCL device of it passed the self-test.
+        compiling: whether it compiles kernels; see ``compilation.warmup``.
     """
 
     threads: int | None
@@ -31,6 +35,7 @@ class WorkerHealth:
     running_tasks: int
     paused: bool
     opencl: bool
+    compiling: bool
 
 
 def health_of(client: Client) -> tuple[WorkerHealth, ...]:
@@ -54,4 +59,5 @@ def _health(worker: dict[str, Any]) -> WorkerHealth:
         running_tasks=int(metrics.get("task_counts", {}).get("executing", 0)),
         paused=worker.get("status") == "paused",
         opencl=worker.get("resources", {}).get("opencl", 0) > 0,
+        compiling=bool(metrics.get(COMPILING, False)),
     )

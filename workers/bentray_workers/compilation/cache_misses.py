@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -31,7 +32,16 @@ class _Listener(event.Listener):  # type: ignore[misc]
 
 
 class _Announcer(_Listener):
+    """Also counts the compilations in progress; those of called kernels are nested."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._lock = threading.Lock()
+        self.in_progress = 0
+
     def on_start(self, event: Any) -> None:
+        with self._lock:
+            self.in_progress += 1
         if not self.kernels:
             log.warning(
                 "Compiling kernels for this processor (%s), which are not in the cache: minutes, once.",
@@ -39,11 +49,17 @@ class _Announcer(_Listener):
             )
         super().on_start(event)
 
+    def on_end(self, event: Any) -> None:
+        with self._lock:
+            self.in_progress -= 1
+
 
 @cache
-def announce() -> None:
-    """Log the first kernel that this process compiles."""
-    event.register(KIND, _Announcer())
+def announce() -> Callable[[], bool]:
+    """Log the first kernel that this process compiles; returns a function that tells if it compiles now."""
+    announcer = _Announcer()
+    event.register(KIND, announcer)
+    return lambda: announcer.in_progress > 0
 
 
 @contextmanager

@@ -29,6 +29,7 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography import Settings, reconstruct
 
 from ..cluster import memory_cache, refusal_log
+from ..cluster.worker_health import COMPILING
 from ..files.volume import Volume
 from ..rendering.field_scenes import camera_of, scene_of
 from ..rendering.field_view import FieldView
@@ -74,7 +75,8 @@ def warm_up_tracing() -> None:
 def dask_setup(worker: Any) -> None:
     """Called by Dask in each worker that preloads this module."""
     refusal_log.install()
-    cache_misses.announce()
+    compiling = cache_misses.announce()
+    worker.metrics[COMPILING] = lambda _: compiling()
     if worker.nanny is not None:
         # A separate process: its files are readable by its user only.
         os.umask(0o077)

@@ -20,12 +20,12 @@ function link(text, address, saveAs) {
   return withKey(node, address);
 }
 
-function duration(seconds) {
+export function duration(seconds) {
   return seconds < 90 ? `${seconds.toFixed(1)} s` : `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
 }
 
 // Mean residual of each iteration over the slices, stage by stage; and the iterations at which a stage begins.
-function residuals(history) {
+export function residuals(history) {
   const sums = new Map();
   for (const { stage, sweep, residual_rms_s: value } of history) {
     if (value === null) continue;
@@ -119,7 +119,7 @@ function pictures(job, title) {
 }
 
 // The request in a heading and a line.
-function summaryOf({ kind, settings }) {
+export function summaryOf({ kind, settings }) {
   if (kind === "geometry-field") {
     return ["Geometry field", `${settings.samples} samples per edge, image of ${settings.image_size} pixels`];
   }
@@ -135,13 +135,13 @@ function summaryOf({ kind, settings }) {
   return [method === "auto" ? "Automatic" : RAYS[rays], `${METHODS[method]}, ${grid}${iterations} iterations`];
 }
 
-function placeInQueue(ahead) {
+export function placeInQueue(ahead) {
   if (!ahead) return "Next in the queue";
   return ahead === 1 ? "1 job before this one" : `${ahead} jobs before this one`;
 }
 
 // The plan in a line, with details on demand.
-function planned({ tasks, largest_bytes: bytes, minutes, why }) {
+export function planned({ tasks, largest_bytes: bytes, minutes, why }) {
   const box = make("details", "plan");
   const time = minutes ? `, about ${duration(60 * minutes)}` : "";
   box.append(make("summary", "", `Plan: ${tasks} tasks of up to ${Math.ceil(bytes / 2 ** 20)} MiB${time}`), make("p", "", why));

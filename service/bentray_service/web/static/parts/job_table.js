@@ -2,14 +2,13 @@
 import { keepQuery } from "./address.js";
 import { request } from "./api.js";
 import { make } from "./dom.js";
+import { followJobs } from "./followed_jobs.js";
 import { jobFilters } from "./job_filters.js";
 import { duration, inWords, moment } from "./job_words.js";
 import { methodOf } from "./results.js";
 import { loadTitles, titleOfJob } from "./titles.js";
 
 const PAGE = 25;
-const BUSY_MS = 1500;
-const IDLE_MS = 5000;
 const ENDED = ["succeeded", "failed", "cancelled"];
 const PLACES = { dataset: "scans", volume: "rendering", mesh: "surfaces" };
 // On a small screen the name of the column stands before each text.
@@ -81,9 +80,6 @@ function when(job) {
 // Show the table in root with the filters and the page of query. Returns { refresh, close }.
 export async function jobTable(root, query) {
   let asked = new URLSearchParams([...query].filter(([name]) => ["text", "state", "kind", "before"].includes(name)));
-  let timer = 0;
-  let number = 0;
-  let closed = false;
   const rows = new Map();
   const error = make("p", "error");
   error.setAttribute("role", "alert");
@@ -104,7 +100,7 @@ export async function jobTable(root, query) {
   const filters = await jobFilters(asked, (changed) => {
     asked = changed;
     keepQuery(asked);
-    refresh();
+    followed.refresh();
   });
   root.append(filters.form, error, told, table, pages);
 
@@ -120,7 +116,7 @@ export async function jobTable(root, query) {
     } catch (problem) {
       return show(problem);
     }
-    return refresh();
+    return followed.refresh();
   }
 
   function actions(job) {
@@ -176,42 +172,45 @@ export async function jobTable(root, query) {
     return anchor;
   }
 
-  async function refresh() {
-    clearTimeout(timer);
-    const mine = ++number;
-    let wait = IDLE_MS;
-    try {
-      const { jobs, next } = await request(`/v1/jobs?${new URLSearchParams([...asked, ["limit", PAGE]])}`);
+  let older = "";
+
+  async function read() {
+    for (;;) {
+      const mine = asked;
+      const { jobs, next } = await request(`/v1/jobs?${new URLSearchParams([...mine, ["limit", PAGE]])}`);
       await loadTitles(jobs);
-      if (closed || mine !== number) return;
-      draw(jobs);
-      table.hidden = !jobs.length;
-      const filtered = [...asked.keys()].some((name) => name !== "before");
-      const none = filtered ? "No job matches these filters." : "Nothing has run yet. Upload a scan and press Fast or Best.";
-      const many = `${jobs.length === 1 ? "1 job" : `${jobs.length} jobs`}${next ? " on this page, and older ones" : ""}`;
-      told.textContent = jobs.length ? many : none;
-      const older = next && new URLSearchParams(next.split("?")[1]).get("before");
-      const links = [asked.has("before") && pageLink("Newest jobs", ""), older && pageLink("Older jobs", older)].filter(Boolean);
-      if (pages.dataset.links !== links.map(String).join(" ")) {
-        pages.dataset.links = links.map(String).join(" ");
-        pages.replaceChildren(...links);
-      }
-      if (jobs.some((job) => !ENDED.includes(job.state))) wait = BUSY_MS;
-      show(null);
-    } catch (problem) {
-      if (closed || mine !== number) return;
-      show(problem);
-      if (asked.has("before")) pages.replaceChildren(pageLink("Newest jobs", ""));
+      // The filters may have been changed in the meantime.
+      if (mine !== asked) continue;
+      older = next && new URLSearchParams(next.split("?")[1]).get("before");
+      return jobs;
     }
-    if (!closed) timer = setTimeout(refresh, wait);
   }
 
-  await refresh();
+  function onJobs(jobs) {
+    draw(jobs);
+    table.hidden = !jobs.length;
+    const filtered = [...asked.keys()].some((name) => name !== "before");
+    const none = filtered ? "No job matches these filters." : "Nothing has run yet. Upload a scan and press Fast or Best.";
+    const many = `${jobs.length === 1 ? "1 job" : `${jobs.length} jobs`}${older ? " on this page, and older ones" : ""}`;
+    told.textContent = jobs.length ? many : none;
+    const links = [asked.has("before") && pageLink("Newest jobs", ""), older && pageLink("Older jobs", older)].filter(Boolean);
+    if (pages.dataset.links !== links.map(String).join(" ")) {
+      pages.dataset.links = links.map(String).join(" ");
+      pages.replaceChildren(...links);
+    }
+  }
+
+  function onError(problem) {
+    show(problem);
+    if (problem && asked.has("before")) pages.replaceChildren(pageLink("Newest jobs", ""));
+  }
+
+  const followed = followJobs({ read, onJobs, onError });
+  await followed.ready;
   return {
-    refresh,
+    refresh: followed.refresh,
     close() {
-      closed = true;
-      clearTimeout(timer);
+      followed.close();
       filters.close();
     },
   };

@@ -1,0 +1,44 @@
+// The misfit of a reconstruction after each iteration, as a curve with axes.
+import { plot } from "../viewer/plot.js";
+import { make } from "./dom.js";
+import { residuals } from "./job_cards.js";
+
+// Whether several models are reconstructed side by side: then an iteration of a slice occurs more than once.
+export function comparesModels(history) {
+  const keys = history.map(({ slice, stage, sweep, of_attenuation: attenuation }) => [slice, stage, sweep, attenuation].join(" "));
+  return new Set(keys).size < keys.length;
+}
+
+// Adds a figure to a place; show(history) draws it, unless nothing has changed.
+export function misfitCurve(place) {
+  const box = make("figure", "tile misfit");
+  const hint = make("p", "hint", "The misfit of the first iteration follows");
+  box.append(make("figcaption", "facts", "Misfit: measured minus predicted travel time, rms"), hint);
+  place.append(box);
+  let drawn = 0;
+
+  return {
+    show(history) {
+      if (comparesModels(history)) {
+        hint.textContent = "Candidate methods are compared; the curve is that of the chosen one.";
+        hint.hidden = false;
+        box.querySelector("svg")?.remove();
+        drawn = 0;
+        return;
+      }
+      const { values, begins } = residuals(history);
+      if (values.length === drawn) return;
+      drawn = values.length;
+      hint.hidden = drawn > 0;
+      if (!drawn) return;
+      const nanoseconds = values.map((value) => 1e9 * value);
+      const stages = begins.length ? ` in ${begins.length + 1} stages` : "";
+      const label = `Misfit of ${drawn} iterations${stages}: ${nanoseconds[0].toPrecision(3)} to ${nanoseconds.at(-1).toPrecision(3)} ns`;
+      const curve = { x: values.map((_, k) => k + 1), y: nanoseconds };
+      const picture = plot([curve], { across: "Iteration", up: "Misfit (ns)", label });
+      picture.dataset.points = drawn;
+      box.querySelector("svg")?.remove();
+      hint.before(picture);
+    },
+  };
+}
