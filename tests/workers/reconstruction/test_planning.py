@@ -19,6 +19,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.files.dataset.counts import DatasetCounts, Summary, Traces
+from bentray_workers.reconstruction.memory.ray_memory import call_bytes, ray_task_parts
 from bentray_workers.reconstruction.planning import plan
 
 PROGRAM = Path(__file__).with_name("ray_task_memory.py")
@@ -96,6 +97,32 @@ def test_rejects_grids_larger_than_worker_memory_with_one_that_fits():
     assert plan(RING, asked, [SMALL, LARGE]).workers == 1
     assert plan(RING, asked, []).workers == 0
     assert plan(RING, asked, [WorkerCapacity(0, BOTH)]).workers == 1
+
+
+@pytest.mark.parametrize(
+    ("method", "nodes", "name", "part"),
+    [("gauss-newton", 128, "update_gauss_newton", "rays"), ("sart", 512, "update_sart", "a travel time")],
+)
+def test_refusal_states_what_takes_most_memory(method, nodes, name, part):
+    asked = Settings.of(method=method, decomposition="volume", nodes=nodes, attenuation=False)
+    scan = replace(RING, slices=32, pairs=32 * 256**2, height_m=0.08)
+    with pytest.raises(InvalidInput) as refusal:
+        plan(scan, asked, [SMALL])
+    parts = ray_task_parts(scan, asked)[name]
+    assert parts[part] == max(parts.values())
+    found = f"a task ({name}) takes {sum(parts.values())} bytes, {parts[part]} of them for {part}"
+    assert found in refusal.value.value
+
+
+def test_an_axial_margin_saves_memory_where_emitters_and_receivers_share_a_height():
+    free, near = (
+        Settings.of(method="sart", decomposition="volume", nodes=96, axial_margin_nodes=margin)
+        for margin in (None, 2)
+    )
+    rings = replace(RING, slices=32, pairs=32 * 256**2, height_m=0.08)
+    assert call_bytes(rings, near)["update_sart"] < 0.8 * call_bytes(rings, free)["update_sart"]
+    bowl_scan = replace(RING, in_space=True, height_m=0.08)
+    assert call_bytes(bowl_scan, near) == call_bytes(bowl_scan, free)
 
 
 def test_no_limit_is_none():

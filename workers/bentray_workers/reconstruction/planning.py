@@ -25,6 +25,7 @@ from .memory.ray_memory import (
     call_bytes,
     emitters_of,
     field_bytes,
+    ray_task_parts,
     rays_of,
     rows_bytes,
     shape_of,
@@ -136,7 +137,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         found = getattr(settings, field)
         raise InvalidInput(
             field,
-            f"{found}, for which a task ({name}) takes {size} bytes",
+            f"{found}, for which a task ({name}) takes {size} bytes" + _largest_part(scan, methods, name),
             f"settings whose tasks take at most {limit:.0f} bytes" + _advice(scan, settings, limit),
         )
     able = [one for one in fitting if one.task_bytes >= size]
@@ -210,6 +211,15 @@ def _stored_bytes(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> 
     picked = len(PAIR_ARRAYS) * REAL * scan.pairs if scan.traces_bytes else 0
     each = len(IMAGES) * REAL * math.prod(shape) + KEPT * state_bytes(shape, settings) + RECORD_BYTES
     return problems * each + picked
+
+
+def _largest_part(scan: Summary, methods: Sequence[Settings], name: str) -> str:
+    """What takes most memory of a task that uses rays, in words; empty for other tasks."""
+    parts = [parts for method in methods if (parts := ray_task_parts(scan, method).get(name))]
+    if not parts:
+        return ""
+    part, size = max(max(parts, key=lambda one: sum(one.values())).items(), key=lambda item: item[1])
+    return f", {size} of them for {part}"
 
 
 def _advice(scan: Summary, settings: Settings, limit: float) -> str:

@@ -95,29 +95,6 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         By the name of the task, with those of ``picking_graph`` where traces are picked: working arrays,
         arguments, result, and cached parts of the dataset.
     """
-    shape, rays = shape_of(scan, settings), rays_of(scan, settings)
-    image = REAL * math.prod(shape)
-    state = state_bytes(shape, settings)
-    # A process caches times and losses of the dataset, and those of recent problems.
-    cached = 3 * REAL * scan.pairs + 3 * REAL * emitters_of(scan, settings) * scan.receivers
-    tracked = shape
-    if settings.numerics.axial_margin_nodes is not None and len(shape) == 3:
-        tracked = (*shape[:2], min(shape[2], 2 * settings.numerics.axial_margin_nodes + 2))
-    field = 2 * REAL * math.prod(tracked)
-    if settings.rays != "straight":
-        field = field_bytes(tracked, settings.ray_eikonal)
-    base = FLOOR_BYTES + cached + state
-
-    def tracing(rows: int) -> int:
-        share = min(BATCH, emitters_of(scan, settings)) / max(1, emitters_of(scan, settings))
-        # The rows of each emitter, and their concatenation.
-        return base + field + image + 2 * rows_bytes(scan, settings, math.ceil(share * rows))
-
-    def solving(rows: int) -> int:
-        # For each row its time, residual, Huber weight and their product.
-        entries = rows * _entries(settings, scan.in_space)
-        return base + math.ceil(entries * ENTRY_BYTES) + 5 * REAL * rows + (8 + 8 * len(shape)) * image
-
     sizes: dict[str, int] = {}
     if scan.traces_bytes:
         sizes |= picking_task_bytes(scan.traces, scan.pairs, settings)
@@ -126,23 +103,68 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
             part = emissions_per_task(scan.traces.receivers * scan.traces.samples)
             part = min(part, scan.traces.emissions)
             predicted = part * scan.traces.receivers
-            sizes["pick_emissions"] += field + 2 * image + 2 * rows_bytes(scan, settings, predicted)
+            shape = shape_of(scan, settings)
+            rays = 2 * REAL * math.prod(shape) + 2 * rows_bytes(scan, settings, predicted)
+            sizes["pick_emissions"] += _field_of_task(scan, settings) + rays
     elif scan.period and settings.picking.examine:
         sizes["finish_slice"] = finish_slice_bytes(scan.pairs // scan.slices)
+    return sizes | {name: sum(parts.values()) for name, parts in ray_task_parts(scan, settings).items()}
+
+
+def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int]]:
+    """Memory of the tasks that trace rays or use them, by what takes it, bytes.
+
+    Args:
+        scan, settings: as for ``call_bytes``.
+    """
+    shape, rays = shape_of(scan, settings), rays_of(scan, settings)
+    image, field = REAL * math.prod(shape), _field_of_task(scan, settings)
+    # A process caches times and losses of the dataset, and those of recent problems.
+    data = 3 * REAL * scan.pairs + 3 * REAL * emitters_of(scan, settings) * scan.receivers
+    state = FLOOR_BYTES + state_bytes(shape, settings)
+
+    def tracing(rows: int) -> dict[str, int]:
+        share = min(BATCH, emitters_of(scan, settings)) / max(1, emitters_of(scan, settings))
+        # The rows of each emitter, and their concatenation.
+        entries = 2 * rows_bytes(scan, settings, math.ceil(share * rows))
+        return {"data": data, "images": state + image, "a travel time": field, "rays": entries}
+
+    def solving(rows: int) -> dict[str, int]:
+        # For each row its time, residual, Huber weight and their product.
+        entries = math.ceil(rows * _entries(settings, scan.in_space) * ENTRY_BYTES) + 5 * REAL * rows
+        return {"data": data, "images": state + (8 + 8 * len(shape)) * image, "rays": entries}
+
+    parts: dict[str, dict[str, int]] = {}
     if settings.method == "gauss-newton":
-        sizes["trace_rays"] = tracing(rays)
-        sizes["update_gauss_newton"] = solving(rays)
+        parts["trace_rays"] = tracing(rays)
+        parts["update_gauss_newton"] = solving(rays)
     elif solver_of(settings, len(shape)).compiled:
-        sizes["update_sart"] = base + _pass_bytes(shape, scan.receivers)
+        parts["update_sart"] = {
+            "data": data,
+            "images": state,
+            "a travel time": _pass_bytes(shape, scan.receivers),
+        }
     else:
-        sizes["update_sart"] = base + field + 8 * image
+        parts["update_sart"] = {"data": data, "images": state + 8 * image, "a travel time": field}
     if settings.attenuation.enabled and scan.amplitudes:
-        sizes["trace_attenuation_rays"] = tracing(rays)
-        sizes["solve_attenuation"] = solving(rays)
+        parts["trace_attenuation_rays"] = tracing(rays)
+        parts["solve_attenuation"] = solving(rays)
     if settings.resolution_check:
-        sizes["trace_final_rays"] = tracing(rays)
-        sizes["check_resolution"] = solving(rays)
-    return sizes
+        parts["trace_final_rays"] = tracing(rays)
+        parts["check_resolution"] = solving(rays)
+    return parts
+
+
+def _field_of_task(scan: Summary, settings: Settings) -> int:
+    """Memory of the travel time of one emitter, in the slab where it is tracked, bytes."""
+    tracked = shape_of(scan, settings)
+    margin = settings.numerics.axial_margin_nodes
+    # The receivers of an emitter of an array in space are at all heights.
+    if margin is not None and len(tracked) == 3 and not scan.in_space:
+        tracked = (*tracked[:2], min(tracked[2], 2 * margin + 2))
+    if settings.rays == "straight":
+        return 2 * REAL * math.prod(tracked)
+    return field_bytes(tracked, settings.ray_eikonal)
 
 
 def _pass_bytes(shape: tuple[int, ...], receivers: int) -> int:
