@@ -20,7 +20,9 @@ from bentray_workers.reconstruction import reconstruction_run
 
 pytestmark = pytest.mark.browser
 
-ITERATIONS = 6
+# Of the image of each iteration.
+CONTRASTS_MPS = (20.0, 40.0, 20.0, 30.0, 40.0, 50.0)
+ITERATIONS = len(CONTRASTS_MPS)
 
 
 @pytest.fixture
@@ -40,8 +42,7 @@ def turns(work, monkeypatch):
                     break
                 except queue.Empty:
                     pass
-            # The contrast grows: by 20 m/s in each iteration.
-            speed = 1500.0 + 20.0 * sweep * np.linspace(0.0, 1.0, 48).reshape(8, 6)
+            speed = 1500.0 + CONTRASTS_MPS[sweep - 1] * np.linspace(0.0, 1.0, 48).reshape(8, 6)
             state = replace(sart_step.begin(1.0 / speed), sweep=sweep)
             kept.save("0-00000", ReconstructionCheckpoint(0, 0, (), state, ()))
             history += (Iteration(0, sweep, 2e-6 / sweep, 8),)
@@ -74,16 +75,18 @@ def test_it_sharpens_until_the_result_is_shown(page, serve, scan, turns):
     # The last colour of viridis.
     np.testing.assert_allclose(picture.evaluate(corner), [253, 231, 37, 255], atol=2)
     expect(page.locator(".colour-bar .ticks")).to_have_text("150015101520")
+    page.get_by_text("2.00e+3 ns in the first iteration").wait_for()
     turns.put(None)
     expect(curve).to_have_attribute("data-points", "2")
     page.get_by_text("iteration 2 of at most").wait_for()
     share = float(page.get_by_label("Progress").get_attribute("value"))
     assert share >= 2 / ITERATIONS
     expect(picture).to_have_attribute("aria-label", "Sound speed so far, 1500 to 1540 m/s")
-    # Half of the way from the range of the image before.
-    expect(page.locator(".colour-bar .ticks")).to_have_text("150015151530")
+    # The range widens at once, and narrows half of the way.
+    expect(page.locator(".colour-bar .ticks")).to_have_text("150015201540")
     turns.put(None)
     expect(curve).to_have_attribute("data-points", "3")
+    expect(page.locator(".colour-bar .ticks")).to_have_text("150015151530")
     label = "Misfit of 3 iterations: 2.00e+3 to 667 ns"
     expect(page.get_by_role("img", name=label)).to_be_visible()
     assert curve.locator("path.curve").get_attribute("d").count("L") == 2

@@ -50,7 +50,7 @@ function happening(job, compiling) {
   if (job.state === "cancelled") return "Cancelled";
   if (job.state === "failed") return "Failed";
   if (job.state === "succeeded") return "Finished";
-  if (compiling && !job.history.length) return COMPILING;
+  if (compiling && !done) return COMPILING;
   if (PHASES[phase]) return PHASES[phase];
   if (job.kind !== "reconstruction") return done ? "Running" : "Starting";
   return phase === "reconstructing" && (done || job.history.length) ? iterationOf(job) : "Starting: the scan is read and the first rays are traced";
@@ -118,12 +118,12 @@ export function liveJob(root, first, onSuccess) {
   // The image after the newest progress; without one yet, the hint stays.
   async function draw() {
     const key = `${job.progress.phase} ${job.progress.done} ${job.history.length}`;
-    if (drawing || key === drawn || !job.links.preview || job.progress.phase !== "reconstructing") return;
+    if (drawing || key === drawn || !job.links.preview || !job.progress.done || job.progress.phase !== "reconstructing") return;
     drawing = true;
     drawn = key;
     try {
       const record = await request(job.links.preview);
-      if (!over) picture.show(record);
+      if (!over) picture.show(record, comparesModels(job.history) ? "candidate method" : "slice");
     } catch {
       // There is none yet, or no longer.
     }

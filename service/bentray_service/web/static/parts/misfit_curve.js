@@ -3,6 +3,8 @@ import { plot } from "../viewer/plot.js";
 import { make } from "./dom.js";
 import { residuals } from "./job_cards.js";
 
+const WAITING = "The misfit of the first iteration follows";
+
 // Whether several models are reconstructed side by side: then an iteration of a slice occurs more than once.
 export function comparesModels(history) {
   const keys = history.map(({ slice, stage, sweep, of_attenuation: attenuation }) => [slice, stage, sweep, attenuation].join(" "));
@@ -12,7 +14,7 @@ export function comparesModels(history) {
 // Adds a figure to a place; show(history) draws it, unless nothing has changed.
 export function misfitCurve(place) {
   const box = make("figure", "tile misfit");
-  const hint = make("p", "hint", "The misfit of the first iteration follows");
+  const hint = make("p", "hint", WAITING);
   box.append(make("figcaption", "facts", "Misfit: measured minus predicted travel time, rms"), hint);
   place.append(box);
   let drawn = 0;
@@ -29,15 +31,17 @@ export function misfitCurve(place) {
       const { values, begins } = residuals(history);
       if (values.length === drawn) return;
       drawn = values.length;
-      hint.hidden = drawn > 0;
-      if (!drawn) return;
       const nanoseconds = values.map((value) => 1e9 * value);
+      box.querySelector("svg")?.remove();
+      hint.hidden = drawn > 1;
+      // One point is no curve.
+      hint.textContent = drawn ? `${nanoseconds[0].toPrecision(3)} ns in the first iteration` : WAITING;
+      if (drawn < 2) return;
       const stages = begins.length ? ` in ${begins.length + 1} stages` : "";
       const label = `Misfit of ${drawn} iterations${stages}: ${nanoseconds[0].toPrecision(3)} to ${nanoseconds.at(-1).toPrecision(3)} ns`;
       const curve = { x: values.map((_, k) => k + 1), y: nanoseconds };
       const picture = plot([curve], { across: "Iteration", up: "Misfit (ns)", label });
       picture.dataset.points = drawn;
-      box.querySelector("svg")?.remove();
       hint.before(picture);
     },
   };

@@ -4,7 +4,7 @@ import { coloured } from "../viewer/image_view.js";
 import { make } from "./dom.js";
 
 const MAP = "viridis";
-// Of the way from the range of the picture before to that of the new one.
+// A range widens at once, so that no value is beyond it, and narrows by this share of the way with each image.
 const EASE = 0.5;
 
 function speedsOf({ speed }) {
@@ -14,12 +14,12 @@ function speedsOf({ speed }) {
 }
 
 // What the image is of: stage and iteration, and which slice or candidate method.
-function captionOf({ stage, iteration, part, parts, shape, every }) {
+function captionOf({ stage, iteration, part, parts, shape, every }, what) {
   const grid = `${shape.join(" × ")} nodes${every > 1 ? `, every ${every}th` : ""}`;
-  return [`Stage ${stage}, iteration ${iteration}`, parts > 1 ? `part ${part} of ${parts}` : "", grid].filter(Boolean).join(" · ");
+  return [`Stage ${stage}, iteration ${iteration}`, parts > 1 ? `${what} ${part} of ${parts}` : "", grid].filter(Boolean).join(" · ");
 }
 
-// Adds a figure to a place; show(record of GET /v1/jobs/{id}/preview).
+// Adds a figure to a place; show(record, what) shows an answer of GET /v1/jobs/{id}/preview; what: the name of its parts.
 export function previewPicture(place) {
   const canvas = make("canvas", "preview");
   canvas.setAttribute("role", "img");
@@ -40,9 +40,9 @@ export function previewPicture(place) {
   let range = null;
 
   return {
-    show(record) {
+    show(record, what) {
       const [low, high] = record.range_mps;
-      range = range ? [range[0] + EASE * (low - range[0]), range[1] + EASE * (high - range[1])] : [low, high];
+      range = range ? [Math.min(low, range[0] + EASE * (low - range[0])), Math.max(high, range[1] + EASE * (high - range[1]))] : [low, high];
       // An even image has no range.
       const [from, to] = range[1] > range[0] ? range : [range[0] - 1, range[1] + 1];
       const [na, nb] = record.shape;
@@ -54,7 +54,7 @@ export function previewPicture(place) {
       marks.replaceChildren(...[0, 0.5, 1].map((share) => make("span", "", String(Math.round(from + share * (to - from))))));
       bar.hidden = false;
       hint.hidden = true;
-      caption.textContent = captionOf(record);
+      caption.textContent = captionOf(record, what);
       canvas.setAttribute("aria-label", `Sound speed so far, ${Math.round(low)} to ${Math.round(high)} m/s`);
       canvas.dataset.pictures = Number(canvas.dataset.pictures || 0) + 1;
     },
