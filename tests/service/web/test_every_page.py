@@ -40,7 +40,8 @@ def places(serve, scan, work, monkeypatch, tmp_path):
     marks = "profile=-8,-15,0,-5&ellipse=-8,-15,0,-5"
     pages = {
         "/": "Sixteen elements",
-        f"/scans/{sent.json()['id']}": "Receiving element 0",
+        # With the form of all settings open.
+        f"/scans/{sent.json()['id']}?from={plane[0]}": "Receiving element 0",
         f"/jobs/{plane[0]}?{marks}": "node ",
         f"/jobs/{volume}?planes=3": "node ",
         f"/compare/{','.join(plane)}?{marks}": "m/s · B",

@@ -1,6 +1,7 @@
 // The list of jobs: one card a job, kept and updated in place so that the focus and the pictures stay.
 import { inWords, request } from "./api.js";
 import { make } from "./dom.js";
+import { duration } from "./job_words.js";
 import { showOnceNear, withKey } from "./key.js";
 import { glassOf, queryOf } from "./views.js";
 
@@ -18,10 +19,6 @@ function link(text, address, saveAs) {
   node.href = address;
   if (saveAs) node.download = "";
   return withKey(node, address);
-}
-
-export function duration(seconds) {
-  return seconds < 90 ? `${seconds.toFixed(1)} s` : `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
 }
 
 // Mean residual of each iteration over the slices, stage by stage; and the iterations at which a stage begins.

@@ -2,7 +2,8 @@
 import { inWords, request } from "./api.js";
 import { make } from "./dom.js";
 import { followJobs } from "./followed_jobs.js";
-import { duration, placeInQueue, planned, summaryOf } from "./job_cards.js";
+import { placeInQueue, planned, summaryOf } from "./job_cards.js";
+import { duration } from "./job_words.js";
 import { comparesModels, misfitCurve } from "./misfit_curve.js";
 import { previewPicture } from "./preview_picture.js";
 import { ProgressEstimate } from "./progress_estimate.js";
