@@ -1,4 +1,4 @@
-"""Turning a volume as the viewer does: previews a second over loopback, and the full picture at rest."""
+"""Turning volumes and surface scenes: previews a second by requests and in the page, and pictures at rest."""
 
 from __future__ import annotations
 
@@ -7,91 +7,182 @@ import os
 import tempfile
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlencode
 
 import httpx
 import numpy as np
+import trimesh
 
+from bentray_kernels.meshes.example_surfaces import torus
 from bentray_kernels.phantoms import TWO_HOLES, sampled
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
+from bentray_service.cli.output.exit_codes import WorkFailed
 from bentray_service.cli.service_process import running_service
 
+from . import _orbit_page
+
 NODES, QUICK_NODES = 192, 64
+# Faces along and around a ring.
+RING, QUICK_RING = (96, 48), (24, 16)
+# Of its geometry field; the defaults unless quick.
+QUICK_FIELD = {"samples": 8, "inner_samples": 4, "divisions": 4, "image_size": 33}
 SECONDS, QUICK_SECONDS = 20.0, 4.0
 RESTS, QUICK_RESTS = 8, 2
-# As in pages/rendering.js.
-PREVIEW = {"width": 256, "height": 256, "supersampling": "none"}
+# Of each motion in the page.
+MOTION_S = 5.0
+FIELD_S = 1800.0
+# As in pages/rendering.js and pages/surfaces.js.
+PREVIEW = {"width": 256, "height": 256}
 FULL = {"width": 512, "height": 512}
+VOLUME = {"index": 1.2}
+
+Query = dict[str, str | int | float]
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A mode of the viewer: what it adds to previews and to full pictures."""
+    """A mode of the viewer.
+
+    Attributes:
+        name: for labels.
+        view: parameters of previews and full pictures, and of the page.
+        preview, full: what is added to previews and to full pictures.
+    """
 
     name: str
-    preview: dict[str, str | int]
-    full: dict[str, str | int]
+    view: Query
+    preview: Query = field(default_factory=dict)
+    full: Query = field(default_factory=dict)
 
 
-MODES = (
+VOLUMES = (
     Shown(
         "lit surface",
-        {**PREVIEW, "mode": "shaded"},
-        {**FULL, "mode": "shaded", "supersampling": "real", "degree": 2},
+        {"mode": "shaded"},
+        {**VOLUME, "supersampling": "none"},
+        {**VOLUME, "supersampling": "real", "degree": 2},
     ),
-    Shown("glass", {**PREVIEW, "ray_spacing": 2}, {**FULL, "supersampling": "prss"}),
+    Shown(
+        "glass",
+        {"mode": "refract"},
+        {**VOLUME, "supersampling": "none", "ray_spacing": 2},
+        {**VOLUME, "supersampling": "prss"},
+    ),
+)
+SURFACES = (
+    Shown("mirror of a mesh", {"mode": "self"}, {}, {"rays": 2}),
+    Shown("glass of a mesh", {"mode": "refract"}, {}, {"rays": 2}),
+    Shown("two mirrors and a ball", {"mode": "self", "scene": "mirror-ball"}, {}, {"rays": 2}),
 )
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
-    """Two rows for each mode, with the load that they began under."""
-    busy = os.getloadavg()[0]
-    nodes = QUICK_NODES if context.quick else NODES
+    """Two rows for each mode by requests, and two in the page, with the load that they began under."""
+    detail = f"load average {os.getloadavg()[0]:.1f}"
+    steps = 2 * (len(VOLUMES) + len(SURFACES))
+    done = 0
+
+    def step(name: str) -> None:
+        nonlocal done
+        context.progress(done, steps, name)
+        done += 1
+
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with (
             running_service(folder / "data", folder / "log") as url,
             httpx.Client(base_url=url, timeout=120.0) as http,
         ):
-            picture = stored(http, nodes)
-            for number, mode in enumerate(MODES):
-                context.progress(number, len(MODES), mode.name)
-                yield from turned(
-                    http, picture, mode, context.quick, f"8-bit volume of {nodes}³; load average {busy:.1f}"
-                )
+            volume = stored_volume(http, QUICK_NODES if context.quick else NODES)
+            mesh, picture = stored_field(http, context.quick)
+            sets = (
+                (VOLUMES, str(volume["links"]["refraction"]), f"{url}/#/rendering/{volume['id']}"),
+                (SURFACES, picture, f"{url}/#/surfaces/{mesh}"),
+            )
+            for modes, address, _ in sets:
+                for mode in modes:
+                    step(mode.name)
+                    yield from turned(http, address, mode, context.quick, detail)
+            for modes, _, page in sets:
+                for mode in modes:
+                    step(f"{mode.name} in the page")
+                    yield from turned_in_page(page, mode, context.quick, detail)
 
 
-def stored(http: httpx.Client, nodes: int) -> str:
-    """Upload a volume of 8-bit integers; returns the address of its pictures."""
+def stored_volume(http: httpx.Client, nodes: int) -> dict[str, Any]:
+    """Upload a volume of 8-bit integers; returns its record."""
     content = io.BytesIO()
     np.save(content, np.round(255.0 * sampled(TWO_HOLES, nodes)).astype(np.uint8))
-    sent = http.post(
-        "/v1/volumes", content=content.getvalue(), headers={"Content-Type": "application/octet-stream"}
-    )
-    return str(sent.raise_for_status().json()["links"]["refraction"])
+    return _sent(http, "/v1/volumes", content.getvalue())
+
+
+def stored_field(http: httpx.Client, quick: bool) -> tuple[str, str]:
+    """Upload a ring and build its geometry field; returns the mesh and the address of its pictures.
+
+    Raises:
+        WorkFailed: if it is not built.
+    """
+    ring = torus(*(QUICK_RING if quick else RING))
+    content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
+    mesh = str(_sent(http, "/v1/meshes", content)["id"])
+    asked = {"kind": "geometry-field", "mesh": mesh, "settings": QUICK_FIELD if quick else {}}
+    job = http.post("/v1/jobs", json=asked).raise_for_status().json()
+    until = time.monotonic() + FIELD_S
+    while job["state"] in ("queued", "running"):
+        if time.monotonic() > until:
+            raise WorkFailed(f"the geometry field was not built within {FIELD_S:g} s")
+        time.sleep(0.5)
+        job = http.get(f"/v1/jobs/{job['id']}").raise_for_status().json()
+    if job["state"] != "succeeded":
+        raise WorkFailed(f"the geometry field was not built: {job['error']}")
+    return mesh, str(job["links"]["image"])
+
+
+def _sent(http: httpx.Client, address: str, content: bytes) -> dict[str, Any]:
+    headers = {"Content-Type": "application/octet-stream"}
+    record: dict[str, Any] = http.post(address, content=content, headers=headers).raise_for_status().json()
+    return record
 
 
 def turned(http: httpx.Client, picture: str, mode: Shown, quick: bool, detail: str) -> Iterator[Row]:
     """Previews one after the other, each of another view, then full pictures."""
 
-    def seconds(view: dict[str, str | int], azimuth_deg: float) -> float:
+    def seconds(view: Query, azimuth_deg: float) -> float:
         begun = time.perf_counter()
-        http.get(
-            f"{picture}?{urlencode({**view, 'index': 1.2, 'azimuth_deg': azimuth_deg})}"
-        ).raise_for_status()
+        query = urlencode({**mode.view, **view, "azimuth_deg": azimuth_deg})
+        http.get(f"{picture}?{query}").raise_for_status()
         return time.perf_counter() - begun
 
     # The scene is built for the first picture.
-    built = seconds(mode.preview, -1.0)
+    built = seconds({**mode.preview, **PREVIEW}, -1.0)
     taken: list[float] = []
     while sum(taken) < (QUICK_SECONDS if quick else SECONDS):
-        taken.append(seconds(mode.preview, 0.7 * len(taken)))
+        taken.append(seconds({**mode.preview, **PREVIEW}, 0.7 * len(taken)))
     p50, p95 = 1e3 * np.percentile(taken, [50, 95])
     rate = f"p50 {p50:.0f} ms, p95 {p95:.0f} ms, one request at a time; first picture {built:.1f} s; {detail}"
     yield Row(f"orbit, {mode.name} at 256²", len(taken) / sum(taken), 10.0, ">=", "1/s", rate)
-    full = [seconds(mode.full, 0.3 + 40.0 * k) for k in range(QUICK_RESTS if quick else RESTS)]
+    full = [seconds({**mode.full, **FULL}, 0.3 + 40.0 * k) for k in range(QUICK_RESTS if quick else RESTS)]
     words = f"median of {len(full)} pictures of 512², longest {max(full):.2f} s; {detail}"
     yield Row(f"orbit, {mode.name}: full quality at rest", float(np.median(full)), 1.0, "<", "s", words)
+
+
+def turned_in_page(page: str, mode: Shown, quick: bool, detail: str) -> Iterator[Row]:
+    """The same in Chromium, where it is installed."""
+    labels = (
+        (f"orbit in the page, {mode.name} at 256²", 10.0, ">=", "1/s"),
+        (f"orbit in the page, {mode.name}: full quality at rest", 1.0, "<", "s"),
+    )
+    if reason := _orbit_page.missing():
+        yield from (Row(label, None, goal, op, unit, reason) for label, goal, op, unit in labels)
+        return
+    motions = QUICK_RESTS if quick else RESTS
+    with _orbit_page.opened() as tab:
+        seen = _orbit_page.turn(tab, f"{page}?{urlencode(mode.view)}", MOTION_S, motions)
+    detail = f"headless Chromium on the same machine; {detail}"
+    yield Row(labels[0][0], seen.rate, *labels[0][1:], f"{motions} motions of {MOTION_S:g} s; {detail}")
+    words = f"median of {motions}, longest {max(seen.rests_s):.2f} s; after the last movement; {detail}"
+    yield Row(labels[1][0], float(np.median(seen.rests_s)), *labels[1][1:], words)
