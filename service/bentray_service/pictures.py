@@ -23,6 +23,7 @@ from bentray_workers.images.truth_export import export_truth
 from bentray_workers.reconstruction.quality_report import quality_page, quality_report
 from bentray_workers.reconstruction.scan_views import emission_traces, scan_geometry
 from bentray_workers.rendering import field_picture, picture_cost, refraction
+from bentray_workers.rendering.coefficients import coefficients_npy
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.histogram import volume_histogram
 from bentray_workers.rendering.isosurface_mesh import mesh_volume
@@ -94,6 +95,14 @@ class Pictures:
         cost = picture_cost.refraction_cost(VolumeFile.of(volume), view)
         what = "volume", f"shape {tuple(volume['shape'])}", cost
         return bytes(await self._made(tenant, what, path, lambda here: refraction.tasks_of(here, view)))
+
+    async def coefficients(
+        self, tenant: Tenant, volume: VolumeRow, path: Path, view: RefractionView
+    ) -> bytes:
+        """Filter a volume, see ``bentray_workers.rendering.coefficients``."""
+        cost = picture_cost.coefficients_cost(VolumeFile.of(volume))
+        what = "volume", f"shape {tuple(volume['shape'])}", cost
+        return bytes(await self._one(tenant, what, path, coefficients_npy, {"view": view}))
 
     async def histogram(
         self, tenant: Tenant, volume: VolumeRow, path: Path, quantity: str, bins: int

@@ -58,6 +58,7 @@ def volume_record(row: VolumeRow) -> VolumeRecord:
     with suppress(InvalidInput):
         check_even(tuple(row["shape"]), tuple(row["spacing_m"]))
         links["refraction"] = f"{here}/refraction.png"
+        links["coefficients"] = f"{here}/coefficients"
     job = row.get("job_id")
     if job is not None:
         links["job"] = f"/v1/jobs/{job}"

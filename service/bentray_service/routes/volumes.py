@@ -11,7 +11,7 @@ from bentray_workers.files.volume_formats import RAW_TYPES
 from ..files.deletion import StoredItem
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service
-from . import histograms, slices, volume_data, volume_summaries
+from . import coefficients, histograms, slices, volume_data, volume_summaries
 from .bodies import Limit, accept_media_types
 from .models.job_records import VolumeList, VolumeRecord
 from .record_conversion import volume_record
@@ -23,6 +23,7 @@ MEDIA_TYPES = ("application/octet-stream", "application/x-npy", "application/x-h
 router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 router.include_router(slices.router)
 router.include_router(histograms.router)
+router.include_router(coefficients.router)
 router.include_router(volume_data.router)
 router.include_router(volume_summaries.router)
 

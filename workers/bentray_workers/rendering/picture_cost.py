@@ -113,6 +113,13 @@ def histogram_cost(stored: VolumeFile) -> Cost:
     return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * math.prod(stored.shape), needed)
 
 
+def coefficients_cost(stored: VolumeFile) -> Cost:
+    """Cost of a filtered volume, sent as float32: one array and its file."""
+    nodes = math.prod(stored.shape)
+    needed = FLOOR_BYTES + stored.read_bytes + needed_bytes(stored.shape, BUILDING_BYTES + REAL)
+    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * nodes, needed)
+
+
 def field_cost(figures: Mapping[str, Any], view: FieldView) -> Cost:
     """Cost of a scene with a geometry field with the sizes in ``figures``.
 

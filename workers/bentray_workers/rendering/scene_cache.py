@@ -94,13 +94,22 @@ def scene_at(path: Path, view: RefractionView) -> Scene:
     return replace(scene, layers=layers)
 
 
+def filtered_at(path: Path, view: RefractionView) -> FilteredVolume:
+    """The filtered volume of a volume or reconstruction file, cached or new.
+
+    Raises:
+        InvalidInput: from the file, and for a volume that is too large.
+    """
+    return _filtered(path, stored_shape(path), view)[1]
+
+
 def default_surface(path: Path) -> tuple[float, float]:
     """Iso-value and smoothing of a picture for which none are requested.
 
     Raises:
         InvalidInput: from the file, and for a volume that is too large or constant.
     """
-    _, filtered = _filtered(path, stored_shape(path), RefractionView())
+    filtered = filtered_at(path, RefractionView())
     return RefractionView().filtered_within(*filtered.range).iso[0], filtered.smoothing
 
 

@@ -12,6 +12,7 @@ import { pictureStream, rateOf } from "../parts/picture_stream.js";
 import { load, titleOf } from "../parts/titles.js";
 import { uploads } from "../parts/uploads.js";
 import { glassOf, queryOf } from "../parts/views.js";
+import { localPreviews } from "../webgl/local_previews.js";
 
 // Sides of pictures, pixels: while the view moves, at rest, and of the picture that a link opens.
 const PREVIEW_PX = 256;
@@ -111,6 +112,7 @@ export async function open(root, { id, query }) {
   let histogram = null;
   let counted = "";
 
+  const local = localPreviews();
   const stream = pictureStream(at("glass"), {
     onShown({ quality, rate }) {
       at("stage-hint").hidden = true;
@@ -165,6 +167,15 @@ export async function open(root, { id, query }) {
     return iso === undefined ? (histogram?.iso == null ? [] : [histogram.iso]) : [iso].flat();
   }
 
+  // What draws the preview in this browser, or null.
+  function drawerHere() {
+    const { iso, index = [1.5], ...rest } = view();
+    // The default iso-value is known for the default filter and smoothing alone.
+    const known = iso !== undefined || (!rest.filter && rest.smoothing === undefined && histogram?.iso != null);
+    if (!known) return null;
+    return local.drawer(chosen(), { ...rest, iso: isoValues(), index: [index].flat() }, PREVIEW_PX);
+  }
+
   function markIso() {
     const values = isoValues();
     bars?.mark(values);
@@ -199,7 +210,7 @@ export async function open(root, { id, query }) {
     }
     markIso();
     const [preview, full] = addresses();
-    if (moving) stream.move(preview, full);
+    if (moving) stream.move(preview, full, drawerHere());
     else stream.set(full);
     // Browsers limit how often the address changes.
     clearTimeout(keeping);
@@ -301,6 +312,7 @@ export async function open(root, { id, query }) {
   return () => {
     clearTimeout(keeping);
     stream.close();
+    local.close();
     jobs.close();
   };
 }

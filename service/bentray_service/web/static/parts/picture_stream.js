@@ -41,6 +41,11 @@ export function pictureStream(canvas, { onShown = () => {}, onError = () => {} }
     }
     const bitmap = await createImageBitmap(await response.blob());
     lastMs = performance.now() - begun;
+    present(view, quality, bitmap, signal);
+  }
+
+  // Show a picture of the service, unless it comes too late.
+  function present(view, quality, bitmap, signal) {
     const late = view.number < shown || view.shown === "full";
     if (closed || signal.aborted || late) {
       bitmap.close();
@@ -52,10 +57,15 @@ export function pictureStream(canvas, { onShown = () => {}, onError = () => {} }
     }
     canvas.getContext("2d").drawImage(bitmap, 0, 0);
     bitmap.close();
+    note(view, quality, "service");
+  }
+
+  function note(view, quality, source) {
     shown = view.number;
     view.shown = quality;
     canvas.dataset.address = view[quality];
     canvas.dataset.quality = quality;
+    canvas.dataset.source = source;
     canvas.dataset.pictures = Number(canvas.dataset.pictures || 0) + 1;
     onError(null);
     onShown({ quality, ms: lastMs, rate: quality === "preview" ? rate() : 0 });
@@ -102,22 +112,27 @@ export function pictureStream(canvas, { onShown = () => {}, onError = () => {} }
     const left = wanted.moved + REST_MS - now;
     const free = underWay.size < (lastMs < QUICK_MS ? MAX_UNDER_WAY : 1);
     if (wanted.preview && !wanted.requested && left > 0) {
-      if (free) start(wanted, "preview");
+      if (wanted.drawHere?.(canvas)) {
+        wanted.requested = "preview";
+        note(wanted, "preview", "browser");
+        timer = setTimeout(next, left);
+      } else if (free) start(wanted, "preview");
     } else if (left > 0) timer = setTimeout(next, left);
     else if (free) start(wanted, "full");
   }
 
-  function want(preview, full, moved) {
+  function want(preview, full, moved, drawHere = null) {
     views += 1;
-    wanted = { preview, full, moved, number: views, requested: "", shown: "" };
+    wanted = { preview, full, moved, drawHere, number: views, requested: "", shown: "" };
     for (const one of underWay) if (one.quality === "full") one.controller.abort();
     next();
   }
 
   return {
-    // The view moves: addresses of its preview and of its full picture.
-    move(preview, full) {
-      want(preview, full, performance.now());
+    // The view moves: addresses of its preview and of its full picture; drawHere, if given, draws the preview on the canvas
+    // and returns whether it did.
+    move(preview, full, drawHere = null) {
+      want(preview, full, performance.now(), drawHere);
     },
     // The view has changed at once.
     set(full) {

@@ -1,0 +1,73 @@
+// Previews that the graphics card of this browser draws while a view moves; the service draws where it cannot or is slow.
+import { authorization } from "../parts/key.js";
+import { queryOf } from "../parts/views.js";
+import { parseNpy } from "../viewer/npy.js";
+import { hasGraphicsCard, rayCaster } from "./ray_caster.js";
+import { hasFilter, MAX_ISOS } from "./ray_shader.js";
+
+// Slower than 10 previews a second, by the mean of some, it is not used again.
+const SLOW_MS = 100;
+const JUDGED = 3;
+const DEFAULT_FILTER = "bspline3";
+
+export function localPreviews() {
+  let caster = null;
+  let loaded = "";
+  let useless = false;
+  let taken = [];
+
+  async function load(key, volume, filter, smoothing) {
+    loaded = key;
+    useless ||= !hasGraphicsCard();
+    if (useless) return;
+    caster?.close();
+    caster = null;
+    try {
+      const query = queryOf({ filter, smoothing: smoothing ?? null });
+      const response = await fetch(`${volume.links.coefficients}?${query}`, { headers: authorization() });
+      if (!response.ok) return;
+      const { values, shape } = parseNpy(await response.arrayBuffer());
+      if (loaded !== key) return;
+      const made = rayCaster(document.createElement("canvas"), { values, shape, spacing: volume.spacing_m, filter });
+      // The first picture waits for the driver, and says nothing of the others.
+      made.draw({ width: 8, height: 8, azimuth_deg: 0, elevation_deg: 0, zoom: 1, mode: "shaded", iso: [0], index: [1] });
+      caster = made;
+      taken = [];
+    } catch {
+      useless = true;
+    }
+  }
+
+  return {
+    // A function that draws a view of a volume on a canvas and returns whether it did; null where the service draws it. iso
+    // and index are lists, known for sure.
+    drawer(volume, { iso, index, filter = DEFAULT_FILTER, smoothing, mode, backdrop, ...camera }, pixels) {
+      const can = hasFilter(filter) && iso.length > 0 && iso.length <= MAX_ISOS && (mode === "shaded" || backdrop === "checkerboard");
+      if (useless || !can || !volume.links.coefficients) return null;
+      const key = `${volume.id} ${filter} ${smoothing}`;
+      if (loaded !== key) load(key, volume, filter, smoothing);
+      const ready = caster;
+      if (!ready) return null;
+      return (target) => {
+        let ms = Infinity;
+        try {
+          ms = ready.draw({ ...camera, mode, iso, index, width: pixels, height: pixels });
+        } catch {
+          useless = true;
+          return false;
+        }
+        target.width = pixels;
+        target.height = pixels;
+        target.getContext("2d").drawImage(ready.canvas, 0, 0);
+        taken = [...taken.slice(1 - JUDGED), ms];
+        useless = taken.length === JUDGED && taken.reduce((sum, one) => sum + one, 0) > JUDGED * SLOW_MS;
+        return true;
+      };
+    },
+    close() {
+      useless = true;
+      loaded = "";
+      caster?.close();
+    },
+  };
+}

@@ -1,0 +1,148 @@
+"""The ray caster in the browser, by WebGL2 in software: the pictures of the service, and when it is used."""
+
+from __future__ import annotations
+
+import base64
+import io
+from urllib.parse import urlencode
+
+import httpx
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+from bentray_kernels.phantoms import ONE_HOLE, TWO_HOLES, sampled
+
+from .conftest import CHROMIUM
+from .structural_similarity import structural_similarity
+
+pytestmark = pytest.mark.browser
+
+# A software renderer says so, and would not be used.
+SOFTWARE = (
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-watchdog",
+)
+ACCEPT_SOFTWARE = """
+    const contextOf = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, how) {
+        return contextOf.call(this, kind, how && { ...how, failIfMajorPerformanceCaveat: false });
+    };
+"""
+# On a machine under load the software renderer compiles for a minute.
+PATIENCE_MS = 240_000
+
+LOAD = """async ({ links, spacing, filter }) => {
+    const { parseNpy } = await import("/static/viewer/npy.js");
+    const { rayCaster } = await import("/static/webgl/ray_caster.js");
+    const response = await fetch(`${links.coefficients}?filter=${filter}`);
+    const { values, shape } = parseNpy(await response.arrayBuffer());
+    window.caster = rayCaster(document.createElement("canvas"), { values, shape, spacing, filter });
+}"""
+DRAW = """view => {
+    window.caster.draw(view);
+    return window.caster.canvas.toDataURL("image/png");
+}"""
+WATCH = """canvas => {
+    window.sources = [];
+    const note = () => window.sources.push([canvas.dataset.source, canvas.dataset.quality]);
+    new MutationObserver(note).observe(canvas, { attributeFilter: ["data-pictures"] });
+}"""
+PRESS_UNTIL_DRAWN = """async () => {
+    const stage = document.querySelector("#stage");
+    while (!window.sources.some(([source]) => source === "browser")) {
+        stage.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));
+        await new Promise((go) => setTimeout(go, 400));
+    }
+}"""
+SIZE = {"width": 256, "height": 256}
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if not CHROMIUM.exists():
+        pytest.skip(f"no browser at {CHROMIUM}")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=str(CHROMIUM), args=["--no-sandbox", *SOFTWARE], timeout=PATIENCE_MS
+        )
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(page):
+    page.set_default_timeout(PATIENCE_MS)
+    page.add_init_script(ACCEPT_SOFTWARE)
+    return page
+
+
+def stored(address, values, spacing="0.001"):
+    """The record of an uploaded volume."""
+    content = io.BytesIO()
+    np.save(content, values)
+    headers = {"Content-Type": "application/x-npy"}
+    sent = httpx.post(
+        f"{address}/v1/volumes?spacing_m={spacing}", content=content.getvalue(), headers=headers, timeout=60.0
+    )
+    return sent.raise_for_status().json()
+
+
+def holes():
+    return np.round(255.0 * sampled(TWO_HOLES, 40)).astype(np.uint8)
+
+
+def cut():
+    """Two surfaces, the outer one cut by the faces of the grid; steps that differ between the axes."""
+    x, y, z = np.ogrid[-1:1:24j, -1:1:30j, -1:1:20j]
+    return (1.5 - x**2 - 0.3 * y**2 - 0.5 * z**2).astype(np.float32)
+
+
+CASES = {
+    "8-bit": (holes, "0.001", "bspline3", {"iso": [120.0], "index": [1.2]}),
+    "layers": (cut, "0.001,0.0008,0.0015", "catmull-rom", {"iso": [0.9, 1.2], "index": [1.05, 1.1]}),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_its_pictures_are_those_of_the_service(page, serve, name):
+    values, spacing, chosen, surfaces = CASES[name]
+    address = serve()
+    volume = stored(address, values(), spacing)
+    page.goto(address)
+    page.evaluate(LOAD, {"links": volume["links"], "spacing": volume["spacing_m"], "filter": chosen})
+    views = [
+        {"mode": "refract", "azimuth_deg": 120, "elevation_deg": -35, "zoom": 1.4},
+        {"mode": "shaded", "azimuth_deg": 30, "elevation_deg": 20, "zoom": 1},
+    ]
+    for view in views:
+        here = page.evaluate(DRAW, {**view, **surfaces, **SIZE})
+        found = Image.open(io.BytesIO(base64.b64decode(here.partition(",")[2]))).convert("RGB")
+        query = urlencode({**view, **surfaces, **SIZE, "filter": chosen, "supersampling": "none"}, doseq=True)
+        answer = httpx.get(f"{address}{volume['links']['refraction']}?{query}", timeout=120.0)
+        expected = Image.open(io.BytesIO(answer.raise_for_status().content)).convert("RGB")
+        assert np.ptp(np.asarray(expected)) > 100
+        assert structural_similarity(found, expected) >= 0.98
+
+
+def test_the_page_draws_previews_here_once_the_volume_is_loaded(page, serve, tmp_path):
+    np.save(tmp_path / "ball.npy", sampled(ONE_HOLE, 12))
+    address = serve()
+    page.goto(address + "/#/rendering")
+    page.set_input_files("#volume-file", tmp_path / "ball.npy")
+    page.get_by_text("ball.npy is stored").wait_for()
+    page.locator("#glass[data-quality=full]").wait_for()
+    page.get_by_role("img", name="Histogram").wait_for()
+    page.locator("#stage").focus()
+    page.locator("#glass").evaluate(WATCH)
+    # The first movement loads the volume.
+    with page.expect_response("**/coefficients*"):
+        page.keyboard.press("ArrowRight")
+    page.evaluate(PRESS_UNTIL_DRAWN)
+    # At rest the service draws.
+    page.locator("#glass[data-quality=full][data-source=service]").wait_for()
+    assert ["browser", "preview"] in page.evaluate("window.sources")
+    assert ["browser", "full"] not in page.evaluate("window.sources")
