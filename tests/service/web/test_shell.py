@@ -23,7 +23,16 @@ def test_page_requests_and_sends_a_key(page, serve, scan, work, tmp_path):
     page.locator("#key-error").get_by_text("unknown, revoked or expired").wait_for()
     page.get_by_label("API key").fill(key.shown())
     page.get_by_role("button", name="Use key").click()
-    page.get_by_text("Tenant local (metrics, read, write)").wait_for()
+    access = page.get_by_text("Tenant local", exact=True)
+    expect(access).to_have_attribute("title", "local: metrics, read, write")
+    # The header is one row on a laptop.
+    page.set_viewport_size({"width": 1400, "height": 900})
+    expect(page.get_by_role("button", name="Forget key")).to_be_visible()
+    middles = []
+    for one in (page.locator(".brand"), page.locator("#theme")):
+        box = one.bounding_box()
+        middles.append(box["y"] + box["height"] / 2)
+    assert abs(middles[0] - middles[1]) < 5
     expect(page.locator("#key")).to_be_hidden()
     page.set_input_files("#scan-file", scan())
     page.get_by_text("16 emitters").wait_for()

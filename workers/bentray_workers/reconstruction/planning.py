@@ -17,6 +17,7 @@ from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of
 from ..cluster.checkpoints import KEPT
+from ..cluster.task_words import task_in_words
 from ..files.dataset.counts import Summary
 from ..files.dataset.format import PAIR_ARRAYS
 from ..files.reconstruction import IMAGES
@@ -137,7 +138,8 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         found = getattr(settings, field)
         raise InvalidInput(
             field,
-            f"{found}, for which a task ({name}) takes {size} bytes" + _largest_part(scan, methods, name),
+            f"{found}, for which a task ({task_in_words(name)}) takes {size} bytes"
+            + _largest_part(scan, methods, name),
             f"settings whose tasks take at most {limit:.0f} bytes" + _advice(scan, settings, limit),
         )
     able = [one for one in fitting if one.task_bytes >= size]
@@ -266,6 +268,6 @@ def _why(
     where = " on OpenCL devices" if lane == "opencl" else ""
     what = cut[decomposition]()
     return (
-        f"{what[0].upper()}{what[1:]}{where}, in about {tasks} tasks; the largest ({name}) takes "
-        f"{size / MIB:.0f} MiB, and {who}."
+        f"{what[0].upper()}{what[1:]}{where}, in about {tasks} tasks; the largest "
+        f"({task_in_words(name)}) takes {size / MIB:.0f} MiB, and {who}."
     )

@@ -10,6 +10,7 @@ from typing import Any
 from bentray_kernels.errors import InvalidInput
 
 from ..cluster.capacities import MIB, WorkerCapacity
+from ..cluster.task_words import task_in_words
 from ..files.hdf5_reading import Limits
 from .cost import costly_setting, cpu_seconds, result_bytes, task_bytes
 from .parts import count_of
@@ -67,7 +68,9 @@ def plan_simulation(request: PhantomScan, capacities: Sequence[WorkerCapacity]) 
     name, largest = max(calls.items(), key=lambda item: item[1])
     if largest > limit:
         field = costly_setting(settings, name)
-        found = f"{getattr(settings, field):g}, for which a task ({name}) takes {largest} bytes"
+        found = (
+            f"{getattr(settings, field):g}, for which a task ({task_in_words(name)}) takes {largest} bytes"
+        )
         raise InvalidInput(field, found, f"settings whose tasks take at most {limit:.0f} bytes")
     tasks = count_of(settings) + 1
     if tasks > MAX_TASKS:
@@ -79,7 +82,7 @@ def plan_simulation(request: PhantomScan, capacities: Sequence[WorkerCapacity]) 
     if capacities:
         where = f"on {len(able)} of {len(capacities)} workers"
     why = (
-        f"{tasks} tasks, about {_duration(minutes)} {where}; the largest ({name}) takes "
+        f"{tasks} tasks, about {_duration(minutes)} {where}; the largest ({task_in_words(name)}) takes "
         f"{largest / MIB:.0f} MiB, the file {size / MIB:.1f} MiB at most."
     )
     return SimulationPlan(tasks, len(able), calls, size, minutes, why)

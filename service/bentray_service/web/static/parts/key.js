@@ -100,8 +100,9 @@ export async function admitted(request) {
   at("forget").hidden = !hasKey();
   try {
     const { tenant, how, scopes } = await request("/v1/access");
-    at("access").textContent =
-      how === "open" ? "Open to this machine" : `Tenant ${tenant} (${scopes.join(", ")})`;
+    at("access").textContent = how === "open" ? "Open to this machine" : `Tenant ${tenant}`;
+    // The page of the service lists the scopes; here they would take a second row.
+    at("access").title = how === "open" ? "" : `${tenant}: ${scopes.join(", ")}`;
     return true;
   } catch (error) {
     // Other errors than a missing key are shown with their reason.

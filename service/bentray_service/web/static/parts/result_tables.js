@@ -46,7 +46,7 @@ export function choiceTable({ candidates, reason }, job) {
   if (!candidates.length) return job.advice ? section("Notes", make("p", "", job.advice)) : null;
   const table = make("table", "choice-table");
   const head = table.createTHead().insertRow();
-  for (const name of ["Candidate", "Held-out misfit (mean)", "Held-out misfit (rms)", "Training misfit (rms)", "Chosen"]) {
+  for (const name of ["Candidate", "Held-out misfit, mean", "Held-out, rms", "Training, rms"]) {
     const cell = make("th", "", name);
     cell.scope = "col";
     head.append(cell);
@@ -54,7 +54,8 @@ export function choiceTable({ candidates, reason }, job) {
   const body = table.createTBody();
   for (const one of candidates) {
     const row = body.insertRow();
-    const cells = [one.label, nanoseconds(one.held_out_mean_s), nanoseconds(one.held_out_rms_s), nanoseconds(one.training_rms_s), one.chosen ? "chosen" : ""];
+    const label = one.chosen ? `${one.label} (chosen)` : one.label;
+    const cells = [label, nanoseconds(one.held_out_mean_s), nanoseconds(one.held_out_rms_s), nanoseconds(one.training_rms_s)];
     row.append(...cells.map((cell) => make("td", "", cell)));
     if (one.chosen) row.className = "chosen";
   }

@@ -1,0 +1,36 @@
+"""What each kind of task does, in words for plans and errors."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+TASK_WORDS = MappingProxyType(
+    {
+        "measure_traces": "measuring traces",
+        "examine_slice": "examining the traces of a slice",
+        "find_chords": "finding paths through water alone",
+        "read_chords": "reading pulses through water alone",
+        "estimate_slice_water": "estimating the water shot",
+        "pick_emissions": "picking arrivals",
+        "finish_slice": "checking the times of a slice",
+        "write_picked": "writing the picked times",
+        "trace_rays": "tracing rays",
+        "update_sart": "updating the image by SART",
+        "update_gauss_newton": "updating the image by Gauss-Newton",
+        "trace_attenuation_rays": "tracing rays for the attenuation",
+        "solve_attenuation": "reconstructing the attenuation",
+        "trace_final_rays": "tracing rays for the resolution",
+        "check_resolution": "checking the resolution",
+        "start_band": "preparing a frequency band",
+        "evaluate_emitter": "simulating the waves of an emitter",
+        "update_image": "updating the image by full waveforms",
+        "validate_image": "comparing the image with unused traces",
+        "make_part": "simulating a part of the scan",
+        "write_scan": "writing the scan",
+    }
+)
+
+
+def task_in_words(name: str) -> str:
+    """What a task does, by the name of its function."""
+    return TASK_WORDS.get(name, name.replace("_", " "))
