@@ -18,6 +18,7 @@ from bentray_kernels.acquisition.simulation.array_shapes import bowl
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
+from bentray_workers.cluster.task_words import task_in_words
 from bentray_workers.files.dataset.counts import DatasetCounts, Summary, Traces
 from bentray_workers.reconstruction.memory.ray_memory import call_bytes, ray_task_parts
 from bentray_workers.reconstruction.planning import plan
@@ -110,7 +111,8 @@ def test_refusal_states_what_takes_most_memory(method, nodes, name, part):
         plan(scan, asked, [SMALL])
     parts = ray_task_parts(scan, asked)[name]
     assert parts[part] == max(parts.values())
-    found = f"a task ({name}) takes {sum(parts.values())} bytes, {parts[part]} of them for {part}"
+    said = task_in_words(name)
+    found = f"a task ({said}) takes {sum(parts.values())} bytes, {parts[part]} of them for {part}"
     assert found in refusal.value.value
 
 
