@@ -1,5 +1,6 @@
 """Jobs of a tenant: newest first, idempotency keys, cancellation, isolation."""
 
+import random
 import threading
 
 import pytest
@@ -72,3 +73,28 @@ def test_a_key_names_one_job_of_its_tenant(database, jobs, queue, dataset):
     assert jobs.add(Tenant("b"), "reconstruction", {"nodes": 17}, dataset, key="k")["id"] not in made
     assert [len(jobs.newest(LOCAL, 9, state=state)) for state in ("queued", "running")] == [1, 0]
     assert queue.load()[0] == {"queued": 2}
+
+
+def test_the_next_place_is_that_of_the_job_submitted_next(jobs, queue, dataset):
+    tenants = [Tenant(name) for name in ("a", "b", "c")]
+    chance = random.Random(4)
+    for _ in range(30):
+        tenant = chance.choice(tenants)
+        before = jobs.next_place(tenant)
+        assert jobs.place(jobs.add(tenant, "reconstruction", {}, dataset)) == before
+        if chance.random() < 0.4:
+            queue.claim()
+
+
+def test_durations_are_those_of_one_tenant_and_kind(jobs, queue, dataset):
+    other = Tenant("other")
+    for tenant, kind in ((LOCAL, "reconstruction"), (LOCAL, "refraction"), (other, "reconstruction")):
+        jobs.add(tenant, kind, {}, dataset, plan={"work_s": 2.0})
+        queue.succeed(queue.claim()["id"], None)
+    jobs.add(LOCAL, "reconstruction", {}, dataset)
+    queue.fail(queue.claim()["id"], {"detail": "no image"})
+    ((plan, seconds),) = jobs.durations(LOCAL, "reconstruction", 10)
+    assert plan == {"work_s": 2.0}
+    assert seconds >= 0.0
+    assert len(jobs.durations(other, "reconstruction", 10)) == 1
+    assert jobs.durations(Tenant("third"), "reconstruction", 10) == []
