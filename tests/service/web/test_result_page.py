@@ -315,8 +315,10 @@ def test_provenance_is_told_in_words_and_copied_as_json(page, result):
     box.get_by_text("Settings", exact=True).click()
     rows = {row.locator("th").inner_text(): row.locator("td").inner_text() for row in box.locator("tr").all()}
     assert (rows["Job"], rows["Scan"], rows["Speed in water"]) == (job["id"], job["dataset"], "1500.0 m/s")
-    assert (rows["Method"], rows["Side"], rows["Roi"]) == ("sart", "automatic", "no")
-    assert (rows["Speed bounds"], rows["Sart: relaxation"]) == ("1300 to 1800 m/s", "0.1")
+    image = (rows["Method"], rows["Side of the image"], rows["Only the region of interest"])
+    assert image == ("sart", "automatic", "no")
+    assert (rows["Speed bounds"], rows["SART: relaxation"]) == ("1300 to 1800 m/s", "0.1")
+    assert rows["SART: smoothing of updates"] == "1 nodes"
     assert "{" not in box.inner_text()
     box.get_by_role("button", name="Copy JSON").click()
     box.get_by_role("button", name="Copied").wait_for()

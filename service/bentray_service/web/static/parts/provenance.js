@@ -26,17 +26,25 @@ const NUMERICS = {
 };
 const UNITS = { mps: "m/s", s: "s", m: "m", hz: "Hz", deg: "°", c: "°C", nodes: "nodes" };
 
+const NAMES = {
+  sart: "SART", gauss_newton: "Gauss–Newton", roi: "Only the region of interest", eikonal: "Eikonal solver", side_m: "Side of the image",
+  minutes: "Time budget of full waveform (minutes)", examine: "Scan is checked first", enabled: "Reconstructed", attenuation_solver: "Solver",
+  nodes: "Nodes per side", smoothing_nodes: "Smoothing of updates", edge_mps: "Edges above",
+};
+
 // "speed_bounds_mps" is "Speed bounds" and the unit m/s.
 function named(name) {
   const [, stem, ending] = /^(.*?)(?:_(mps|s|m|hz|deg|c|nodes))?$/.exec(name);
   const words = stem.replaceAll("_", " ");
-  return [words[0].toUpperCase() + words.slice(1), UNITS[ending] ?? ""];
+  return [NAMES[name] ?? words[0].toUpperCase() + words.slice(1), UNITS[ending] ?? ""];
 }
 
 // A value in words; without one, what that means.
 export function inWords(value, unit = "", unset = "automatic") {
   if (value === null) return unset;
   if (typeof value === "boolean") return value ? "yes" : "no";
+  // Times of waves are nanoseconds.
+  if (unit === "s" && value > 0 && value < 1e-3) return `${Number((1e9 * value).toPrecision(4))} ns`;
   const number = (one) => (typeof one === "number" ? String(Number(one.toPrecision(6))) : String(one));
   const text = Array.isArray(value) ? value.map(number).join(" to ") : number(value);
   return unit && typeof value !== "string" ? `${text} ${unit}` : text;
@@ -65,7 +73,7 @@ function settingRows(settings, before = "") {
   return Object.entries(settings).flatMap(([name, value]) => {
     if (value !== null && typeof value === "object" && !Array.isArray(value)) return settingRows(value, `${before}${named(name)[0]}: `);
     const [words, unit] = named(name);
-    return [[before ? `${before}${words.toLowerCase()}` : words, inWords(value, unit)]];
+    return [[before ? `${before}${words[0].toLowerCase()}${words.slice(1)}` : words, inWords(value, unit)]];
   });
 }
 
