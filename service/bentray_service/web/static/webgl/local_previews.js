@@ -8,6 +8,9 @@ import { hasFilter, MAX_ISOS } from "./ray_shader.js";
 // Slower than 10 previews a second, by the mean of some, it is not used again.
 const SLOW_MS = 100;
 const JUDGED = 3;
+// Before, one of fewer pixels shows that it will not be much slower.
+const TRIAL_PX = 64;
+const TRIAL_MS = SLOW_MS / 4;
 const DEFAULT_FILTER = "bspline3";
 
 export function localPreviews() {
@@ -16,7 +19,7 @@ export function localPreviews() {
   let useless = false;
   let taken = [];
 
-  async function load(key, volume, filter, smoothing) {
+  async function load(key, volume, view, filter, smoothing) {
     loaded = key;
     useless ||= !hasGraphicsCard();
     if (useless) return;
@@ -30,8 +33,10 @@ export function localPreviews() {
       if (loaded !== key) return;
       const made = rayCaster(document.createElement("canvas"), { values, shape, spacing: volume.spacing_m, filter });
       // The first picture waits for the driver, and says nothing of the others.
-      made.draw({ width: 8, height: 8, azimuth_deg: 0, elevation_deg: 0, zoom: 1, mode: "shaded", iso: [0], index: [1] });
-      caster = made;
+      made.draw({ ...view, width: 1, height: 1 });
+      useless = made.draw({ ...view, width: TRIAL_PX, height: TRIAL_PX }) > TRIAL_MS;
+      if (useless) made.close();
+      else caster = made;
       taken = [];
     } catch {
       useless = true;
@@ -45,7 +50,7 @@ export function localPreviews() {
       const can = hasFilter(filter) && iso.length > 0 && iso.length <= MAX_ISOS && (mode === "shaded" || backdrop === "checkerboard");
       if (useless || !can || !volume.links.coefficients) return null;
       const key = `${volume.id} ${filter} ${smoothing}`;
-      if (loaded !== key) load(key, volume, filter, smoothing);
+      if (loaded !== key) load(key, volume, { ...camera, mode, iso, index }, filter, smoothing);
       const ready = caster;
       if (!ready) return null;
       return (target) => {

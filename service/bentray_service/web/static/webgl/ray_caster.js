@@ -77,27 +77,26 @@ function texture3d(gl, unit, values, [nx, ny, nz], channels) {
   gl.texImage3D(gl.TEXTURE_3D, 0, stored, nz, ny, nx, 0, given, gl.FLOAT, values);
 }
 
-// The context of a canvas on a graphics card, or null: software is slower than the service.
-function contextOf(canvas) {
-  return canvas.getContext("webgl2", {
-    alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true, failIfMajorPerformanceCaveat: true,
-  });
-}
+// Names of renderers without a graphics card, which are slower than the service.
+const SOFTWARE = /SwiftShader|llvmpipe|softpipe|software|Basic Render/i;
 
 const release = (gl) => gl.getExtension("WEBGL_lose_context")?.loseContext();
 
 export function hasGraphicsCard() {
-  const gl = contextOf(document.createElement("canvas"));
-  if (gl) release(gl);
-  return gl !== null;
+  const gl = document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true });
+  if (!gl) return false;
+  const names = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
+  release(gl);
+  return !SOFTWARE.test(name);
 }
 
 // Draws views of a volume on a canvas. values, shape: coefficients of a filter of four nodes, Float32Array (x, y, z), with one
 // node before the first one and two after the last one along each axis; spacing: along each axis. Throws where WebGL2 is
-// missing, slow by its own account, or too small.
+// missing or too small.
 export function rayCaster(canvas, { values, shape, spacing, filter }) {
-  const gl = contextOf(canvas);
-  if (!gl) throw new Error("No WebGL2 on a graphics card");
+  const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true });
+  if (!gl) throw new Error("No WebGL2");
   if (Math.max(...shape) > gl.getParameter(gl.MAX_3D_TEXTURE_SIZE)) throw new Error("The volume is too large for WebGL2");
   const program = programOf(gl, filter);
   const cells = shape.map((count) => count - 3);
