@@ -56,7 +56,7 @@ parameters = {{ {ids} }}
 # The systematic requests of these, one a bound of each parameter, are a thousand, or draw large pictures.
 MANY = """
 [[operations]]
-include-path-regex = "/jobs$|[.]png$|^/v1/uploads$"
+include-path-regex = "/(jobs|plans)$|[.]png$|^/v1/uploads$"
 phases = { coverage = { enabled = false } }
 """
 
