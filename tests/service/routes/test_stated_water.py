@@ -60,7 +60,7 @@ def test_another_water_is_another_picture(http, here):
     assert after.status_code == 200
 
 
-@pytest.mark.parametrize("wrong", [-0.1, 95.1, "warm"])
+@pytest.mark.parametrize("wrong", [-0.1, 95.1, "warm", True, "31"])
 def test_a_temperature_without_a_speed_is_rejected(http, here, wrong):
     answer = http.patch(here, json={"water_temperature_c": wrong})
     assert (answer.status_code, answer.json()["field"]) == (422, "water_temperature_c")

@@ -25,6 +25,8 @@ class DatasetChanges(BaseModel):
         None,
         ge=WATER_C.least,
         le=WATER_C.most,
+        # true is no temperature.
+        strict=True,
         description="Temperature of the water, °C, for later reconstructions and views, in place of that of "
         "the file, which stays as it is; null: that of the file again.",
     )
