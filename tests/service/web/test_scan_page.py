@@ -6,6 +6,7 @@ from dataclasses import replace
 import httpx
 import numpy as np
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 from bentray_kernels.acquisition import speed_from_temperature
@@ -330,3 +331,8 @@ def test_without_a_water_shot_there_is_none_to_choose(page, serve, tmp_path):
     page.goto(f"{address}/#/scans/{sent['id']}")
     expect(page.locator("#shot-legend")).to_contain_text("the scan has no water shot")
     expect(page.locator("#shot-quantity")).to_be_hidden()
+    page.get_by_role("button", name="Edit name").click()
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        violations = Axe().run(page).response["violations"]
+        assert [one["id"] for one in violations if one["impact"] in ("serious", "critical")] == []

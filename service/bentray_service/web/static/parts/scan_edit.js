@@ -14,6 +14,8 @@ const FORM = `
     <label class="short"><span class="caption">Water temperature (°C)</span>
       <input name="water" type="number" min="0" max="95" step="any" placeholder="as in the file" aria-describedby="edit-water-words"></label>
     <p id="edit-water-words" class="facts"></p>
+    <p class="facts">A stored scan is in metres and seconds. If the lengths or times of its file were in other units, convert the file
+      again with them stated, as in <code>bentray convert scan.mat -o scan.h5 --unit mm --unit us</code>, and upload the result.</p>
     <div class="actions"><button type="submit">Save</button> <button id="edit-cancel" type="button" class="quiet">Cancel</button></div>
     <p id="edit-error" class="error" role="alert" hidden></p>
   </form>`;
