@@ -7,6 +7,7 @@ import { duration } from "./job_words.js";
 import { comparesModels, misfitCurve } from "./misfit_curve.js";
 import { previewPicture } from "./preview_picture.js";
 import { ProgressEstimate } from "./progress_estimate.js";
+import { methodOf } from "./results.js";
 import { loadTitles, titleOfJob } from "./titles.js";
 
 const TICK_MS = 500;
@@ -173,7 +174,8 @@ export function liveJob(root, first, onSuccess) {
     // Events carry the progress alone.
     if (next.seconds !== seconds) [seconds, received] = [next.seconds, performance.now()];
     job = next;
-    const [what, settings] = summaryOf(job);
+    const [summary, settings] = summaryOf(job);
+    const what = job.kind === "reconstruction" ? methodOf(job) : summary;
     say("h1", job.name || what);
     say(".live-facts", [titleOfJob(job), job.name ? `${what}: ${settings}` : settings].join(" · "));
     const now = performance.now();

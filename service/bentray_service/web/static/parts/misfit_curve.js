@@ -15,7 +15,7 @@ export function comparesModels(history) {
 export function misfitCurve(place) {
   const box = make("figure", "tile misfit");
   const hint = make("p", "hint", WAITING);
-  box.append(make("figcaption", "facts", "Misfit: measured minus predicted travel time, rms"), hint);
+  box.append(make("figcaption", "facts", "Misfit: measured minus predicted travel time, rms; of full waveforms the equivalent time shift"), hint);
   place.append(box);
   let drawn = 0;
 

@@ -1,7 +1,7 @@
 // How far a phase of a job is, moving evenly between two reports, and the time that is left.
 
 // Reports of the last seconds from which the rate is taken, and the share that only the next phase reaches.
-const WINDOW_S = 60;
+const WINDOW_S = 20;
 const FULL = 0.995;
 
 export class ProgressEstimate {
