@@ -119,6 +119,7 @@ def test_a_failure_is_explained(page, serve, scan, work):
         has_text="no finite speed at 3 nodes; accepted: smaller relaxation"
     )
     expect(reason).to_contain_text("Change this and run it again")
+    page.locator(".live-time").get_by_text("took ").wait_for()
     page.get_by_role("link", name="Examine the scan").click()
     page.get_by_role("heading", level=1, name="Sixteen elements").wait_for()
 

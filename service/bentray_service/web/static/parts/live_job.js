@@ -101,7 +101,7 @@ export function liveJob(root, first, onSuccess) {
     else bar.removeAttribute("value");
     const words = [];
     if (running && job.progress.total) words.push(`${Math.floor(100 * estimate.share(now))} % of this step`);
-    if (job.seconds !== null) words.push(`${duration(elapsed)} so far`);
+    if (job.seconds !== null) words.push(job.finished ? `took ${duration(elapsed)}` : `${duration(elapsed)} so far`);
     const planMinutes = job.plan?.minutes;
     const left = estimate.left(now) ?? (planMinutes ? Math.max(0, 60 * planMinutes - elapsed) : null);
     if (running && left !== null) words.push(`${leftInWords(left)}${PHASES[job.progress.phase] ? " of this step" : ""}`);
