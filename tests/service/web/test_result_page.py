@@ -303,7 +303,7 @@ def test_a_result_is_renamed(page, result):
     page.reload()
     expect(page.get_by_role("heading", level=1)).to_have_text("With the new water speed")
     page.get_by_role("navigation").get_by_role("link", name="Jobs").click()
-    page.locator(".job").get_by_role("link", name="With the new water speed").wait_for()
+    page.get_by_role("main").get_by_role("link", name="With the new water speed").wait_for()
 
 
 def test_provenance_is_told_in_words_and_copied_as_json(page, result):
