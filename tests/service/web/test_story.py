@@ -53,7 +53,7 @@ def enter(page, service, tenant):
     page.goto(service.url)
     page.get_by_label("API key").fill(service.keys[tenant])
     page.get_by_role("button", name="Use key").click()
-    page.get_by_text(f"Tenant {tenant} (").wait_for()
+    page.get_by_text(f"Tenant {tenant}", exact=True).wait_for()
 
 
 def dropped(page, scan, folder):

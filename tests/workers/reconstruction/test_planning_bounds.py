@@ -95,7 +95,8 @@ def test_the_largest_dataset_is_planned_in_as_many_steps_as_a_small_one(way):
     few, _ = steps(lambda: planned(SMALL, settings))
     many, taken = steps(lambda: planned(LARGEST, settings))
     assert many <= 1.5 * few
-    assert many < 20_000
+    # Mostly the checks of settings: the time of each candidate of auto is counted too.
+    assert many < 60_000
     assert taken < MIB
 
 
@@ -109,7 +110,8 @@ def test_rejecting_the_largest_dataset_takes_few_steps(way):
             plan(LARGEST.summary(settings), settings, little)
 
     many, taken = steps(refused)
-    assert many < 20_000
+    # Mostly the checks of settings: the time of each candidate of auto is counted too.
+    assert many < 60_000
     assert taken < 2 * MIB
 
 
