@@ -18,9 +18,9 @@ from bentray_kernels.refraction.caster_opencl import on_the_device as caster_on_
 from bentray_kernels.splines import Spline
 from bentray_kernels.splines.sampling_opencl import OpenCLSpline
 from bentray_kernels.splines.sampling_opencl import on_the_device as spline_on_the_device
+from bentray_kernels.wave.emissions import Emissions, misfit_gradients, simulate_emissions
+from bentray_kernels.wave.emissions import Engine as WaveEngine
 from bentray_kernels.wave.medium import Medium
-from bentray_kernels.wave.simulation import simulate
-from bentray_kernels.wave.simulation_opencl import simulate_opencl
 
 from ..geometry_field._geometry_scenes import SCENES
 from ..refraction._refracting_ball import board, camera, scene, signed_distance
@@ -58,7 +58,8 @@ def engines(quick: bool) -> Iterator[Engine]:
     """The engines, each built when its turn comes."""
     yield projection(64 if quick else 256, 1)
     yield projection(64 if quick else 256, 4 if quick else 64)
-    yield wave(100 if quick else 400, 100 if quick else 800)
+    yield traces(60 if quick else 212, 100 if quick else 800, 2 if quick else 8)
+    yield gradients(60 if quick else 212, 100 if quick else 800, 2 if quick else 8)
     yield spline(10_000 if quick else 1_000_000)
     yield glass(64 if quick else 512)
     yield field(64 if quick else 512)
@@ -83,28 +84,69 @@ def projection(nodes: int, sources: int) -> Engine:
     )
 
 
-def wave(nodes: int, steps: int) -> Engine:
-    """Traces of one emitter in float32."""
-    spacing, step = 5e-4, 1e-7
-    speed = np.random.default_rng(0).uniform(1400.0, 1600.0, (nodes, nodes))
-    medium = Medium.of(speed, spacing, step, edge_nodes=10, dtype=np.float32)
-    time = step * np.arange(steps)
-    pulse = np.exp(-(((time - 6e-6) * 3e5) ** 2)) * np.sin(2e6 * np.pi * 0.3 * (time - 6e-6))
-    middle = 0.5 * (nodes - 1) * spacing
-    emitter = np.array([middle, middle])
-    receivers = middle + 0.3 * middle * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+def traces(nodes: int, steps: int, emitters: int) -> Engine:
+    """Traces of emitters on a ring, float32."""
+    medium, emissions = wave_scan(nodes, steps, emitters)
+    work = float(emitters * steps * medium.keep.size)
+
+    def simulated(engine: WaveEngine) -> Floats:
+        return np.stack(list(simulate_emissions(medium, emissions, engine=engine)))
+
     return Engine(
-        f"wave step, {nodes}², {steps} steps",
-        lambda: simulate(medium, emitter, receivers, pulse),
-        lambda: simulate_opencl(medium, emitter, receivers, pulse),
-        float(steps * nodes**2),
+        f"waves forwards, {emitters} of {nodes}², {steps} steps",
+        lambda: simulated("compiled"),
+        lambda: simulated("opencl"),
+        work,
         "node updates",
-        # Two fields and three factors of the medium are read, one field is written.
-        6.0 * 4.0 * steps * nodes**2,
+        STEP_BYTES * work,
         relative,
         "of the largest",
         1e-5,
     )
+
+
+def gradients(nodes: int, steps: int, emitters: int) -> Engine:
+    """Gradients of emitters on a ring by the speed, float32, every fourth field stored."""
+    medium, emissions = wave_scan(nodes, steps, emitters)
+    updates, stored = float(emitters * steps * medium.keep.size), emitters * steps / 4 * nodes**2
+
+    def energy(k: int, samples: Floats) -> tuple[float, Floats]:
+        return 0.5 * float((samples**2).sum()), samples
+
+    def summed(engine: WaveEngine) -> Floats:
+        parts = misfit_gradients(medium, emissions, energy, 4, engine=engine)
+        return np.stack([part.gradient for part in parts])
+
+    return Engine(
+        f"waves and adjoint, {emitters} of {nodes}², {steps} steps",
+        lambda: summed("compiled"),
+        lambda: summed("opencl"),
+        2.0 * updates,
+        "node updates",
+        # A stored field is written and read, the adjoint read, image and illumination read and written.
+        2.0 * STEP_BYTES * updates + 7.0 * 4.0 * stored,
+        relative,
+        "of the largest",
+        1e-4,
+    )
+
+
+# Of a node in a step in float32: two fields are read and one is written; the three factors of the medium are
+# the same for all emitters and remain in a cache.
+STEP_BYTES = 12.0
+
+
+def wave_scan(nodes: int, steps: int, emitters: int) -> tuple[Medium, Emissions]:
+    """A random medium, and emitters on a ring of 64 receivers."""
+    spacing, step = 5e-4, 1e-7
+    speed = np.random.default_rng(0).uniform(1400.0, 1600.0, (nodes, nodes))
+    medium = Medium.of(speed, spacing, step, dtype=np.float32)
+    time = step * np.arange(steps)
+    pulse = np.exp(-(((time - 6e-6) * 3e5) ** 2)) * np.sin(2e6 * np.pi * 0.3 * (time - 6e-6))
+    angle = 2.0 * np.pi * np.arange(64) / 64
+    ring = spacing * (0.5 * (nodes - 1) + 0.45 * nodes * np.column_stack((np.cos(angle), np.sin(angle))))
+    senders = ring[np.linspace(0, 64, emitters, endpoint=False).astype(int)]
+    return medium, Emissions(senders, ring, [np.arange(64)] * emitters, pulse)
 
 
 def spline(points: int) -> Engine:

@@ -30,6 +30,7 @@ class Session:
         self.context = cl.Context([self.handle])
         self.queue = cl.CommandQueue(self.context)
         self._kernels: dict[tuple[tuple[str, ...], str, tuple[str, ...]], Any] = {}
+        self._programs: dict[tuple[tuple[str, ...], tuple[str, ...]], Any] = {}
 
     def kernel(self, sources: tuple[str, ...], name: str, *defines: str) -> Any:
         """A kernel of the files ``sources/<source>.cl``, built as one program on first use.
@@ -39,20 +40,26 @@ class Session:
             name: name of the kernel.
             defines: ``NAME=VALUE`` for the compiler.
         """
-        import pyopencl as cl
-
         key = (sources, name, defines)
         if key not in self._kernels:
+            self._kernels[key] = self.own_kernel(sources, name, *defines)
+        return self._kernels[key]
+
+    def own_kernel(self, sources: tuple[str, ...], name: str, *defines: str) -> Any:
+        """As ``kernel``, but a new one of the caller's own, whose arguments nobody else sets."""
+        import pyopencl as cl
+
+        key = (sources, defines)
+        if key not in self._programs:
             text = "".join(_named(source) for source in sources)
             with warnings.catch_warnings():
                 # Compiler remarks about programs that pass the self-test.
                 warnings.simplefilter("ignore", cl.CompilerWarning)
                 # Drivers cache programs themselves; pyopencl's own cache warns under load.
-                program = cl.Program(self.context, text).build(
+                self._programs[key] = cl.Program(self.context, text).build(
                     [f"-D{define}" for define in defines], cache_dir=False
                 )
-            self._kernels[key] = cl.Kernel(program, name)
-        return self._kernels[key]
+        return cl.Kernel(self._programs[key], name)
 
     def upload(self, array: Any) -> Any:
         """A buffer on the device with a copy of a C-ordered array."""
@@ -66,6 +73,23 @@ class Session:
         import pyopencl as cl
 
         return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size_bytes)
+
+    def zeros(self, count: int, dtype: Any) -> Any:
+        """A buffer on the device with ``count`` zeros of a type."""
+        import pyopencl as cl
+
+        zero = np.zeros(1, dtype)
+        buffer = self.reserve(count * zero.itemsize)
+        cl.enqueue_fill_buffer(self.queue, buffer, zero, 0, count * zero.itemsize)
+        return buffer
+
+    def mark(self) -> Any:
+        """The event that all launched kernels have finished; the device begins with them."""
+        import pyopencl as cl
+
+        marker = cl.enqueue_marker(self.queue)
+        self.queue.flush()
+        return marker
 
     def download(self, array: Any, buffer: Any, offset_bytes: int = 0) -> None:
         """Fill ``array`` from a buffer after all launched kernels have finished."""

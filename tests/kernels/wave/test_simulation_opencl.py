@@ -37,7 +37,7 @@ def test_without_a_device_the_cpu_computes_with_a_warning(monkeypatch):
     choice._warn_once.cache_clear()
     host = medium(np.float32)
     try:
-        with pytest.warns(OpenCLFallbackWarning, match="simulate"):
+        with pytest.warns(OpenCLFallbackWarning, match="compiled code"):
             found = simulate_opencl(host, EMITTER, RECEIVERS, WAVELET)
     finally:
         choice._found.cache_clear()

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from ...arrays import Floats, Ints
-from ...wave.adjoint import misfit_gradient
-from ...wave.simulation import simulate
+from ...wave.emissions import Emissions, misfit_gradients, simulate_emissions
 from .lbfgs import append_pair, search_direction
 from .waveform_problem import WaveProblem
 from .waveform_settings import Steps, WaveSettings
@@ -127,23 +125,40 @@ def emitters(problem: WaveProblem) -> Ints:
 
 def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: Ints) -> EmitterMisfit:
     """Misfit of some of ``emitters(problem)``, and its gradient by the band's unknown."""
-    held_out = set(problem.held.tolist())
     medium, by = problem.medium(model.speed, model.attenuation), problem.band.of
-    wavelet = problem.wavelet if model.wavelet is None else model.wavelet
     measure = settings.measure(by)
-    misfit, held = 0.0, 0.0
-    gradient, illumination = np.zeros_like(model.speed), np.zeros_like(model.speed)
-    for emitter in some.tolist():
+    held_out = np.isin(some, problem.held)
+
+    def emissions(emitters: Ints) -> Emissions:
+        valid = [problem.valid_receivers(emitter) for emitter in emitters.tolist()]
+        wavelet = problem.wavelet if model.wavelet is None else model.wavelet
+        return Emissions(problem.emitters[emitters], problem.receivers, valid, wavelet)
+
+    def compare(emitter: int, traces: Floats) -> tuple[float, Floats]:
         valid = problem.valid_receivers(emitter)
-        recorded = problem.recorded(emitter, valid)
         window = problem.window(emitter, valid, settings.window_s)
-        at, receivers = problem.emitters[emitter], problem.receivers[valid]
-        if emitter in held_out:
-            traces = simulate(medium, at, receivers, wavelet, poll=problem.poll)
-            held += measure(traces, recorded, window)[0]
-            continue
-        compare = partial(measure, recorded=recorded, weight=window)
-        one = misfit_gradient(medium, at, receivers, wavelet, compare, problem.every, by, problem.poll)
+        return measure(traces, problem.recorded(emitter, valid), window)
+
+    held = 0.0
+    validated = emissions(some[held_out])
+    for emitter, traces in zip(
+        some[held_out].tolist(),
+        simulate_emissions(medium, validated, problem.poll, settings.engine),
+        strict=True,
+    ):
+        held += compare(emitter, traces)[0]
+    misfit = 0.0
+    gradient, illumination = np.zeros_like(model.speed), np.zeros_like(model.speed)
+    used = some[~held_out].tolist()
+    for one in misfit_gradients(
+        medium,
+        emissions(some[~held_out]),
+        lambda k, traces: compare(used[k], traces),
+        problem.every,
+        by,
+        problem.poll,
+        settings.engine,
+    ):
         misfit += one.misfit
         gradient += one.gradient
         illumination += one.illumination

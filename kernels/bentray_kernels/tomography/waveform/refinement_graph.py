@@ -11,6 +11,7 @@ from scipy.ndimage import map_coordinates
 
 from ...arrays import Floats
 from ...task_graph import Task
+from ...wave.emissions import Engine
 from ...wave.simulation import Unknown
 from ..result import Iteration
 from . import band_inversion
@@ -20,6 +21,9 @@ from .iterations import iteration_records
 from .source_estimation import estimate_source
 from .waveform_problem import WaveProblem
 from .waveform_settings import WaveSettings
+
+# Emitters of a task by engine: a device has many in flight.
+EMITTERS_OF_A_TASK: dict[Engine, int] = {"compiled": 1, "opencl": 64}
 
 # Bands whose simulated water shots have a lower correlation with the recorded ones are skipped: their waves
 # are too long for the array and its absorbing edges, or were not emitted.
@@ -87,7 +91,7 @@ class RefinementGraph:
             return finished
         settings = self._scan.settings()
         passes = settings.bands[self.number].emitters + settings.held_out
-        passes = passes * len(self._band.state.history) + len(self._misfits)
+        passes = passes * len(self._band.state.history) + len(self._misfits) * self._emitters_of_a_task
         return finished + min(passes, self._sizes[self.number])
 
     @property
@@ -130,10 +134,10 @@ class RefinementGraph:
             return []
         if self._band is None:
             return [Task(start_band, (self._scan, self.number, self.image))]
-        model = self._band.model
+        model, number = self._band.model, self._emitters_of_a_task
         return [
-            Task(evaluate_emitter, (self._scan, self.number, model, place), keep_on_worker=True)
-            for place in range(self._band.emitters)
+            Task(evaluate_emitter, (self._scan, self.number, model, place, number), keep_on_worker=True)
+            for place in range(0, self._band.emitters, number)
         ]
 
     def after(self, task: Task, result: Any) -> list[Task]:
@@ -145,8 +149,8 @@ class RefinementGraph:
             return self.first()
         assert self._band is not None
         if task.function is evaluate_emitter:
-            self._misfits[task.arguments[-1]] = result
-            if len(self._misfits) < self._band.emitters:
+            self._misfits[task.arguments[3]] = result
+            if len(self._misfits) * self._emitters_of_a_task < self._band.emitters:
                 return []
             # In the order of the emitters, not of completion: floating-point sums depend on it.
             parts = [part for _, part in sorted(self._misfits.items())]
@@ -163,6 +167,10 @@ class RefinementGraph:
             while result.skipped and not self.over and self._of == "speed":
                 self.ends = (*self.ends, BandEnd(self.image, skipped=True, history=()))
         return self.first()
+
+    @property
+    def _emitters_of_a_task(self) -> int:
+        return EMITTERS_OF_A_TASK[self._scan.settings().engine]
 
     @property
     def _of(self) -> Unknown:
@@ -192,12 +200,11 @@ def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
     return ActiveBand(band_inversion.begin(np.zeros_like(speed)), problem.origin, count, speed, wavelet)
 
 
-def evaluate_emitter(scan: WaveScan, number: int, model: Model, place: int) -> EmitterMisfit:
-    """Task: misfit and gradient of one emitter, by its place among the band's emitters."""
+def evaluate_emitter(scan: WaveScan, number: int, model: Model, place: int, count: int = 1) -> EmitterMisfit:
+    """Task: misfit and gradient of some emitters, by their places among the band's emitters."""
     problem = scan.problem(number)
-    return band_inversion.evaluate(
-        problem, scan.settings(), model, band_inversion.emitters(problem)[place : place + 1]
-    )
+    some = band_inversion.emitters(problem)[place : place + count]
+    return band_inversion.evaluate(problem, scan.settings(), model, some)
 
 
 def update_image(

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from ...errors import InvalidInput
 from ...limits import SPACING_M, SPEED_MPS
 from ...ranges import SEED, Range, check_ranges, ranged
+from ...wave.emissions import Engine
 from ...wave.simulation import Unknown
 from .misfits import Misfit, correlation, least_squares
 
@@ -117,6 +118,7 @@ class WaveSettings:
         roi: whether only the dataset's region of interest may change (``mask/roi``).
         opening_angle_deg: pairs outside this angle are left out, see ``directivity``; None: no pair is.
         estimates_source: whether the source is estimated anew in each band from the traces of the object.
+        engine: that simulates the waves.
     """
 
     bands: tuple[Band, ...]
@@ -131,6 +133,7 @@ class WaveSettings:
     roi: bool = False
     opening_angle_deg: float | None = None
     estimates_source: bool = False
+    engine: Engine = "compiled"
 
     def __post_init__(self) -> None:
         if not self.bands:

@@ -1,0 +1,197 @@
+"""Traces and gradients of many emissions of one scan, by compiled code or on an OpenCL device."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints
+from ..errors import InvalidInput
+from .adjoint import MisfitGradient, gradient_of, misfit_gradient
+from .medium import Medium
+from .points import Points
+from .simulation import Unknown, check_2d, forward, place_scan
+from .time_blocks import Poll, no_poll
+
+if TYPE_CHECKING:
+    from ..opencl.session import Session
+    from .device_waves import DeviceWaves
+
+# What simulates the waves.
+Engine = Literal["compiled", "opencl"]
+
+# The misfit of the k-th emission's traces, (receivers, nt): its value, and its derivative by every sample.
+EmissionMisfit = Callable[[int, NDArray[Any]], tuple[float, Floats]]
+
+
+class Emissions(NamedTuple):
+    """Emissions with the same receivers and the same source.
+
+    Attributes:
+        emitters: (k, 2), m, node 0 of the image at 0.
+        receivers: (nrx, 2), m.
+        valid: for each emission the indices of the receivers whose traces are used.
+        wavelet: (nt,), as for ``simulate``.
+    """
+
+    emitters: Floats
+    receivers: Floats
+    valid: Sequence[Ints]
+    wavelet: Floats
+
+
+def simulate_emissions(
+    medium: Medium,
+    emissions: Emissions,
+    poll: Poll = no_poll,
+    engine: Engine = "compiled",
+    memory_bytes: float = math.inf,
+) -> Iterator[NDArray[Any]]:
+    """Traces of each emission, (its receivers, nt), in their order.
+
+    On a device many emissions are in flight; the traces of each have the same bits however many they are.
+    They differ from those of compiled code by less than 1e-5 of the largest sample in float32.
+
+    Args:
+        medium: 2-D.
+        emissions: what is simulated.
+        poll: see ``time_blocks``.
+        engine: ``opencl`` for the device of ``opencl.choice``.
+        memory_bytes: limit of the fields of emissions in flight on a device, beside its own memory.
+
+    Raises:
+        InvalidInput: as ``simulate``; a 3-D medium; for a device that cannot hold one emission, and where
+            ``BENTRAY_OPENCL_DEVICE`` does not match one device.
+
+    Warns:
+        OpenCLFallbackWarning: once, where no device passes its self-test and compiled code is used instead.
+    """
+    sources, receivers = _placed(medium, emissions)
+    session = _session(engine) if len(emissions.emitters) else None
+    if session is None:
+        for source, valid in zip(_each(sources), emissions.valid, strict=True):
+            yield forward(medium, source, _some(receivers, valid), emissions.wavelet, 0, poll=poll)[0]
+        return
+    from .device_waves import DeviceWaves, Scan
+
+    waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
+    pulse, scale = _normalised(emissions.wavelet)
+    for tile in waves.tiles(len(emissions.emitters), memory_bytes):
+        traces, _ = waves.forward(Points(sources.first[tile], sources.weights[tile]), pulse, poll)
+        for samples, valid in zip(traces, emissions.valid[tile], strict=True):
+            yield _of_receivers(samples, valid, scale)
+
+
+def misfit_gradients(
+    medium: Medium,
+    emissions: Emissions,
+    misfit: EmissionMisfit,
+    every: int = 1,
+    by: Unknown = "speed",
+    poll: Poll = no_poll,
+    engine: Engine = "compiled",
+    memory_bytes: float = math.inf,
+) -> Iterator[MisfitGradient]:
+    """Misfit and gradient of each emission, in their order; see ``misfit_gradient``.
+
+    On a device an emission's gradient has the same bits on every run, however many emissions are in flight.
+    It differs from that of compiled code by less than 1e-4 of its largest value in float32.
+
+    Args:
+        medium: 2-D.
+        emissions: what is simulated.
+        misfit: of the traces of an emission.
+        every: time steps between stored fields.
+        by: variable of the gradient.
+        poll, engine, memory_bytes: as ``simulate_emissions``.
+
+    Raises:
+        InvalidInput: as ``simulate_emissions``; a step between fields below 1.
+    """
+    if every < 1:
+        raise InvalidInput("every", every, "at least 1 step")
+    sources, receivers = _placed(medium, emissions)
+    session = _session(engine) if len(emissions.emitters) else None
+    if session is None:
+        for k, (emitter, valid) in enumerate(zip(emissions.emitters, emissions.valid, strict=True)):
+            at = emissions.receivers[valid]
+
+            def compare(traces: NDArray[Any], k: int = k) -> tuple[float, Floats]:
+                return misfit(k, traces)
+
+            yield misfit_gradient(medium, emitter, at, emissions.wavelet, compare, every, by, poll)
+        return
+    from .device_waves import DeviceWaves, Scan
+
+    waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size, every, by))
+    for tile in waves.tiles(len(emissions.emitters), memory_bytes):
+        yield from _tile_gradients(waves, medium, emissions, misfit, tile, sources, every, by, poll)
+
+
+def _tile_gradients(
+    waves: DeviceWaves,
+    medium: Medium,
+    emissions: Emissions,
+    misfit: EmissionMisfit,
+    tile: slice,
+    sources: Points,
+    every: int,
+    by: Unknown,
+    poll: Poll,
+) -> Iterator[MisfitGradient]:
+    """The gradients of the emissions that are in flight together."""
+    pulse, loudest = _normalised(emissions.wavelet)
+    traces, stored = waves.forward(Points(sources.first[tile], sources.weights[tile]), pulse, poll)
+    residuals = np.zeros_like(traces)
+    values, scales = [], []
+    for k, (samples, valid) in enumerate(zip(traces, emissions.valid[tile], strict=True)):
+        value, residual = misfit(tile.start + k, _of_receivers(samples, valid, loudest))
+        scale = float(np.abs(residual).max(initial=0.0))
+        residuals[k][:, valid] = (residual / (scale or 1.0)).T
+        values.append(value)
+        scales.append(scale)
+    images, lights = waves.backward(residuals, stored, poll)
+    for value, scale, image, light in zip(values, scales, images, lights, strict=True):
+        summed = scale * image.astype(np.float64)
+        yield gradient_of(medium, emissions.wavelet, value, summed, light.astype(np.float64), every, by)
+
+
+def _session(engine: Engine) -> Session | None:
+    if engine == "compiled":
+        return None
+    # Imported here, so that OpenCL is loaded only when it is used.
+    from ..opencl.choice import session_or_warning
+
+    return session_or_warning(instead="compiled code")
+
+
+def _placed(medium: Medium, emissions: Emissions) -> tuple[Points, Points]:
+    """Emitters and receivers on the medium's grid."""
+    check_2d(medium)
+    return place_scan(medium, emissions.emitters, emissions.receivers, emissions.wavelet)
+
+
+def _each(points: Points) -> Iterator[Points]:
+    for k in range(len(points.first)):
+        yield _some(points, np.array([k]))
+
+
+def _some(points: Points, indices: Ints) -> Points:
+    return Points(points.first[indices], points.weights[indices])
+
+
+def _normalised(wavelet: Floats) -> tuple[Floats, float]:
+    """The wavelet over its largest magnitude, and that magnitude."""
+    scale = float(np.abs(wavelet).max())
+    return wavelet / scale, scale
+
+
+def _of_receivers(samples: NDArray[Any], valid: Ints, scale: float) -> NDArray[Any]:
+    """Traces of the valid receivers, (receivers, nt), from those of all, (nt, receivers)."""
+    traces = np.ascontiguousarray(samples[:, valid].T)
+    traces *= samples.dtype.type(scale)
+    return traces
