@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any
+from difflib import get_close_matches
+from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.settings import NUMERICAL, PLACES, Settings
 from bentray_kernels.tomography.stored_settings import REMOVED, RENAMED
 
-ADAPTER: TypeAdapter[Settings] = TypeAdapter(Settings)
+Record = TypeVar("Record")
+_ADAPTERS: dict[type, TypeAdapter[Any]] = {}
 
 
 def check_setting_names(settings: Any, kind: type[Any] = Settings, place: str = "") -> Any:
@@ -24,14 +27,15 @@ def check_setting_names(settings: Any, kind: type[Any] = Settings, place: str = 
         place: before the names in the error.
 
     Raises:
-        InvalidInput: naming the first unknown field, and what to use instead.
+        InvalidInput: naming the first unknown field, and what to use instead or the name spelt most like it.
     """
     known = {field.name: field.default for field in fields(kind)}
     for name, value in settings.items() if isinstance(settings, Mapping) else ():
         inner = is_dataclass(known.get(name))
         if name not in known or (inner and isinstance(value, bool)):
             instead = _replacement(name) if kind is Settings else ""
-            accepted = instead or "a known setting: " + ", ".join(known)
+            others = PLACES.values() if kind is Settings else (f"{place}{one}" for one in known)
+            accepted = instead or known_setting(place + str(name), others, ", ".join(known))
             raise InvalidInput(place + str(name), repr(value)[:80], accepted)
         if inner:
             check_setting_names(value, type(known[name]), f"{place}{name}.")
@@ -49,10 +53,32 @@ def _replacement(name: str) -> str:
     return f"{PLACES[new]}, which replaces it" if new in PLACES else ""
 
 
+def known_setting(name: str, names: Iterable[str], known: str) -> str:
+    """The accepted names in words, first the one that is spelt most like an unknown name.
+
+    Args:
+        name: the unknown one.
+        names: what it may be meant for.
+        known: the list to show.
+    """
+    # A person writes the last part of ``sart.relaxation`` alone.
+    by_spelling = {spelt: one for one in names for spelt in (one.rpartition(".")[2], one)}
+    near = get_close_matches(name, by_spelling, 1)
+    meant = f"{by_spelling[near[0]]} is spelt like it; " if near else ""
+    return f"{meant}a known setting: {known}"
+
+
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by the names of ``PLACES`` as the nested record has them."""
+    """Values by the names of ``PLACES`` as the nested record has them.
+
+    Raises:
+        InvalidInput: naming the first unknown name, and what to use instead or the name spelt most like it.
+    """
     settings: dict[str, Any] = {}
     for name, value in values.items():
+        if name not in PLACES:
+            accepted = _replacement(name) or known_setting(name, PLACES, ", ".join(PLACES))
+            raise InvalidInput(name, repr(value)[:80], accepted)
         record, _, leaf = PLACES[name].rpartition(".")
         (settings.setdefault(record, {}) if record else settings)[leaf] = value
     return settings
@@ -64,11 +90,29 @@ def settings_of(values: Mapping[str, Any]) -> Settings:
     Raises:
         InvalidInput: naming the first setting that is unknown or wrong, its value and what is accepted.
     """
+    return record_of(Settings, values)
+
+
+def record_of(kind: type[Record], values: Mapping[str, Any]) -> Record:
+    """As ``settings_of`` for any dataclass of settings."""
     try:
-        return ADAPTER.validate_python(check_setting_names(dict(values)))
+        return _adapter(kind)(check_setting_names(dict(values), kind))
     except ValidationError as error:
         # Loads FastAPI, which nothing else here needs.
         from .web.errors import fault_of
 
         fault = fault_of(error.errors()[0])
         raise InvalidInput(fault.field, fault.found, fault.accepted) from None
+
+
+def plain_numbers(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The same values with Python's numbers in place of those of NumPy, which JSON does not know."""
+    return {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
+
+
+def _adapter(kind: type[Record]) -> Callable[[Any], Record]:
+    """Makes a record of plain values; each kind is analysed once."""
+    if kind not in _ADAPTERS:
+        _ADAPTERS[kind] = TypeAdapter(kind)
+    validate: Callable[[Any], Record] = _ADAPTERS[kind].validate_python
+    return validate

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.export.suffixes import COMPRESSED, SUFFIXES
 
-from .export import SUFFIXES, AttenuationFrequency, AttenuationUnit, Quantity
+from .export import AttenuationFrequency, AttenuationUnit, Quantity
 from .options.paths import output_file
 from .output.exit_codes import client_errors
 from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
@@ -45,8 +46,12 @@ def download(
     """
     formats: dict[str, Format] = {".h5": "hdf5", ".hdf5": "hdf5"}
     if stored.startswith("vol-"):
-        # A service sends OME-Zarr as a zip.
-        formats = {suffix: cast("Format", name) for suffix, name in SUFFIXES.items() if suffix != ".zarr"}
+        # A service sends OME-Zarr as a zip, and NIfTI uncompressed.
+        formats = {
+            suffix: cast("Format", name)
+            for suffix, name in SUFFIXES.items()
+            if suffix not in (".zarr", COMPRESSED)
+        }
     elif not stored.startswith("ds-"):
         raise InvalidInput("id", repr(stored), "the id of a scan (ds-…) or a volume (vol-…)")
     names: dict[str, Format] = {**{one: one for one in formats.values()}, "h5": "hdf5"}

@@ -9,25 +9,11 @@ from typing import Annotated
 import typer
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.export.suffixes import format_of
 
 from .options.paths import check_apart, input_file, output_file
 from .output.terminal import AsJson, print_json, print_lines
 
-# Formats by suffix; OME-Zarr is a folder or a zip.
-SUFFIXES = {
-    ".h5": "hdf5",
-    ".hdf5": "hdf5",
-    ".npy": "npy",
-    ".nii": "nifti",
-    ".nrrd": "nrrd",
-    ".mha": "metaimage",
-    ".mat": "mat",
-    ".vti": "vti",
-    ".zarr": "ome-zarr",
-    ".ozx": "ome-zarr",
-    ".zip": "ome-zarr",
-    ".dcm": "dicom",
-}
 ACCEPTED = "a reconstruction.h5, its folder, or a volume of Bentray in HDF5"
 
 Quantity = Annotated[
@@ -51,15 +37,13 @@ def export(
 ) -> None:
     """Write a result in the format of another program; the suffix of OUTPUT selects it.
 
-    .h5 HDF5, .npy NumPy, .nii NIfTI, .nrrd NRRD, .mha MetaImage, .mat MATLAB, .vti VTK ImageData (ParaView),
-    .zarr, .ozx or .zip OME-Zarr 0.5 (a folder, or a zip), .dcm DICOM Parametric Map.
+    .h5 HDF5, .npy NumPy, .nii or .nii.gz NIfTI, .nrrd NRRD, .mha MetaImage, .mat MATLAB, .vti VTK ImageData
+    (ParaView), .zarr, .ozx or .zip OME-Zarr 0.5 (a folder, or a zip), .dcm DICOM Parametric Map.
 
     Example:  bentray export result/reconstruction.h5 -o speed.nii
     """
     source = input_file(result / "reconstruction.h5" if result.is_dir() else result, ACCEPTED)
-    name = SUFFIXES.get(output.suffix.lower())
-    if name is None:
-        raise InvalidInput("output", output, "a name ending in " + ", ".join(SUFFIXES))
+    name = format_of(output)
     if output.suffix.lower() == ".zarr" and output.exists():
         raise InvalidInput("output", f"{output} (exists)", "a new folder, or a .zip with --force")
     target = output_file(output, force=force)

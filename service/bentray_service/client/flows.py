@@ -10,11 +10,12 @@ from typing import Any, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel
 
+from ..interactive.result import Result
 from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from ..routes.models.surface_records import MeshRecord
 from .connection import Connection
 from .errors import ClientError
-from .results import Result, read_result
+from .results import read_result
 from .steps import DownloadStep, Flow, RequestStep
 from .uploading import PLACES, OnBytes, UploadKind, send_file
 from .waiting import wait_for

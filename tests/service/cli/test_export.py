@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from bentray_service.cli.export import SUFFIXES
+from bentray_workers.files.export.suffixes import SUFFIXES
 from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
 from bentray_workers.files.volume_export import FORMATS
 

@@ -1,12 +1,9 @@
-"""Results as arrays: places, units, provenance, and the same as a dataset of xarray."""
-
-import sys
+"""Results of a service as arrays: places, units and provenance, as of a reconstruction in this process."""
 
 import numpy as np
 import pytest
 
-from bentray_service.client import Client, ClientError
-from bentray_service.client.results import Result
+from bentray_service.client import Client
 
 
 @pytest.fixture
@@ -18,23 +15,22 @@ def result(serve, work, scan):
 
 def test_a_reconstruction_has_places_units_and_provenance(result):
     assert result.axes == ("x", "y")
-    assert result.values["speed"].max() == 1540.0
+    assert result.speed.max() == 1540.0
     assert set(result.values) == {"speed", "coverage"}
     np.testing.assert_allclose(result.coordinates["x"], -0.01 + 1e-3 * np.arange(16))
     assert result.units == {"speed": "m/s", "coverage": "m"}
     assert result.attributes["bentray"] == "test"
     assert result.attributes["title"] == "Sixteen elements"
+    assert result.attributes["id"].startswith("vol-")
+    assert result.settings.nodes == 16
 
 
-def test_xarray_finds_a_place(result):
-    found = result.to_xarray()
-    assert found.speed.dims == ("x", "y")
-    assert (found.speed.attrs, found.x.attrs) == ({"units": "m/s"}, {"units": "m"})
-    assert found.attrs["bentray"] == "test"
-    assert float(found.speed.sel(x=-0.01, y=-0.01, method="nearest")) == result.values["speed"][0, 0]
-
-
-def test_missing_xarray_is_reported(monkeypatch):
-    monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(ClientError, match="pip install"):
-        Result((), {}, {}, {}).to_xarray()
+def test_an_uploaded_volume_keeps_its_unit_and_places(serve, work, tmp_path):
+    values = np.arange(60, dtype=np.float32).reshape(3, 4, 5)
+    np.save(tmp_path / "cube.npy", values)
+    with Client(serve()) as client:
+        record = client.upload(tmp_path / "cube.npy", kind="volume", spacing_m="0.002", title="Cube")
+        result = client.result(record.id)
+    np.testing.assert_array_equal(result.values["value"], values)
+    assert (result.units, result.attributes["title"]) == ({"value": ""}, "Cube")
+    np.testing.assert_allclose(result.coordinates["z"], 2e-3 * np.arange(5))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import FREQUENCY_HZ
+from bentray_kernels.tomography import Reconstruction
 
 from .atomic import atomic_replace
 from .export.dicom_writing import write_dicom
@@ -26,7 +27,7 @@ from .export.ome_zarr_writing import write_ome_zarr
 from .export.vti_writing import write_vti
 from .hdf5_reading import Limits, opened
 from .reconstruction import IMAGES, read_reconstruction
-from .volume import FORMAT, read_volume
+from .volume import FORMAT, Volume, read_volume
 
 SPEED, ATTENUATION, ATTENUATION_DB = "speed_mps", "attenuation_np_m", "attenuation_db_cm_mhz"
 UNITS = {
@@ -135,14 +136,9 @@ def export_volume(volume: Path, *, target: Path, name: str, selection: Selection
             the field of the selection, for a quantity that the volume does not have.
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with opened(volume, Limits()) as reader:
-        uploaded = reader.text("", "format") == FORMAT
-    chosen = selection or Selection()
-    if uploaded and chosen != Selection():
-        found = f"{chosen.quantity}, {chosen.attenuation}"
-        raise InvalidInput("quantity", found, "none: an uploaded volume has values only")
+    image = read_image(volume)
     try:
-        FORMATS[name].write(target, _uploaded(volume) if uploaded else _reconstructed(volume, chosen))
+        export_image(image, target=target, name=name, selection=selection, seconds=volume.stat().st_mtime)
     except FileNotFoundError:
         # Deleting a volume removes its file and its exports, also unfinished ones.
         if not target.parent.is_dir():
@@ -150,14 +146,52 @@ def export_volume(volume: Path, *, target: Path, name: str, selection: Selection
         raise InvalidInput("volume", "one that was deleted during its export", "one that stays") from None
 
 
-def _uploaded(volume: Path) -> Content:
-    own = read_volume(volume)
-    images = {"values": own.values}
-    return Content(own.values, own.spacing_m, own.origin_m, own.title, images, volume.stat().st_mtime)
+def read_image(path: Path) -> Reconstruction | Volume:
+    """Read the file of a reconstruction or of a volume.
+
+    Raises:
+        InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.
+    """
+    with opened(path, Limits()) as reader:
+        uploaded = reader.text("", "format") == FORMAT
+    return read_volume(path) if uploaded else read_reconstruction(path)
 
 
-def _reconstructed(volume: Path, chosen: Selection) -> Content:
-    own = read_reconstruction(volume)
+def export_image(
+    image: Reconstruction | Volume,
+    *,
+    target: Path,
+    name: str,
+    selection: Selection | None = None,
+    seconds: float = 0.0,
+) -> None:
+    """Write a reconstruction or a volume in another format.
+
+    Args:
+        image: what to write.
+        target: the exported file, replaced atomically.
+        name: a key of ``FORMATS``.
+        selection: of quantity and unit; None: the speed, and Np/m.
+        seconds: time of the image, s since 1970.
+
+    Raises:
+        InvalidInput: naming ``volume``, for content that the format cannot store; naming the field of the
+            selection, for a quantity that the image does not have.
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    chosen = selection or Selection()
+    if isinstance(image, Volume):
+        if chosen != Selection():
+            found = f"{chosen.quantity}, {chosen.attenuation}"
+            raise InvalidInput("quantity", found, "none: an uploaded volume has values only")
+        images = {"values": image.values}
+        content = Content(image.values, image.spacing_m, image.origin_m, image.title, images, seconds)
+    else:
+        content = _reconstructed(image, chosen, seconds)
+    FORMATS[name].write(target, content)
+
+
+def _reconstructed(own: Reconstruction, chosen: Selection, seconds: float) -> Content:
     held = {place: getattr(own, name) for name, place in IMAGES.items()}
     images = {place: image for place, image in held.items() if image is not None}
     if chosen.attenuation != "Np/m" and ATTENUATION in images:
@@ -171,9 +205,7 @@ def _reconstructed(volume: Path, chosen: Selection) -> Content:
     if selected is None:
         present = ", ".join(name for name in QUANTITIES if any(one.startswith(name) for one in images))
         raise InvalidInput("quantity", f"{chosen.quantity} of a result without it", present)
-    return Content(
-        images[selected], own.spacing_m, own.origin_m, TITLES[selected], images, volume.stat().st_mtime
-    )
+    return Content(images[selected], own.spacing_m, own.origin_m, TITLES[selected], images, seconds)
 
 
 def _frequency(provenance: Mapping[str, str], chosen: Selection) -> float:

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
 from ..files.reconstruction import read_reconstruction
@@ -55,12 +56,7 @@ def slice_png(
         raise InvalidInput("quantity", repr(quantity), accepted)
     grid = (result.spacing_m, result.origin_m, axis, index)
     plane = plane_of(volume, *grid)
-    passed = plane_of(result.coverage, *grid).image > 0.0
-    limits = robust_limits([plane.image], passed if passed.any() else None)
-    if quantity == "coverage":
-        limits = (0.0, limits[1])
-    elif quantity == "recovery":
-        limits = RECOVERY_LIMITS
+    limits = usual_limits(quantity, plane.image, plane_of(result.coverage, *grid).image)
     title = ", ".join(filter(None, (NAMES[quantity], plane.caption())))
     limits = requested_limits(limits, low, high)
     return plane_png(plane, limits, chosen, title=title, unit=LABELS[quantity], note=facts(result))
@@ -83,6 +79,21 @@ def volume_slice_png(
     caption = plane.caption()
     title = caption[0].upper() + caption[1:]
     return plane_png(plane, limits, chosen, title=title, unit="value", note=volume.title[:80])
+
+
+def usual_limits(quantity: str, image: Floats, coverage: Floats | None) -> Limits:
+    """The range of nodes with rays, without outliers; from 0 for the coverage, 0 and 1 for the recovery.
+
+    Args:
+        quantity: as for ``slice_png``, or any name of other values.
+        image: the slice.
+        coverage: of the same nodes; None: unknown.
+    """
+    if quantity == "recovery":
+        return RECOVERY_LIMITS
+    passed = None if coverage is None else coverage > 0.0
+    limits = robust_limits([image], passed if passed is not None and passed.any() else None)
+    return (0.0, limits[1]) if quantity == "coverage" else limits
 
 
 def requested_limits(limits: Limits, low: float | None, high: float | None) -> Limits:

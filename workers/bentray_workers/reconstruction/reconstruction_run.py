@@ -52,6 +52,7 @@ def reconstruct(
     work_dir: Path | None = None,
     on_saved: Callable[[], None] | None = None,
     share: Share | None = None,
+    threads: int | None = 1,
 ) -> Reconstruction:
     """Reconstruct a dataset file.
 
@@ -59,7 +60,7 @@ def reconstruct(
     state of each slice comes back after every batch, so that the loop can report, stop and save it.
 
     Args:
-        client: of a cluster; None: a thread of this process. The bits do not depend on it.
+        client: of a cluster; None: threads of this process. The bits do not depend on it.
         dataset_path: a file in the upload format, readable by every worker.
         settings: see ``Settings``.
         on_progress: called after each batch.
@@ -69,6 +70,7 @@ def reconstruct(
             temporary folder of this machine.
         on_saved: called after each checkpoint.
         share: of the workers; None: all of them.
+        threads: without a client; None: one for each core.
 
     Raises:
         Cancelled: when ``stop`` returned true.
@@ -76,7 +78,7 @@ def reconstruct(
     """
     with _folder(work_dir) as folder:
         resources = RECONSTRUCTION if client is None else resources_for(client, settings)
-        pool = open_pool(client, folder, share, placement=lambda: {"resources": resources}, threads=1)
+        pool = open_pool(client, folder, share, placement=lambda: {"resources": resources}, threads=threads)
         checkpoints = Checkpoints(folder / CHECKPOINTS, on_saved or (lambda: None))
         job = _Job(pool, stop, dataset_path, folder, checkpoints, count())
         progress = _JobProgress(on_progress)

@@ -6,26 +6,21 @@ import json
 import math
 import sys
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Annotated, Any, Protocol
+from collections.abc import Collection, Iterable, Sequence
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
+
+from ...interactive.progress_bar import Step as Step
+from ...interactive.progress_bar import progress_bar as progress_bar
 
 # Width of tables in files and pipes.
 WIDTH = 120
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON; nothing else is on stdout.")]
-
-
-class Step(Protocol):
-    """Updates a progress bar."""
-
-    def __call__(self, done: int, total: int, note: str = "") -> None: ...
 
 
 def remark(text: str) -> None:
@@ -85,23 +80,3 @@ def print_lines(lines: Iterable[str]) -> None:
 def residual_note(rms_s: float | None) -> str:
     """The residual for a progress bar; empty before the end of the first iteration."""
     return "" if rms_s is None else f"residual {rms_s * 1e9:.0f} ns"
-
-
-@contextmanager
-def progress_bar(description: str) -> Iterator[Step]:
-    """Show a progress bar on stderr, on a terminal only; yields a function to update it."""
-    console = Console(stderr=True)
-    columns: list[Any] = [
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[remark]}"),
-    ]
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task(description, total=None, remark="")
-
-        def step(done: int, total: int, note: str = "") -> None:
-            bar.update(task, completed=done, total=total, remark=note)
-
-        yield step

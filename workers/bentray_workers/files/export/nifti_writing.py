@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ def write_nifti(
     """Write a volume as NIfTI-1, or as NIfTI-2 where an axis is too long; ``path`` is replaced atomically.
 
     Args:
-        path: of the file.
+        path: of the file; compressed with gzip if its name ends in ``.gz``.
         values: (nx, ny[, nz]), of a type of NIfTI.
         spacing_m: per axis, m.
         origin_m: position of node 0, per axis, m.
@@ -54,4 +55,9 @@ def write_nifti(
     length = image.header["descrip"].dtype.itemsize
     image.header["descrip"] = title.encode()[:length].decode(errors="ignore").encode()
     with atomic_replace(path) as partial, partial.open("wb") as file:
-        image.to_stream(file)
+        if path.name.lower().endswith(".gz"):
+            # Without name and time: the same volume gives the same bytes.
+            with gzip.GzipFile("", "wb", fileobj=file, mtime=0) as packed:
+                image.to_stream(packed)
+        else:
+            image.to_stream(file)

@@ -1,0 +1,72 @@
+"""Reconstruction of a scan in this process, by the pipeline of the service."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Unpack
+
+from bentray_kernels.tomography.result import Progress, Reconstruction
+
+from .interruption import OnProgress, Stop, run_interruptibly
+from .progress_bar import progress_bar
+from .result import Result, result_of
+from .scan import Scan, read
+from .setting_types import Method, ReconstructionSettings
+
+MOST_THREADS = 1024
+
+
+def reconstruct(
+    scan: Scan | str | os.PathLike[str],
+    method: Method = "auto",
+    *,
+    progress: bool = True,
+    threads: int | None = None,
+    **settings: Unpack[ReconstructionSettings],
+) -> Result:
+    """Reconstruct the sound speed, and the attenuation where there are amplitudes (experimental).
+
+    The computation is that of the service and of ``bentray reconstruct``: the same scan and settings give the
+    same bits.
+
+    Args:
+        scan: of ``bentray.read`` or ``bentray.simulate``, or the path of a scan.
+        method: ``auto`` chooses method and rays by held-out validation; ``sart``; ``gauss-newton``;
+            ``waveform``: full-waveform inversion of traces.
+        progress: show a progress bar.
+        threads: of this process; None: one for each core.
+        settings: as in the table of settings, each by the last part of its name: ``rays="straight"``,
+            ``iterations=8``, ``relaxation=0.2``, ``attenuation=False``.
+
+    Raises:
+        InvalidInput: naming the setting or the field of the scan, its value and what is accepted; for an
+            unknown setting the one that is spelt most like it.
+        KeyboardInterrupt: once the tasks have stopped, which takes up to a few seconds.
+    """
+    from bentray_kernels.ranges import Range
+    from bentray_kernels.tomography.requirements import check_scan
+    from bentray_workers.reconstruction.reconstruction_run import reconstruct as run
+
+    from ..settings_request import nested, plain_numbers, settings_of
+
+    chosen = settings_of(nested(plain_numbers({"method": method, **settings})))
+    if threads is not None:
+        Range(1, MOST_THREADS).check("threads", threads)
+    source = scan if isinstance(scan, Scan) else read(scan)
+    check_scan(source.dataset, chosen, source.samples)
+    begun = time.perf_counter()
+    with progress_bar("Reconstructing", shown=progress) as step:
+
+        def work(report: OnProgress, stop: Stop) -> Reconstruction:
+            return run(None, Path(source), chosen, report, stop, threads=threads)
+
+        def show(now: Progress) -> None:
+            rms = now.history[-1].residual_rms_s if now.history else None
+            step(now.done, now.total, now.phase if rms is None else f"residual {1e9 * rms:.0f} ns")
+
+        image = run_interruptibly(work, show)
+    told = {"title": source.title, "scan": source.name, "seconds": f"{time.perf_counter() - begun:.2f}"}
+    given = {name: text for name, text in told.items() if text}
+    return result_of(image, given, truth=source.truth, roi=source.dataset.roi)

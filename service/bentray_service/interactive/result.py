@@ -1,0 +1,403 @@
+"""An image with its coordinates, units and provenance: drawn, compared, converted and saved."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.acquisition import Truth
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Iteration, Reconstruction, Settings, Trial
+from bentray_workers.files.export.optional_library import import_optional
+from bentray_workers.files.volume import Volume
+
+from ..html_tables import figures_html, picture_html
+from .scan import Scan
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+    from .comparison import Comparison
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# Units of the arrays of a reconstruction.
+UNITS = {"speed": "m/s", "coverage": "m", "attenuation": "Np/m", "recovery": "1"}
+# Name of the only array of an uploaded volume.
+VALUE = "value"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result:
+    """An image: arrays by quantity, their coordinates and units, and how they were made.
+
+    Attributes:
+        axes: names of the axes in order: ``x``, ``y`` and, in 3-D, ``z``.
+        values: arrays by name, each (nx, ny[, nz]): for a reconstruction ``speed``, ``coverage`` and, if
+            present, ``attenuation`` and ``recovery``; for an upload ``value``.
+        coordinates: node positions along each axis, m; ``z`` is missing for slices with non-uniform heights.
+        units: unit of each array.
+        attributes: provenance: title, settings, versions, time; of a service also the ids.
+        image: what the arrays are taken from, with settings and history.
+        truth: of a simulated scan, else None.
+        roi: the region of interest of the scan, on the grid of the truth, or None.
+    """
+
+    axes: tuple[str, ...]
+    values: Mapping[str, NDArray[Any]]
+    coordinates: Mapping[str, Floats]
+    units: Mapping[str, str]
+    attributes: Mapping[str, str] = field(default_factory=dict)
+    image: Reconstruction | Volume | None = None
+    truth: Truth | None = None
+    roi: Bools | None = None
+
+    @property
+    def speed(self) -> Floats:
+        """Sound speed, (nx, ny[, nz]), m/s."""
+        return self._of("speed")
+
+    @property
+    def attenuation(self) -> Floats:
+        """Attenuation, as ``speed``, Np/m (experimental); raises InvalidInput if it was not reconstructed."""
+        return self._of("attenuation")
+
+    @property
+    def coverage(self) -> Floats:
+        """Length of rays through each node, as ``speed``, m."""
+        return self._of("coverage")
+
+    @property
+    def recovery(self) -> Floats:
+        """Recovered fraction of a checkerboard, as ``speed``; raises InvalidInput without a check."""
+        return self._of("recovery")
+
+    @property
+    def spacing_m(self) -> tuple[float, ...]:
+        """Node spacing along each axis, m; z is NaN for slices with non-uniform heights."""
+        return tuple(self._image().spacing_m)
+
+    @property
+    def origin_m(self) -> tuple[float, ...]:
+        """Position of node 0 along each axis, m."""
+        return tuple(self._image().origin_m)
+
+    @property
+    def settings(self) -> Settings:
+        """The settings that were used; raises InvalidInput for an uploaded volume."""
+        return self._reconstruction().settings
+
+    @property
+    def history(self) -> tuple[Iteration, ...]:
+        """The misfit after each iteration; raises InvalidInput for an uploaded volume."""
+        return self._reconstruction().history
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """The candidate models of method auto, the best first; raises InvalidInput for an uploaded volume."""
+        return self._reconstruction().trials
+
+    def plot(
+        self,
+        quantity: str | None = None,
+        *,
+        axis: str = "z",
+        index: int | None = None,
+        low: float | None = None,
+        high: float | None = None,
+        ax: Axes | None = None,
+    ) -> Axes:
+        """Draw a slice in mm with a colour bar.
+
+        Args:
+            quantity: a name of ``values``; None: the first one.
+            axis: across the slice of a volume: x, y or z.
+            index: of the slice along it; None: the middle.
+            low, high: values of the first and the last colour, in the unit of the quantity; None: the range
+                of nodes with rays, without outliers.
+            ax: axes to draw on; None: those of a new figure of ``pyplot``.
+
+        Raises:
+            InvalidInput: naming the argument.
+        """
+        from .plotting import new_axes
+
+        axes = new_axes()[0] if ax is None else ax
+        self._draw(axes, quantity, (axis, index), (low, high))
+        return axes
+
+    def compare(self, other: Result | Scan | None = None, quantity: str = "speed") -> Comparison:
+        """Compare with another image, or with the truth of a simulated scan, at the nodes of this image.
+
+        Args:
+            other: a result, interpolated linearly; or a scan with a truth; None: the truth of the own scan.
+            quantity: ``speed`` or another name of ``values``; of a truth ``speed`` or ``attenuation``.
+
+        Returns:
+            The difference and its figures. Of two results they are over the nodes that rays of both cross; of
+            a truth over its region of interest, else the object.
+
+        Raises:
+            InvalidInput: naming the argument: without a truth, or for images that cannot be compared.
+        """
+        if isinstance(other, Result):
+            return self._compared(other, quantity)
+        truth = self.truth if other is None else other.truth
+        roi = self.roi if other is None else other.dataset.roi
+        if truth is None:
+            found = "no other image, of a scan without a truth" if other is None else f"{other!r}, no truth"
+            raise InvalidInput("other", found, "a result of bentray.reconstruct, or a simulated scan")
+        return self._against_truth(truth, roi, quantity)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Convert to a dataset of xarray, with the units in ``attrs``.
+
+        Raises:
+            InvalidInput: when xarray is not installed.
+        """
+        library = import_optional("xarray", "xarray", "a dataset")
+        arrays = {
+            name: library.DataArray(array, dims=self.axes, attrs={"units": self.units[name]})
+            for name, array in self.values.items()
+        }
+        places = {
+            name: library.DataArray(place, dims=(name,), attrs={"units": "m"})
+            for name, place in self.coordinates.items()
+        }
+        found: xarray.Dataset = library.Dataset(arrays, coords=places, attrs=dict(self.attributes))
+        return found
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        quantity: str = "speed",
+        *,
+        attenuation: str = "Np/m",
+        frequency_hz: float | None = None,
+    ) -> Path:
+        """Write a file in the format of its suffix; an existing file is replaced, whole or not at all.
+
+        ``.h5`` holds everything and is read by ``bentray.load``; ``.npy``, ``.nii``, ``.nii.gz``, ``.nrrd``
+        and ``.mha`` hold one quantity; ``.mat``, ``.vti``, ``.zarr``, ``.zip`` and ``.ozx`` (OME-Zarr) all
+        images; ``.dcm`` (DICOM) speed and attenuation.
+
+        Args:
+            path: of the file.
+            quantity: for formats with one.
+            attenuation: unit of the attenuation, ``Np/m`` or ``dB/cm/MHz``; HDF5 holds Np/m.
+            frequency_hz: for dB/cm/MHz, Hz; None: that of the scan.
+
+        Returns:
+            The path.
+
+        Raises:
+            InvalidInput: naming the argument and what is accepted, such as the suffixes.
+            OSError: where the folder cannot be written to or the disk is full.
+        """
+        from bentray_workers.files.export.suffixes import format_of
+        from bentray_workers.files.reconstruction import write_reconstruction
+        from bentray_workers.files.volume import write_volume
+        from bentray_workers.files.volume_export import Selection, export_image
+
+        target, image = Path(path), self._image()
+        name = format_of(target)
+        chosen = Selection(quantity, attenuation, frequency_hz)
+        if not target.absolute().parent.is_dir():
+            raise InvalidInput(
+                "path", f"{target} (its folder does not exist)", "a path in an existing folder"
+            )
+        if name != "hdf5":
+            export_image(image, target=target, name=name, selection=chosen, seconds=time.time())
+        elif attenuation != "Np/m":
+            accepted = "Np/m, which HDF5 results hold, or another format"
+            raise InvalidInput("attenuation", repr(attenuation), accepted)
+        elif isinstance(image, Volume):
+            write_volume(target, image)
+        else:
+            write_reconstruction(target, image)
+        return target
+
+    def __repr__(self) -> str:
+        if not self.values:
+            return "<bentray.Result without arrays>"
+        name, array = next(iter(self.values.items()))
+        size = " x ".join(map(str, array.shape))
+        spread = f"{np.nanmin(array):.6g} to {np.nanmax(array):.6g} {self.units[name]}".rstrip()
+        return f"<bentray.Result of {size} nodes: {', '.join(self.values)}; {name} {spread}>"
+
+    def _repr_html_(self) -> str:
+        from bentray_workers.images.canvas import drawing, new_figure, to_png
+        from bentray_workers.images.captions import facts
+
+        shown = list(self.values)[:1] + [name for name in ("attenuation",) if name in self.values]
+        with drawing():
+            figure = new_figure(4.6 * len(shown), 3.7)
+            for axes, name in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
+                self._draw(axes, name, ("z", None), (None, None))
+            png = to_png(figure)
+        rows = [
+            (f"{name} ({self.units[name]})", f"{np.nanmin(array):.6g} to {np.nanmax(array):.6g}")
+            for name, array in self.values.items()
+        ]
+        rows += [(f"{name} (m)", f"{at[0]:.4g} to {at[-1]:.4g}") for name, at in self.coordinates.items()]
+        if isinstance(self.image, Reconstruction):
+            rows.append(("method", facts(self.image)))
+        told = ("seconds", "water", "geometry", "quality", "waveform", "bentray")
+        rows += [(name, self.attributes[name]) for name in told if name in self.attributes]
+        title = self.attributes.get("title") or "Result"
+        return picture_html(png, title) + figures_html(title, rows)
+
+    def _of(self, quantity: str) -> NDArray[Any]:
+        if quantity not in self.values:
+            raise InvalidInput("quantity", repr(quantity), "one of " + ", ".join(self.values))
+        return self.values[quantity]
+
+    def _image(self) -> Reconstruction | Volume:
+        if self.image is None:
+            raise InvalidInput("image", "none", "a result of bentray.reconstruct or of a client")
+        return self.image
+
+    def _reconstruction(self) -> Reconstruction:
+        image = self._image()
+        if isinstance(image, Volume):
+            raise InvalidInput("image", "an uploaded volume", "a reconstruction")
+        return image
+
+    def _draw(
+        self,
+        axes: Axes,
+        quantity: str | None,
+        cut: tuple[str, int | None],
+        limits: tuple[float | None, float | None],
+    ) -> None:
+        from bentray_workers.images.captions import LABELS, NAMES
+        from bentray_workers.images.maps import SPEED
+        from bentray_workers.images.plane import plane_of
+        from bentray_workers.images.report import COLORMAPS
+        from bentray_workers.images.slice import requested_limits, usual_limits
+
+        from .plotting import draw_plane
+
+        name = next(iter(self.values)) if quantity is None else quantity
+        grid = self.spacing_m, self.origin_m
+        plane = plane_of(self._of(name), *grid, *cut)
+        crossed = self.values.get("coverage")
+        coverage = None if crossed is None else plane_of(crossed, *grid, *cut).image
+        chosen = requested_limits(usual_limits(name, plane.image, coverage), *limits)
+        title = NAMES.get(name) or self.attributes.get("title", "")
+        label = LABELS.get(name) or f"value ({self.units[name]})".replace(" ()", "")
+        draw_plane(axes, plane, chosen, colormap=COLORMAPS.get(name, SPEED), title=title, label=label)
+
+    def _compared(self, other: Result, quantity: str) -> Comparison:
+        from .comparison import Comparison, at_nodes
+
+        image, theirs = np.asarray(self._of(quantity), np.float64), other._of(quantity)
+        if image.ndim != theirs.ndim:
+            found = f"{theirs.ndim} dimensions beside {image.ndim}"
+            raise InvalidInput("other", found, "a result of as many dimensions")
+        nodes = (self.spacing_m, self.origin_m)
+        grid = (other.spacing_m, other.origin_m)
+        even = np.isfinite(nodes).all() and np.isfinite(grid).all()
+        if not even and (image.shape != theirs.shape or not np.array_equal(grid, nodes, equal_nan=True)):
+            found = "slices at uneven heights on another grid"
+            raise InvalidInput("other", found, "a result on the same nodes, or of evenly spaced slices")
+        there = at_nodes(theirs, grid, image.shape, nodes)
+        region, choice = np.isfinite(there) & np.isfinite(image), "nodes of both images"
+        crossed = [one.values.get("coverage") for one in (self, other)]
+        if crossed[0] is not None and crossed[1] is not None:
+            both = (crossed[0] > 0.0) & (at_nodes(crossed[1], grid, image.shape, nodes) > 0.0)
+            if (region & both).any():
+                region, choice = region & both, "nodes that rays of both images cross"
+        if not region.any():
+            raise InvalidInput("other", "an image without a common node", "one that overlaps with this one")
+        names = ("this image", "the other")
+        unit = self.units[quantity]
+        return Comparison(names, quantity, unit, image, there, region, choice, *nodes)
+
+    def _against_truth(self, truth: Truth, roi: Bools | None, quantity: str) -> Comparison:
+        from bentray_workers.images.truth_comparison import NotComparable, compare
+        from bentray_workers.images.truth_on_grid import on_grid
+
+        from .comparison import Comparison
+
+        true_images = {"speed": truth.sound_speed_mps, "attenuation": truth.attenuation_np_m}
+        known = {name: image for name, image in true_images.items() if image is not None}
+        if quantity not in known or quantity not in self.values:
+            accepted = "one of " + ", ".join(name for name in known if name in self.values)
+            raise InvalidInput("quantity", repr(quantity), accepted)
+        try:
+            found = compare(self._reconstruction(), truth, roi)
+            true = found.true_speed_mps
+            if quantity != "speed":
+                true = on_grid(known[quantity], truth, self._reconstruction())
+        except NotComparable as reason:
+            raise InvalidInput("truth", str(reason), "a truth on the axes of the image") from None
+        nodes = (self.spacing_m, self.origin_m)
+        image = np.asarray(self._of(quantity), np.float64)
+        names = ("reconstruction", "truth")
+        return Comparison(
+            names, quantity, self.units[quantity], image, true, found.region, found.region_choice, *nodes
+        )
+
+
+def result_of(
+    image: Reconstruction | Volume,
+    attributes: Mapping[str, str],
+    *,
+    unit: str = "",
+    truth: Truth | None = None,
+    roi: Bools | None = None,
+) -> Result:
+    """A reconstruction or a volume as a result.
+
+    Args:
+        image: what is shown.
+        attributes: what is known beside: ids, title, time.
+        unit: of the values of a volume.
+        truth, roi: of the scan.
+    """
+    if isinstance(image, Volume):
+        values: dict[str, NDArray[Any]] = {VALUE: image.values}
+        units, known = {VALUE: unit}, {"title": image.title} if image.title else {}
+    else:
+        held = {name: getattr(image, name) for name in UNITS}
+        values = {name: array for name, array in held.items() if array is not None}
+        units = {name: UNITS[name] for name in values}
+        known = {**image.provenance, "settings": json.dumps(image.settings.to_dict())}
+    shape = next(iter(values.values())).shape
+    axes = tuple("xyz"[: len(shape)])
+    coordinates = {
+        axis: start + step * np.arange(n)
+        for axis, n, start, step in zip(axes, shape, image.origin_m, image.spacing_m, strict=True)
+        if np.isfinite(start) and np.isfinite(step)
+    }
+    return Result(axes, values, coordinates, units, {**known, **attributes}, image, truth, roi)
+
+
+def load(path: str | os.PathLike[str]) -> Result:
+    """Read a result that ``Result.save`` or ``bentray reconstruct`` wrote (``.h5``), or a volume of Bentray.
+
+    Args:
+        path: of the file, or of a folder with ``reconstruction.h5``.
+
+    Raises:
+        InvalidInput: naming the first field that is missing or wrong.
+    """
+    from bentray_workers.files.volume_export import read_image
+
+    found = Path(path)
+    file = found / "reconstruction.h5" if found.is_dir() else found
+    if not file.is_file():
+        accepted = "a reconstruction.h5, its folder, or a volume of Bentray in HDF5"
+        raise InvalidInput("file", f"{file} (no such file)", accepted)
+    return result_of(read_image(file), {"file": file.name})

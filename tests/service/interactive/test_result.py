@@ -1,0 +1,207 @@
+"""Results: pictures, comparisons, conversions and files, with places and units that agree."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import nibabel
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+
+import bentray
+from bentray_service.interactive.result import UNITS, Result, result_of
+from bentray_workers.files.export.suffixes import SUFFIXES
+from bentray_workers.files.volume import Volume
+
+from ...workers.files.reconstructions import made, truth
+
+SPACING_M = 2e-3
+
+
+@pytest.fixture
+def result() -> Result:
+    return result_of(made(nodes=12), {"title": "A <b>disc</b>"}, truth=truth(nodes=12))
+
+
+@pytest.fixture(autouse=True)
+def _closed_figures() -> None:
+    plt.close("all")
+
+
+def volume(values: np.ndarray) -> Result:
+    return result_of(Volume.of(values, (1e-3,) * 3, title="Cube"), {})
+
+
+def test_arrays_have_places_and_units(result: Result) -> None:
+    assert result.axes == ("x", "y")
+    assert dict(result.units) == UNITS
+    np.testing.assert_allclose(result.coordinates["x"], SPACING_M * (np.arange(12) - 5.5))
+    np.testing.assert_array_equal(result.speed, made(nodes=12).speed)
+    np.testing.assert_array_equal(result.attenuation, made(nodes=12).attenuation)
+    assert result.attributes["bentray"] == "0.1.0"
+    assert result.trials[0].settings == {"rays": "straight", "relaxation": 0.03}
+    assert repr(result).startswith(
+        "<bentray.Result of 12 x 12 nodes: speed, coverage, attenuation, recovery;"
+    )
+
+
+def test_missing_arrays_are_named() -> None:
+    bare = result_of(replace(made(nodes=12), attenuation=None, recovery=None), {})
+    with pytest.raises(
+        bentray.InvalidInput, match="quantity: found 'attenuation'; accepted: one of speed, cov"
+    ):
+        _ = bare.attenuation
+    with pytest.raises(bentray.InvalidInput, match="an uploaded volume; accepted: a reconstruction"):
+        _ = volume(np.zeros((3, 3, 3), np.float32)).settings
+
+
+def test_a_slice_is_drawn_in_mm(result: Result) -> None:
+    axes = result.plot("attenuation", low=0.0, high=4.0)
+    assert (axes.get_title(), axes.get_xlabel(), axes.get_ylabel()) == (
+        "Attenuation (experimental)",
+        "x (mm)",
+        "y (mm)",
+    )
+    np.testing.assert_allclose(axes.get_xlim(), (-12.0, 12.0))
+    (image,) = axes.get_images()
+    assert image.get_clim() == (0.0, 4.0)
+    np.testing.assert_array_equal(image.get_array(), result.attenuation.T)
+    figure, own = plt.subplots()
+    assert result.plot(ax=own) is own
+    assert figure.axes[1].get_ylabel() == "sound speed (m/s)"
+
+
+def test_a_volume_is_cut_across_any_axis() -> None:
+    cube = volume(np.arange(60, dtype=np.float32).reshape(3, 4, 5))
+    axes = cube.plot(axis="x", index=2)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("y (mm)", "z (mm)")
+    assert axes.get_title() == "Cube, slice index 2 (0 to 2), x = 2 mm"
+    np.testing.assert_array_equal(axes.get_images()[0].get_array(), cube.values["value"][2].T)
+    with pytest.raises(bentray.InvalidInput, match="index: found 3; accepted: 0 to 2"):
+        cube.plot(axis="x", index=3)
+
+
+def test_figures_of_a_comparison(result: Result) -> None:
+    image = made(nodes=12)
+    shifted = result_of(replace(image, speed=image.speed + np.where(image.speed > 1520.0, 4.0, 0.0)), {})
+    found = shifted.compare(result)
+    share = float((image.speed > 1520.0).mean())
+    assert found.region.all()
+    assert found.rms == pytest.approx(4.0 * share**0.5)
+    assert found.mean_absolute == pytest.approx(4.0 * share)
+    assert found.bias == pytest.approx(4.0 * share)
+    assert found.largest == pytest.approx(4.0)
+    assert 0.9 < found.correlation < 1.0
+    assert result.compare(result).rms == 0.0
+    assert result.compare(result).correlation == pytest.approx(1.0)
+    assert "rms" in repr(found)
+
+
+def test_nodes_without_rays_do_not_count(result: Result) -> None:
+    image = made(nodes=12)
+    coverage = image.coverage.copy()
+    coverage[:6] = 0.0
+    speed = image.speed.copy()
+    speed[:6] += 100.0
+    found = result_of(replace(image, speed=speed, coverage=coverage), {}).compare(result)
+    assert found.rms == 0.0
+    assert found.region_choice == "nodes that rays of both images cross"
+
+
+def test_another_grid_is_interpolated() -> None:
+    places = [np.arange(n) * 1e-3 for n in (5, 6, 7)]
+    linear = 1.0 + 2e3 * places[0][:, None, None] - 1e3 * places[1][None, :, None] + 5e2 * places[2]
+    coarse = volume(linear.astype(np.float32))
+    fine_places = np.meshgrid(*(np.arange(3) * 5e-4 + 1e-3 for _ in range(3)), indexing="ij")
+    exact = 1.0 + 2e3 * fine_places[0] - 1e3 * fine_places[1] + 5e2 * fine_places[2]
+    fine = result_of(Volume.of(exact, (5e-4,) * 3, (1e-3,) * 3), {})
+    found = fine.compare(coarse, "value")
+    assert found.region.all()
+    np.testing.assert_allclose(found.difference, 0.0, atol=1e-5)
+    outside = result_of(Volume.of(exact, (5e-4,) * 3, (1.0,) * 3), {})
+    with pytest.raises(bentray.InvalidInput, match="without a common node"):
+        outside.compare(coarse, "value")
+
+
+def test_the_truth_of_a_scan(result: Result, simulated: bentray.Scan) -> None:
+    found = result.compare()
+    inside = made(nodes=12).speed - found.other
+    assert found.rms == pytest.approx(np.sqrt(np.mean(inside[found.region] ** 2)))
+    assert 0.5 < found.rms < 2.0, "noise of 1 m/s"
+    assert found.names == ("reconstruction", "truth")
+    assert result.compare(simulated).region_choice == "mask/roi of the file"
+    with pytest.raises(bentray.InvalidInput, match="other: found no other image, of a scan without a truth"):
+        replace(result, truth=None).compare()
+    with pytest.raises(bentray.InvalidInput, match="quantity: found 'attenuation'; accepted: one of speed"):
+        result.compare(quantity="attenuation")
+
+
+def test_a_comparison_is_drawn(result: Result) -> None:
+    first, second, third = result.compare().plot()
+    assert [one.get_title() for one in (first, second)] == ["Reconstruction", "Truth"]
+    assert third.get_title().startswith("Difference: ")
+    assert first.get_images()[0].get_clim() == second.get_images()[0].get_clim()
+
+
+def test_notebooks_show_pictures_and_escaped_words(result: Result) -> None:
+    for shown in (result._repr_html_(), result.compare()._repr_html_()):
+        assert '<img alt="' in shown
+        assert "data:image/png;base64,iVBOR" in shown
+        assert "<b>" not in shown
+    assert "A &lt;b&gt;disc&lt;/b&gt;" in result._repr_html_()
+    assert not plt.get_fignums(), "no figure of pyplot stays open"
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_every_suffix_is_a_file(tmp_path: Path, suffix: str) -> None:
+    image = made(nodes=6)
+    image = replace(image, provenance={**image.provenance, "frequency_hz": "1e6"})
+    path = result_of(image, {}).save(tmp_path / f"image{suffix}")
+    assert path.exists()
+    assert [one.name for one in tmp_path.iterdir()] == [f"image{suffix}"]
+
+
+def test_compressed_nifti_holds_the_image_and_hdf5_everything(result: Result, tmp_path: Path) -> None:
+    packed = nibabel.load(result.save(tmp_path / "x.NII.gz", "attenuation"))
+    np.testing.assert_array_equal(packed.get_fdata(), result.attenuation)
+    np.testing.assert_allclose(packed.affine[:2, 3], -11.0)
+    assert (tmp_path / "x.NII.gz").read_bytes()[:2] == b"\x1f\x8b"
+    again = bentray.load(result.save(tmp_path / "x.h5"))
+    for name, array in result.values.items():
+        np.testing.assert_array_equal(again.values[name], array)
+    assert (again.settings, again.history, again.trials) == (result.settings, result.history, result.trials)
+    cube = volume(np.arange(27, dtype=np.float32).reshape(3, 3, 3))
+    np.testing.assert_array_equal(
+        bentray.load(cube.save(tmp_path / "cube.h5")).values["value"], cube.values["value"]
+    )
+
+
+def test_what_cannot_be_saved_is_named(result: Result, tmp_path: Path) -> None:
+    for words, said in (
+        (("image.tif",), r"a name ending in \.h5, \.hdf5, \.npy, \.nii, \.nii\.gz, \.nrrd, .*\.dcm$"),
+        (("none/image.nii",), r"path: found .*\(its folder does not exist\)"),
+        (("image.nii", "density"), "quantity: found 'density'; accepted: one of speed, coverage"),
+    ):
+        with pytest.raises(bentray.InvalidInput, match=said):
+            result.save(tmp_path / words[0], *words[1:])
+    with pytest.raises(bentray.InvalidInput, match="Np/m, which HDF5 results hold"):
+        result.save(tmp_path / "x.h5", attenuation="dB/cm/MHz")
+    with pytest.raises(bentray.InvalidInput, match="no such file"):
+        bentray.load(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_xarray_finds_a_place(result: Result) -> None:
+    found = result.to_xarray()
+    assert found.speed.dims == ("x", "y")
+    assert (found.speed.attrs, found.x.attrs) == ({"units": "m/s"}, {"units": "m"})
+    assert float(found.speed.sel(x=-0.011, y=0.011, method="nearest")) == result.speed[0, -1]
+
+
+def test_missing_xarray_is_reported(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(bentray.InvalidInput, match=r'pip install "bentray\[xarray\]"'):
+        result.to_xarray()
