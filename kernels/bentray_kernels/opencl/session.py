@@ -83,6 +83,14 @@ class Session:
         cl.enqueue_fill_buffer(self.queue, buffer, zero, 0, count * zero.itemsize)
         return buffer
 
+    def copied(self, buffer: Any) -> Any:
+        """A copy of a buffer on the device."""
+        import pyopencl as cl
+
+        copy = self.reserve(buffer.size)
+        cl.enqueue_copy(self.queue, copy, buffer, byte_count=buffer.size)
+        return copy
+
     def mark(self) -> Any:
         """The event that all launched kernels have finished; the device begins with them."""
         import pyopencl as cl

@@ -1,4 +1,4 @@
-"""Acoustic waves: a finite-difference simulator in 2-D and 3-D, and its adjoint in 2-D."""
+"""Acoustic waves: a finite-difference simulator in 2-D and 3-D, and its adjoint (3-D on devices)."""
 
 from .adjoint import MisfitGradient, misfit_gradient
 from .emissions import Emissions, misfit_gradients, simulate_emissions

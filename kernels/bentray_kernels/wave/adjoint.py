@@ -71,16 +71,16 @@ def misfit_gradient(
     traces, scattered = forward(medium, source, detectors, wavelet, every, by=by, poll=poll)
     value, residual = misfit(traces)
     image, light = backward(medium, detectors, residual, scattered, every, poll)
-    return gradient_of(medium, wavelet, value, image, light, every, by)
+    return gradient_of(medium, float(np.abs(wavelet).max()), value, image, light, every, by)
 
 
 def gradient_of(
-    medium: Medium, wavelet: Floats, misfit: float, image: Floats, light: Floats, every: int, by: Unknown
+    medium: Medium, scale: float, misfit: float, image: Floats, light: Floats, every: int, by: Unknown
 ) -> MisfitGradient:
-    """The gradient from the correlated fields that ``backward`` gives."""
+    """The gradient from the correlated fields of ``backward``; ``scale`` is the pressure that is 1 there."""
     # By (c dt / h)^2, the factor of a step, and by sigma dt = c alpha dt; the adjoint field has it too.
     along = 2.0 if by == "speed" else -(medium.spacing**2) / medium.time_step_s
-    return MisfitGradient(misfit, along * every * float(np.abs(wavelet).max()) * image / medium.speed, light)
+    return MisfitGradient(misfit, along * every * scale * image / medium.speed, light)
 
 
 def backward(

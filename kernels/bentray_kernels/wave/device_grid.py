@@ -1,7 +1,8 @@
-"""Arrangement of padded 2-D grids on an OpenCL device: aligned rows, filled up to whole work-groups."""
+"""Arrangement of padded grids on an OpenCL device: aligned rows, filled up to whole work-groups."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,79 +18,107 @@ from .stencil import HALO
 # before, too.
 LEAD = 8
 
-# Nodes along x that a work-item takes: it reads 12 rows for 4 nodes in place of 36.
+# Nodes along the first axis that a work-item takes: it reads 12 of them for 4 in place of 36.
 ROWS = 4
 
-# Work-items of a group along y and x.
+# Work-items of a group along the last axis, and along the one before (in 2-D the blocks of rows).
 Group = tuple[int, int]
 
 
 @dataclass(frozen=True)
 class DeviceGrid:
-    """Place of every node of a padded image, (nx, ny) with its margin, on the device.
+    """Place of every node of a padded image, (nx, ny[, nz]) with its margin, on the device.
 
     Attributes:
-        nodes: (margin, nx, ny), of the image alone.
+        shape: of the image alone.
+        margin: nodes of edge and halo on every side.
         group: work-items of a group.
-        width: nodes of a row that are computed, a multiple of the group's.
-        height: rows that are computed, a multiple of the group's.
+        filled: computed nodes along each axis, multiples of what a group computes.
     """
 
-    nodes: tuple[int, int, int]
+    shape: tuple[int, ...]
+    margin: int
     group: Group
-    width: int
-    height: int
+    filled: tuple[int, ...]
 
     @classmethod
     def of(cls, medium: Medium, group: Group) -> DeviceGrid:
-        """The grid of a 2-D medium."""
-        nx, ny = medium.speed.shape
-        inner = 2 * (medium.margin - HALO)
+        """The grid of a medium."""
+        shape = medium.speed.shape
         across, along = group
-        width = -(-(ny + inner) // across) * across
-        height = -(-(nx + inner) // (along * ROWS)) * along * ROWS
-        return cls((medium.margin, nx, ny), group, width, height)
+        multiples = (ROWS * along, across) if len(shape) == 2 else (ROWS, along, across)
+        edges = 2 * (medium.margin - HALO)
+        filled = tuple(-(-(n + edges) // m) * m for n, m in zip(shape, multiples, strict=True))
+        return cls(shape, medium.margin, group, filled)
 
     @property
     def pitch(self) -> int:
         """From a row to the next."""
-        return LEAD + self.width
+        return LEAD + self.filled[-1]
+
+    @property
+    def slab(self) -> int:
+        """From a node to the next along the first axis."""
+        return self.pitch * math.prod(n + 2 * HALO for n in self.filled[1:-1])
 
     @property
     def plane(self) -> int:
         """From the field of an emitter to that of the next."""
-        return (self.height + 2 * HALO) * self.pitch + LEAD
+        return (self.filled[0] + 2 * HALO) * self.slab + LEAD
 
     @property
     def shift(self) -> int:
-        """Place of node (0, 0) of the padded image, added to ``x * pitch + y``."""
+        """Place of node (0, 0[, 0]) of the padded image."""
         return LEAD - HALO
+
+    @property
+    def strides(self) -> tuple[int, ...]:
+        """From a node to the next along each axis."""
+        return (self.slab, 1) if len(self.shape) == 2 else (self.slab, self.pitch, 1)
 
     @property
     def first(self) -> int:
         """Place of the first node that is computed."""
-        return HALO * self.pitch + LEAD
+        return HALO * sum(self.strides) + self.shift
 
     @property
-    def work_items(self) -> tuple[int, int]:
-        """Of one emitter's time step, along y and x."""
-        return self.width, self.height // ROWS
+    def blocks(self) -> int:
+        """Blocks of ``ROWS`` nodes along the first axis."""
+        return self.filled[0] // ROWS
+
+    def work_items(self, emitters: int) -> tuple[int, int, int]:
+        """Of a time step."""
+        if len(self.shape) == 2:
+            return self.filled[1], self.blocks, emitters
+        return self.filled[2], self.filled[1], self.blocks * emitters
+
+    @property
+    def rows(self) -> int:
+        """Rows of the image."""
+        return math.prod(self.shape[:-1])
+
+    @property
+    def nodes(self) -> NDArray[np.uint32]:
+        """Margin; slabs, rows of a slab and nodes of a row of the image, as the program takes them."""
+        middle = self.shape[1:-1] or (1,)
+        return np.array((self.margin, self.shape[0], *middle, self.shape[-1]), np.uint32)
 
     def packed(self, factor: NDArray[Any]) -> NDArray[Any]:
-        """A factor of the medium, (nx, ny) padded, as (plane,); 0 in the halo and beyond the image."""
-        inner = factor[HALO:-HALO, HALO:-HALO]
-        rows = np.zeros((self.height, self.pitch), factor.dtype)
-        rows[: inner.shape[0], LEAD : LEAD + inner.shape[1]] = inner
+        """A padded factor of the medium as (plane,); 0 in the halo and beyond the image."""
         flat = np.zeros(self.plane, factor.dtype)
-        flat[HALO * self.pitch : (HALO + self.height) * self.pitch] = rows.ravel()
+        inner = factor[(slice(HALO, -HALO),) * factor.ndim]
+        strides = tuple(step * factor.itemsize for step in self.strides)
+        view = np.lib.stride_tricks.as_strided(flat[self.first :], inner.shape, strides)
+        view[...] = inner
         return flat
 
     def taps(self, elements: Points) -> Ints:
-        """Places of the taps of elements, (elements, 2 REACH, 2 REACH)."""
-        step = np.arange(2 * REACH)
-        x = (elements.first[:, 0, None] + step) * self.pitch
-        y = elements.first[:, 1, None] + step
-        return x[:, :, None] + y[:, None, :] + self.shift
+        """Places of the taps of elements, (elements, 2 REACH, 2 REACH[, 2 REACH])."""
+        places: Ints = np.full((len(elements.first), *(1,) * len(self.shape)), self.shift, np.int64)
+        for axis, stride in enumerate(self.strides):
+            along = (elements.first[:, axis, None] + np.arange(2 * REACH)) * stride
+            places = places + along.reshape(len(along), *_axis(axis, len(self.shape)))
+        return places
 
 
 @dataclass(frozen=True)
@@ -100,7 +129,7 @@ class Gather:
         node: (nodes,), uint32, places of nodes with a tap, ascending.
         begin: (nodes + 1,), uint32, first entry of each node.
         receiver: (entries,), uint32, ascending for each node.
-        weight: (entries,), product of the weights along both axes.
+        weight: (entries,), product of the weights along all axes.
     """
 
     node: NDArray[np.uint32]
@@ -112,8 +141,11 @@ class Gather:
     def of(cls, grid: DeviceGrid, receivers: Points) -> Gather:
         """The taps of the receivers on a grid."""
         places = grid.taps(receivers)
-        weights = receivers.weights[:, 0, :, None] * receivers.weights[:, 1, None, :]
-        owner = np.broadcast_to(np.arange(len(places))[:, None, None], places.shape).ravel()
+        dims = len(grid.shape)
+        weights = np.ones((1,) * (1 + dims), receivers.weights.dtype)
+        for axis in range(dims):
+            weights = weights * receivers.weights[:, axis].reshape(len(places), *_axis(axis, dims))
+        owner = np.broadcast_to(np.arange(len(places)).reshape(-1, *(1,) * dims), places.shape).ravel()
         order = np.lexsort((owner, places.ravel()))
         node, begin = np.unique(places.ravel()[order], return_index=True)
         return cls(
@@ -122,3 +154,8 @@ class Gather:
             owner[order].astype(np.uint32),
             np.ascontiguousarray(weights.ravel()[order]),
         )
+
+
+def _axis(axis: int, dims: int) -> tuple[int, ...]:
+    """Shape of the taps along one axis."""
+    return tuple(2 * REACH if one == axis else 1 for one in range(dims))

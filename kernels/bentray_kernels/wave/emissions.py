@@ -14,12 +14,11 @@ from ..errors import InvalidInput
 from .adjoint import MisfitGradient, gradient_of, misfit_gradient
 from .medium import Medium
 from .points import Points
-from .simulation import Unknown, check_2d, forward, place_scan
+from .simulation import Unknown, forward, place_scan
 from .time_blocks import Poll, no_poll
 
 if TYPE_CHECKING:
     from ..opencl.session import Session
-    from .device_waves import DeviceWaves
 
 # What simulates the waves.
 Engine = Literal["compiled", "opencl"]
@@ -32,8 +31,8 @@ class Emissions(NamedTuple):
     """Emissions with the same receivers and the same source.
 
     Attributes:
-        emitters: (k, 2), m, node 0 of the image at 0.
-        receivers: (nrx, 2), m.
+        emitters: (k, d), m, d = 2 or 3, node 0 of the image at 0.
+        receivers: (nrx, d), m.
         valid: for each emission the indices of the receivers whose traces are used.
         wavelet: (nt,), as for ``simulate``.
     """
@@ -42,6 +41,11 @@ class Emissions(NamedTuple):
     receivers: Floats
     valid: Sequence[Ints]
     wavelet: Floats
+
+    @property
+    def elements(self) -> tuple[Floats, Floats]:
+        """Emitters and receivers."""
+        return self.emitters, self.receivers
 
 
 def simulate_emissions(
@@ -57,32 +61,34 @@ def simulate_emissions(
     They differ from those of compiled code by less than 1e-5 of the largest sample in float32.
 
     Args:
-        medium: 2-D.
+        medium: 2-D or 3-D.
         emissions: what is simulated.
         poll: see ``time_blocks``.
         engine: ``opencl`` for the device of ``opencl.choice``.
         memory_bytes: limit of the fields of emissions in flight on a device, beside its own memory.
 
     Raises:
-        InvalidInput: as ``simulate``; a 3-D medium; for a device that cannot hold one emission, and where
+        InvalidInput: as ``simulate``; for a device that cannot hold one emission, and where
             ``BENTRAY_OPENCL_DEVICE`` does not match one device.
 
     Warns:
         OpenCLFallbackWarning: once, where no device passes its self-test and compiled code is used instead.
     """
-    sources, receivers = _placed(medium, emissions)
+    sources, receivers = place_scan(medium, *emissions.elements, emissions.wavelet)
     session = _session(engine) if len(emissions.emitters) else None
     if session is None:
         for source, valid in zip(_each(sources), emissions.valid, strict=True):
             yield forward(medium, source, _some(receivers, valid), emissions.wavelet, 0, poll=poll)[0]
         return
-    from .device_waves import DeviceWaves, Scan
+    from .device_flight import Flight
+    from .device_waves import DeviceWaves, Scan, tiles
 
     waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
-    pulse, scale = _normalised(emissions.wavelet)
-    for tile in waves.tiles(len(emissions.emitters), memory_bytes):
-        traces, _ = waves.forward(Points(sources.first[tile], sources.weights[tile]), pulse, poll)
-        for samples, valid in zip(traces, emissions.valid[tile], strict=True):
+    plan = waves.plan(memory_bytes)
+    pulse, scale = _normalised(medium, emissions.wavelet)
+    for tile in tiles(len(emissions.emitters), plan.emitters):
+        flight = Flight(waves, Points(sources.first[tile], sources.weights[tile]), pulse, 1, poll)
+        for samples, valid in zip(flight.forward(), emissions.valid[tile], strict=True):
             yield _of_receivers(samples, valid, scale)
 
 
@@ -99,10 +105,11 @@ def misfit_gradients(
     """Misfit and gradient of each emission, in their order; see ``misfit_gradient``.
 
     On a device an emission's gradient has the same bits on every run, however many emissions are in flight.
-    It differs from that of compiled code by less than 1e-4 of its largest value in float32.
+    It differs from that of compiled code by less than 1e-4 of its largest value in float32. Where the stored
+    fields of one emission do not fit, checkpoints take their place, and most steps forwards are made twice.
 
     Args:
-        medium: 2-D.
+        medium: 2-D; for a device 3-D, too.
         emissions: what is simulated.
         misfit: of the traces of an emission.
         every: time steps between stored fields.
@@ -110,11 +117,11 @@ def misfit_gradients(
         poll, engine, memory_bytes: as ``simulate_emissions``.
 
     Raises:
-        InvalidInput: as ``simulate_emissions``; a step between fields below 1.
+        InvalidInput: as ``simulate_emissions``; a step between fields below 1; 3-D for compiled code.
     """
     if every < 1:
         raise InvalidInput("every", every, "at least 1 step")
-    sources, receivers = _placed(medium, emissions)
+    sources, receivers = place_scan(medium, *emissions.elements, emissions.wavelet)
     session = _session(engine) if len(emissions.emitters) else None
     if session is None:
         for k, (emitter, valid) in enumerate(zip(emissions.emitters, emissions.valid, strict=True)):
@@ -125,39 +132,26 @@ def misfit_gradients(
 
             yield misfit_gradient(medium, emitter, at, emissions.wavelet, compare, every, by, poll)
         return
-    from .device_waves import DeviceWaves, Scan
+    from .device_flight import Flight
+    from .device_waves import DeviceWaves, Scan, tiles
 
     waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size, every, by))
-    for tile in waves.tiles(len(emissions.emitters), memory_bytes):
-        yield from _tile_gradients(waves, medium, emissions, misfit, tile, sources, every, by, poll)
-
-
-def _tile_gradients(
-    waves: DeviceWaves,
-    medium: Medium,
-    emissions: Emissions,
-    misfit: EmissionMisfit,
-    tile: slice,
-    sources: Points,
-    every: int,
-    by: Unknown,
-    poll: Poll,
-) -> Iterator[MisfitGradient]:
-    """The gradients of the emissions that are in flight together."""
-    pulse, loudest = _normalised(emissions.wavelet)
-    traces, stored = waves.forward(Points(sources.first[tile], sources.weights[tile]), pulse, poll)
-    residuals = np.zeros_like(traces)
-    values, scales = [], []
-    for k, (samples, valid) in enumerate(zip(traces, emissions.valid[tile], strict=True)):
-        value, residual = misfit(tile.start + k, _of_receivers(samples, valid, loudest))
-        scale = float(np.abs(residual).max(initial=0.0))
-        residuals[k][:, valid] = (residual / (scale or 1.0)).T
-        values.append(value)
-        scales.append(scale)
-    images, lights = waves.backward(residuals, stored, poll)
-    for value, scale, image, light in zip(values, scales, images, lights, strict=True):
-        summed = scale * image.astype(np.float64)
-        yield gradient_of(medium, emissions.wavelet, value, summed, light.astype(np.float64), every, by)
+    plan = waves.plan(memory_bytes)
+    pulse, scale = _normalised(medium, emissions.wavelet)
+    for tile in tiles(len(emissions.emitters), plan.emitters):
+        some = Points(sources.first[tile], sources.weights[tile])
+        flight = Flight(waves, some, pulse, plan.segments, poll)
+        traces = flight.forward()
+        residuals, values, scales = np.zeros_like(traces), [], []
+        for k, (samples, valid) in enumerate(zip(traces, emissions.valid[tile], strict=True)):
+            value, residual = misfit(tile.start + k, _of_receivers(samples, valid, scale))
+            largest = float(np.abs(residual).max(initial=0.0))
+            residuals[k][:, valid] = (residual / (largest or 1.0)).T
+            values.append(value)
+            scales.append(largest)
+        for value, largest, image, light in zip(values, scales, *flight.backward(residuals), strict=True):
+            summed = largest * image.astype(np.float64)
+            yield gradient_of(medium, scale, value, summed, light.astype(np.float64), every, by)
 
 
 def _session(engine: Engine) -> Session | None:
@@ -169,12 +163,6 @@ def _session(engine: Engine) -> Session | None:
     return session_or_warning(instead="compiled code")
 
 
-def _placed(medium: Medium, emissions: Emissions) -> tuple[Points, Points]:
-    """Emitters and receivers on the medium's grid."""
-    check_2d(medium)
-    return place_scan(medium, emissions.emitters, emissions.receivers, emissions.wavelet)
-
-
 def _each(points: Points) -> Iterator[Points]:
     for k in range(len(points.first)):
         yield _some(points, np.array([k]))
@@ -184,10 +172,11 @@ def _some(points: Points, indices: Ints) -> Points:
     return Points(points.first[indices], points.weights[indices])
 
 
-def _normalised(wavelet: Floats) -> tuple[Floats, float]:
-    """The wavelet over its largest magnitude, and that magnitude."""
-    scale = float(np.abs(wavelet).max())
-    return wavelet / scale, scale
+def _normalised(medium: Medium, wavelet: Floats) -> tuple[Floats, float]:
+    """The wavelet over its largest magnitude, and the pressure that this makes 1."""
+    largest = float(np.abs(wavelet).max())
+    # A point source is 1 / spacing^d on its node; the factors contain spacing^2.
+    return wavelet / largest, largest / medium.spacing ** (medium.speed.ndim - 2)
 
 
 def _of_receivers(samples: NDArray[Any], valid: Ints, scale: float) -> NDArray[Any]:

@@ -13,7 +13,7 @@ def simulate_opencl(medium: Medium, emitter: Floats, receivers: Floats, wavelet:
     """As ``simulate``, from the same stencil, factors and weights; equal to it except for rounding.
 
     Raises:
-        InvalidInput: as ``simulate``, for a 3-D medium, and where ``BENTRAY_OPENCL_DEVICE`` does not
+        InvalidInput: as ``simulate``, and where ``BENTRAY_OPENCL_DEVICE`` does not
             match one device.
 
     Warns:

@@ -8,9 +8,9 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import OpenCLFallbackWarning, choice, session_or_warning
-from bentray_kernels.wave.device_waves import OTHER_GROUP, PROCESSOR_GROUP, DeviceWaves, Scan
+from bentray_kernels.wave.device_flight import Flight
+from bentray_kernels.wave.device_waves import OTHER_GROUP, PROCESSOR_GROUPS, DeviceWaves, Scan, tiles
 from bentray_kernels.wave.emissions import misfit_gradients, simulate_emissions
-from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.points import Points
 from bentray_kernels.wave.simulation import place_elements, simulate
 from bentray_kernels.wave.time_blocks import no_poll
@@ -114,17 +114,36 @@ def test_scattering_and_the_gradient_are_transposes(dtype, bound):
 
 
 @pytest.mark.opencl
-def test_every_run_and_every_tile_gives_the_same_bits(recorded):
+def test_every_run_every_tile_and_every_checkpoint_give_the_same_bits(recorded):
     misfit = compare(recorded)
-    runs = [gradients(medium(), misfit, "opencl", 3) for _ in range(2)]
-    session = session_or_warning("")
-    waves = DeviceWaves(session, medium(), Scan(place_elements(medium(), RECEIVERS), STEPS, 3))
-    alone = gradients(medium(), misfit, "opencl", 3, memory_bytes=1.5 * waves.emitter_bytes[0])
-    for first, *others in zip(*runs, alone, strict=True):
+    waves = DeviceWaves(session_or_warning(""), medium(), Scan(place_elements(medium(), RECEIVERS), STEPS, 1))
+    limits = [math.inf, math.inf, *(1.01 * waves.size.bytes(segments) for segments in (1, 2, 6))]
+    assert [waves.plan(limit).segments for limit in limits] == [1, 1, 1, 2, 6]
+    assert waves.plan(limits[2]).emitters == 1
+    runs = [gradients(medium(), misfit, "opencl", 1, memory_bytes=limit) for limit in limits]
+    for first, *others in zip(*runs, strict=True):
+        assert first.gradient.any()
         for other in others:
             assert first.misfit == other.misfit
             assert np.array_equal(first.gradient, other.gradient)
             assert np.array_equal(first.illumination, other.illumination)
+
+
+@pytest.mark.opencl
+@pytest.mark.parametrize("every", [1, 3, 7])
+@pytest.mark.parametrize("segments", [2, 3, 10])
+def test_divided_time_loops_give_the_bits_of_whole_ones(every, segments):
+    host = medium()
+    waves = DeviceWaves(
+        session_or_warning(""), host, Scan(place_elements(host, RECEIVERS), STEPS, every, "attenuation")
+    )
+    found = []
+    for number in (1, segments):
+        flight = Flight(waves, place_elements(host, EMITTERS[:2]), WAVELET / 3e4, number, no_poll)
+        traces = flight.forward()
+        found.append((traces, *flight.backward(traces)))
+    for whole, divided in zip(*found, strict=True):
+        assert np.array_equal(whole, divided)
 
 
 @pytest.mark.opencl
@@ -134,29 +153,34 @@ def test_groups_of_a_processor_and_of_a_gpu_give_the_same_bits(by):
     scan = Scan(place_elements(host, RECEIVERS), STEPS, 3, by)
     sources = place_elements(host, EMITTERS)
     found = []
-    for group, tile in itertools.product((PROCESSOR_GROUP, OTHER_GROUP), (slice(0, 5), slice(0, 2))):
+    for group, tile in itertools.product((PROCESSOR_GROUPS[0], OTHER_GROUP), (slice(0, 5), slice(0, 2))):
         waves = DeviceWaves(session, host, scan, group)
         some = Points(sources.first[tile], sources.weights[tile])
-        traces, stored = waves.forward(some, WAVELET / np.abs(WAVELET).max(), no_poll)
-        found.append((traces, *waves.backward(traces, stored, no_poll)))
+        flight = Flight(waves, some, WAVELET / np.abs(WAVELET).max(), 1, no_poll)
+        traces = flight.forward()
+        found.append((traces, *flight.backward(traces)))
     for others in found[1:]:
         for expected, other in zip(found[0], others, strict=True):
             assert other.any()
             assert np.array_equal(expected[: len(other)], other[: len(expected)])
 
 
+def test_tiles_hold_every_emitter_once():
+    for emitters, most in ((0, 3), (1, 3), (7, 3), (7, 7), (7, 10)):
+        found = list(tiles(emitters, most))
+        assert [k for tile in found for k in range(emitters)[tile]] == list(range(emitters))
+        sizes = [tile.stop - tile.start for tile in found]
+        assert not sizes or max(sizes) <= min(most, min(sizes) + 1)
+
+
 @pytest.mark.opencl
-def test_tiles_hold_every_emitter_once_within_the_memory():
-    session, host = session_or_warning(""), medium()
-    waves = DeviceWaves(session, host, Scan(place_elements(host, RECEIVERS), STEPS, 1))
-    whole, largest = waves.emitter_bytes
-    assert 0 < largest < whole
-    for memory in (math.inf, 2.5 * whole, whole):
-        tiles = list(waves.tiles(7, memory))
-        assert [k for tile in tiles for k in range(7)[tile]] == list(range(7))
-        assert all((tile.stop - tile.start) * whole <= memory for tile in tiles)
-    with pytest.raises(InvalidInput, match=f"{whole} bytes"):
-        waves.tiles(7, whole - 1)
+def test_a_device_that_is_too_small_is_refused_by_number():
+    host = medium()
+    waves = DeviceWaves(session_or_warning(""), host, Scan(place_elements(host, RECEIVERS), STEPS, 1))
+    least = min(waves.size.bytes(segments) for segments in range(1, STEPS + 1))
+    with pytest.raises(InvalidInput, match=f"{least} bytes"):
+        waves.plan(least - 1)
+    assert waves.plan(least).emitters == 1
 
 
 @pytest.mark.opencl
@@ -194,6 +218,3 @@ def test_bad_input_is_rejected_by_both_engines(engine):
         list(simulate_emissions(medium(), EMISSIONS._replace(receivers=RECEIVERS + 1.0), engine=engine))
     with pytest.raises(InvalidInput, match="every"):
         gradients(medium(), None, engine, 0)
-    space = Medium.of(np.full((6, 6, 6), 1500.0), 1e-3, 1e-7, edge_nodes=4)
-    with pytest.raises(InvalidInput, match="speed"):
-        list(simulate_emissions(space, EMISSIONS, engine=engine))

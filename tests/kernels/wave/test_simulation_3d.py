@@ -12,7 +12,6 @@ from bentray_kernels.wave.adjoint import misfit_gradient
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.memory import emission_bytes
 from bentray_kernels.wave.simulation import simulate
-from bentray_kernels.wave.simulation_opencl import simulate_opencl
 from bentray_kernels.wave.stencil import longest_step, symbol
 
 WATER = 1500.0
@@ -167,7 +166,6 @@ def test_rejects_unsupported_3d_settings():
     wavelet, at = pulse(time, 1.8e5), np.full((1, 3), 5e-3)
     for wrong in (
         lambda: misfit_gradient(medium, at[0], at, wavelet, lambda traces: (0.0, traces)),
-        lambda: simulate_opencl(medium, at[0], at, wavelet),
         lambda: simulate(medium, at[0], at[:, :2], wavelet),
         lambda: simulate(medium, at[0], at + 9e-3, wavelet),
         lambda: water((14, 14, 14), 1.01 * longest_step(WATER, SPACING, dimensions=3)),

@@ -1,0 +1,151 @@
+"""Emitters in flight on an OpenCL device: time loops forwards and backwards, without host round trips."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from .device_waves import NOTHING, DeviceWaves
+from .points import REACH, Points
+from .time_blocks import Poll
+
+# Time steps between two polls: the device has work for a block while the host waits for the one before.
+BLOCK_STEPS = 64
+
+# Of so many stored fields one is taken for the illumination.
+LIGHT_EVERY = 1
+
+
+class Flight:
+    """Some emitters of a scan, simulated together.
+
+    An emitter's results have the same bits whichever emitters are in flight with it, and whether its time
+    loop is divided or not.
+
+    Args:
+        waves: the medium on the device.
+        sources: the emitters on its grid.
+        pulse: (steps,), their source.
+        segments: of the time loop, see ``device_memory.FlightPlan``.
+        poll: see ``time_blocks``.
+    """
+
+    def __init__(self, waves: DeviceWaves, sources: Points, pulse: Floats, segments: int, poll: Poll) -> None:
+        session, kind = waves.session, waves.kind
+        self._waves, self._session, self._poll = waves, session, poll
+        self._emitters = len(sources.first)
+        size, scan = waves.size, waves.scan
+        self._held = size.held(segments)
+        # First step of each segment, and the end of the last.
+        length = self._held * scan.every or scan.steps
+        self._edges = [*range(0, scan.steps, length), scan.steps]
+        self._traces = np.empty((self._emitters, scan.steps, len(scan.receivers.first)), kind)
+        self._samples = session.reserve(max(self._traces.nbytes, 1))
+        self._stored = session.reserve(max(self._emitters * self._held * size.image * kind.itemsize, 1))
+        self._points = (*waves.uploaded(sources), session.upload(pulse.astype(kind)))
+        self._checkpoints: dict[int, list[Any]] = {}
+
+    def forward(self) -> NDArray[Any]:
+        """Traces of the emitters, (emitters, steps, receivers)."""
+        with self._session.lock:
+            fields = self._fields()
+            last = len(self._edges) - 2
+            for segment in range(last + 1):
+                if 0 < segment < last:
+                    self._checkpoints[segment] = [self._session.copied(field) for field in fields]
+                self._forward(fields, segment, storing=segment == last, reading=True)
+            self._session.download(self._traces, self._samples)
+        return self._traces
+
+    def backward(self, residual: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """The adjoint fields correlated with the stored ones, and the energy of the stored ones.
+
+        To be called after ``forward``, once.
+
+        Args:
+            residual: (emitters, steps, receivers), of the medium's type.
+
+        Returns:
+            (emitters, nx, ny[, nz]), twice.
+        """
+        session, waves = self._session, self._waves
+        shape = (self._emitters, *waves.grid.shape)
+        image, light = np.empty(shape, waves.kind), np.empty(shape, waves.kind)
+        with session.lock:
+            adjoint, sums = self._fields(), [session.zeros(image.size, waves.kind) for _ in range(2)]
+            samples = session.upload(residual)
+            for segment in reversed(range(len(self._edges) - 1)):
+                if segment < len(self._edges) - 2:
+                    fields = self._checkpoints.pop(segment) if segment else self._fields()
+                    self._forward(fields, segment, storing=True, reading=False)
+                self._backward(adjoint, segment, samples, sums)
+            session.download(image, sums[0])
+            session.download(light, sums[1])
+        return image, light
+
+    def _forward(self, fields: list[Any], segment: int, *, storing: bool, reading: bool) -> None:
+        """Enqueue the steps of a segment."""
+        waves, every = self._waves, self._waves.scan.every
+        store = waves.scan.store if storing else NOTHING
+        uses = {NOTHING, store}
+        # A kernel for each role of the two fields, so that only numbers change from step to step.
+        stepping, ending = [], []
+        for now, new in (fields, fields[::-1]):
+            arrays = (now, new, self._stored)
+            stepping.append({use: waves.advance(use, *arrays, self._emitters) for use in uses})
+            points = (self._samples, *self._points)
+            ending.append({use: waves.exchange(use, *arrays, *points, reading=reading) for use in uses})
+        receivers = self._traces.shape[2] if reading else 0
+        ends = (receivers + (2 * REACH) ** len(waves.grid.shape), self._emitters)
+        for n in self._steps(segment):
+            use = store if store and n % every == 0 else NOTHING
+            step, end = stepping[n % 2][use], ending[n % 2][use]
+            if use:
+                slot = np.uint32(n // every % self._held)
+                step.set_arg(15, slot)
+                end.set_arg(17, slot)
+            self._session.launch(step, waves.grid.work_items(self._emitters), (*waves.grid.group, 1))
+            end.set_arg(18, np.uint32(n))
+            self._session.launch(end, ends, None)
+
+    def _backward(self, adjoint: list[Any], segment: int, residual: Any, sums: list[Any]) -> None:
+        """Enqueue the steps of a segment, the last one first."""
+        waves, every = self._waves, self._waves.scan.every
+        correlating, stepping, ending = [], [], []
+        for now, new in (adjoint, adjoint[::-1]):
+            correlating.append(waves.correlate(now, self._stored, *sums))
+            stepping.append(waves.advance(NOTHING, now, new, self._stored, self._emitters))
+            ending.append(waves.inject(new, residual))
+        rows = (waves.grid.shape[-1], waves.grid.rows, self._emitters)
+        for n in self._steps(segment, backwards=True):
+            if n % every == 0:
+                slot = n // every
+                correlating[n % 2].set_arg(9, np.uint32(slot % self._held))
+                correlating[n % 2].set_arg(10, np.uint32(slot % LIGHT_EVERY == 0))
+                self._session.launch(correlating[n % 2], rows, None)
+            items = waves.grid.work_items(self._emitters)
+            self._session.launch(stepping[n % 2], items, (*waves.grid.group, 1))
+            ending[n % 2].set_arg(10, np.uint32(n))
+            self._session.launch(ending[n % 2], (waves.gathered, self._emitters), None)
+
+    def _fields(self) -> list[Any]:
+        """Two fields of zeros."""
+        count = self._emitters * self._waves.grid.plane
+        return [self._session.zeros(count, self._waves.kind) for _ in range(2)]
+
+    def _steps(self, segment: int, *, backwards: bool = False) -> Iterator[int]:
+        """Numbers of the steps; ``poll`` is called between blocks, at most two of which are waiting."""
+        begin, end = self._edges[segment : segment + 2]
+        before: Any = None
+        for first in range(begin, end, BLOCK_STEPS):
+            self._poll()
+            block = range(first, min(first + BLOCK_STEPS, end))
+            yield from (begin + end - 1 - n for n in block) if backwards else block
+            marker = self._session.mark()
+            if before is not None:
+                before.wait()
+            before = marker
