@@ -5,12 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager
+from functools import cache
 from typing import Any
 
-from fastapi import Depends, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from fastapi.security import HTTPBearer
 from fastapi.staticfiles import StaticFiles
 from starlette.concurrency import run_in_threadpool
+from starlette.routing import BaseRoute
 
 from bentray_workers.cluster.connection import open_cluster
 
@@ -114,7 +116,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
-        responses=errors.problems("default"),
+        routes=[*_routes()],
     )
     # Set when the server stops, so that event streams end before it waits for them.
     app.state.leaving = threading.Event()
@@ -126,6 +128,17 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     app.add_middleware(RequestIds)
     app.state.metrics = Metrics()
     app.add_middleware(app.state.metrics.middleware)
+    app.mount("/static", StaticFiles(directory=pages.WEB / "static"), name="static")
+    return app
+
+
+@cache
+def _routes() -> tuple[BaseRoute, ...]:
+    """The routes, shared by all applications of a process.
+
+    FastAPI reads the signatures of their functions again for every application that includes a router itself.
+    """
+    router = APIRouter(responses=errors.problems("default"))
     for part in (
         tus,
         datasets,
@@ -141,12 +154,11 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         access,
         cluster_health,
     ):
-        app.include_router(part.router, **CLOSED)
-    app.include_router(health.metrics_router, **CLOSED)
+        router.include_router(part.router, **CLOSED)
+    router.include_router(health.metrics_router, **CLOSED)
     for public in (health, pages):
-        app.include_router(public.router)
-    app.mount("/static", StaticFiles(directory=pages.WEB / "static"), name="static")
-    return app
+        router.include_router(public.router)
+    return tuple(router.routes)
 
 
 def _open(
