@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from .device_waves import NOTHING, DeviceWaves
+from .device_waves import NOTHING, DeviceWaves, uints
 from .points import REACH, Points
 from .time_blocks import Poll
 
@@ -43,14 +44,14 @@ class Flight:
         # First step of each segment, and the end of the last.
         length = self._held * scan.every or scan.steps
         self._edges = [*range(0, scan.steps, length), scan.steps]
-        self._traces = np.empty((self._emitters, scan.steps, len(scan.receivers.first)), kind)
-        self._samples = session.reserve(max(self._traces.nbytes, 1))
+        self._shape = (self._emitters, scan.steps, len(scan.receivers.first))
+        self._samples = session.reserve(max(math.prod(self._shape) * kind.itemsize, 1))
         self._stored = session.reserve(max(self._emitters * self._held * size.image * kind.itemsize, 1))
         self._points = (*waves.uploaded(sources), session.upload(pulse.astype(kind)))
         self._checkpoints: dict[int, list[Any]] = {}
 
-    def forward(self) -> NDArray[Any]:
-        """Traces of the emitters, (emitters, steps, receivers)."""
+    def forward(self) -> None:
+        """Enqueue the time loop."""
         with self._session.lock:
             fields = self._fields()
             last = len(self._edges) - 2
@@ -58,16 +59,48 @@ class Flight:
                 if 0 < segment < last:
                     self._checkpoints[segment] = [self._session.copied(field) for field in fields]
                 self._forward(fields, segment, storing=segment == last, reading=True)
-            self._session.download(self._traces, self._samples)
-        return self._traces
 
-    def backward(self, residual: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """The adjoint fields correlated with the stored ones, and the energy of the stored ones.
+    def traces(self) -> NDArray[Any]:
+        """Those of the emitters, (emitters, steps, receivers)."""
+        traces = np.empty(self._shape, self._waves.kind)
+        with self._session.lock:
+            self._session.download(traces, self._samples)
+        return traces
 
-        To be called after ``forward``, once.
+    def compare(
+        self, program: str, recorded: NDArray[Any], weight: NDArray[Any], scale: float
+    ) -> tuple[Floats, Floats]:
+        """Replace the traces by residuals, on the device.
 
         Args:
-            residual: (emitters, steps, receivers), of the medium's type.
+            program: of ``misfits.cl``.
+            recorded, weight: (emitters, steps, receivers), of the medium's type.
+            scale: of the recorded traces.
+
+        Returns:
+            The misfit of each emitter, and the divisor of its residuals.
+        """
+        session, (emitters, steps, receivers) = self._session, self._shape
+        sums = np.empty((emitters, receivers, 2))
+        with session.lock:
+            buffers = [session.upload(array) for array in (recorded, weight, sums)]
+            sizes = (*uints(steps, receivers), np.float64(scale))
+            kernel = self._waves.misfit(program, self._samples, *buffers, *sizes)
+            session.launch(kernel, (receivers, emitters), None)
+            session.download(sums, buffers[2])
+        values, divisors = sums.sum(axis=1).T
+        divisors = np.where(divisors > 0.0, divisors, 1.0)
+        return values / divisors, divisors
+
+    def replace_traces(self, residual: NDArray[Any]) -> None:
+        """Replace the traces by residuals, (emitters, steps, receivers), of the medium's type."""
+        with self._session.lock:
+            self._samples = self._session.upload(residual)
+
+    def backward(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """The adjoint fields of the residuals correlated with the stored ones, and the energy of the latter.
+
+        To be called once, when residuals have replaced the traces of ``forward``.
 
         Returns:
             (emitters, nx, ny[, nz]), twice.
@@ -77,12 +110,11 @@ class Flight:
         image, light = np.empty(shape, waves.kind), np.empty(shape, waves.kind)
         with session.lock:
             adjoint, sums = self._fields(), [session.zeros(image.size, waves.kind) for _ in range(2)]
-            samples = session.upload(residual)
             for segment in reversed(range(len(self._edges) - 1)):
                 if segment < len(self._edges) - 2:
                     fields = self._checkpoints.pop(segment) if segment else self._fields()
                     self._forward(fields, segment, storing=True, reading=False)
-                self._backward(adjoint, segment, samples, sums)
+                self._backward(adjoint, segment, sums)
             session.download(image, sums[0])
             session.download(light, sums[1])
         return image, light
@@ -99,7 +131,7 @@ class Flight:
             stepping.append({use: waves.advance(use, *arrays, self._emitters) for use in uses})
             points = (self._samples, *self._points)
             ending.append({use: waves.exchange(use, *arrays, *points, reading=reading) for use in uses})
-        receivers = self._traces.shape[2] if reading else 0
+        receivers = self._shape[2] if reading else 0
         ends = (receivers + (2 * REACH) ** len(waves.grid.shape), self._emitters)
         for n in self._steps(segment):
             use = store if store and n % every == 0 else NOTHING
@@ -112,14 +144,14 @@ class Flight:
             end.set_arg(18, np.uint32(n))
             self._session.launch(end, ends, None)
 
-    def _backward(self, adjoint: list[Any], segment: int, residual: Any, sums: list[Any]) -> None:
+    def _backward(self, adjoint: list[Any], segment: int, sums: list[Any]) -> None:
         """Enqueue the steps of a segment, the last one first."""
         waves, every = self._waves, self._waves.scan.every
         correlating, stepping, ending = [], [], []
         for now, new in (adjoint, adjoint[::-1]):
             correlating.append(waves.correlate(now, self._stored, *sums))
             stepping.append(waves.advance(NOTHING, now, new, self._stored, self._emitters))
-            ending.append(waves.inject(new, residual))
+            ending.append(waves.inject(new, self._samples))
         rows = (waves.grid.shape[-1], waves.grid.rows, self._emitters)
         for n in self._steps(segment, backwards=True):
             if n % every == 0:

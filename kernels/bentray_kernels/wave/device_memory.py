@@ -16,7 +16,7 @@ class FlightSize:
         field: of a padded field.
         image: of the image alone, so of a stored field.
         slots: stored fields; 0: no gradient.
-        samples: of all its traces.
+        samples: of all its traces, and as many of recorded ones and of their weights.
         itemsize: bytes of a number.
     """
 
@@ -40,7 +40,7 @@ class FlightSize:
         pairs = 1 if segments == 1 else 1 + max(1, segments - 2)
         images = 2 * self.image if self.slots else 0
         return self.itemsize * (
-            2 * pairs * self.field + self.held(segments) * self.image + images + self.samples
+            2 * pairs * self.field + self.held(segments) * self.image + images + 3 * self.samples
         )
 
     def largest_bytes(self, segments: int) -> int:

@@ -127,7 +127,7 @@ class DeviceWaves:
         flush = self.kind.type(FLUSH)
         numbers = (*uints(grid.blocks, emitters), grid.nodes, stored, np.uint32(0))
         place = (np.uint32(grid.first), *self._strides, *numbers)
-        return self.kernel("advance", store, now, new, *self._factors, self._taps, flush, *place)
+        return self._kernel("advance", store, now, new, *self._factors, self._taps, flush, *place)
 
     def exchange(self, store: int, now: Any, new: Any, stored: Any, *points: Any, reading: bool) -> Any:
         """The kernel that ends a step forwards.
@@ -143,21 +143,21 @@ class DeviceWaves:
         receivers = len(self.scan.receivers.first) if reading else 0
         sizes = uints(self.scan.steps, receivers, self.grid.shift)
         place = (*self._strides, self.grid.nodes, stored, *uints(0, 0))
-        return self.kernel(
+        return self._kernel(
             "exchange", store, now, new, self.drive, *self._receivers, traces, *emitters, *sizes, *place
         )
 
     def correlate(self, now: Any, stored: Any, image: Any, light: Any) -> Any:
         """The kernel that correlates the adjoint field ``now`` with a stored one."""
         place = (np.uint32(self.grid.shift), *self._strides, self.grid.nodes, *uints(0, 0))
-        return self.kernel("correlate", NOTHING, now, stored, image, light, *place)
+        return self._kernel("correlate", NOTHING, now, stored, image, light, *place)
 
     def inject(self, new: Any, residual: Any) -> Any:
         """The kernel that ends a step backwards."""
         assert self.gather is not None
         sizes = uints(self.scan.steps, len(self.scan.receivers.first))
         plane = np.uint64(self.grid.plane)
-        return self.kernel(
+        return self._kernel(
             "inject", NOTHING, new, self.drive, *self.gather, residual, *sizes, plane, np.uint32(0)
         )
 
@@ -165,14 +165,20 @@ class DeviceWaves:
     def _strides(self) -> tuple[Any, ...]:
         return *uints(self.grid.pitch, self.grid.slab), np.uint64(self.grid.plane)
 
-    def kernel(self, name: str, store: int, *arguments: Any) -> Any:
-        """A kernel of the program with its arguments."""
+    def misfit(self, name: str, *arguments: Any) -> Any:
+        """A kernel of ``misfits.cl`` with its arguments."""
+        return self._own_kernel("wave/misfits", name, {}, arguments)
+
+    def _kernel(self, name: str, store: int, *arguments: Any) -> Any:
+        sizes = {"DIMS": len(self.grid.shape), "HALO": HALO, "TAPS": 2 * REACH, "ROWS": ROWS, "STORE": store}
+        return self._own_kernel("wave/waves", name, sizes, arguments)
+
+    def _own_kernel(self, source: str, name: str, sizes: dict[str, int], arguments: tuple[Any, ...]) -> Any:
         from ..opencl.session import set_arguments
 
         real = "float" if self.kind == np.float32 else "double"
-        sizes = {"DIMS": len(self.grid.shape), "HALO": HALO, "TAPS": 2 * REACH, "ROWS": ROWS, "STORE": store}
         defines = (f"REAL={real}", *(f"{key}={value}" for key, value in sizes.items()))
-        kernel = self.session.own_kernel(("wave/waves",), name, *defines)
+        kernel = self.session.own_kernel((source,), name, *defines)
         set_arguments(kernel, *arguments)
         return kernel
 

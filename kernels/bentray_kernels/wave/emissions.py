@@ -19,12 +19,26 @@ from .time_blocks import Poll, no_poll
 
 if TYPE_CHECKING:
     from ..opencl.session import Session
+    from .device_flight import Flight
 
 # What simulates the waves.
 Engine = Literal["compiled", "opencl"]
 
 # The misfit of the k-th emission's traces, (receivers, nt): its value, and its derivative by every sample.
 EmissionMisfit = Callable[[int, NDArray[Any]], tuple[float, Floats]]
+
+
+class Observed(NamedTuple):
+    """A misfit that exists as a program of devices, which then compare the traces where they are.
+
+    Attributes:
+        program: its name in ``misfits.cl``.
+        traces: of the k-th emission: recorded traces and their weights, (nt, nrx) each, of the medium's type;
+            of all receivers, with weight 0 for those that are not used.
+    """
+
+    program: str
+    traces: Callable[[int], tuple[NDArray[Any], NDArray[Any]]]
 
 
 class Emissions(NamedTuple):
@@ -87,9 +101,37 @@ def simulate_emissions(
     plan = waves.plan(memory_bytes)
     pulse, scale = _normalised(medium, emissions.wavelet)
     for tile in tiles(len(emissions.emitters), plan.emitters):
-        flight = Flight(waves, Points(sources.first[tile], sources.weights[tile]), pulse, 1, poll)
-        for samples, valid in zip(flight.forward(), emissions.valid[tile], strict=True):
+        flight = Flight(waves, _some(sources, tile), pulse, 1, poll)
+        flight.forward()
+        for samples, valid in zip(flight.traces(), emissions.valid[tile], strict=True):
             yield _of_receivers(samples, valid, scale)
+
+
+def emission_misfits(
+    medium: Medium,
+    emissions: Emissions,
+    misfit: EmissionMisfit,
+    poll: Poll = no_poll,
+    engine: Engine = "compiled",
+    observed: Observed | None = None,
+    memory_bytes: float = math.inf,
+) -> Iterator[float]:
+    """Misfit of each emission, in their order; see ``misfit_gradients``."""
+    session = _session(engine) if observed and len(emissions.emitters) else None
+    if session is None or observed is None:
+        simulated = simulate_emissions(medium, emissions, poll, engine, memory_bytes)
+        yield from (misfit(k, traces)[0] for k, traces in enumerate(simulated))
+        return
+    from .device_flight import Flight
+    from .device_waves import DeviceWaves, Scan, tiles
+
+    sources, receivers = place_scan(medium, *emissions.elements, emissions.wavelet)
+    waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
+    pulse, scale = _normalised(medium, emissions.wavelet)
+    for tile in tiles(len(emissions.emitters), waves.plan(memory_bytes).emitters):
+        flight = Flight(waves, _some(sources, tile), pulse, 1, poll)
+        flight.forward()
+        yield from _compared(flight, observed, tile, scale)[0].tolist()
 
 
 def misfit_gradients(
@@ -100,6 +142,7 @@ def misfit_gradients(
     by: Unknown = "speed",
     poll: Poll = no_poll,
     engine: Engine = "compiled",
+    observed: Observed | None = None,
     memory_bytes: float = math.inf,
 ) -> Iterator[MisfitGradient]:
     """Misfit and gradient of each emission, in their order; see ``misfit_gradient``.
@@ -114,6 +157,7 @@ def misfit_gradients(
         misfit: of the traces of an emission.
         every: time steps between stored fields.
         by: variable of the gradient.
+        observed: the same misfit as a program, so that no trace leaves the device.
         poll, engine, memory_bytes: as ``simulate_emissions``.
 
     Raises:
@@ -139,19 +183,37 @@ def misfit_gradients(
     plan = waves.plan(memory_bytes)
     pulse, scale = _normalised(medium, emissions.wavelet)
     for tile in tiles(len(emissions.emitters), plan.emitters):
-        some = Points(sources.first[tile], sources.weights[tile])
-        flight = Flight(waves, some, pulse, plan.segments, poll)
-        traces = flight.forward()
-        residuals, values, scales = np.zeros_like(traces), [], []
-        for k, (samples, valid) in enumerate(zip(traces, emissions.valid[tile], strict=True)):
-            value, residual = misfit(tile.start + k, _of_receivers(samples, valid, scale))
-            largest = float(np.abs(residual).max(initial=0.0))
-            residuals[k][:, valid] = (residual / (largest or 1.0)).T
-            values.append(value)
-            scales.append(largest)
-        for value, largest, image, light in zip(values, scales, *flight.backward(residuals), strict=True):
-            summed = largest * image.astype(np.float64)
-            yield gradient_of(medium, scale, value, summed, light.astype(np.float64), every, by)
+        flight = Flight(waves, _some(sources, tile), pulse, plan.segments, poll)
+        flight.forward()
+        if observed is None:
+            values, factors = _compared_here(flight, emissions, misfit, tile, scale)
+        else:
+            values, divisors = _compared(flight, observed, tile, scale)
+            # The residuals are derivatives by samples in the unit of the device.
+            factors = 1.0 / (divisors * scale)
+        for value, factor, image, light in zip(values, factors, *flight.backward(), strict=True):
+            summed = factor * image.astype(np.float64)
+            yield gradient_of(medium, scale, float(value), summed, light.astype(np.float64), every, by)
+
+
+def _compared(flight: Flight, observed: Observed, tile: slice, scale: float) -> tuple[Floats, Floats]:
+    """Misfits of emissions in flight, and divisors of the residuals that have replaced their traces."""
+    recorded, weight = zip(*(observed.traces(k) for k in range(tile.start, tile.stop)), strict=True)
+    return flight.compare(observed.program, np.stack(recorded), np.stack(weight), 1.0 / scale)
+
+
+def _compared_here(
+    flight: Flight, emissions: Emissions, misfit: EmissionMisfit, tile: slice, scale: float
+) -> tuple[Floats, Floats]:
+    """Misfits of emissions in flight, and factors of the residuals that have replaced their traces."""
+    traces = flight.traces()
+    residuals, values, factors = np.zeros_like(traces), np.empty(len(traces)), np.empty(len(traces))
+    for k, (samples, valid) in enumerate(zip(traces, emissions.valid[tile], strict=True)):
+        values[k], residual = misfit(tile.start + k, _of_receivers(samples, valid, scale))
+        factors[k] = np.abs(residual).max(initial=0.0)
+        residuals[k][:, valid] = (residual / (factors[k] or 1.0)).T
+    flight.replace_traces(residuals)
+    return values, factors
 
 
 def _session(engine: Engine) -> Session | None:
@@ -165,10 +227,10 @@ def _session(engine: Engine) -> Session | None:
 
 def _each(points: Points) -> Iterator[Points]:
     for k in range(len(points.first)):
-        yield _some(points, np.array([k]))
+        yield _some(points, slice(k, k + 1))
 
 
-def _some(points: Points, indices: Ints) -> Points:
+def _some(points: Points, indices: Ints | slice) -> Points:
     return Points(points.first[indices], points.weights[indices])
 
 

@@ -38,12 +38,16 @@ def change(seed):
     return way
 
 
+def windows(k):
+    """Weight of each sample of an emission's traces."""
+    arrival = np.linalg.norm(RECEIVERS[VALID[k]] - EMITTERS[k], axis=1) / 1500.0 + 6e-6
+    return misfits.arrival_window(arrival, TIME, 8e-6, 10e-6)
+
+
 def compare(recorded):
     """The misfit of each emission's traces from recorded ones."""
 
     def misfit(k, traces):
-        arrival = np.linalg.norm(RECEIVERS[VALID[k]] - EMITTERS[k], axis=1) / 1500.0 + 6e-6
-        window = misfits.arrival_window(arrival, TIME, 8e-6, 10e-6)
-        return misfits.correlation(traces, recorded[k], window)
+        return misfits.correlation(traces, recorded[k], windows(k))
 
     return misfit

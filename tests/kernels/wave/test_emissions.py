@@ -8,9 +8,10 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import OpenCLFallbackWarning, choice, session_or_warning
+from bentray_kernels.tomography.waveform import misfits
 from bentray_kernels.wave.device_flight import Flight
 from bentray_kernels.wave.device_waves import OTHER_GROUP, PROCESSOR_GROUPS, DeviceWaves, Scan, tiles
-from bentray_kernels.wave.emissions import misfit_gradients, simulate_emissions
+from bentray_kernels.wave.emissions import Observed, emission_misfits, misfit_gradients, simulate_emissions
 from bentray_kernels.wave.points import Points
 from bentray_kernels.wave.simulation import place_elements, simulate
 from bentray_kernels.wave.time_blocks import no_poll
@@ -25,6 +26,7 @@ from .emissions_scan import (
     change,
     compare,
     medium,
+    windows,
 )
 
 ENGINES = ("compiled", "opencl")
@@ -114,6 +116,34 @@ def test_scattering_and_the_gradient_are_transposes(dtype, bound):
 
 
 @pytest.mark.opencl
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("measure", [misfits.correlation, misfits.least_squares])
+def test_misfits_on_the_device_are_those_of_the_host(measure, dtype, recorded):
+    bound = 1e-11 if dtype == np.float64 else 1e-4
+    traces = [one.astype(np.float64) for one in recorded]
+    # A dead trace.
+    traces[1][2] = 0.0
+    weights = [windows(k) for k in range(len(VALID))]
+
+    def here(k, simulated):
+        return measure(simulated, traces[k], weights[k])
+
+    def there(k):
+        found = np.zeros((2, STEPS, len(RECEIVERS)), dtype)
+        found[0][:, VALID[k]], found[1][:, VALID[k]] = traces[k].T, weights[k].T
+        return found[0], found[1]
+
+    host, observed = medium(dtype), Observed(measure.__name__, there)
+    expected = gradients(host, here, "opencl")
+    found = gradients(host, here, "opencl", observed=observed)
+    values = list(emission_misfits(host, EMISSIONS, here, engine="opencl", observed=observed))
+    for one, other, value in zip(found, expected, values, strict=True):
+        assert one.misfit == value == pytest.approx(other.misfit, rel=bound)
+        assert off(one.gradient, other.gradient) < bound
+        assert np.array_equal(one.illumination, other.illumination)
+
+
+@pytest.mark.opencl
 def test_every_run_every_tile_and_every_checkpoint_give_the_same_bits(recorded):
     misfit = compare(recorded)
     waves = DeviceWaves(session_or_warning(""), medium(), Scan(place_elements(medium(), RECEIVERS), STEPS, 1))
@@ -140,8 +170,9 @@ def test_divided_time_loops_give_the_bits_of_whole_ones(every, segments):
     found = []
     for number in (1, segments):
         flight = Flight(waves, place_elements(host, EMITTERS[:2]), WAVELET / 3e4, number, no_poll)
-        traces = flight.forward()
-        found.append((traces, *flight.backward(traces)))
+        # The traces are the residuals.
+        flight.forward()
+        found.append((flight.traces(), *flight.backward()))
     for whole, divided in zip(*found, strict=True):
         assert np.array_equal(whole, divided)
 
@@ -157,8 +188,9 @@ def test_groups_of_a_processor_and_of_a_gpu_give_the_same_bits(by):
         waves = DeviceWaves(session, host, scan, group)
         some = Points(sources.first[tile], sources.weights[tile])
         flight = Flight(waves, some, WAVELET / np.abs(WAVELET).max(), 1, no_poll)
-        traces = flight.forward()
-        found.append((traces, *flight.backward(traces)))
+        # The traces are the residuals.
+        flight.forward()
+        found.append((flight.traces(), *flight.backward()))
     for others in found[1:]:
         for expected, other in zip(found[0], others, strict=True):
             assert other.any()

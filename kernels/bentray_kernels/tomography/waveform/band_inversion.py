@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from ...arrays import Floats, Ints
-from ...wave.emissions import Emissions, misfit_gradients, simulate_emissions
+from ...wave.emissions import EmissionMisfit, Emissions, Observed, emission_misfits, misfit_gradients
 from .lbfgs import append_pair, search_direction
 from .waveform_problem import WaveProblem
 from .waveform_settings import Steps, WaveSettings
@@ -139,26 +139,21 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: I
         window = problem.window(emitter, valid, settings.window_s)
         return measure(traces, problem.recorded(emitter, valid), window)
 
-    held = 0.0
-    validated = emissions(some[held_out])
-    for emitter, traces in zip(
-        some[held_out].tolist(),
-        simulate_emissions(medium, validated, problem.poll, settings.engine),
-        strict=True,
-    ):
-        held += compare(emitter, traces)[0]
+    def parts(emitters: Ints) -> tuple[EmissionMisfit, Observed]:
+        some = emitters.tolist()
+        return (
+            lambda k, traces: compare(some[k], traces),
+            Observed(settings.program(by), lambda k: problem.observed(some[k], settings.window_s)),
+        )
+
+    validated, used = some[held_out], some[~held_out]
+    here, observed = parts(validated)
+    engine, poll = settings.engine, problem.poll
+    held = sum(emission_misfits(medium, emissions(validated), here, poll, engine, observed), 0.0)
+    here, observed = parts(used)
     misfit = 0.0
     gradient, illumination = np.zeros_like(model.speed), np.zeros_like(model.speed)
-    used = some[~held_out].tolist()
-    for one in misfit_gradients(
-        medium,
-        emissions(some[~held_out]),
-        lambda k, traces: compare(used[k], traces),
-        problem.every,
-        by,
-        problem.poll,
-        settings.engine,
-    ):
+    for one in misfit_gradients(medium, emissions(used), here, problem.every, by, poll, engine, observed):
         misfit += one.misfit
         gradient += one.gradient
         illumination += one.illumination

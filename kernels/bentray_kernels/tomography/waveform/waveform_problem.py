@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -60,6 +60,9 @@ class WaveProblem:
     held: Ints
     every: int
     poll: Poll = no_poll
+    _observed: dict[int, tuple[NDArray[np.float32], NDArray[np.float32]]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def medium(self, speed: Floats, attenuation: Floats | None = None) -> Medium:
         """The medium of images on this grid."""
@@ -69,6 +72,22 @@ class WaveProblem:
         """Traces of some receivers, resampled to the simulator's time steps, (receivers, steps)."""
         sampled = self.traces[emitter][receivers] @ self.sampler
         return np.asarray(self.gain[emitter][receivers][:, None] * sampled, dtype=np.float64)
+
+    def observed(
+        self, emitter: int, reach_s: tuple[float, float]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """``recorded`` and ``window`` of all receivers for devices, (steps, receivers); kept in memory.
+
+        The weight of receivers that are not used is 0.
+        """
+        if emitter not in self._observed:
+            valid = self.valid_receivers(emitter)
+            shape = (self.clock.steps, len(self.receivers))
+            traces, weight = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+            traces[:, valid] = self.recorded(emitter, valid).T
+            weight[:, valid] = self.window(emitter, valid, reach_s).T
+            self._observed[emitter] = traces, weight
+        return self._observed[emitter]
 
     def valid_receivers(self, emitter: int) -> Ints:
         """Receivers whose traces of an emitter are used."""

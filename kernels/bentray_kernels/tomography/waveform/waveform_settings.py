@@ -157,3 +157,7 @@ class WaveSettings:
     def measure(self, of: Unknown) -> Misfit:
         """The misfit that is minimised for speed or attenuation."""
         return correlation if of == "speed" else least_squares
+
+    def program(self, of: Unknown) -> str:
+        """The same misfit as a program of devices, see ``wave.emissions.Observed``."""
+        return "correlation" if of == "speed" else "least_squares"
