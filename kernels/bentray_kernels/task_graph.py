@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
+from threadpoolctl import threadpool_limits
+
 # Longest wait for a result before ``stop`` is polled again, s.
 POLL_S = 0.2
 
@@ -187,6 +189,9 @@ class ThreadPool:
     def __init__(self, threads: int | None = 1) -> None:
         self._threads = threads or len(os.sched_getaffinity(0))
         self._executor = ThreadPoolExecutor(self._threads)
+        # Otherwise the threads of matrix products compete with these: a full waveform took half as long
+        # again. Workers of a cluster have the limit in their environment.
+        self._limit = threadpool_limits(1, "blas")
 
     def may_submit(self, running: int, ready: int) -> bool:
         return ready > 0 and running < self._threads
@@ -206,3 +211,4 @@ class ThreadPool:
         for future in running:
             future.cancel()
         wait(running)
+        self._limit.restore_original_limits()

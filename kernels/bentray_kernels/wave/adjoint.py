@@ -8,15 +8,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
+from .cache_lines import zeros
+from .light_cone import BLOCK_STEPS, TILE, Spans, everywhere, light_cone
 from .medium import Medium
 from .points import Points
-from .simulation import Unknown, check_2d, forward, place_scan
-from .stencil import weights
+from .simulation import Unknown, check_2d, cut, forward, place_scan
+from .stencil import HALO, weights
 from .time_blocks import Poll, no_poll, split_steps
-from .time_step import advance, inject
+from .time_step import advance, inject, inside
+
+# Of so many stored fields one is taken for the illumination, which only scales steps.
+LIGHT_EVERY = 4
 
 # A misfit of simulated traces (nrx, nt): its value, and its derivative by every sample.
 Misfit = Callable[[NDArray[Any]], tuple[float, Floats]]
@@ -45,6 +50,7 @@ def misfit_gradient(
     every: int = 1,
     by: Unknown = "speed",
     poll: Poll = no_poll,
+    until: Ints | None = None,
 ) -> MisfitGradient:
     """Misfit of one emitter's traces and its gradient (Plessix, Geophys. J. Int. 167, 2006).
 
@@ -60,6 +66,7 @@ def misfit_gradient(
         every: time steps between stored fields.
         by: variable of the gradient.
         poll: see ``time_blocks``.
+        until: (nrx,), samples of each trace that the misfit depends on; the others are 0. All by default.
 
     Raises:
         InvalidInput: as ``simulate``; a 3-D medium; a step between fields below 1.
@@ -68,9 +75,10 @@ def misfit_gradient(
         raise InvalidInput("every", every, "at least 1 step")
     check_2d(medium)
     source, detectors = place_scan(medium, emitter, receivers, wavelet)
-    traces, scattered = forward(medium, source, detectors, wavelet, every, by=by, poll=poll)
-    value, residual = misfit(traces)
-    image, light = backward(medium, detectors, residual, scattered, every, poll)
+    spans = everywhere(medium) if until is None else light_cone(medium, source, detectors, until)
+    traces, scattered = forward(medium, source, detectors, wavelet, every, by=by, spans=spans, poll=poll)
+    value, residual = misfit(traces if until is None else cut(traces, until))
+    image, light = backward(medium, detectors, residual, scattered, every, spans, poll)
     return gradient_of(medium, float(np.abs(wavelet).max()), value, image, light, every, by)
 
 
@@ -89,6 +97,7 @@ def backward(
     residual: Floats,
     scattered: NDArray[Any],
     every: int,
+    spans: Spans | None = None,
     poll: Poll = no_poll,
 ) -> tuple[Floats, Floats]:
     """The adjoint field correlated with a stored one: (nx, ny), and the energy of the stored one.
@@ -97,17 +106,19 @@ def backward(
         detectors: receivers on the grid.
         residual: (nrx, nt), derivative of the misfit by every sample.
         scattered: as ``forward`` gives it.
+        spans: as ``forward`` took them.
         poll: see ``time_blocks``.
     """
     kind = medium.keep.dtype
-    fields = np.zeros((2, *medium.keep.shape), kind)
-    image, light = np.zeros(medium.speed.shape), np.zeros(medium.speed.shape)
+    fields = [zeros(medium.keep.shape, kind) for _ in range(2)]
+    image, light = np.zeros(medium.speed.shape, kind), np.zeros(medium.speed.shape, kind)
     scale = float(np.abs(residual).max())
-    taps, sources = weights().astype(kind), (residual / (scale or 1.0)).astype(kind)
-    arguments = (fields[0], fields[1], medium.factors, taps, detectors, sources, medium.margin, every)
+    taps, sources = weights(medium.order).astype(kind), (residual / (scale or 1.0)).astype(kind)
+    spans = everywhere(medium) if spans is None else spans
+    arguments = (fields[0], fields[1], medium.factors, taps, detectors, sources, spans, medium.margin, every)
     for begin, end in split_steps(residual.shape[1], medium.keep.size, poll):
         _backward(begin, end, *arguments, scattered, image, light)
-    return scale * image, light
+    return scale * image.astype(np.float64), LIGHT_EVERY * light.astype(np.float64)
 
 
 @kernel
@@ -120,6 +131,7 @@ def _backward(
     weights: Any,
     receivers: Any,
     residual: Any,
+    spans: Any,
     margin: int,
     every: int,
     scattered: Any,
@@ -132,15 +144,21 @@ def _backward(
     nx, ny = image.shape
     last = residual.shape[1] - 1
     for n in range(last - begin, last - end, -1):
+        part = spans[min(n // BLOCK_STEPS, spans.shape[0] - 1)]
         if n % every == 0:
+            lit = n % (every * LIGHT_EVERY) == 0
             for i in range(nx):
-                adjoint = now[i + margin, margin:]
-                wave = scattered[n // every, i]
-                out, energy = image[i], light[i]
-                for j in range(ny):
+                left, right = inside(part[(i + margin - HALO) // TILE], margin, ny)
+                adjoint = now[i + margin, margin + left : margin + right]
+                wave, out = scattered[n // every, i, left:right], image[i, left:right]
+                for j in range(out.shape[0]):
                     out[j] += adjoint[j] * wave[j]
-                    energy[j] += wave[j] * wave[j]
-        advance(now, old, keep, fade, drive, weights)
+                if lit:
+                    energy = light[i, left:right]
+                    for j in range(energy.shape[0]):
+                        energy[j] += wave[j] * wave[j]
+        advance(now, old, keep, fade, drive, weights, part)
         for r in range(residual.shape[0]):
-            inject(old, drive, receivers.first[r], receivers.weights[r], residual[r, n])
+            if residual[r, n] != 0:
+                inject(old, drive, receivers.first[r], receivers.weights[r], residual[r, n])
         now, old = old, now

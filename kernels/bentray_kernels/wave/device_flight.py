@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from .adjoint import LIGHT_EVERY
 from .device_waves import NOTHING, DeviceWaves, uints
 from .points import REACH, Points
 from .time_blocks import Poll
 
 # Time steps between two polls: the device has work for a block while the host waits for the one before.
 BLOCK_STEPS = 64
-
-# Of so many stored fields one is taken for the illumination.
-LIGHT_EVERY = 1
 
 
 class Flight:
@@ -117,7 +115,7 @@ class Flight:
                 self._backward(adjoint, segment, sums)
             session.download(image, sums[0])
             session.download(light, sums[1])
-        return image, light
+        return image, LIGHT_EVERY * light
 
     def _forward(self, fields: list[Any], segment: int, *, storing: bool, reading: bool) -> None:
         """Enqueue the steps of a segment."""

@@ -47,8 +47,8 @@ class DeviceGrid:
         shape = medium.speed.shape
         across, along = group
         multiples = (ROWS * along, across) if len(shape) == 2 else (ROWS, along, across)
-        edges = 2 * (medium.margin - HALO)
-        filled = tuple(-(-(n + edges) // m) * m for n, m in zip(shape, multiples, strict=True))
+        padded = medium.keep.shape
+        filled = tuple(-(-(n - 2 * HALO) // m) * m for n, m in zip(padded, multiples, strict=True))
         return cls(shape, medium.margin, group, filled)
 
     @property

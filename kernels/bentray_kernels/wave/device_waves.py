@@ -85,7 +85,7 @@ class DeviceWaves:
         self.session, self.scan, self.kind = session, scan, medium.keep.dtype
         self.grid = DeviceGrid.of(medium, group or _group(session, medium))
         self._factors = [session.upload(self.grid.packed(factor)) for factor in medium.factors]
-        self._taps = session.upload(weights().astype(self.kind))
+        self._taps = session.upload(weights(medium.order).astype(self.kind))
         self._receivers = self.uploaded(scan.receivers)
         self.drive, self.gather, self.gathered = self._factors[2], None, 0
         if scan.every:

@@ -14,7 +14,7 @@ from ..errors import InvalidInput
 from .adjoint import MisfitGradient, gradient_of, misfit_gradient
 from .medium import Medium
 from .points import Points
-from .simulation import Unknown, forward, place_scan
+from .simulation import Unknown, cut, place_scan, simulate
 from .time_blocks import Poll, no_poll
 
 if TYPE_CHECKING:
@@ -49,17 +49,24 @@ class Emissions(NamedTuple):
         receivers: (nrx, d), m.
         valid: for each emission the indices of the receivers whose traces are used.
         wavelet: (nt,), as for ``simulate``.
+        until: for each emission the samples that are needed of the trace of each of its receivers, see
+            ``simulate``; all where it is None.
     """
 
     emitters: Floats
     receivers: Floats
     valid: Sequence[Ints]
     wavelet: Floats
+    until: Sequence[Ints] | None = None
 
     @property
     def elements(self) -> tuple[Floats, Floats]:
         """Emitters and receivers."""
         return self.emitters, self.receivers
+
+    def needed(self, k: int) -> Ints | None:
+        """``until`` of the k-th emission."""
+        return None if self.until is None else self.until[k]
 
 
 def simulate_emissions(
@@ -91,8 +98,9 @@ def simulate_emissions(
     sources, receivers = place_scan(medium, *emissions.elements, emissions.wavelet)
     session = _session(engine) if len(emissions.emitters) else None
     if session is None:
-        for source, valid in zip(_each(sources), emissions.valid, strict=True):
-            yield forward(medium, source, _some(receivers, valid), emissions.wavelet, 0, poll=poll)[0]
+        for k, (emitter, valid) in enumerate(zip(emissions.emitters, emissions.valid, strict=True)):
+            at, until = emissions.receivers[valid], emissions.needed(k)
+            yield simulate(medium, emitter, at, emissions.wavelet, poll, until)
         return
     from .device_flight import Flight
     from .device_waves import DeviceWaves, Scan, tiles
@@ -103,8 +111,8 @@ def simulate_emissions(
     for tile in tiles(len(emissions.emitters), plan.emitters):
         flight = Flight(waves, _some(sources, tile), pulse, 1, poll)
         flight.forward()
-        for samples, valid in zip(flight.traces(), emissions.valid[tile], strict=True):
-            yield _of_receivers(samples, valid, scale)
+        for k, samples in enumerate(flight.traces(), tile.start):
+            yield _traces(emissions, k, samples, scale)
 
 
 def emission_misfits(
@@ -174,7 +182,8 @@ def misfit_gradients(
             def compare(traces: NDArray[Any], k: int = k) -> tuple[float, Floats]:
                 return misfit(k, traces)
 
-            yield misfit_gradient(medium, emitter, at, emissions.wavelet, compare, every, by, poll)
+            until = emissions.needed(k)
+            yield misfit_gradient(medium, emitter, at, emissions.wavelet, compare, every, by, poll, until)
         return
     from .device_flight import Flight
     from .device_waves import DeviceWaves, Scan, tiles
@@ -209,7 +218,7 @@ def _compared_here(
     traces = flight.traces()
     residuals, values, factors = np.zeros_like(traces), np.empty(len(traces)), np.empty(len(traces))
     for k, (samples, valid) in enumerate(zip(traces, emissions.valid[tile], strict=True)):
-        values[k], residual = misfit(tile.start + k, _of_receivers(samples, valid, scale))
+        values[k], residual = misfit(tile.start + k, _traces(emissions, tile.start + k, samples, scale))
         factors[k] = np.abs(residual).max(initial=0.0)
         residuals[k][:, valid] = (residual / (factors[k] or 1.0)).T
     flight.replace_traces(residuals)
@@ -225,12 +234,7 @@ def _session(engine: Engine) -> Session | None:
     return session_or_warning(instead="compiled code")
 
 
-def _each(points: Points) -> Iterator[Points]:
-    for k in range(len(points.first)):
-        yield _some(points, slice(k, k + 1))
-
-
-def _some(points: Points, indices: Ints | slice) -> Points:
+def _some(points: Points, indices: slice) -> Points:
     return Points(points.first[indices], points.weights[indices])
 
 
@@ -241,8 +245,9 @@ def _normalised(medium: Medium, wavelet: Floats) -> tuple[Floats, float]:
     return wavelet / largest, largest / medium.spacing ** (medium.speed.ndim - 2)
 
 
-def _of_receivers(samples: NDArray[Any], valid: Ints, scale: float) -> NDArray[Any]:
-    """Traces of the valid receivers, (receivers, nt), from those of all, (nt, receivers)."""
-    traces = np.ascontiguousarray(samples[:, valid].T)
+def _traces(emissions: Emissions, k: int, samples: NDArray[Any], scale: float) -> NDArray[Any]:
+    """Traces of the k-th emission's receivers, (receivers, nt), from those of all, (nt, receivers)."""
+    traces = np.ascontiguousarray(samples[:, emissions.valid[k]].T)
     traces *= samples.dtype.type(scale)
-    return traces
+    until = emissions.needed(k)
+    return traces if until is None else cut(traces, until)

@@ -11,8 +11,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats
 from ..errors import InvalidInput
+from .cache_lines import missing, zeros
 from .memory import check_memory
-from .stencil import HALO, longest_step
+from .stencil import HALO, Order, longest_step
 
 # Width of the absorbing edge, nodes; power of its profile; theoretical reflection at normal incidence. Among
 # powers 2 to 4 and reflections 1e-3 to 1e-6 these reflect least: 1 % of waves of 15 nodes, 0.4 % of 7.5.
@@ -32,11 +33,13 @@ class Medium:
     value at the centre of the band. The edges have the same term, growing outwards as a power (a sponge).
 
     Attributes:
-        keep, fade, drive: (nx + 2 margin, ny + 2 margin[, nz + 2 margin]), float32 or float64.
+        keep, fade, drive: (nx + 2 margin, ny + 2 margin[, nz + 2 margin]), float32 or float64; the rows of a
+            plane are filled up to whole cache lines, see ``cache_lines``.
         speed: (nx, ny[, nz]), m/s, of the image alone.
         spacing: m.
         time_step_s: s.
         margin: nodes of edge and halo on every side of the image.
+        order: of the Laplacian, see ``stencil.weights``.
     """
 
     keep: NDArray[np.floating]
@@ -46,6 +49,7 @@ class Medium:
     spacing: float
     time_step_s: float
     margin: int
+    order: Order = 2 * HALO
 
     @property
     def factors(self) -> tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]:
@@ -63,6 +67,7 @@ class Medium:
         edge_nodes: int = EDGE_NODES,
         dtype: DTypeLike = np.float32,
         memory_bytes: float = math.inf,
+        order: Order = 2 * HALO,
     ) -> Medium:
         """The medium of an image, its outermost values continued through the edges.
 
@@ -74,6 +79,7 @@ class Medium:
             edge_nodes: width of the absorbing edges, nodes.
             dtype: of the fields; float64 for tests of exactness.
             memory_bytes: limit for one emission, see ``wave.memory.emission_bytes``.
+            order: in space, see ``stencil.weights``. Synthetic data for an inversion should use another one.
 
         Raises:
             InvalidInput: for an invalid speed or attenuation, an edge without a node, a time step beyond
@@ -88,7 +94,8 @@ class Medium:
             raise InvalidInput("edge_nodes", edge_nodes, "at least 1 node")
         check_memory(speed.shape, edge_nodes, dtype, memory_bytes)
         margin = edge_nodes + HALO
-        c = np.pad(speed, margin, mode="edge")
+        width = _padding(speed.shape, margin)
+        c = np.pad(speed, width, mode="edge")
         # By the speed at the boundary, so that no change of the object changes the edges.
         faces = [speed.take(end, axis).ravel() for axis in range(speed.ndim) for end in (0, -1)]
         rim = np.concatenate(faces).mean()
@@ -99,17 +106,24 @@ class Medium:
                 raise InvalidInput(
                     "attenuation", f"shape {loss.shape}", f"{speed.shape} of finite numbers >= 0 Np/m"
                 )
-            damping = damping + c * np.pad(loss, margin, mode="edge")
-        limit = longest_step(float(c.max()), spacing, float(damping.max()), speed.ndim)
+            damping = damping + c * np.pad(loss, width, mode="edge")
+        limit = longest_step(float(c.max()), spacing, float(damping.max()), speed.ndim, order)
         if not 0.0 < time_step_s <= limit:
             raise InvalidInput("time_step_s", time_step_s, f"a step > 0 and <= {limit:.4g} s, to be stable")
         turn = damping * time_step_s
         del damping
         # Converted one after the other: in 3-D they dominate the memory.
-        keep = np.ascontiguousarray((2.0 - turn**2) / (1.0 + turn), dtype=dtype)
-        fade = np.ascontiguousarray((1.0 - turn) / (1.0 + turn), dtype=dtype)
-        drive = np.ascontiguousarray((c * time_step_s / spacing) ** 2 / (1.0 + turn), dtype=dtype)
-        return cls(keep, fade, drive, speed, spacing, time_step_s, margin)
+        keep, fade, drive = (zeros(c.shape, dtype) for _ in range(3))
+        keep[...] = (2.0 - turn**2) / (1.0 + turn)
+        fade[...] = (1.0 - turn) / (1.0 + turn)
+        drive[...] = (c * time_step_s / spacing) ** 2 / (1.0 + turn)
+        return cls(keep, fade, drive, speed, spacing, time_step_s, margin, order)
+
+
+def _padding(shape: tuple[int, ...], margin: int) -> list[tuple[int, int]]:
+    """Nodes before and behind an image along each axis; rows of a plane are whole cache lines."""
+    tail = missing(shape[1] + 2 * margin) if len(shape) == 2 else 0
+    return [(margin, margin)] * (len(shape) - 1) + [(margin, margin + tail)]
 
 
 def _sponge(shape: tuple[int, ...], edge_nodes: int) -> Floats:
@@ -120,8 +134,8 @@ def _sponge(shape: tuple[int, ...], edge_nodes: int) -> Floats:
     strongest = -0.5 * (EDGE_POWER + 1) * np.log(EDGE_REFLECTION) / edge_nodes
     margin = edge_nodes + HALO
     profiles = []
-    for nodes in shape:
-        place = np.arange(nodes + 2 * margin) - margin
+    for nodes, width in zip(shape, _padding(shape, margin), strict=True):
+        place = np.arange(nodes + sum(width)) - margin
         depth = np.clip(np.maximum(-place, place - (nodes - 1)) / edge_nodes, 0.0, 1.0)
         profiles.append(strongest * depth**EDGE_POWER)
     return np.asarray(reduce(np.maximum, np.ix_(*profiles)))

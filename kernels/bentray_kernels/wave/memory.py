@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from ..errors import InvalidInput
+from .cache_lines import missing
 from .stencil import HALO
 
 # Bytes per padded node of the intermediate arrays while a medium is built.
@@ -17,7 +18,10 @@ MAKING = 40
 
 def padded_nodes(shape: Sequence[int], edge_nodes: int) -> int:
     """Number of nodes of an image with its edges and halo."""
-    return math.prod(nodes + 2 * (edge_nodes + HALO) for nodes in shape)
+    padded = [nodes + 2 * (edge_nodes + HALO) for nodes in shape]
+    if len(padded) == 2:
+        padded[1] += missing(padded[1])
+    return math.prod(padded)
 
 
 def emission_bytes(shape: Sequence[int], edge_nodes: int, dtype: DTypeLike = np.float32) -> int:

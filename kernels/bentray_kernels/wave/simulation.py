@@ -7,23 +7,34 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
+from .cache_lines import zeros
+from .light_cone import BLOCK_STEPS, Spans, everywhere, light_cone
 from .medium import Medium
 from .points import Points, place
-from .stencil import HALO, weights
+from .stencil import OPTIMISED, weights
 from .time_blocks import Poll, no_poll, split_steps
-from .time_step import advance, begin_loss_scattering, curvature, end_loss_scattering, inject, read, spread
+from .time_step import (
+    advance,
+    advance_storing,
+    begin_loss_scattering,
+    end_loss_scattering,
+    inject,
+    read,
+    spread,
+)
 from .time_step_3d import advance_3d, inject_3d, read_3d
 
 # Variables of a gradient.
 Unknown = Literal["speed", "attenuation"]
 
-# Fewest nodes per shortest wavelength of a source. The spatial phase error is 6.3 % at 2.5 nodes, 2.2 % at 3,
-# 0.34 % at 4, 0.07 % at 5 (``stencil.phase_error``, which a test measures); resampling compensates that of
-# water, so that an inversion may work near the limit.
-MIN_POINTS = 2.5
+# Fewest nodes per shortest wavelength of a source. The phase speed in space is too low by 6.3 % at 2.5 nodes,
+# 2.2 % at 3, 0.34 % at 4, 0.07 % at 5 with order 8 (``stencil.phase_error``, which a test measures); with
+# optimised weights by 3 % at 2.5, 0.4 % at 3 and at most 0.035 % from 3.3 on. Resampling compensates that of
+# water, so that the weak end of a pulse's band may come near the limit.
+MIN_POINTS, MIN_POINTS_OPTIMISED = 2.5, 2.0
 
 # The band of a source ends where its amplitude falls below this fraction of the highest.
 BAND_EDGE = 0.03
@@ -34,12 +45,12 @@ def simulate(
     emitter: Floats,
     receivers: Floats,
     wavelet: Floats,
-    order: int = 2 * HALO,
     poll: Poll = no_poll,
+    until: Ints | None = None,
 ) -> Floats:
     """Traces of a point source.
 
-    Second order in time, order 8 in space by default; free of temporal dispersion where wavelet and traces
+    Second order in time, in space that of the medium; free of temporal dispersion where wavelet and traces
     are resampled by ``waveform.trace_resampling.resampler``. Releases the GIL.
 
     Args:
@@ -47,8 +58,9 @@ def simulate(
         emitter: (d,), m, node 0 of the image at 0.
         receivers: (nrx, d), m.
         wavelet: (nt,), the source s(t) of (1/c^2) p'' - laplacian p = s(t) delta(x), a sample a time step.
-        order: in space; see ``stencil.weights``. Synthetic data for an inversion should use another order.
         poll: see ``time_blocks``.
+        until: (nrx,), samples of each trace that are needed; the others are 0. All by default. Without the
+            late ones a simulation in a plane takes half the time or less, see ``light_cone``.
 
     Returns:
         (nrx, nt), of the medium's type; sample n is the pressure at n time steps.
@@ -57,7 +69,14 @@ def simulate(
         InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
     """
     source, detectors = place_scan(medium, emitter, receivers, wavelet)
-    return forward(medium, source, detectors, wavelet, 0, order, poll=poll)[0]
+    spans = None if until is None or medium.speed.ndim == 3 else light_cone(medium, source, detectors, until)
+    traces = forward(medium, source, detectors, wavelet, 0, spans=spans, poll=poll)[0]
+    return traces if until is None else cut(traces, until)
+
+
+def cut(traces: NDArray[Any], until: Ints) -> NDArray[Any]:
+    """The traces with zeros from sample ``until`` of each on."""
+    return np.where(np.arange(traces.shape[1]) < until[:, None], traces, traces.dtype.type(0))
 
 
 def place_scan(medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floats) -> tuple[Points, Points]:
@@ -67,11 +86,12 @@ def place_scan(medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floa
         InvalidInput: elements outside the image, a wavelet with waves too short for the grid.
     """
     points = points_per_wavelength(medium, wavelet)
-    if points < MIN_POINTS:
+    fewest = MIN_POINTS_OPTIMISED if medium.order == OPTIMISED else MIN_POINTS
+    if points < fewest:
         raise InvalidInput(
             "spacing",
             f"{points:.2f} nodes in the shortest wave",
-            f"at least {MIN_POINTS:g}: a finer grid or a lower frequency",
+            f"at least {fewest:g}: a finer grid or a lower frequency",
         )
     return place_elements(medium, np.atleast_2d(emitter)), place_elements(medium, receivers)
 
@@ -108,8 +128,8 @@ def forward(
     detectors: Points,
     wavelet: Floats,
     every: int,
-    order: int = 2 * HALO,
     by: Unknown = "speed",
+    spans: Spans | None = None,
     poll: Poll = no_poll,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Traces, and the source of scattered waves in the image at every ``every``-th step.
@@ -117,8 +137,8 @@ def forward(
     Args:
         source, detectors: as ``place_elements`` gives them.
         every: steps between stored fields; 0: store none.
-        order: in space.
         by: the variable whose change scatters.
+        spans: the nodes that matter, see ``light_cone``; all by default, and for a 3-D medium.
         poll: see ``time_blocks``.
 
     Returns:
@@ -129,10 +149,10 @@ def forward(
     """
     kind = medium.keep.dtype
     nt = wavelet.size
-    traces = np.empty((len(detectors.first), nt), kind)
-    fields = np.zeros((2, *medium.keep.shape), kind)
+    traces = np.zeros((len(detectors.first), nt), kind)
+    fields = [zeros(medium.keep.shape, kind) for _ in range(2)]
     scale = float(np.abs(wavelet).max())
-    taps, pulse = weights(order).astype(kind), (wavelet / scale).astype(kind)
+    taps, pulse = weights(medium.order).astype(kind), (wavelet / scale).astype(kind)
     arguments = (fields[0], fields[1], medium.factors, taps, source, detectors, pulse, traces)
     blocks = split_steps(nt, medium.keep.size, poll)
     if medium.speed.ndim == 3:
@@ -142,11 +162,12 @@ def forward(
         traces *= kind.type(scale / medium.spacing)
         return traces, np.empty((0, *medium.speed.shape), kind)
     scattered = np.empty((-(-nt // every) if every else 0, *medium.speed.shape), kind)
-    inner = slice(medium.margin, -medium.margin)
-    fade = medium.fade[inner, inner]
+    inner = tuple(slice(medium.margin, medium.margin + nodes) for nodes in medium.speed.shape)
+    fade = medium.fade[inner]
     turn = (1 - fade) / (1 + fade)
+    spans = everywhere(medium) if spans is None else spans
     for begin, end in blocks:
-        _forward(begin, end, *arguments, medium.margin, every, by == "attenuation", turn, scattered)
+        _forward(begin, end, *arguments, spans, medium.margin, every, by == "attenuation", turn, scattered)
     traces *= kind.type(scale)
     return traces, scattered
 
@@ -163,6 +184,7 @@ def _forward(
     detectors: Any,
     wavelet: Any,
     traces: Any,
+    spans: Any,
     margin: int,
     every: int,
     by_loss: bool,
@@ -171,16 +193,20 @@ def _forward(
 ) -> None:
     keep, fade, drive = factors
     first, along = source.first[0], source.weights[0]
+    scratch = np.empty(now.shape[1], now.dtype)
     for n in range(begin, end):
         for r in range(traces.shape[0]):
             traces[r, n] = read(now, detectors.first[r], detectors.weights[r])
+        part = spans[min(n // BLOCK_STEPS, spans.shape[0] - 1)]
         stored = every > 0 and n % every == 0
-        if stored and by_loss:
-            begin_loss_scattering(now, old, turn, margin, scattered[n // every])
-        elif stored:
-            curvature(now, weights, margin, scattered[n // every])
-            spread(scattered[n // every], margin, first, along, wavelet[n])
-        advance(now, old, keep, fade, drive, weights)
+        if stored and not by_loss:
+            into = scattered[n // every]
+            advance_storing(now, old, keep, fade, drive, weights, part, margin, scratch, into)
+            spread(into, margin, first, along, wavelet[n])
+        else:
+            if stored:
+                begin_loss_scattering(now, old, turn, margin, scattered[n // every])
+            advance(now, old, keep, fade, drive, weights, part)
         inject(old, drive, first, along, wavelet[n])
         if stored and by_loss:
             end_loss_scattering(old, margin, scattered[n // every])

@@ -6,11 +6,21 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.wave.medium import Medium, _sponge
 from bentray_kernels.wave.simulation import simulate
-from bentray_kernels.wave.stencil import HALO, longest_step, numerical_frequency, phase_error, symbol, weights
+from bentray_kernels.wave.stencil import (
+    HALO,
+    OPTIMISED,
+    OPTIMISED_NODES,
+    longest_step,
+    numerical_frequency,
+    phase_error,
+    symbol,
+    weights,
+)
 
 
 @pytest.mark.parametrize("degree", range(10))
@@ -31,9 +41,29 @@ def test_lower_orders_are_exact_as_far_as_they_say(order):
     assert not weights(order)[order // 2 + 1 :].any()
 
 
-def test_odd_orders_are_rejected():
+@pytest.mark.parametrize("order", [5, 0, 10, "best", 8.0])
+def test_other_orders_are_rejected(order):
     with pytest.raises(InvalidInput, match="order"):
-        weights(5)
+        weights(order)
+
+
+def test_optimised_weights_have_the_least_largest_error():
+    """A linear program: least bound of the relative error of the symbol, for waves of 3 nodes and more."""
+    angle = np.linspace(0.0, 2.0 * math.pi / OPTIMISED_NODES, 2001)[1:, None]
+    distance = np.arange(1, HALO + 1)
+    each, bound = 2.0 * (1.0 - np.cos(angle * distance)) / angle**2, -np.ones_like(angle)
+    found = linprog(
+        [0.0] * HALO + [1.0],
+        np.block([[each, bound], [-each, bound]]),
+        np.concatenate((np.ones(angle.size), -np.ones(angle.size))),
+        [[*distance**2, 0.0]],
+        [1.0],
+        bounds=(None, None),
+    )
+    assert weights(OPTIMISED)[1:] == pytest.approx(found.x[:HALO], abs=2e-6)
+    errors = [phase_error(points, order=OPTIMISED) for points in np.linspace(OPTIMISED_NODES, 30.0, 400)]
+    assert np.abs(errors).max() == pytest.approx(0.5 * found.x[HALO], rel=0.01)
+    assert np.abs(errors).max() < 0.04 * abs(phase_error(OPTIMISED_NODES))
 
 
 def test_degree_ten_is_not():
@@ -47,11 +77,11 @@ def test_symbol_stays_below_the_square_that_it_replaces(angle):
     assert float(symbol(np.array(angle))) <= angle**2 + 1e-12
 
 
-def grown(factor):
+def grown(factor, order):
     """Highest pressure after 300 steps at a part of the limit, over that of a sound run."""
     speed, spacing = np.full((30, 30), 1500.0), 1e-3
-    step = longest_step(1500.0, spacing)
-    medium = Medium.of(speed, spacing, 0.9 * step, dtype=np.float64)
+    step = longest_step(1500.0, spacing, order=order)
+    medium = Medium.of(speed, spacing, 0.9 * step, dtype=np.float64, order=order)
     rough = medium.__class__(
         np.full_like(medium.keep, 2.0),
         np.ones_like(medium.fade),
@@ -60,6 +90,7 @@ def grown(factor):
         spacing,
         factor * step,
         medium.margin,
+        order,
     )
     time = np.arange(300) * step
     wavelet = np.exp(-(((time - 8e-6) * 2e5) ** 2))
@@ -67,9 +98,10 @@ def grown(factor):
     return np.abs(simulate(rough, at[0], at + 4e-3, wavelet)).max()
 
 
-def test_the_limit_of_stability_is_sharp():
-    assert grown(0.999) < 1.0
-    assert grown(1.02) > 1e3
+@pytest.mark.parametrize("order", [2, 6, 8, OPTIMISED])
+def test_the_limit_of_stability_is_sharp(order):
+    assert grown(0.999, order) < 1.0
+    assert grown(1.02, order) > 1e3
 
 
 @given(

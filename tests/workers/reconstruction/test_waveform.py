@@ -113,7 +113,7 @@ def test_slices_are_refined_by_themselves(cluster, tmp_path, expected):
     assert result.spacing_m == (*expected.spacing_m, pytest.approx(0.002))
     for k in range(2):
         image = Image(result.speed[..., k], result.spacing_m[0], result.origin_m[:2])
-        assert error(image) < 0.6 * error(water())
+        assert error(image) < 0.75 * error(water())
     assert {sweep.slice for sweep in result.history if sweep.band_hz} == {0, 1}
 
 
@@ -126,7 +126,7 @@ def test_without_a_water_shot_the_image_is_nearly_as_good(picked, tmp_path, expe
     with_water, without = (
         error(Image(one.speed, one.spacing_m[0], one.origin_m)) for one in (expected, result)
     )
-    assert without < 1.2 * with_water
+    assert without < 1.25 * with_water
 
 
 def test_an_estimated_water_shot_is_the_same_on_a_cluster(cluster, tmp_path):

@@ -32,8 +32,8 @@ from .plane import NODES, SNR, ring_radius
 # of its maximum.
 HIGHEST = 1.54
 
-# Unlike the simulations of a refinement (order 8, 4.5 nodes per shortest wavelength), so that data are not
-# inverted with the model that made them; and the time step relative to the longest stable one.
+# Unlike the simulations of a refinement (optimised weights, 4 nodes per wavelength at the upper corner), so
+# that data are not inverted with the model that made them; and the time step over the longest stable one.
 ORDER, NODES_A_WAVE, STEP = 6, 7.0, 0.5
 
 FREQUENCY_HZ = Range(1e4, 1e7, unit="Hz")
@@ -244,7 +244,7 @@ def simulate_emission(
     late = time * settings.frequency_hz
     pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
     received, water = (
-        simulate(medium, at, places, pulse, ORDER, poll)[:, :: settings.skip] for medium in _media(settings)
+        simulate(medium, at, places, pulse, poll)[:, :: settings.skip] for medium in _media(settings)
     )
     return received.astype(np.float32), water.astype(np.float32)
 
@@ -268,6 +268,7 @@ def _made(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
             settings.step_s,
             edge_nodes=settings.edge_nodes,
             memory_bytes=MEMORY_LIMIT or math.inf,
+            order=ORDER,
         )
         for speed in (settings.speed(), np.full(settings.grid, settings.coupling_mps))
     )

@@ -6,8 +6,9 @@ import math
 from typing import NamedTuple
 
 from ...wave.medium import EDGE_NODES
+from ...wave.memory import padded_nodes
 from ...wave.points import REACH
-from ...wave.stencil import HALO, longest_step
+from ...wave.stencil import OPTIMISED, longest_step
 from .trace_resampling import FALL
 from .waveform_settings import Band
 
@@ -45,7 +46,7 @@ class Extent(NamedTuple):
             record_s: duration of a trace, s.
             fastest_mps: highest speed of a node, m/s.
         """
-        step = SAFE * longest_step(fastest_mps, band.spacing_m)
+        step = SAFE * longest_step(fastest_mps, band.spacing_m, order=OPTIMISED)
         lead = LEAD / band.high_hz
         return cls(
             2 * math.ceil(reach_m / band.spacing_m + REACH) + 1,
@@ -58,5 +59,5 @@ class Extent(NamedTuple):
 
     @property
     def padded(self) -> int:
-        """Nodes along each side with edges and halo."""
-        return self.nodes + 2 * (EDGE_NODES + HALO)
+        """Nodes of the image with edges and halo."""
+        return padded_nodes((self.nodes, self.nodes), EDGE_NODES)

@@ -132,7 +132,11 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: I
     def emissions(emitters: Ints) -> Emissions:
         valid = [problem.valid_receivers(emitter) for emitter in emitters.tolist()]
         wavelet = problem.wavelet if model.wavelet is None else model.wavelet
-        return Emissions(problem.emitters[emitters], problem.receivers, valid, wavelet)
+        until = [
+            problem.until(emitter, some, settings.window_s)
+            for emitter, some in zip(emitters.tolist(), valid, strict=True)
+        ]
+        return Emissions(problem.emitters[emitters], problem.receivers, valid, wavelet, until)
 
     def compare(emitter: int, traces: Floats) -> tuple[float, Floats]:
         valid = problem.valid_receivers(emitter)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats
-from ...wave.stencil import numerical_frequency
+from ...wave.stencil import OPTIMISED, numerical_frequency
 
 
 class Water(NamedTuple):
@@ -73,7 +73,8 @@ def resampler(
     # Twice the length, against wrap-around of the filter.
     simulated = 2.0 * np.pi * np.fft.rfftfreq(2 * clock.steps, clock.step_s)
     number = np.linspace(0.0, np.pi / spacing, 2001)
-    reached = np.interp(simulated, numerical_frequency(number, water.speed, spacing, clock.step_s), number)
+    numerical = numerical_frequency(number, water.speed, spacing, clock.step_s, OPTIMISED)
+    reached = np.interp(simulated, numerical, number)
     frequency = np.linspace(0.0, 2.0 * band_hz[1], 2001)
     recorded = 1.0 - water.lead - water.bend * frequency**2
     true = np.interp(reached, 2.0 * np.pi * frequency * recorded / water.speed, 2.0 * np.pi * frequency)

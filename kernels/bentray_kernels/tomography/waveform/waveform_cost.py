@@ -10,7 +10,7 @@ from .validation import Validation
 from .waveform_settings import Band, WaveSettings
 
 # CPU time per node and time step of one evaluation, forward and adjoint, s; a core of 2020.
-NODE_STEP_S = 4e-9
+NODE_STEP_S = 2e-9
 
 # A misfit through an image above this multiple of the misfit in water is due to the image. Through the truth
 # the ratio is one to two, because traces of the object are weaker and relatively noisier.
@@ -32,7 +32,7 @@ def core_seconds(plan: Sequence[Band], width_m: float, record_s: float, fastest_
     seconds = 0.0
     for band in plan:
         extent = Extent.of(band, 0.5 * width_m, record_s, fastest_mps)
-        seconds += NODE_STEP_S * extent.padded**2 * extent.steps * band.evaluations(WaveSettings.held_out)
+        seconds += NODE_STEP_S * extent.padded * extent.steps * band.evaluations(WaveSettings.held_out)
     return seconds
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Flags, Floats, Ints
 from ...wave.medium import Medium
+from ...wave.stencil import OPTIMISED
 from ...wave.time_blocks import Poll, no_poll
 from .misfits import arrival_window
 from .trace_resampling import Clock, Water
@@ -66,7 +67,9 @@ class WaveProblem:
 
     def medium(self, speed: Floats, attenuation: Floats | None = None) -> Medium:
         """The medium of images on this grid."""
-        return Medium.of(speed, self.band.spacing_m, self.clock.step_s, attenuation=attenuation)
+        return Medium.of(
+            speed, self.band.spacing_m, self.clock.step_s, attenuation=attenuation, order=OPTIMISED
+        )
 
     def recorded(self, emitter: int, receivers: Ints) -> Floats:
         """Traces of some receivers, resampled to the simulator's time steps, (receivers, steps)."""
@@ -92,6 +95,11 @@ class WaveProblem:
     def valid_receivers(self, emitter: int) -> Ints:
         """Receivers whose traces of an emitter are used."""
         return np.flatnonzero(self.weight[emitter] > 0.0)
+
+    def until(self, emitter: int, receivers: Ints, reach_s: tuple[float, float]) -> Ints:
+        """Samples of each trace that have a weight in ``window``, (receivers,)."""
+        end = (self.arrival_s[emitter][receivers] + reach_s[1] - self.clock.begin_s) / self.clock.step_s
+        return np.asarray(np.clip(np.ceil(end), 0, self.clock.steps), dtype=np.int64)
 
     def window(self, emitter: int, receivers: Ints, reach_s: tuple[float, float]) -> Floats:
         """Weight of each sample, (receivers, steps): a window around the arrival, tapered at the end."""

@@ -26,7 +26,7 @@ class Band:
 
     Attributes:
         low_hz, high_hz: corners of the filter, Hz.
-        spacing_m: of the grid, m; the shortest wave needs 2.5 nodes.
+        spacing_m: of the grid, m; the shortest wave needs 2 nodes.
         iterations: at most.
         emitters: number of emitters, drawn at random; all where there are no more.
         smoothing_m: standard deviation of the Gaussian on gradients, m; should decrease with the frequency.
@@ -54,7 +54,7 @@ class Band:
 def bands(centre_hz: float, water_mps: float = 1500.0) -> tuple[Band, ...]:
     """The continuation for a pulse, up to 0.5, 0.75, 1.125 and 1.5 times its centre frequency.
 
-    Grids have 5 to 4.5 nodes per wavelength in water at the upper corner.
+    Grids have 4 nodes per wavelength in water at the upper corner, for which the Laplacian is optimised.
 
     Args:
         centre_hz: of the pulse, Hz.
@@ -62,10 +62,10 @@ def bands(centre_hz: float, water_mps: float = 1500.0) -> tuple[Band, ...]:
     """
     wave = water_mps / centre_hz
     return (
-        Band(0.25 * centre_hz, 0.5 * centre_hz, wave / 2.5, 8, 32, 0.8 * wave),
-        Band(0.25 * centre_hz, 0.75 * centre_hz, wave / 3.75, 12, 32, 0.53 * wave),
-        Band(0.25 * centre_hz, 1.125 * centre_hz, wave / 5.0, 16, 40, 0.2 * wave),
-        Band(0.25 * centre_hz, 1.5 * centre_hz, wave / 6.8, 8, 32, 0.13 * wave),
+        Band(0.25 * centre_hz, 0.5 * centre_hz, wave / 2.0, 8, 32, 0.8 * wave),
+        Band(0.25 * centre_hz, 0.75 * centre_hz, wave / 3.0, 12, 32, 0.53 * wave),
+        Band(0.25 * centre_hz, 1.125 * centre_hz, wave / 4.0, 16, 40, 0.2 * wave),
+        Band(0.25 * centre_hz, 1.5 * centre_hz, wave / 6.2, 8, 32, 0.13 * wave),
     )
 
 
@@ -80,7 +80,7 @@ def loss_band(centre_hz: float, water_mps: float = 1500.0) -> Band:
         water_mps: speed of the water, m/s.
     """
     wave = water_mps / centre_hz
-    return Band(0.75 * centre_hz, 1.125 * centre_hz, wave / 5.0, 4, 20, 0.5 * wave, "attenuation")
+    return Band(0.75 * centre_hz, 1.125 * centre_hz, wave / 4.0, 4, 20, 0.5 * wave, "attenuation")
 
 
 class Steps(NamedTuple):

@@ -22,7 +22,7 @@ SETTINGS = WaveSettings(
 def test_water_shots_are_simulated_as_recorded():
     problem = prepare(scan(), SETTINGS, 0)
     assert problem.water_correlation > 0.99
-    assert abs(problem.water.lead) < 1e-3
+    assert abs(problem.water.lead) < 1.5e-3
     emitter = int(problem.held[0])
     heard = problem.valid_receivers(emitter)
     medium = problem.medium(np.full(problem.region.shape, 1500.0))
@@ -35,7 +35,7 @@ def test_water_shots_are_simulated_as_recorded():
 def test_a_wrong_speed_of_water_is_found():
     wrong = replace(scan(), water_speed_mps=1503.0)
     problem = prepare(wrong, SETTINGS, 0)
-    assert 1503.0 / (1.0 - problem.water.lead) == pytest.approx(1500.0, abs=1.0)
+    assert 1503.0 / (1.0 - problem.water.lead) == pytest.approx(1500.0, abs=2.0)
 
 
 def test_held_out_emitters_are_the_same_in_every_band_and_not_used():
@@ -116,7 +116,8 @@ def test_gains_of_traces_are_used():
     plain, scaled = (prepare(replace(data, waveform=w), SETTINGS, 0) for w in (data.waveform, waveform))
     assert np.allclose(scaled.wavelet, plain.wavelet, atol=1e-4 * np.abs(plain.wavelet).max())
     heard = plain.valid_receivers(1)
-    assert np.allclose(scaled.recorded(1, heard), plain.recorded(1, heard), atol=1e-9)
+    expected = plain.recorded(1, heard)
+    assert np.allclose(scaled.recorded(1, heard), expected, atol=1e-5 * np.abs(expected).max())
 
 
 def test_only_the_region_of_interest_may_change():

@@ -24,9 +24,10 @@ def test_misfits_of_all_emitters_are_those_of_compiled_code(number):
     expected, found = (evaluate(problem, plan, model, some) for plan in (SETTINGS, ON_A_DEVICE))
     assert found.misfit == pytest.approx(expected.misfit, rel=1e-4)
     assert found.held == pytest.approx(expected.held, rel=1e-4)
-    for name in ("gradient", "illumination"):
+    # Compiled code leaves out waves that come too late for every receiver.
+    for name, bound in (("gradient", 1e-4), ("illumination", 1e-2)):
         one, other = getattr(found, name), getattr(expected, name)
-        assert np.abs(one - other).max() < 1e-4 * np.abs(other).max()
+        assert np.abs(one - other).max() < bound * np.abs(other).max()
     again = evaluate(problem, ON_A_DEVICE, model, some)
     assert np.array_equal(found.gradient, again.gradient)
 

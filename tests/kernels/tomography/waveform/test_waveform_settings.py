@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import ranges_of
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings, bands
-from bentray_kernels.wave.simulation import MIN_POINTS
+from bentray_kernels.wave.simulation import MIN_POINTS_OPTIMISED
 
 from ....extremes import EXTREMES
 
@@ -20,7 +20,7 @@ def test_bands_rise_and_their_grids_carry_their_waves(centre):
     assert [band.high_hz for band in found] == sorted(band.high_hz for band in found)
     assert [band.smoothing_m for band in found] == sorted((b.smoothing_m for b in found), reverse=True)
     for band in found:
-        assert 1500.0 / (1.5 * band.high_hz * band.spacing_m) > MIN_POINTS
+        assert 1500.0 / (1.5 * band.high_hz * band.spacing_m) > MIN_POINTS_OPTIMISED
 
 
 @pytest.mark.parametrize(

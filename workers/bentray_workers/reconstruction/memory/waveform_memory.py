@@ -88,7 +88,7 @@ def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -
 def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) -> dict[str, int]:
     record_s = (traces.samples - 1) / traces.rate_hz
     extent = Extent.of(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
-    image, padded = 8 * extent.nodes**2, extent.padded**2
+    image, padded = 8 * extent.nodes**2, extent.padded
     samples = traces.receivers * extent.steps
     looks = band.emitters + WaveSettings((band,)).held_out
     # Cached data of a problem: traces of its emitters, and the resampler to the time steps of the simulation.
