@@ -34,6 +34,9 @@ from .reconstruction_graph import (
     progress_of,
     solve_attenuation,
 )
+from .reflection.memory_echoes import MemoryEchoScan
+from .reflection.reflection_plan import Echoes, check_reflection
+from .reflection.with_reflection import with_reflection
 from .result import Progress, Reconstruction, Trial
 from .settings import Settings
 from .stage_graphs import Scan
@@ -75,16 +78,18 @@ def reconstruct(
     def wave_scan(plan: WaveSettings, index: int) -> WaveScan:
         return MemoryWaveScan(dataset, plan, index=index)
 
-    samples = 0
-    if dataset.waveform is not None and dataset.waveform.water is not None:
-        samples = dataset.waveform.object.shape[-1]
+    recorded = dataset.waveform
+    echoes = None
+    if recorded is not None:
+        echoes = Echoes(recorded.object.shape[-1], lambda index: MemoryEchoScan(dataset, index))
     return run_reconstruction(
         dataset,
         settings,
         lambda plan, part: MemoryScan(dataset, plan, part),
         run_graphs,
         wave_scan,
-        samples,
+        0 if recorded is None or recorded.water is None else recorded.object.shape[-1],
+        echoes,
     )
 
 
@@ -95,6 +100,7 @@ def run_reconstruction(
     run_graphs: Run,
     wave_scan_of: WaveScanOf,
     samples: int = 0,
+    echoes: Echoes | None = None,
 ) -> Reconstruction:
     """Reconstruct a dataset by task graphs that the caller runs.
 
@@ -105,10 +111,35 @@ def run_reconstruction(
         run_graphs: runs graphs to their end.
         wave_scan_of: the same as ``scan_of`` for the refinement of a slice.
         samples: of each trace of object and water; 0: none.
+        echoes: the traces of the object; None without any.
 
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it, and errors of ``run_graphs``.
     """
+    if not settings.reflection.enabled:
+        return _speed_of(dataset, settings, scan_of, run_graphs, wave_scan_of, samples)
+    in_space = dataset.element_position_m.shape[1] == 3
+    check_reflection(settings, traces=echoes is not None, in_space=in_space)
+    assert echoes is not None
+    passes = [0]
+
+    def run_first(graphs: Sequence[TomographyGraph], before: int, after: int) -> None:
+        run_graphs(graphs, before, after + dataset.slices * len(dataset.tx))
+        passes[0] = before + sum(graph.total for graph in graphs)
+
+    result = _speed_of(dataset, settings, scan_of, run_first, wave_scan_of, samples)
+    return with_reflection(result, dataset, settings, echoes, run_graphs, passes[0])
+
+
+def _speed_of(
+    dataset: Dataset,
+    settings: Settings,
+    scan_of: Callable[[Settings, Part], Scan],
+    run_graphs: Run,
+    wave_scan_of: WaveScanOf,
+    samples: int,
+) -> Reconstruction:
+    """As ``run_reconstruction``, without the reflection image."""
     requested = settings
     settings = with_nodes(dataset, with_decomposition(dataset.element_position_m, settings))
     count = pairs.count(dataset, settings)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,29 @@ class Trial:
     held_out_mean_s: float | None = None
 
 
+class GridImage(NamedTuple):
+    """Values of a quantity, (nx, ny[, nz]), with spacing and position of node 0 per axis, m."""
+
+    values: NDArray[np.float64]
+    spacing_m: tuple[float, ...]
+    origin_m: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Reflection:
+    """A reflection image, with a grid of its own.
+
+    Attributes:
+        db: (nx, ny[, nz]), envelope of the echoes relative to its maximum, dB, at most 0; the lowest value
+            outside the array.
+        spacing_m, origin_m: of its pixels (x, y[, z]), m; z as in the reconstruction.
+    """
+
+    db: NDArray[np.float64]
+    spacing_m: tuple[float, ...]
+    origin_m: tuple[float, ...]
+
+
 @dataclass(frozen=True)
 class Reconstruction:
     """A reconstructed scan.
@@ -95,6 +118,7 @@ class Reconstruction:
         coverage: as ``speed``: metres of ray through each node in the last iteration that changed the image.
         attenuation: as ``speed``, Np/m, or None.
         recovery: as ``speed``: recovered fraction of a checkerboard's contrast, or None.
+        reflection: image of echoes on a grid of its own, or None.
         spacing_m: node spacing (x, y[, z]), m; z is NaN when the slices are not evenly spaced.
         origin_m: position of node 0 (x, y[, z]), m.
         water_speed_mps: speed of the coupling water, m/s.
@@ -114,9 +138,23 @@ class Reconstruction:
     history: tuple[Iteration, ...] = ()
     attenuation: NDArray[np.float64] | None = None
     recovery: NDArray[np.float64] | None = None
+    reflection: Reflection | None = None
     residuals: NDArray[np.int64] | None = None
     trials: tuple[Trial, ...] = ()
     provenance: dict[str, str] = field(default_factory=dict)
+
+    def image(self, quantity: str) -> GridImage | None:
+        """A quantity on its grid; None if the result does not have it.
+
+        Args:
+            quantity: ``speed``, ``coverage``, ``attenuation``, ``recovery`` or ``reflection``.
+        """
+        held = getattr(self, quantity)
+        if held is None:
+            return None
+        if isinstance(held, Reflection):
+            return GridImage(held.db, held.spacing_m, held.origin_m)
+        return GridImage(held, self.spacing_m, self.origin_m)
 
     @property
     def residual_rms_s(self) -> float | None:

@@ -151,6 +151,57 @@ class AttenuationSettings:
             raise InvalidInput("attenuation.focusing", True, accepted)
 
 
+@dataclass(frozen=True)
+class ReflectionSettings:
+    """Reflection image: delay and sum of echoes along the rays of the speed image."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = FORBID
+
+    enabled: bool = setting(
+        False,
+        "Also make a reflection image from the traces: echoes of all pairs, delayed by their travel times "
+        "along bent rays and summed; slices.",
+        label="Make a reflection image",
+    )
+    delays: Literal["reconstructed", "water"] = setting(
+        "reconstructed",
+        "Travel times in the reconstructed speed, or, for comparison, in water.",
+        label="Travel times in",
+        words={"reconstructed": "Reconstructed speed", "water": "Water"},
+    )
+    pixel_m: float | None = setting(
+        None,
+        "Distance of pixels, m; at most the wavelength, and at most 4096 pixels along a side.",
+        Range(1e-6, 1.0, unit="m"),
+        unset="an eighth of the wavelength in water at the centre frequency, at most 2048 along a side",
+        label="Distance of pixels",
+        unit="m",
+    )
+    pair_angle_deg: float = setting(
+        90.0,
+        "Largest angle at a pixel between the rays from the emitter and from the receiver, degrees; the "
+        "weight of a pair falls with its cosine, from 1 for an echo straight back to 0.",
+        Range(1.0, 180.0, unit="degrees"),
+        label="Largest angle of a pair",
+        unit="degrees",
+    )
+    coherence_factor: bool = setting(
+        True,
+        "Multiply by the coherence factor of the emissions, which lowers what does not focus.",
+        label="Coherence factor",
+    )
+    gain: Literal["none", "spreading", "attenuation"] = setting(
+        "none",
+        "Compensation of amplitudes on the way to a pixel and back: spreading, of cylindrical waves; "
+        "attenuation, that and the losses along the rays in the reconstructed attenuation.",
+        label="Compensate",
+        words={"none": "Nothing", "spreading": "Spreading", "attenuation": "Spreading and attenuation"},
+    )
+
+    def __post_init__(self) -> None:
+        check(self, place="reflection")
+
+
 def _record(label: str, description: str) -> dict[str, Any]:
     """The metadata of a record of settings."""
     return {"description": description, "json_schema_extra": {"x-label": label}}
@@ -292,6 +343,10 @@ class Settings:
         default=AttenuationSettings(),
         metadata=_record("Attenuation", "For scans with amplitudes or traces; experimental."),
     )
+    reflection: ReflectionSettings = field(
+        default=ReflectionSettings(),
+        metadata=_record("Reflection", "For scans with traces; slices."),
+    )
 
     def __post_init__(self) -> None:
         check(self)
@@ -301,6 +356,8 @@ class Settings:
             raise InvalidInput("sart.speed_range_mps", self.sart.speed_range_mps, accepted)
         if self.method == "waveform" and self.decomposition == "volume":
             raise InvalidInput("decomposition", "'volume'", "slices, with method waveform")
+        if self.reflection.enabled and self.decomposition == "volume":
+            raise InvalidInput("decomposition", "'volume'", "slices, with reflection")
 
     @classmethod
     def of(cls, **values: Any) -> Settings:

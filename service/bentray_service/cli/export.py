@@ -17,7 +17,11 @@ from .output.terminal import AsJson, print_json, print_lines
 ACCEPTED = "a reconstruction.h5, its folder, or a volume of Bentray in HDF5"
 
 Quantity = Annotated[
-    str, typer.Option(help="Quantity of .npy, .nii, .nrrd and .mha: speed or attenuation; others hold all.")
+    str,
+    typer.Option(
+        help="Quantity of .npy, .nii, .nrrd and .mha, e.g. speed or reflection; others hold all, "
+        "but for the reflection, which has a grid of its own."
+    ),
 ]
 AttenuationUnit = Annotated[str, typer.Option("--attenuation", help="Its unit: Np/m or dB/cm/MHz.")]
 AttenuationFrequency = Annotated[

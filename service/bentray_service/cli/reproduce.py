@@ -75,11 +75,16 @@ def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
     """The difference of each array: None if identical, the maximum difference, or a description."""
     import numpy as np
 
-    from bentray_workers.files.reconstruction import IMAGES
+    from bentray_workers.files.reconstruction import IMAGES, REFLECTION
 
     differences: dict[str, Any] = {}
-    for name, place in {**IMAGES, "residuals": "residuals"}.items():
-        old, new = getattr(before, name), getattr(after, name)
+    arrays = [
+        (place, getattr(before, name), getattr(after, name))
+        for name, place in {**IMAGES, "residuals": "residuals"}.items()
+    ]
+    echoes = (one.image("reflection") for one in (before, after))
+    arrays.append((REFLECTION, *(None if one is None else one.values for one in echoes)))
+    for place, old, new in arrays:
         if old is None and new is None:
             continue
         if old is None or new is None:

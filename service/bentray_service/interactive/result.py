@@ -32,7 +32,9 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 # Units of the arrays of a reconstruction.
-UNITS = {"speed": "m/s", "coverage": "m", "attenuation": "Np/m", "recovery": "1"}
+UNITS = {"speed": "m/s", "coverage": "m", "attenuation": "Np/m", "recovery": "1", "reflection": "dB"}
+# Axes of the reflection, before that of heights: it has a grid of its own.
+REFLECTION_AXES = ("reflection_x", "reflection_y")
 # Name of the only array of an uploaded volume.
 VALUE = "value"
 
@@ -44,8 +46,9 @@ class Result:
     Attributes:
         axes: names of the axes in order: ``x``, ``y`` and, in 3-D, ``z``.
         values: arrays by name, each (nx, ny[, nz]): for a reconstruction ``speed``, ``coverage`` and, if
-            present, ``attenuation`` and ``recovery``; for an upload ``value``.
+            present, ``attenuation``, ``recovery`` and ``reflection``; for an upload ``value``.
         coordinates: node positions along each axis, m; ``z`` is missing for slices with non-uniform heights.
+            The reflection has a grid of its own, along ``reflection_x`` and ``reflection_y``.
         units: unit of each array.
         attributes: provenance: title, settings, versions, time; of a service also the ids.
         image: what the arrays are taken from, with settings and history.
@@ -81,6 +84,15 @@ class Result:
     def recovery(self) -> Floats:
         """Recovered fraction of a checkerboard, as ``speed``; raises InvalidInput without a check."""
         return self._of("recovery")
+
+    @property
+    def reflection(self) -> Floats:
+        """Envelope of the echoes, dB, on pixels of its own; raises InvalidInput without ``reflection``."""
+        return self._of("reflection")
+
+    def axes_of(self, name: str) -> tuple[str, ...]:
+        """The axes of one of ``values``."""
+        return (*REFLECTION_AXES, *self.axes[2:]) if name == "reflection" else self.axes
 
     @property
     def spacing_m(self) -> tuple[float, ...]:
@@ -167,7 +179,7 @@ class Result:
         """
         library = import_optional("xarray", "xarray", "a dataset")
         arrays = {
-            name: library.DataArray(array, dims=self.axes, attrs={"units": self.units[name]})
+            name: library.DataArray(array, dims=self.axes_of(name), attrs={"units": self.units[name]})
             for name, array in self.values.items()
         }
         places = {
@@ -262,6 +274,14 @@ class Result:
             raise InvalidInput("quantity", repr(quantity), "one of " + ", ".join(self.values))
         return self.values[quantity]
 
+    def _grid(self, quantity: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Spacing and position of node 0 of a quantity, m."""
+        image = self._image()
+        held = None if isinstance(image, Volume) else image.image(quantity)
+        if held is None:
+            return self.spacing_m, self.origin_m
+        return tuple(held.spacing_m), tuple(held.origin_m)
+
     def _image(self) -> Reconstruction | Volume:
         if self.image is None:
             raise InvalidInput("image", "none", "a result of bentray.reconstruct or of a client")
@@ -289,9 +309,9 @@ class Result:
         from .plotting import draw_plane
 
         name = next(iter(self.values)) if quantity is None else quantity
-        grid = self.spacing_m, self.origin_m
+        grid = self._grid(name)
         plane = plane_of(self._of(name), *grid, *cut)
-        crossed = self.values.get("coverage")
+        crossed = None if name == "reflection" else self.values.get("coverage")
         coverage = None if crossed is None else plane_of(crossed, *grid, *cut).image
         chosen = requested_limits(usual_limits(name, plane.image, coverage), *limits)
         title = NAMES.get(name) or self.attributes.get("title", "")
@@ -305,15 +325,15 @@ class Result:
         if image.ndim != theirs.ndim:
             found = f"{theirs.ndim} dimensions beside {image.ndim}"
             raise InvalidInput("other", found, "a result of as many dimensions")
-        nodes = (self.spacing_m, self.origin_m)
-        grid = (other.spacing_m, other.origin_m)
+        nodes, grid = self._grid(quantity), other._grid(quantity)
         even = np.isfinite(nodes).all() and np.isfinite(grid).all()
         if not even and (image.shape != theirs.shape or not np.array_equal(grid, nodes, equal_nan=True)):
             found = "slices at uneven heights on another grid"
             raise InvalidInput("other", found, "a result on the same nodes, or of evenly spaced slices")
         there = at_nodes(theirs, grid, image.shape, nodes)
         region, choice = np.isfinite(there) & np.isfinite(image), "nodes of both images"
-        crossed = [one.values.get("coverage") for one in (self, other)]
+        coverage = "" if quantity == "reflection" else "coverage"
+        crossed = [one.values.get(coverage) for one in (self, other)]
         if crossed[0] is not None and crossed[1] is not None:
             both = (crossed[0] > 0.0) & (at_nodes(crossed[1], grid, image.shape, nodes) > 0.0)
             if (region & both).any():
@@ -370,8 +390,8 @@ def result_of(
         values: dict[str, NDArray[Any]] = {VALUE: image.values}
         units, known = {VALUE: unit}, {"title": image.title} if image.title else {}
     else:
-        held = {name: getattr(image, name) for name in UNITS}
-        values = {name: array for name, array in held.items() if array is not None}
+        held = {name: image.image(name) for name in UNITS}
+        values = {name: one.values for name, one in held.items() if one is not None}
         units = {name: UNITS[name] for name in values}
         known = {**image.provenance, "settings": json.dumps(image.settings.to_dict())}
     shape = next(iter(values.values())).shape
@@ -381,6 +401,10 @@ def result_of(
         for axis, n, start, step in zip(axes, shape, image.origin_m, image.spacing_m, strict=True)
         if np.isfinite(start) and np.isfinite(step)
     }
+    if isinstance(image, Reconstruction) and image.reflection is not None:
+        own = image.reflection
+        grid = zip(REFLECTION_AXES, own.db.shape, own.origin_m, own.spacing_m, strict=False)
+        coordinates |= {axis: start + step * np.arange(n) for axis, n, start, step in grid}
     return Result(axes, values, coordinates, units, {**known, **attributes}, image, truth, roi)
 
 

@@ -30,10 +30,10 @@ async def show_histogram(
     service: Service,
     tenant: CallerTenant,
     quantity: Annotated[
-        Literal["speed", "coverage", "attenuation", "recovery", "value"] | None,
+        Literal["speed", "coverage", "attenuation", "recovery", "reflection", "value"] | None,
         Query(
             description="Reconstructions: speed (default), coverage, attenuation if the scan has amplitudes, "
-            "recovery if resolution_check was set. Uploads: value."
+            "recovery if resolution_check was set, reflection (dB) if it was requested. Uploads: value."
         ),
     ] = None,
     bins: Annotated[
@@ -49,7 +49,9 @@ async def show_histogram(
     chosen = quantity or ("value" if uploaded else "speed")
     if (chosen == "value") != uploaded:
         accepted = (
-            "value: this is an uploaded volume" if uploaded else "speed, coverage, attenuation or recovery"
+            "value: this is an uploaded volume"
+            if uploaded
+            else "speed, coverage, attenuation, recovery or reflection"
         )
         raise InvalidInput("quantity", repr(quantity), accepted)
     path = service.files.of(tenant).volume(volume["id"])

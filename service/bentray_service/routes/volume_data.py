@@ -9,6 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import FREQUENCY_HZ
+from bentray_workers.files.reconstruction import shape_of_quantity
 from bentray_workers.files.volume_export import FORMATS, Selection, largest_bytes
 
 from .. import __version__
@@ -48,10 +49,11 @@ async def volume_data(
         ),
     ] = "hdf5",
     quantity: Annotated[
-        Literal["speed", "attenuation", "coverage", "recovery", "truth"],
+        Literal["speed", "attenuation", "coverage", "recovery", "reflection", "truth"],
         Query(
             description="Quantity of npy, nifti, metaimage and nrrd of a reconstruction; truth: the true "
-            "speed at its nodes, NaN outside, of a scan that has it."
+            "speed at its nodes, NaN outside, of a scan that has it. reflection, in dB, has a grid of its "
+            "own: mat, vti, ome-zarr and dicom then hold this image alone, otherwise all others."
         ),
     ] = "speed",
     attenuation: Annotated[
@@ -107,7 +109,9 @@ async def volume_data(
             headers = {"Accept-Ranges": "bytes", "Content-Disposition": f'attachment; filename="{name}"'}
             return without_length(chosen.media_type, headers_of(tag) | headers)
         parts_of(request).sign_in.check_render(caller_of(request))
-        most = largest_bytes(volume["shape"], uploaded="job_id" not in volume)
+        uploaded, held = "job_id" not in volume, "speed" if of_truth else quantity
+        shape = await run_in_threadpool(shape_of_quantity, path, held, tuple(volume["shape"]))
+        most = largest_bytes(shape, uploaded=uploaded)
         async with service.quota.reserved(tenant, made.name, most):
             try:
                 if of_truth:

@@ -14,6 +14,7 @@ import numpy as np
 from bentray_kernels.sources import digest
 from bentray_kernels.task_graph import Checkpoint
 from bentray_kernels.tomography.checkpoint import pack, unpack
+from bentray_kernels.tomography.reflection.reflection_graph import RECORDS
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
 from ..files.atomic import atomic_replace
@@ -26,6 +27,9 @@ INTERVAL_S = 5.0
 
 # Files of each graph: the newest, and the one before it in case the newest is damaged.
 KEPT = 2
+
+# Records in checkpoints of all kinds, by name.
+ALL_TYPES = {**TYPES, **{record.__name__: record for record in RECORDS}}
 
 # What a damaged file, or one of another version, may raise.
 UNREADABLE = (OSError, ValueError, KeyError, TypeError, IndexError, EOFError, zipfile.BadZipFile)
@@ -106,4 +110,4 @@ def _read(path: Path) -> Checkpoint:
         content = json.loads(bytes(archive["json"]))
         if content["kernels"] != _kernels():
             raise ValueError("it is of another version of the kernels")
-        return unpack(content["state"], [archive[str(k)] for k in range(len(archive.files) - 1)], TYPES)
+        return unpack(content["state"], [archive[str(k)] for k in range(len(archive.files) - 1)], ALL_TYPES)

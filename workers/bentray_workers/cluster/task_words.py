@@ -25,6 +25,9 @@ TASK_WORDS = MappingProxyType(
         "evaluate_emitter": "simulating the waves of an emitter",
         "update_image": "updating the image by full waveforms",
         "validate_image": "comparing the image with unused traces",
+        "solve_element_times": "computing travel times to the pixels",
+        "measure_scan_pulse": "measuring the pulse",
+        "sum_emissions": "summing echoes",
         "make_part": "simulating a part of the scan",
         "write_scan": "writing the scan",
     }

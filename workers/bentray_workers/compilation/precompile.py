@@ -83,7 +83,7 @@ def trace_settings() -> Iterator[dict[str, Any]]:
     for picker in PICKERS:
         yield {"picker": picker, "attenuation": False}
     yield {"guided_rounds": 1, "amplitudes": "ratio", "focusing": True}
-    yield {"amplitudes": "spectrum"}
+    yield {"amplitudes": "spectrum", "reflection": True, "pixel_m": 5e-3, "gain": "attenuation"}
     yield {"method": "waveform", "bands": 1, "emitters": 4}
 
 

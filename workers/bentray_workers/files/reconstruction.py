@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import RESIDUAL_EDGES_S, Iteration, Reconstruction, Settings, Trial
+from bentray_kernels.tomography.result import Reflection
 from bentray_kernels.tomography.stored_settings import from_stored
 
 from .dataset.write import write_array
@@ -37,13 +38,17 @@ IMAGES = {
     "attenuation": "attenuation_np_m",
     "recovery": "recovery",
 }
+# The reflection image has attributes spacing_m and origin_m of its own.
+REFLECTION = "reflection_db"
+QUANTITIES = (*IMAGES, "reflection")
 
 
 def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
     """Write a reconstruction; ``path`` is replaced atomically.
 
     The file holds ``speed_mps``, ``coverage_m`` and, if present, ``attenuation_np_m`` and ``recovery``,
-    each (nx, ny) or (nx, ny, nz); ``history`` with a column for each field of ``Iteration``; ``residuals``
+    each (nx, ny) or (nx, ny, nz); ``reflection_db``, if present, with attributes ``spacing_m`` and
+    ``origin_m`` of its own; ``history`` with a column for each field of ``Iteration``; ``residuals``
     with ``count`` and the ``edge_s`` of its bins; and root attributes ``spacing_m``, ``origin_m``, ``axes``,
     ``water_speed_mps``, ``settings``, ``trials`` and ``provenance``, the last three JSON.
 
@@ -63,6 +68,10 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
         for name, place in IMAGES.items():
             if getattr(reconstruction, name) is not None:
                 write_array(file, place, getattr(reconstruction, name))
+        if reconstruction.reflection is not None:
+            write_array(file, REFLECTION, reconstruction.reflection.db)
+            file[REFLECTION].attrs["spacing_m"] = reconstruction.reflection.spacing_m
+            file[REFLECTION].attrs["origin_m"] = reconstruction.reflection.origin_m
         history = file.create_group("history")
         for column, dtype in HISTORY.items():
             rows: NDArray[Any] = np.array([getattr(sweep, column) for sweep in reconstruction.history], dtype)
@@ -100,6 +109,7 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
             speed=speed,
             coverage=coverage,
             **extra,
+            reflection=_reflection(reader, speed.shape[2:]),
             spacing_m=_per_axis(reader, "spacing_m", speed.ndim),
             origin_m=_per_axis(reader, "origin_m", speed.ndim),
             water_speed_mps=water,
@@ -111,6 +121,26 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
         )
 
 
+def shape_of_quantity(path: Path, quantity: str, shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Shape of a quantity of a reconstruction file.
+
+    Args:
+        path: of the file.
+        quantity: of ``QUANTITIES``.
+        shape: of the speed.
+
+    Raises:
+        InvalidInput: for a result without a reflection image.
+    """
+    if quantity != "reflection":
+        return shape
+    with opened(Path(path), Limits()) as reader:
+        found = reader.checked(REFLECTION, "f", "(nx, ny) or (nx, ny, nz) numbers")
+        if found is None:
+            raise InvalidInput("quantity", "reflection of a result without it", "a quantity of this result")
+        return tuple(int(n) for n in found.shape)
+
+
 def _image(reader: Reader, place: str, shape: tuple[int, ...] | None) -> NDArray[np.float64]:
     accepted = "(nx, ny) or (nx, ny, nz) numbers" if shape is None else f"numbers of shape {shape}"
     image = reader.required(place, "f", accepted)
@@ -119,10 +149,22 @@ def _image(reader: Reader, place: str, shape: tuple[int, ...] | None) -> NDArray
     return np.asarray(image, dtype=np.float64)
 
 
-def _per_axis(reader: Reader, name: str, ndim: int) -> tuple[float, ...]:
-    values = reader.numbers("", name, "m")
+def _reflection(reader: Reader, heights: tuple[int, ...]) -> Reflection | None:
+    """The reflection image, with as many heights as the speed; None if there is none."""
+    if not reader.has(REFLECTION):
+        return None
+    db = _image(reader, REFLECTION, None)
+    if db.shape[2:] != heights:
+        raise InvalidInput(REFLECTION, f"shape {db.shape}", "the slices of the speed")
+    grid = (_per_axis(reader, name, db.ndim, REFLECTION) for name in ("spacing_m", "origin_m"))
+    return Reflection(db, *grid)
+
+
+def _per_axis(reader: Reader, name: str, ndim: int, path: str = "") -> tuple[float, ...]:
+    values = reader.numbers(path, name, "m")
     if values is None or len(values) != ndim:
-        raise InvalidInput(f"@{name}", "nothing" if values is None else values, f"{ndim} numbers in m")
+        found = "nothing" if values is None else values
+        raise InvalidInput(f"{path}@{name}", found, f"{ndim} numbers in m")
     return values
 
 

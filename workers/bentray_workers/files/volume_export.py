@@ -26,7 +26,7 @@ from .export.nrrd_writing import write_nrrd
 from .export.ome_zarr_writing import write_ome_zarr
 from .export.vti_writing import write_vti
 from .hdf5_reading import Limits, opened
-from .reconstruction import IMAGES, read_reconstruction
+from .reconstruction import IMAGES, QUANTITIES, REFLECTION, read_reconstruction
 from .volume import FORMAT, Volume, read_volume
 
 SPEED, ATTENUATION, ATTENUATION_DB = "speed_mps", "attenuation_np_m", "attenuation_db_cm_mhz"
@@ -36,6 +36,7 @@ UNITS = {
     ATTENUATION: "Np/m",
     ATTENUATION_DB: "dB/(cm.MHz)",
     "recovery": "1",
+    REFLECTION: "dB",
 }
 TITLES = {
     SPEED: "Speed of sound, m/s",
@@ -43,8 +44,8 @@ TITLES = {
     ATTENUATION_DB: "Attenuation, dB/(cm MHz)",
     "coverage_m": "Ray length per node, m",
     "recovery": "Recovered fraction of a checkerboard",
+    REFLECTION: "Reflection, dB",
 }
-QUANTITIES = tuple(IMAGES)
 # Formats with one image.
 SINGLE = ("npy", "nifti", "metaimage", "nrrd")
 ATTENUATION_UNITS = ("Np/m", "dB/cm/MHz")
@@ -58,7 +59,8 @@ class Selection:
     """What is exported of a reconstruction.
 
     Attributes:
-        quantity: of formats with one image, of ``QUANTITIES``.
+        quantity: of formats with one image, of ``QUANTITIES``; of formats with all images ``reflection``
+            selects that image, which has a grid of its own.
         attenuation: unit of the attenuation, of ``ATTENUATION_UNITS``.
         frequency_hz: for dB/cm/MHz; None: that of the scan.
 
@@ -83,13 +85,13 @@ class Selection:
 
 @dataclass(frozen=True)
 class Content:
-    """Content of the file of a volume.
+    """Content of the file of a volume: one grid.
 
     Attributes:
         values: (nx, ny[, nz]): the selected quantity of a reconstruction, or the values of an upload.
         spacing_m, origin_m: per axis, m; NaN for uneven heights.
         title: of the volume.
-        images: all arrays by name, including the values.
+        images: all arrays on this grid by name, including the values.
         seconds: time of the file, s since 1970.
     """
 
@@ -201,9 +203,19 @@ def _reconstructed(own: Reconstruction, chosen: Selection, seconds: float) -> Co
             ATTENUATION_DB if name == ATTENUATION else name: factor * image if name == ATTENUATION else image
             for name, image in images.items()
         }
+    if chosen.quantity == "reflection" and own.reflection is not None:
+        image = own.reflection
+        return Content(
+            image.db,
+            image.spacing_m,
+            image.origin_m,
+            TITLES[REFLECTION],
+            {REFLECTION: image.db},
+            seconds,
+        )
     selected = next((name for name in images if name.startswith(chosen.quantity)), None)
     if selected is None:
-        present = ", ".join(name for name in QUANTITIES if any(one.startswith(name) for one in images))
+        present = ", ".join(name for name in QUANTITIES if own.image(name) is not None)
         raise InvalidInput("quantity", f"{chosen.quantity} of a result without it", present)
     return Content(images[selected], own.spacing_m, own.origin_m, TITLES[selected], images, seconds)
 

@@ -12,12 +12,14 @@ LABELS = {
     "coverage": "ray length per node (m)",
     "attenuation": "attenuation (Np/m)",
     "recovery": "recovered fraction of a checkerboard",
+    "reflection": "reflection (dB)",
 }
 NAMES = {
     "speed": "Sound speed",
     "coverage": "Coverage",
     "attenuation": "Attenuation (experimental)",
     "recovery": "Resolution check",
+    "reflection": "Reflection",
 }
 
 

@@ -24,7 +24,10 @@ ATTENUATION = "cividis"
 RECOVERY = "bone"
 MISSING = "#e4e4e4"
 
-RECOVERY_LIMITS = (0.0, 1.0)
+REFLECTION = "gray"
+
+# Of the recovered fraction, and of the reflection, dB.
+FIXED_LIMITS = {"recovery": (0.0, 1.0), "reflection": (-50.0, 0.0)}
 
 # Nodes outside robust limits at each end, per cent.
 OUTSIDE_PERCENT = 0.1

@@ -22,8 +22,9 @@ from .maps import (
     ATTENUATION,
     COVERAGE,
     DIFFERENCE,
+    FIXED_LIMITS,
     RECOVERY,
-    RECOVERY_LIMITS,
+    REFLECTION,
     SPEED,
     Limits,
     draw_bar,
@@ -45,7 +46,12 @@ GRIDS = {3: (1, 3), 4: (2, 2), 6: (2, 3), 8: (2, 4), 9: (3, 3)}
 # Characters per inch of the line under the panels.
 CHARACTERS_AN_INCH = 15
 
-COLORMAPS = {"coverage": COVERAGE, "attenuation": ATTENUATION, "recovery": RECOVERY}
+COLORMAPS = {
+    "coverage": COVERAGE,
+    "attenuation": ATTENUATION,
+    "recovery": RECOVERY,
+    "reflection": REFLECTION,
+}
 
 
 def report_png(result: Reconstruction, truth: Truth | None = None, roi: Bools | None = None) -> bytes:
@@ -182,13 +188,15 @@ def _limits(image: Floats, coverage: Floats) -> Limits:
 
 def _maps(panels: Iterator[Axes], result: Reconstruction, k: int) -> None:
     for name in _quantities(result):
-        image = cut(getattr(result, name), k)
-        limits = _limits(image, cut(result.coverage, k))
-        if name == "coverage":
+        whole = result.image(name)
+        assert whole is not None
+        image, grid = cut(whole.values, k), (whole.spacing_m, whole.origin_m)
+        if name in FIXED_LIMITS:
+            limits = FIXED_LIMITS[name]
+        elif name == "coverage":
             limits = (0.0, robust_limits([image])[1])
-        elif name == "recovery":
-            limits = RECOVERY_LIMITS
-        grid = (result.spacing_m, result.origin_m)
+        else:
+            limits = _limits(image, cut(result.coverage, k))
         shown = draw_map(next(panels), image, *grid, limits, colormap=COLORMAPS[name], title=NAMES[name])
         draw_bar([shown], LABELS[name])
 

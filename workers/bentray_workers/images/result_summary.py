@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 from ..files.dataset.read import read_dataset
-from ..files.reconstruction import IMAGES, read_reconstruction
+from ..files.reconstruction import QUANTITIES, read_reconstruction
 
 
 def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
@@ -18,6 +19,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
 
     Returns:
         ``quantities``: those in the file, and ``truth`` if the scan has one on comparable axes;
+        ``grids``: shape, spacing and origin of quantities whose grid is not that of the speed;
         ``candidates``: the models that were compared, the chosen one first, each with ``label``,
         ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s`` and
         ``chosen``; ``reason``: of this choice, empty without candidates; ``truth``: None without a truth,
@@ -32,7 +34,8 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
     from .truth_comparison import NotComparable, compare
 
     own, dataset = read_reconstruction(volume), read_dataset(scan, traces=False)
-    quantities = [name for name in IMAGES if getattr(own, name) is not None]
+    held = {name: image for name in QUANTITIES if (image := own.image(name)) is not None}
+    quantities = list(held)
     errors: dict[str, Any] | None = None
     if dataset.truth is not None:
         try:
@@ -45,6 +48,15 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
             errors = {"region": found.region_choice, "nodes": nodes, "rmse_mps": found.rmse_mps}
     return {
         "quantities": quantities,
+        "grids": {
+            name: {
+                "shape": list(image.values.shape),
+                "spacing_m": _or_none(image.spacing_m),
+                "origin_m": _or_none(image.origin_m),
+            }
+            for name, image in held.items()
+            if image.values.shape != own.speed.shape
+        },
         "reason": advice_of(own),
         "candidates": [
             {
@@ -58,3 +70,8 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         ],
         "truth": errors,
     }
+
+
+def _or_none(lengths: tuple[float, ...]) -> list[float | None]:
+    """Lengths for JSON; None for the uneven spacing of heights."""
+    return [one if math.isfinite(one) else None for one in lengths]

@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from ..files.reconstruction import read_reconstruction
 from ..files.volume import read_volume
 from .captions import LABELS, NAMES, facts
-from .maps import RECOVERY_LIMITS, Limits, robust_limits
+from .maps import FIXED_LIMITS, Limits, robust_limits
 from .plane import UPRIGHT, plane_of
 from .plane_picture import plane_png
 from .slice_style import COLOUR_VALUE, SliceStyle
@@ -35,11 +35,11 @@ def slice_png(
 
     Args:
         path: of ``reconstruction.h5``.
-        quantity: ``speed``, ``coverage``, or ``attenuation`` or ``recovery`` if present.
+        quantity: ``speed``, ``coverage``, or ``attenuation``, ``recovery`` or ``reflection`` if present.
         axis: across the slice: x, y or z.
         index: along the axis; None: the middle.
         low, high: values of the first and the last colour, in the unit of the quantity; None: the range
-            of nodes with rays, without outliers; 0 and 1 for the recovery.
+            of nodes with rays, without outliers; 0 and 1 for the recovery, -50 and 0 dB for the reflection.
         style: fields of ``SliceStyle``.
 
     Raises:
@@ -49,14 +49,16 @@ def slice_png(
     if quantity not in LABELS:
         raise InvalidInput("quantity", repr(quantity), "one of " + ", ".join(LABELS))
     result = read_reconstruction(path)
-    volume = getattr(result, quantity)
-    if volume is None:
+    image = result.image(quantity)
+    if image is None:
         held = [name for name in LABELS if getattr(result, name) is not None]
         accepted = f"one of {', '.join(held)}: this file has no other"
         raise InvalidInput("quantity", repr(quantity), accepted)
-    grid = (result.spacing_m, result.origin_m, axis, index)
-    plane = plane_of(volume, *grid)
-    limits = usual_limits(quantity, plane.image, plane_of(result.coverage, *grid).image)
+    plane = plane_of(image.values, image.spacing_m, image.origin_m, axis, index)
+    coverage = None
+    if quantity not in FIXED_LIMITS:
+        coverage = plane_of(result.coverage, result.spacing_m, result.origin_m, axis, index).image
+    limits = usual_limits(quantity, plane.image, coverage)
     title = ", ".join(filter(None, (NAMES[quantity], plane.caption())))
     limits = requested_limits(limits, low, high)
     return plane_png(plane, limits, chosen, title=title, unit=LABELS[quantity], note=facts(result))
@@ -82,15 +84,15 @@ def volume_slice_png(
 
 
 def usual_limits(quantity: str, image: Floats, coverage: Floats | None) -> Limits:
-    """The range of nodes with rays, without outliers; from 0 for the coverage, 0 and 1 for the recovery.
+    """The range of nodes with rays, without outliers; from 0 for the coverage; or fixed limits.
 
     Args:
         quantity: as for ``slice_png``, or any name of other values.
         image: the slice.
         coverage: of the same nodes; None: unknown.
     """
-    if quantity == "recovery":
-        return RECOVERY_LIMITS
+    if quantity in FIXED_LIMITS:
+        return FIXED_LIMITS[quantity]
     passed = None if coverage is None else coverage > 0.0
     limits = robust_limits([image], passed if passed is not None and passed.any() else None)
     return (0.0, limits[1]) if quantity == "coverage" else limits

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
@@ -59,6 +61,24 @@ class FileWaveScan(NamedTuple):
 
     def problem(self, number: int) -> WaveProblem:
         return _wave_problem(self, number)
+
+
+class FileEchoScan(NamedTuple):
+    """See ``tomography.reflection.reflection_plan.EchoScan``; attributes as of ``FileWaveScan``."""
+
+    path: Path
+    stamp: int
+    slice: int
+    findings: Path
+    water_temperature_c: float | None = None
+
+    @contextmanager
+    def open(self) -> Iterator[Dataset]:
+        faults = read_findings(self.findings).of_traces(self.slice)
+        poll = partial(check_job_active, self.findings.parent)
+        recorded = read_once(self.path, self.stamp, self.water_temperature_c)
+        with open_slice(self.path, recorded, self.slice, poll) as one:
+            yield apply(one, faults)
 
 
 @lru_cache(maxsize=16)

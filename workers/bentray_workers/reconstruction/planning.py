@@ -11,6 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import WIDTH_M
 from bentray_kernels.tomography.directivity import check_normals
 from bentray_kernels.tomography.model_selection.selection import CANDIDATES, final_settings, label
+from bentray_kernels.tomography.reflection.reflection_plan import check_reflection
 from bentray_kernels.tomography.requirements import check_waveform
 from bentray_kernels.tomography.settings import MIN_NODES, Settings
 from bentray_kernels.tomography.stage_graphs import BATCH
@@ -32,6 +33,7 @@ from .memory.ray_memory import (
     shape_of,
     state_bytes,
 )
+from .memory.reflection_memory import reflection_bytes, reflection_task_bytes, reflection_tasks
 from .memory.waveform_memory import budgeted, wave_task_bytes, wave_tasks
 from .reconstruction_cost import reconstruction_cost
 
@@ -131,11 +133,15 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     refining = budgeted(traces, scan.width_m, scan.slices, settings)
     waves = wave_task_bytes(traces, scan.width_m, refining)
     calls |= waves
+    check_reflection(settings, traces=scan.echoes is not None, in_space=scan.in_space)
+    echoes = reflection_task_bytes(scan, settings)
+    calls |= echoes
     limit = max((one.task_bytes for one in fitting), default=math.inf)
     name, size = max(calls.items(), key=lambda item: item[1])
     if size > limit:
         field: str = "nodes" if name not in waves else "method" if name == "validate_image" else "minutes"
-        found = getattr(settings, field)
+        found = settings.reflection.pixel_m if name in echoes else getattr(settings, field)
+        field = "reflection.pixel_m" if name in echoes else field
         raise InvalidInput(
             field,
             f"{found}, for which a task ({task_in_words(name)}) takes {size} bytes"
@@ -146,7 +152,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     shape = shape_of(scan, settings)
     decomposition = _decomposition(settings)
     tasks = sum(_tasks(scan, method, shape) for method in methods)
-    tasks += scan.slices * wave_tasks(traces, scan.width_m, refining)
+    tasks += scan.slices * wave_tasks(traces, scan.width_m, refining) + reflection_tasks(scan, settings)
     if scan.traces_bytes:
         tasks = tasks * (1 + settings.numerics.guided_rounds) + picking_tasks(
             scan.traces, scan.slices, settings
@@ -212,6 +218,7 @@ def _stored_bytes(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> 
     problems = 1 if settings.decomposition == "volume" else scan.slices
     picked = len(PAIR_ARRAYS) * REAL * scan.pairs if scan.traces_bytes else 0
     each = len(IMAGES) * REAL * math.prod(shape) + KEPT * state_bytes(shape, settings) + RECORD_BYTES
+    each += reflection_bytes(scan, settings)
     return problems * each + picked
 
 

@@ -22,6 +22,7 @@ from bentray_kernels.tomography.settings import DEVIATION, Settings
 
 from ..files.dataset.counts import Summary
 from .memory.ray_memory import emitters_of, shape_of
+from .memory.reflection_memory import reflection_seconds
 from .memory.waveform_memory import budgeted, wave_minutes
 
 # Node visits of a core in a second, see ``_visits``: 256 emitters on 128 x 128 nodes take 0.96 ms an emitter
@@ -73,7 +74,8 @@ def reconstruction_cost(scan: Summary, settings: Settings, workers: int) -> Reco
     sequential = settings.method == "sart"
     problems = 1 if settings.decomposition == "volume" else scan.slices
     at_once = max(1, min(workers, problems) if sequential else workers)
-    seconds = OVERHEAD_S + rays / at_once + (picking + waves) / max(1, workers)
+    parallel = picking + waves + reflection_seconds(scan, settings)
+    seconds = OVERHEAD_S + rays / at_once + parallel / max(1, workers)
     return ReconstructionCost(_class(scan, settings, waves > 0.0), seconds, _speed_known(settings))
 
 
@@ -85,6 +87,8 @@ def _class(scan: Summary, settings: Settings, waves: bool) -> str:
         parts.append("waves")
     if settings.selects_model and scan.period:
         parts.append("finite-frequency")
+    if settings.reflection.enabled:
+        parts.append("reflection")
     return " ".join(parts)
 
 

@@ -20,6 +20,7 @@ from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
 from bentray_kernels.tomography.guided_picking import same_picks
 from bentray_kernels.tomography.reconstruction import run_reconstruction
 from bentray_kernels.tomography.reconstruction_graph import TomographyGraph, progress_of
+from bentray_kernels.tomography.reflection.reflection_plan import Echoes
 
 from ..cluster.capacities import resources_for
 from ..cluster.checkpoints import Checkpoints
@@ -33,7 +34,7 @@ from ..files.findings import ScanFindings, read_findings
 from ..files.reconstruction import write_reconstruction
 from ..files.reference import read_reference, reference_path
 from ..files.volume_export import FREQUENCY
-from .file_scan import FileScan, FileWaveScan
+from .file_scan import FileEchoScan, FileScan, FileWaveScan
 from .picking_graph import PickingFiles, PickingGraph, PickingGuide, PickingSource
 
 # Phase of the progress of a job, after those of ``picking_graph``.
@@ -164,6 +165,7 @@ def _pick_with_guides(
         method="auto" if settings.method == "waveform" else settings.method,
         attenuation=False,
         resolution_check=False,
+        reflection=False,
         minutes=None,
     )
     trials: tuple[Trial, ...] = ()
@@ -175,9 +177,8 @@ def _pick_with_guides(
         progress.next()
         if settings.method == "auto" and not trials:
             rays, trials = result.settings, result.trials
-            requested = {
-                name: getattr(settings, name) for name in ("attenuation", "resolution_check", "minutes")
-            }
+            names = ("attenuation", "resolution_check", "reflection", "minutes")
+            requested = {name: getattr(settings, name) for name in names}
             settings = rays.changed(**requested)
         guide = PickingGuide(image, PickingFiles.of(job.folder).findings)
         again, findings_again = _pick(job, source, PickingFiles.of(job.folder, number), guide, progress)
@@ -239,7 +240,16 @@ def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _Jo
             settings.water_temperature_c,
         ),
         0 if bare else trace_samples(job.scan),
+        _echoes(job, recorded, settings.water_temperature_c),
     )
+
+
+def _echoes(job: _Job, stamp: int, water_temperature_c: float | None) -> Echoes | None:
+    """The traces of the object; None without any."""
+    samples, faults = trace_samples(job.scan), PickingFiles.of(job.folder).findings
+    if not samples:
+        return None
+    return Echoes(samples, lambda index: FileEchoScan(job.scan, stamp, index, faults, water_temperature_c))
 
 
 class _JobProgress:

@@ -20,7 +20,14 @@ from .scene_cache import default_surface
 BINS = Range(2, 1024)
 DEFAULT_BINS = 256
 
-UNITS = {"speed": "m/s", "coverage": "m", "attenuation": "Np/m", "recovery": "", "value": ""}
+UNITS = {
+    "speed": "m/s",
+    "coverage": "m",
+    "attenuation": "Np/m",
+    "recovery": "",
+    "reflection": "dB",
+    "value": "",
+}
 # The quantities that are rendered.
 RENDERED = ("speed", "value")
 
@@ -30,8 +37,8 @@ def volume_histogram(path: Path, quantity: str, bins: int) -> dict[str, Any]:
 
     Args:
         path: of a volume or reconstruction file.
-        quantity: ``value`` of a volume; ``speed``, ``coverage``, ``attenuation`` or ``recovery`` of a
-            reconstruction.
+        quantity: ``value`` of a volume; ``speed``, ``coverage``, ``attenuation``, ``recovery`` or
+            ``reflection`` of a reconstruction.
         bins: of equal width between least and greatest value.
 
     Returns:
@@ -70,8 +77,8 @@ def _read(path: Path, quantity: str) -> tuple[NDArray[Any], tuple[float, ...]]:
         volume = read_volume(path)
         return volume.values, volume.spacing_m
     result = read_reconstruction(path)
-    values = getattr(result, quantity)
-    if values is None:
+    image = result.image(quantity)
+    if image is None:
         held = [name for name in UNITS if getattr(result, name, None) is not None]
         raise InvalidInput("quantity", repr(quantity), f"one of {', '.join(held)}: this file has no other")
-    return values, result.spacing_m
+    return image.values, image.spacing_m

@@ -27,11 +27,22 @@ class TruthErrors(BaseModel):
     rmse_mps: float | None = Field(description="Root mean square error, m/s.")
 
 
+class GridRecord(BaseModel):
+    """The grid of a quantity."""
+
+    shape: list[int] = Field(description="Nodes per axis.")
+    spacing_m: list[float | None] = Field(description="Node spacing per axis, m; null for uneven heights.")
+    origin_m: list[float | None] = Field(description="Position of node 0, m.")
+
+
 class SummaryRecord(BaseModel):
     """What a reconstruction holds, and how its model was chosen."""
 
-    quantities: list[Literal["speed", "coverage", "attenuation", "recovery", "truth"]] = Field(
+    quantities: list[Literal["speed", "coverage", "attenuation", "recovery", "reflection", "truth"]] = Field(
         description="Those that can be shown and downloaded."
+    )
+    grids: dict[str, GridRecord] = Field(
+        description="Grids of quantities that are not on the grid of the volume, such as reflection."
     )
     candidates: list[CandidateRecord] = Field(description="The chosen one first; empty unless auto chose.")
     reason: str = Field(description="Reason of this choice; empty without candidates.")

@@ -73,6 +73,7 @@ class Summary:
         nodes: along each side of an image, at most, where the settings leave them open.
         decomposition: where the settings leave it open.
         normals: whether the directions of the elements are known.
+        echoes: traces of the object for a reflection image; None if there are none, or none is requested.
     """
 
     emitters: int
@@ -89,6 +90,7 @@ class Summary:
     nodes: int = 128
     decomposition: str = "slices"
     normals: bool = False
+    echoes: Traces | None = None
 
 
 @dataclass(frozen=True)
@@ -177,6 +179,7 @@ class DatasetCounts:
             nodes=self._nodes(settings),
             decomposition=self.decomposition,
             normals=self.normals,
+            echoes=self._traces() if settings.reflection.enabled else None,
         )
 
     def _nodes(self, settings: Settings) -> int:

@@ -29,6 +29,7 @@ QUANTITIES = {
         "dB/(cm.MHz)",
         "decibel per centimeter and megahertz",
     ),
+    "reflection_db": ("REFLECTION", "Reflection", "dB", "decibel"),
     "values": ("VALUES", "Values", "1", "no units"),
 }
 # Parametric maps have at most so many rows and columns.

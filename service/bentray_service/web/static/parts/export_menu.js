@@ -7,7 +7,8 @@ import { QUANTITIES } from "../viewer/quantities.js";
 const WHOLE = [["hdf5", "HDF5"], ["mat", "MATLAB"], ["vti", "VTK (ParaView)"], ["ome-zarr", "OME-Zarr"], ["dicom", "DICOM"]];
 const SINGLE = [["npy", "NumPy"], ["nifti", "NIfTI"], ["nrrd", "NRRD"], ["metaimage", "MetaImage"]];
 const NAMES = {
-  speed: "speed (m/s)", attenuation: "attenuation (Np/m)", coverage: "coverage (m)", recovery: "resolution", truth: "truth (m/s)",
+  speed: "speed (m/s)", attenuation: "attenuation (Np/m)", coverage: "coverage (m)", recovery: "resolution",
+  reflection: "reflection (dB)", truth: "truth (m/s)",
 };
 const DECIBEL = "attenuation-db";
 

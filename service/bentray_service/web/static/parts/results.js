@@ -9,7 +9,7 @@ export async function loadResult(id) {
   }
   const volume = await request(job.links.volume);
   const summary = await request(`${volume.links.self}/summary`);
-  return { job, volume, summary, values: new Values(volume) };
+  return { job, volume, summary, values: new Values(volume, summary.grids) };
 }
 
 // What a reader calls it: its own name, else what was reconstructed how.

@@ -17,6 +17,10 @@ export const QUANTITIES = {
     title: "Resolution", words: "recovered fraction of a checkerboard", unit: "", map: "bone", digits: 3, reads: ["recovery"],
     limits: [0, 1],
   },
+  reflection: {
+    title: "Reflection", words: "reflection, envelope relative to its maximum", unit: "dB", map: "gray", digits: 1,
+    reads: ["reflection"], limits: [-50, 0],
+  },
   error: {
     title: "Difference to truth", words: "speed minus true speed", unit: "m/s", map: "RdBu_r", digits: 2, reads: ["speed", "truth"],
     symmetric: true,
@@ -63,8 +67,10 @@ async function* partsOf(reader) {
 
 // The values of one result, read once each.
 export class Values {
-  constructor(volume) {
+  // grids: of quantities with a grid of their own, by name.
+  constructor(volume, grids = {}) {
     this.volume = volume;
+    this.grids = grids;
     this.read = new Map();
   }
 
@@ -85,6 +91,7 @@ export class Values {
     if (second) values = values.map((value, k) => value - second.values[k]);
     if (factor) values = values.map((value) => value * factor);
     const millimetres = (lengths) => lengths.map((one) => (one === null ? null : 1e3 * one));
-    return new Field(values, first.shape, millimetres(this.volume.spacing_m), millimetres(this.volume.origin_m));
+    const grid = this.grids[name] ?? this.volume;
+    return new Field(values, first.shape, millimetres(grid.spacing_m), millimetres(grid.origin_m));
   }
 }

@@ -1,0 +1,1 @@
+"""Reflection image: delay and sum of echoes along bent rays."""

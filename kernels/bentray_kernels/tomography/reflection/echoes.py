@@ -1,0 +1,114 @@
+"""Analytic signals of the echoes of an emission, without transmitted waves; delay and length of the pulse."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.fft
+
+from ...arrays import Flags, Float32s, Floats
+from ...errors import InvalidInput
+
+# Samples of a signal in a period: a linear interpolation of its phase is wrong by 2 % of its size at most.
+SAMPLES_A_PERIOD = 16
+
+# The pulse ends where its envelope has fallen to this part of its maximum.
+PULSE_END = 0.1
+
+# Width of the taper after the transmitted wave, and of that at the end of the record, periods.
+TAPER_PERIODS = 1.0
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """The transmitted pulse of a scan.
+
+    Attributes:
+        delay_s: from the travel time to the maximum of its envelope, s.
+        length_s: from there to its end, s.
+    """
+
+    delay_s: float
+    length_s: float
+
+
+def upsampling(rate_hz: float, frequency_hz: float) -> int:
+    """Samples of a signal for each one of a trace."""
+    return max(1, math.ceil(SAMPLES_A_PERIOD * frequency_hz / rate_hz - 1e-9))
+
+
+def analytic(traces: Any, factor: int = 1) -> Float32s:
+    """Analytic signals of traces, with samples ``factor`` times as dense.
+
+    Args:
+        traces: (n, samples), real.
+        factor: at least 1.
+
+    Returns:
+        (n, 2, factor · samples), real and imaginary parts.
+    """
+    count, samples = traces.shape
+    length = scipy.fft.next_fast_len(samples)
+    spectrum = scipy.fft.rfft(np.asarray(traces, dtype=np.float32), length, axis=1)
+    # The mean has no phase, and half of the highest frequency belongs to the negative ones.
+    spectrum[:, 0] = 0.0
+    whole = np.zeros((count, factor * length), dtype=np.complex64)
+    whole[:, 1 : spectrum.shape[1]] = 2.0 * factor * spectrum[:, 1:]
+    signals = scipy.fft.ifft(whole, axis=1, overwrite_x=True)[:, : factor * samples]
+    return np.ascontiguousarray(np.stack((signals.real, signals.imag), axis=1))
+
+
+def envelope(traces: Any) -> Floats:
+    """Size of the analytic signals of traces (n, samples)."""
+    signals = analytic(traces)
+    return np.asarray(np.hypot(signals[:, 0], signals[:, 1]), dtype=np.float64)
+
+
+def measure_pulse(traces: list[Any], expected_s: Floats, use: Flags, times_s: Floats) -> Pulse:
+    """Delay and length of the pulse, medians over pairs of the largest arrival in each trace.
+
+    Args:
+        traces: of some emissions, (nrx, samples) each; of the water shot, or through the object.
+        expected_s: (emissions, nrx), travel times of the transmitted waves, s.
+        use: as ``expected_s``, pairs that are used.
+        times_s: (samples,), s.
+
+    Raises:
+        InvalidInput: where no pair is used, or all their traces are 0.
+    """
+    step = times_s[1] - times_s[0]
+    delays, lengths = [], []
+    for shot, expected, used in zip(traces, expected_s, use, strict=True):
+        sizes = envelope(np.asarray(shot, dtype=np.float32)[used])
+        for size, arrival in zip(sizes, expected[used], strict=True):
+            peak = int(np.argmax(size))
+            if size[peak] == 0.0:
+                continue
+            below = np.flatnonzero(size[peak:] < PULSE_END * size[peak])
+            delays.append(times_s[peak] - arrival)
+            lengths.append(step * (below[0] if below.size else size.size - peak))
+    if not delays:
+        raise InvalidInput("waveform/object", "no trace with a pulse", "traces of transmitted waves")
+    return Pulse(float(np.median(delays)), float(np.median(lengths)))
+
+
+def echo_window(transmitted_s: Floats, pulse: Pulse, times_s: Floats, period_s: float) -> Floats:
+    """Weight of each sample of traces: 0 until the transmitted pulse is over, then a raised cosine to 1.
+
+    Args:
+        transmitted_s: (n,), travel times of the transmitted waves, s.
+        pulse: of the scan.
+        times_s: (samples,), s.
+        period_s: of the centre frequency, s.
+
+    Returns:
+        (n, samples); it falls to 0 at the end of the record.
+    """
+    taper = TAPER_PERIODS * period_s
+    over = transmitted_s[:, None] + pulse.delay_s + pulse.length_s
+    begun = np.clip((times_s[None, :] - over) / taper, 0.0, 1.0)
+    ending = np.clip((times_s[-1] - times_s) / taper, 0.0, 1.0)
+    return np.asarray(0.25 * (1.0 - np.cos(np.pi * begun)) * (1.0 - np.cos(np.pi * ending)))

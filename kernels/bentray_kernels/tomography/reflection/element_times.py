@@ -1,0 +1,149 @@
+"""Travel times and losses from elements to every pixel: factored Eikonal solutions, read by cubic splines."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Float32s, Floats, Ints
+from ...compiled import kernel
+from ...eikonal import solve
+from ...splines.cubic import coefficients, jet_2d
+
+# The loss along a ray is the derivative of its time by the slowness (Fermat): from a second solution with
+# this relative change of the slowness at the largest attenuation.
+CHANGE = 1e-2
+
+
+class ElementTimes(NamedTuple):
+    """Times and losses between some elements and every point, on the nodes of the speed.
+
+    Divided by the distance from the element both are smooth there, so that a spline may read them between
+    nodes (T = |x - element| · τ; dissertation, section 6.2).
+
+    Attributes:
+        place: (k, 2), elements, nodes.
+        slowness: (k, nx + 3, ny + 3), spline of τ, the mean slowness along the ray, s/m, float32.
+        loss: the same of the mean attenuation along the ray, Np/m; (k, 0, 0) without one.
+    """
+
+    place: Floats
+    slowness: Float32s
+    loss: Float32s
+
+
+def solve_times(speed: Floats, spacing: float, elements: Floats, attenuation: Floats | None) -> ElementTimes:
+    """Times, and losses where an attenuation is given, of some elements.
+
+    Args:
+        speed: (nx, ny), m/s.
+        spacing: node spacing, m.
+        elements: (k, 2), m, node 0 at 0, inside the grid.
+        attenuation: as ``speed``, Np/m; None: no losses.
+
+    Raises:
+        InvalidInput: as ``eikonal.solve``.
+    """
+    splines = np.empty((len(elements), *(n + 3 for n in speed.shape)), dtype=np.float32)
+    losses = np.empty(splines.shape if attenuation is not None else (len(elements), 0, 0), dtype=np.float32)
+    nodes = np.stack(np.meshgrid(*map(np.arange, speed.shape), indexing="ij"), axis=-1) * spacing
+    strongest = 0.0 if attenuation is None else float(attenuation.max())
+    change = 0.0 if strongest == 0.0 else CHANGE / (strongest * float(speed.max()))
+    for k, element in enumerate(elements):
+        distance = np.linalg.norm(nodes - element, axis=-1)
+        near = distance < 1e-6 * spacing
+        distance[near] = 1.0
+        time = solve(speed, spacing, element)
+        splines[k] = coefficients(np.where(near, 1.0 / speed, time / distance))
+        if attenuation is None:
+            continue
+        if change == 0.0:
+            losses[k] = 0.0
+            continue
+        later = solve(1.0 / (1.0 / speed + change * attenuation), spacing, element)
+        losses[k] = coefficients(np.where(near, attenuation, (later - time) / (change * distance)))
+    return ElementTimes(elements / spacing, splines, losses)
+
+
+def joined(parts: list[ElementTimes]) -> ElementTimes:
+    """Those of several groups of elements, in their order."""
+    return ElementTimes(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def times_between(times: ElementTimes, spacing: float, elements: Floats) -> Floats:
+    """Time from each element to each of others, (k, n), s.
+
+    Args:
+        times: of the first.
+        spacing: of its nodes, m.
+        elements: (n, 2), m, node 0 at 0.
+    """
+    return _between(times, spacing, elements / spacing)
+
+
+@kernel
+def _between(times: ElementTimes, spacing: float, others: Floats) -> Floats:
+    found = np.empty((len(times.place), len(others)))
+    for k in range(len(times.place)):
+        for n in range(len(others)):
+            x, y = others[n, 0] - times.place[k, 0], others[n, 1] - times.place[k, 1]
+            slowness = jet_2d(times.slowness[k], others[n, 0], others[n, 1])[0]
+            found[k, n] = spacing * math.sqrt(x * x + y * y) * slowness
+    return found
+
+
+class Views(NamedTuple):
+    """Some pixels as seen from some elements, each (k, pixels), float32.
+
+    Attributes:
+        time: T(element, pixel), s.
+        x, y: direction of the ray at the pixel, ∇T/|∇T|.
+        gain: correction of the amplitude on this way.
+    """
+
+    time: Float32s
+    x: Float32s
+    y: Float32s
+    gain: Float32s
+
+
+@kernel(inline="always")
+def view_pixels(
+    times: ElementTimes,
+    which: Ints,
+    spacing: float,
+    px: Floats,
+    py: Floats,
+    count: int,
+    spreading: bool,
+    views: Views,
+) -> None:
+    """Times, directions and gains of some elements at the first ``count`` pixels.
+
+    Args:
+        times: of the elements.
+        which: (k,), indices of those that are viewed.
+        spacing: of the nodes, m.
+        px, py: of the pixels, nodes.
+        spreading: whether the gain compensates cylindrical spreading, √distance.
+        views: written.
+    """
+    for n in range(len(which)):
+        k = which[n]
+        spline = times.slowness[k]
+        for p in range(count):
+            x, y = px[p] - times.place[k, 0], py[p] - times.place[k, 1]
+            distance = math.sqrt(x * x + y * y)
+            slowness, in_x, in_y, _, _, _ = jet_2d(spline, px[p], py[p])
+            # ∇T = τ ∇d + d ∇τ; its length is the slowness there.
+            gx, gy = slowness * x / distance + distance * in_x, slowness * y / distance + distance * in_y
+            length = math.sqrt(gx * gx + gy * gy)
+            views.time[n, p] = spacing * distance * slowness
+            views.x[n, p] = gx / length
+            views.y[n, p] = gy / length
+            gain = math.sqrt(spacing * distance) if spreading else 1.0
+            if times.loss.shape[1] > 0:
+                gain *= math.exp(spacing * distance * jet_2d(times.loss[k], px[p], py[p])[0])
+            views.gain[n, p] = gain

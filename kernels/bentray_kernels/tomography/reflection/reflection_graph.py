@@ -1,0 +1,283 @@
+"""Task graph of the reflection image of one slice: travel times, the pulse, then sums over emissions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...acquisition import Dataset
+from ...arrays import Floats, Ints
+from ...errors import InvalidInput
+from ...task_graph import Task
+from ..result import Iteration
+from .delay_and_sum import Signals, Sums, empty_sums, sum_echoes
+from .echoes import Pulse, analytic, echo_window, measure_pulse, upsampling
+from .element_times import ElementTimes, joined, solve_times, times_between
+from .reflection_plan import EchoScan, ReflectionPlan, emissions_per_task
+
+# Elements whose travel times are solved in one task.
+ELEMENTS = 16
+
+# Emissions that the pulse is measured in.
+PULSE_EMISSIONS = 8
+
+
+@dataclass(frozen=True)
+class ReflectionState:
+    """Sums over the first emissions.
+
+    Attributes:
+        pulse: of the scan.
+        batches: number of summed batches of emissions.
+        of: number of all batches.
+        echo, power, weight: as in ``delay_and_sum.Sums``.
+    """
+
+    pulse: Pulse
+    batches: int
+    of: int
+    echo: Any
+    power: Any
+    weight: Any
+
+
+@dataclass(frozen=True)
+class ReflectionCheckpoint:
+    """State of a ``ReflectionGraph``; see ``task_graph.Checkpoint``.
+
+    Attributes:
+        state: None until the pulse is measured.
+    """
+
+    state: ReflectionState | None
+
+    @property
+    def milestone(self) -> tuple[Any, ...]:
+        # The sums are large: between quarters of the emissions they are saved by the clock.
+        return (None if self.state is None else 4 * self.state.batches // self.state.of,)
+
+
+# Records in checkpoints.
+RECORDS = (ReflectionCheckpoint, ReflectionState, Pulse)
+
+
+class ReflectionGraph:
+    """Travel times of all elements, the pulse, and the emissions in batches, summed in their order.
+
+    Args:
+        scan: see ``EchoScan``.
+        plan: of the image.
+        samples: of each trace.
+        rate_hz: of the traces.
+        history: of the reconstruction, for its progress.
+
+    Attributes:
+        total: number of emissions.
+        history: as given.
+    """
+
+    def __init__(
+        self,
+        scan: EchoScan,
+        plan: ReflectionPlan,
+        samples: int,
+        rate_hz: float,
+        history: tuple[Iteration, ...] = (),
+    ) -> None:
+        self._scan, self._plan = scan, plan
+        self.history = history
+        each = emissions_per_task(len(plan.receivers), samples * upsampling(rate_hz, plan.frequency_hz))
+        emissions = plan.emissions
+        if emissions.size == 0:
+            raise InvalidInput("mask/valid", "no pair of two elements", "pairs with traces")
+        self._batches = [emissions[k : k + each] for k in range(0, len(emissions), each)]
+        self._groups = [slice(k, k + ELEMENTS) for k in range(0, len(plan.elements), ELEMENTS)]
+        self._times: dict[int, Any] = {}
+        self._waiting: dict[int, Sums] = {}
+        self._state: ReflectionState | None = None
+        self.total = len(emissions)
+
+    @property
+    def done(self) -> int:
+        """Emissions that are computed."""
+        summed = 0 if self._state is None else self._state.batches
+        return sum(map(len, self._batches[:summed])) + sum(len(self._batches[k]) for k in self._waiting)
+
+    @property
+    def checkpoint(self) -> ReflectionCheckpoint:
+        """The state, without sums that wait for those of earlier emissions."""
+        return ReflectionCheckpoint(self._state)
+
+    def restore(self, checkpoint: ReflectionCheckpoint) -> None:
+        """As ``task_graph.ResumableGraph``."""
+        self._state = checkpoint.state
+
+    @property
+    def sums(self) -> Sums:
+        """Over the emissions so far."""
+        state = self._state
+        if state is None:
+            return empty_sums(self._plan.pixels.inside.shape)
+        return Sums(state.echo, state.power, state.weight)
+
+    @property
+    def pulse(self) -> Pulse | None:
+        """Of the scan, once it is measured."""
+        return None if self._state is None else self._state.pulse
+
+    def first(self) -> list[Task]:
+        """As ``task_graph.TaskGraph``."""
+        if self.done == self.total:
+            return []
+        plan = self._plan
+        return [
+            Task(
+                solve_element_times,
+                (plan.speed, plan.spacing, plan.attenuation, plan.elements[group], number),
+                keep_on_worker=True,
+            )
+            for number, group in enumerate(self._groups)
+        ]
+
+    def after(self, task: Task, result: Any) -> list[Task]:
+        """As ``task_graph.TaskGraph``."""
+        if task.function is solve_element_times:
+            self._times[task.arguments[-1]] = result
+            if len(self._times) < len(self._groups):
+                return []
+            if self._state is None:
+                return [Task(measure_scan_pulse, (self._scan, self._plan, self._all_times))]
+            return self._summing()
+        if task.function is measure_scan_pulse:
+            self._state = ReflectionState(
+                result, 0, len(self._batches), *empty_sums(self._plan.pixels.inside.shape)
+            )
+            return self._summing()
+        assert self._state is not None
+        self._waiting[task.arguments[-1]] = result
+        # In the order of the emitters, not of completion: floating-point sums depend on it.
+        while (number := self._state.batches) in self._waiting:
+            parts = zip(self.sums, self._waiting.pop(number), strict=True)
+            self._state = ReflectionState(
+                self._state.pulse, number + 1, self._state.of, *(a + b for a, b in parts)
+            )
+        if self.done == self.total:
+            self._times = {}
+        return []
+
+    @property
+    def _all_times(self) -> list[Any]:
+        return [times for _, times in sorted(self._times.items())]
+
+    def _summing(self) -> list[Task]:
+        assert self._state is not None
+        return [
+            Task(
+                sum_emissions,
+                (self._scan, self._plan, self._state.pulse, self._all_times, self._batches[number], number),
+            )
+            for number in range(self._state.batches, len(self._batches))
+        ]
+
+
+def solve_element_times(
+    speed: Floats, spacing: float, attenuation: Floats | None, elements: Floats, _number: int
+) -> ElementTimes:
+    """Task: travel times of some elements to all nodes."""
+    return solve_times(speed, spacing, elements, attenuation)
+
+
+def measure_scan_pulse(scan: EchoScan, plan: ReflectionPlan, times: list[ElementTimes]) -> Pulse:
+    """Task: the pulse, from the water shot, else from waves transmitted through the object."""
+    emissions = plan.emissions
+    chosen = emissions[:: max(1, len(emissions) // PULSE_EMISSIONS)]
+    with scan.open() as dataset:
+        recorded = dataset.waveform
+        assert recorded is not None
+        if recorded.water is not None:
+            shots, expected = recorded.water, _water_times(plan, chosen)
+        else:
+            shots, expected = recorded.object, _transmitted(plan, times, chosen)
+        return measure_pulse([shots[e] for e in chosen], expected, plan.used[chosen], _sample_times(dataset))
+
+
+def sum_emissions(
+    scan: EchoScan,
+    plan: ReflectionPlan,
+    pulse: Pulse,
+    times: list[ElementTimes],
+    emissions: Ints,
+    _number: int,
+) -> Sums:
+    """Task: the sums over one batch of emissions."""
+    transmitted = _transmitted(plan, times, emissions)
+    with scan.open() as dataset:
+        signals = echo_signals(dataset, plan, pulse, transmitted, emissions)
+    settings = plan.settings
+    return sum_echoes(
+        signals,
+        joined(times),
+        plan.spacing,
+        plan.emitters[emissions],
+        plan.receivers,
+        plan.pixels,
+        settings.pair_angle_deg,
+        settings.gain != "none",
+    )
+
+
+def echo_signals(
+    dataset: Dataset, plan: ReflectionPlan, pulse: Pulse, transmitted_s: Floats, emissions: Ints
+) -> Signals:
+    """Analytic signals of some emissions without the waves that were transmitted.
+
+    Args:
+        dataset: the slice with its traces.
+        plan: of the image.
+        pulse: of the scan.
+        transmitted_s: (emissions, nrx), travel times of the transmitted waves, s.
+        emissions: indices.
+    """
+    recorded, rate = dataset.waveform, dataset.sampling_rate_hz
+    assert recorded is not None
+    assert rate is not None
+    at = _sample_times(dataset)
+    factor = upsampling(rate, plan.frequency_hz)
+    used = plan.used[emissions].copy()
+    parts = np.zeros((len(emissions), len(plan.receivers), 2, factor * at.size), dtype=np.float32)
+    for n, e in enumerate(emissions):
+        scale = np.full(len(plan.receivers), recorded.scale)
+        if recorded.object_scale is not None:
+            scale = scale * recorded.object_scale[e]
+        traces = scale[:, None] * np.asarray(recorded.object[e], dtype=np.float64)
+        used[n] &= np.isfinite(traces).all(axis=1)
+        traces[~used[n]] = 0.0
+        traces *= echo_window(transmitted_s[n], pulse, at, 1.0 / plan.frequency_hz)
+        parts[n] = analytic(traces, factor)
+    # Beyond the record the nearest sample is read.
+    parts[..., 0] = 0.0
+    parts[..., -1] = 0.0
+    return Signals(parts, used, at[0] - pulse.delay_s, factor * rate)
+
+
+def _sample_times(dataset: Dataset) -> Floats:
+    assert dataset.waveform is not None
+    assert dataset.sampling_rate_hz is not None
+    samples = dataset.waveform.object.shape[-1]
+    return dataset.t0_s + np.arange(samples, dtype=np.float64) / dataset.sampling_rate_hz
+
+
+def _water_times(plan: ReflectionPlan, emissions: Ints) -> Floats:
+    """Times along straight lines through water, (emissions, nrx), s."""
+    sent, received = plan.elements[plan.emitters[emissions]], plan.elements[plan.receivers]
+    return np.asarray(np.linalg.norm(sent[:, None] - received[None], axis=-1) / plan.water_mps)
+
+
+def _transmitted(plan: ReflectionPlan, times: list[ElementTimes], emissions: Ints) -> Floats:
+    """Predicted times of the first arrivals, (emissions, nrx), s."""
+    whole = joined(times)
+    which = plan.emitters[emissions]
+    of_emitters = ElementTimes(whole.place[which], whole.slowness[which], whole.loss[which])
+    return times_between(of_emitters, plan.spacing, plan.elements[plan.receivers])

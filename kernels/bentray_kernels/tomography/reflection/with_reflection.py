@@ -1,0 +1,76 @@
+"""A reconstruction with its reflection image: plans of the slices, their task graphs, the result."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...acquisition import Dataset
+from ...arrays import Floats
+from .. import pairs
+from ..reconstruction_graph import Run
+from ..result import Reconstruction, Reflection
+from ..settings import Settings
+from .reflection_graph import ReflectionGraph
+from .reflection_image import envelope_of, in_decibels
+from .reflection_plan import Echoes, plan_reflection
+
+
+def with_reflection(
+    result: Reconstruction,
+    dataset: Dataset,
+    settings: Settings,
+    echoes: Echoes,
+    run_graphs: Run,
+    before: int,
+) -> Reconstruction:
+    """The reconstruction with the reflection image along the rays of its speed.
+
+    Args:
+        result: with the speed, and the attenuation where losses are compensated.
+        dataset: of the scan; its traces may be in their file.
+        settings: as requested.
+        echoes: the traces of the object.
+        run_graphs: runs graphs to their end.
+        before: emitter passes already made.
+
+    Raises:
+        InvalidInput: as ``plan_reflection``.
+    """
+    count = pairs.count(dataset, settings)
+    speeds = _slices(result.speed)
+    losses = [None] * count if result.attenuation is None else _slices(result.attenuation)
+    origin = (result.origin_m[0], result.origin_m[1])
+    rate = dataset.sampling_rate_hz
+    assert rate is not None
+    graphs, envelopes, plans = [], [], []
+    for index, (speed, loss) in enumerate(zip(speeds, losses, strict=True)):
+        plan = plan_reflection(dataset.slice(index), settings, speed, loss, result.spacing_m[0], origin)
+        graph = ReflectionGraph(echoes.scan_of(index), plan, echoes.samples, rate, result.history)
+        run_graphs([graph], before, graph.total * (count - 1 - index))
+        before += graph.total
+        plans.append(plan)
+        graphs.append(graph)
+        own = plan.settings
+        envelopes.append(envelope_of(graph.sums, graph.total, coherence_factor=own.coherence_factor))
+    images = in_decibels(envelopes)
+    stacked = result.speed.ndim == 3
+    plan, pulse = plans[0], graphs[0].pulse
+    image = Reflection(
+        np.ascontiguousarray(np.stack(images, axis=-1)) if stacked else images[0],
+        (plan.pixel_m, plan.pixel_m, *result.spacing_m[2:]),
+        (*plan.origin_m, *result.origin_m[2:]),
+    )
+    assert pulse is not None
+    nx, ny = plan.pixels.inside.shape
+    medium = "water" if plan.settings.delays == "water" else "the reconstructed speed"
+    summary = (
+        f"{nx} by {ny} pixels of {1e3 * plan.pixel_m:.3g} mm; delays in {medium}; pulse "
+        f"{1e6 * pulse.delay_s:.3g} us after its travel time, muted for {1e6 * pulse.length_s:.3g} us"
+    )
+    return replace(result, reflection=image, provenance={**result.provenance, "reflection": summary})
+
+
+def _slices(values: Floats) -> list[Floats]:
+    return [np.ascontiguousarray(one) for one in np.moveaxis(np.atleast_3d(values), -1, 0)]

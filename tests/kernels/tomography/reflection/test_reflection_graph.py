@@ -1,0 +1,165 @@
+"""Reflection image of a small scan: pulse, muting, order of tasks, restart, result of a reconstruction."""
+
+import random
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography.reflection import reflection_plan
+from bentray_kernels.tomography.reflection.echoes import echo_window, measure_pulse
+from bentray_kernels.tomography.reflection.memory_echoes import MemoryEchoScan
+from bentray_kernels.tomography.reflection.reflection_graph import ReflectionGraph
+from bentray_kernels.tomography.reflection.reflection_plan import plan_reflection
+
+from .point_echoes import CENTRE_HZ, RADIUS, RATE_HZ, T0, WATER, ring, traces
+
+# An eighth of a wavelength.
+PIXEL = 3.75e-4
+POINT, DELAY = np.array([0.006, -0.0045]), 1.3e-6
+SETTINGS = Settings.of(method="sart", nodes=24, iterations=1, reflection=True, pixel_m=PIXEL)
+
+
+def scan(water=True, **changes):
+    elements = ring()
+    whole = traces(elements, [POINT], delay_s=DELAY, transmitted=30.0)
+    alone = traces(elements, [], delay_s=DELAY, transmitted=30.0)
+    fields = {
+        "element_position_m": elements,
+        "tx": np.arange(24),
+        "rx": np.arange(24),
+        "water_speed_mps": WATER,
+        "delta_tof_s": np.zeros((24, 24)),
+        "waveform": Waveform(whole.astype(np.float32), alone.astype(np.float32) if water else None),
+        "center_frequency_hz": CENTRE_HZ,
+        "sampling_rate_hz": RATE_HZ,
+        "t0_s": T0,
+    }
+    return Dataset(**{**fields, **changes})
+
+
+def begun(dataset=None, settings=SETTINGS):
+    dataset = dataset or scan()
+    corner = -1.1 * RADIUS
+    speed = np.full((23, 23), WATER)
+    plan = plan_reflection(dataset, settings, speed, None, -corner / 11.0, (corner, corner))
+    return ReflectionGraph(MemoryEchoScan(dataset, 0), plan, 400, RATE_HZ)
+
+
+def run_in_random_order(graph, rng, most=None):
+    """Run tasks one at a time in a random order, to the end or until ``most`` tasks have run."""
+    tasks = graph.first()
+    while tasks and most != 0:
+        task = tasks.pop(rng.randrange(len(tasks)))
+        tasks += graph.after(task, task.function(*task.arguments))
+        most = None if most is None else most - 1
+    return graph
+
+
+@pytest.fixture
+def small_batches(monkeypatch):
+    monkeypatch.setattr(reflection_plan, "TASK_BYTES", 5 * 8 * 24 * 800)
+
+
+@pytest.mark.usefixtures("small_batches")
+def test_tasks_may_finish_in_any_order_and_resume():
+    expected = run_in_random_order(begun(), random.Random(1))
+    assert (expected.done, expected.total) == (24, 24)
+    for seed, stop in ((2, 1), (3, 4), (4, 6)):
+        broken = run_in_random_order(begun(), random.Random(seed), stop)
+        assert broken.done < broken.total
+        again = begun()
+        again.restore(broken.checkpoint)
+        run_in_random_order(again, random.Random(seed + 10))
+        for one, other in zip(again.sums, expected.sums, strict=True):
+            assert np.array_equal(one, other)
+        assert again.first() == []
+
+
+@pytest.mark.parametrize("water", [True, False])
+def test_delay_of_the_pulse_is_measured_with_and_without_a_water_shot(water):
+    graph = run_in_random_order(begun(scan(water)), random.Random(1))
+    assert graph.pulse.delay_s == pytest.approx(DELAY, abs=0.3 / RATE_HZ)
+    # 0.1 of the maximum of exp(-(0.9 f t)^2).
+    assert graph.pulse.length_s == pytest.approx(np.sqrt(np.log(10.0)) / (0.9 * CENTRE_HZ), abs=2.0 / RATE_HZ)
+
+
+def test_reconstruction_has_an_image_of_the_point_on_its_own_grid():
+    result = reconstruct(scan(), SETTINGS)
+    image = result.reflection
+    assert image.spacing_m == (PIXEL, PIXEL)
+    assert image.db.shape != result.speed.shape
+    assert (image.db.max(), image.db.min()) == (0.0, -100.0)
+    brightest = np.array(image.origin_m) + PIXEL * np.array(
+        np.unravel_index(image.db.argmax(), image.db.shape)
+    )
+    assert np.abs(brightest - POINT).max() <= 0.5 * PIXEL + 1e-9
+    assert "delays in the reconstructed speed" in result.provenance["reflection"]
+    assert result.settings.reflection.enabled
+
+
+def test_transmitted_waves_are_muted():
+    # 30 times as strong as the echo, they would outshine it.
+    image = reconstruct(scan(), SETTINGS.changed(coherence_factor=False)).reflection
+    x, y = (image.origin_m[k] + image.spacing_m[k] * np.arange(image.db.shape[k]) for k in (0, 1))
+    away = np.hypot(x[:, None] - POINT[0], y[None, :] - POINT[1])
+    assert image.db[away > 0.008].max() < -8.0
+
+
+def test_several_slices_are_stacked():
+    one = scan()
+    both = np.stack([one.waveform.object, 0.5 * one.waveform.object])
+    water = np.stack([one.waveform.water] * 2)
+    dataset = scan(
+        slice_z_m=np.array([0.0, 2e-3]), delta_tof_s=np.zeros((2, 24, 24)), waveform=Waveform(both, water)
+    )
+    image = reconstruct(dataset, SETTINGS).reflection
+    assert image.db.shape[2] == 2
+    assert image.spacing_m[2] == 2e-3
+    assert image.db[..., 0].max() == 0.0
+    # The transmitted waves are half as strong, too, so that the echo is half of the other one.
+    assert image.db[..., 1].max() == pytest.approx(-6.02, abs=0.01)
+
+
+def test_delays_in_water_move_the_image():
+    found = begun(settings=SETTINGS.changed(delays="water"))._plan.speed
+    assert (found == WATER).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "settings", "field"),
+    [
+        ({"waveform": None}, {}, "reflection"),
+        ({"center_frequency_hz": None}, {}, "acquisition@center_frequency_hz"),
+        ({}, {"gain": "attenuation"}, "reflection.gain"),
+        ({}, {"pixel_m": 1e-6}, "reflection.pixel_m"),
+        ({}, {"pixel_m": 0.5}, "reflection.pixel_m"),
+    ],
+)
+def test_what_is_impossible_is_named(changes, settings, field):
+    with pytest.raises(InvalidInput) as refused:
+        reconstruct(scan(**changes), SETTINGS.changed(**settings))
+    assert refused.value.field == field
+
+
+def test_volumes_are_rejected():
+    with pytest.raises(InvalidInput, match="decomposition"):
+        SETTINGS.changed(decomposition="volume")
+
+
+def test_window_opens_after_the_pulse_and_closes_with_the_record():
+    shot = traces(ring(), [], delay_s=DELAY, transmitted=1.0)
+    at = T0 + np.arange(400) / RATE_HZ
+    expected = np.linalg.norm(ring()[:1] - ring(), axis=1)[None] / WATER
+    pulse = measure_pulse([shot[0]], expected, np.ones((1, 24), bool), at)
+    window = echo_window(expected[0], pulse, at, 1.0 / CENTRE_HZ)
+    assert np.abs(shot[0] * window).max() < 0.1
+    assert window[:, -1].max() == 0.0
+    assert window[3, np.searchsorted(at, expected[0, 3] + DELAY + 8e-6)] == 1.0
+
+
+def test_a_scan_of_zeros_has_no_pulse():
+    with pytest.raises(InvalidInput, match="pulse"):
+        measure_pulse([np.zeros((2, 50))], np.zeros((1, 2)), np.ones((1, 2), bool), np.arange(50) * 1e-7)
