@@ -78,12 +78,14 @@ def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
     from bentray_workers.files.reconstruction import IMAGES, REFLECTION
 
     differences: dict[str, Any] = {}
-    arrays = [
+    arrays: list[tuple[str, Any, Any]] = [
         (place, getattr(before, name), getattr(after, name))
         for name, place in {**IMAGES, "residuals": "residuals"}.items()
     ]
-    echoes = (one.image("reflection") for one in (before, after))
-    arrays.append((REFLECTION, *(None if one is None else one.values for one in echoes)))
+    old_echoes, new_echoes = (
+        None if one.reflection is None else one.reflection.db for one in (before, after)
+    )
+    arrays.append((REFLECTION, old_echoes, new_echoes))
     for place, old, new in arrays:
         if old is None and new is None:
             continue

@@ -12,6 +12,7 @@ import pytest
 from matplotlib import pyplot as plt
 
 import bentray
+from bentray_kernels.tomography.result import Reflection
 from bentray_service.interactive.result import UNITS, Result, result_of
 from bentray_workers.files.export.suffixes import SUFFIXES
 from bentray_workers.files.volume import Volume
@@ -37,7 +38,7 @@ def volume(values: np.ndarray) -> Result:
 
 def test_arrays_have_places_and_units(result: Result) -> None:
     assert result.axes == ("x", "y")
-    assert dict(result.units) == UNITS
+    assert dict(result.units) == {name: unit for name, unit in UNITS.items() if name != "reflection"}
     np.testing.assert_allclose(result.coordinates["x"], SPACING_M * (np.arange(12) - 5.5))
     np.testing.assert_array_equal(result.speed, made(nodes=12).speed)
     np.testing.assert_array_equal(result.attenuation, made(nodes=12).attenuation)
@@ -46,6 +47,21 @@ def test_arrays_have_places_and_units(result: Result) -> None:
     assert repr(result).startswith(
         "<bentray.Result of 12 x 12 nodes: speed, coverage, attenuation, recovery;"
     )
+
+
+def test_reflection_has_a_grid_of_its_own(result: Result) -> None:
+    db = np.linspace(-100.0, 0.0, 30 * 20).reshape(30, 20)
+    image = replace(made(nodes=12), reflection=Reflection(db, (5e-4, 5e-4), (-7e-3, -5e-3)))
+    both = result_of(image, {})
+    np.testing.assert_array_equal(both.reflection, db)
+    assert (both.units["reflection"], both.axes_of("reflection")) == ("dB", ("reflection_x", "reflection_y"))
+    np.testing.assert_allclose(both.coordinates["reflection_x"], 5e-4 * np.arange(30) - 7e-3)
+    assert both.to_xarray()["reflection"].shape == (30, 20)
+    left, right, *_ = both.plot("reflection").images[0].get_extent()
+    assert (left, right) == pytest.approx((-7.25, 7.75))
+    assert both.compare(both, "reflection").spacing_m == (5e-4, 5e-4)
+    with pytest.raises(bentray.InvalidInput, match="reflection"):
+        _ = result.reflection
 
 
 def test_missing_arrays_are_named() -> None:
