@@ -1,5 +1,6 @@
 """Every task that a plan counts is told in words, never by the name of a function."""
 
+from dataclasses import replace
 from itertools import product
 
 import pytest
@@ -27,6 +28,7 @@ def plans():
             if method in ("sart", "gauss-newton"):
                 settings = settings.changed(minutes=None)
             yield plan(summary(traces), settings, ())
+    yield plan(replace(summary(TRACES), echoes=TRACES), Settings.of(method="sart", reflection=True), ())
 
 
 def test_every_task_of_a_plan_has_words():

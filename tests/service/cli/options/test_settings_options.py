@@ -44,6 +44,12 @@ CHOICES = [
     (["--amplitudes", "ratio"], "amplitudes", "ratio"),
     (["--attenuation-solver", "sart"], "attenuation_solver", "sart"),
     (["--focusing"], "focusing", True),
+    (["--reflection"], "reflection", True),
+    (["--delays", "water"], "delays", "water"),
+    (["--pixel", "0.0002"], "pixel_m", 2e-4),
+    (["--pair-angle", "60"], "pair_angle_deg", 60.0),
+    (["--no-coherence-factor"], "coherence_factor", False),
+    (["--gain", "spreading"], "gain", "spreading"),
 ]
 
 
