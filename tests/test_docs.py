@@ -122,8 +122,8 @@ class Reader:
         return self._run([sys.executable, "-W", "error::SyntaxWarning", "-c", begin + self._filled(text)])
 
     def _wait(self, job: str) -> None:
-        begin = "from bentray_service.client import Client\n"
-        code = f"{begin}with Client({self.url!r}) as client: print(client.wait({job!r}))"
+        begin = "import bentray\n"
+        code = f"{begin}with bentray.Client({self.url!r}) as client: print(client.wait({job!r}))"
         for kind, number in ID.findall(self._run([sys.executable, "-c", code])):
             self.seen[kind] = f"{kind}-{number}"
 

@@ -13,6 +13,8 @@ from pydantic import BaseModel
 # Characters of a value in a table.
 LONGEST = 200
 LEFT = "text-align:left"
+# Fields of records that are for programs.
+UNSHOWN = ("links", "history", "plan")
 
 
 class ShownRecord(BaseModel):
@@ -25,12 +27,11 @@ class ShownRecord(BaseModel):
     columns: ClassVar[tuple[str, ...]] = ()
 
     def _repr_html_(self) -> str:
-        rows = [
-            (name, value)
-            for name in type(self).model_fields
-            if name not in ("links", "history", "plan") and (value := getattr(self, name)) not in (None, "")
-        ]
-        return figures_html(type(self).__name__.removesuffix("Record"), rows)
+        held = {name: getattr(self, name) for name in type(self).model_fields if name not in UNSHOWN}
+        lists = {name: RecordList(value) for name, value in held.items() if _are_records(value)}
+        rows = [(name, held[name]) for name in held if name not in lists and held[name] not in (None, "")]
+        below = [records._repr_html_() for records in lists.values()]
+        return figures_html(type(self).__name__.removesuffix("Record"), rows) + "".join(below)
 
 
 Shown = TypeVar("Shown", bound=ShownRecord)
@@ -67,6 +68,10 @@ def picture_html(png: bytes, alt: str) -> str:
     """A picture as part of the page."""
     text = base64.b64encode(png).decode()
     return f'<img alt="{html.escape(alt)}" src="data:image/png;base64,{text}" style="max-width:100%">'
+
+
+def _are_records(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], ShownRecord)
 
 
 def _cell(value: Any) -> str:

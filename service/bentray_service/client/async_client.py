@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar, Unpack
 
 import anyio
 import httpx
 
-from . import flows
-from .connection import Connection, document
+from . import flows, lists, pictures
+from .connection import Connection, ConnectionOptions, document
 from .errors import ClientError, from_response, no_answer
 from .saving import saving
 from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, FlowRun, PauseStep, RequestStep, Step
@@ -32,8 +32,8 @@ def _method(
 class AsyncClient(Connection):
     """As :class:`Client`; use it with ``async with``, and await its methods."""
 
-    def __init__(self, url: str, **options: Any) -> None:
-        super().__init__(url, **options)
+    def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
+        super().__init__(url, key, **options)
         self._http = httpx.AsyncClient(**self._options, transport=httpx.AsyncHTTPTransport(retries=2))
 
     async def __aenter__(self) -> Self:
@@ -49,15 +49,24 @@ class AsyncClient(Connection):
     upload = _method(flows.upload)
     submit = _method(flows.submit)
     simulate = _method(flows.simulate)
-    job = _method(flows.job)
-    cancel = _method(flows.cancel)
+    reconstruct = _method(flows.reconstruct)
     wait = _method(flows.wait)
-    volume = _method(flows.volume)
-    slice_png = _method(flows.slice_png)
+    cancel = _method(flows.cancel)
+    result = _method(flows.result)
     download = _method(flows.download)
     download_dataset = _method(flows.download_dataset)
-    result = _method(flows.result)
     delete = _method(flows.delete)
+    datasets = _method(lists.datasets)
+    jobs = _method(lists.jobs)
+    volumes = _method(lists.volumes)
+    meshes = _method(lists.meshes)
+    dataset = _method(lists.dataset)
+    job = _method(lists.job)
+    volume = _method(lists.volume)
+    quality = _method(lists.quality)
+    quality_png = _method(pictures.quality_png)
+    slice_png = _method(pictures.slice_png)
+    refraction_png = _method(pictures.refraction_png)
 
     async def _run(self, flow: Flow[T]) -> T:
         run = FlowRun(self._retries.through(flow))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar, Unpack
 
 import httpx
 
-from . import flows
-from .connection import Connection, document
+from . import flows, lists, pictures
+from .connection import Connection, ConnectionOptions, document
 from .errors import ClientError, from_response, no_answer
 from .saving import saving
 from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, FlowRun, PauseStep, RequestStep, Step
@@ -30,8 +30,8 @@ def _method(flow: Callable[Concatenate[Connection, P], Flow[T]]) -> Callable[Con
 class Client(Connection):
     __doc__ = Connection.__doc__
 
-    def __init__(self, url: str, **options: Any) -> None:
-        super().__init__(url, **options)
+    def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
+        super().__init__(url, key, **options)
         self._http = httpx.Client(**self._options, transport=httpx.HTTPTransport(retries=2))
 
     def __enter__(self) -> Self:
@@ -47,15 +47,24 @@ class Client(Connection):
     upload = _method(flows.upload)
     submit = _method(flows.submit)
     simulate = _method(flows.simulate)
-    job = _method(flows.job)
-    cancel = _method(flows.cancel)
+    reconstruct = _method(flows.reconstruct)
     wait = _method(flows.wait)
-    volume = _method(flows.volume)
-    slice_png = _method(flows.slice_png)
+    cancel = _method(flows.cancel)
+    result = _method(flows.result)
     download = _method(flows.download)
     download_dataset = _method(flows.download_dataset)
-    result = _method(flows.result)
     delete = _method(flows.delete)
+    datasets = _method(lists.datasets)
+    jobs = _method(lists.jobs)
+    volumes = _method(lists.volumes)
+    meshes = _method(lists.meshes)
+    dataset = _method(lists.dataset)
+    job = _method(lists.job)
+    volume = _method(lists.volume)
+    quality = _method(lists.quality)
+    quality_png = _method(pictures.quality_png)
+    slice_png = _method(pictures.slice_png)
+    refraction_png = _method(pictures.refraction_png)
 
     def _run(self, flow: Flow[T]) -> T:
         run = FlowRun(self._retries.through(flow))

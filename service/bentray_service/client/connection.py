@@ -6,7 +6,7 @@ import inspect
 import os
 from collections.abc import Callable
 from functools import update_wrapper
-from typing import Any
+from typing import Any, TypedDict
 
 import httpx
 
@@ -15,6 +15,15 @@ from bentray_kernels.errors import InvalidInput
 from .retries import PATIENCE_S, Retries
 
 CONNECT_S = 10.0
+
+
+class ConnectionOptions(TypedDict, total=False):
+    """Keyword arguments of both clients, see ``Connection``."""
+
+    timeout_s: float
+    poll_s: float
+    patience_s: float
+    on_wait: Callable[[str], None] | None
 
 
 class Connection:
@@ -40,8 +49,8 @@ class Connection:
     def __init__(
         self,
         url: str,
-        *,
         key: str | None = None,
+        *,
         timeout_s: float = 300.0,
         poll_s: float = 0.3,
         patience_s: float = PATIENCE_S,
@@ -63,6 +72,9 @@ class Connection:
             # An upload is answered after the service has read the file.
             "timeout": httpx.Timeout(timeout_s, connect=CONNECT_S),
         }
+
+    def __repr__(self) -> str:
+        return f"<bentray.{type(self).__name__} of {self.url}>"
 
 
 def document(method: Callable[..., Any], flow: Callable[..., Any]) -> None:

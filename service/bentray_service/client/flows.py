@@ -2,37 +2,44 @@
 
 from __future__ import annotations
 
+import os
+import re
 import tempfile
 import uuid
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Any, Literal, TypeAlias, Unpack
 
-from pydantic import BaseModel
+from bentray_kernels.errors import InvalidInput
 
+from ..interactive.progress_bar import progress_bar
 from ..interactive.result import Result
+from ..interactive.setting_types import Method, PhantomName, ReconstructionSettings, SimulationSettings
 from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from ..routes.models.surface_records import MeshRecord
+from ..settings_request import known_setting, nested, plain_numbers
 from .connection import Connection
 from .errors import ClientError
+from .lists import volume as volume_record
 from .results import read_result
 from .steps import DownloadStep, Flow, RequestStep
+from .stored import DatasetId, JobId, StoredId, VolumeId, id_of, volume_of
 from .uploading import PLACES, OnBytes, UploadKind, send_file
 from .waiting import wait_for
 
 Format = Literal["hdf5", "h5", "nifti", "metaimage", "nrrd", "mat", "vti", "ome-zarr", "dicom", "npy"]
-Record = TypeVar("Record", bound=BaseModel)
 
 Uploaded: TypeAlias = DatasetRecord | VolumeRecord | MeshRecord
 
 RECORDS: dict[str, type[Uploaded]] = {"dataset": DatasetRecord, "volume": VolumeRecord, "mesh": MeshRecord}
+SCAN_ID = re.compile(r"ds-[0-9a-z]+")
 PREFIXES = {"ds": "dataset", "vol": "volume", "mesh": "mesh"}
 
 
 def upload(
     connection: Connection,
     /,
-    path: Path | str,
+    path: os.PathLike[str] | str,
     on_progress: OnBytes | None = None,
     *,
     kind: UploadKind = "dataset",
@@ -42,7 +49,7 @@ def upload(
     """Upload a file in chunks; interrupted uploads are continued.
 
     Args:
-        path: of the file.
+        path: of the file, or a ``bentray.Scan``.
         on_progress: called with ``(sent, total)``, bytes.
         kind: type of the file.
         resume: id of an interrupted upload, from ``ClientError.upload``.
@@ -57,94 +64,164 @@ def upload(
 
 
 def submit(
-    connection: Connection, dataset_id: str, settings: Mapping[str, Any] | None = None
+    connection: Connection,
+    dataset: DatasetId,
+    settings: Mapping[str, Any] | None = None,
+    *,
+    method: Method | None = None,
+    **values: Unpack[ReconstructionSettings],
 ) -> Flow[JobRecord]:
-    """Start a reconstruction; omitted settings take their defaults."""
+    """Start a reconstruction; omitted settings take their defaults.
+
+    Args:
+        dataset: id or record of the scan.
+        settings: nested, as the REST interface has them.
+        method: as for ``bentray.reconstruct``.
+        values: single settings as for ``bentray.reconstruct``, in place of those of ``settings``.
+
+    Raises:
+        InvalidInput: for an unknown name in ``values``, with the one that is spelt most like it.
+    """
+    merged = dict(settings or {})
+    given = {**values} if method is None else {"method": method, **values}
+    for name, value in nested(plain_numbers(given)).items():
+        own = merged.get(name)
+        merged[name] = {**own, **value} if isinstance(own, Mapping) and isinstance(value, dict) else value
+    return (yield from _start({"kind": "reconstruction", "dataset": id_of(dataset), "settings": merged}))
+
+
+def simulate(
+    connection: Connection,
+    settings: Mapping[str, Any] | None = None,
+    *,
+    phantom: PhantomName | None = None,
+    **values: Unpack[SimulationSettings],
+) -> Flow[JobRecord]:
+    """Start the simulation of a scan; ``dataset`` of the successful job is its id.
+
+    Args:
+        settings: as the REST interface has them.
+        phantom, values: as for ``bentray.simulate``, in place of those of ``settings``.
+
+    Raises:
+        InvalidInput: for an unknown name in ``values``, with the one that is spelt most like it.
+    """
+    known = SimulationSettings.__annotations__
+    for name, value in values.items():
+        if name not in known:
+            raise InvalidInput(name, repr(value)[:80], known_setting(name, known, ", ".join(known)))
+    given = {**values} if phantom is None else {"phantom": phantom, **values}
     return (
-        yield from _start({"kind": "reconstruction", "dataset": dataset_id, "settings": dict(settings or {})})
+        yield from _start({"kind": "simulation", "settings": {**(settings or {}), **plain_numbers(given)}})
     )
 
 
-def simulate(connection: Connection, settings: Mapping[str, Any] | None = None) -> Flow[JobRecord]:
-    """Start the simulation of a scan; ``dataset`` of the successful job is its id."""
-    return (yield from _start({"kind": "simulation", "settings": dict(settings or {})}))
+def reconstruct(
+    connection: Connection,
+    scan: os.PathLike[str] | DatasetId,
+    method: Method = "auto",
+    *,
+    progress: bool = True,
+    **settings: Unpack[ReconstructionSettings],
+) -> Flow[Result]:
+    """Upload a scan, reconstruct it on the service and get the result; as ``bentray.reconstruct``.
+
+    Args:
+        scan: a ``bentray.Scan``, the path of a scan, or the id or record of one on the service.
+        method: as for ``bentray.reconstruct``.
+        progress: show progress bars.
+        settings: as for ``bentray.reconstruct``.
+
+    Raises:
+        InvalidInput: for an unknown setting, with the one that is spelt most like it.
+    """
+    # An unknown setting is refused before the upload.
+    nested({**settings})
+    if isinstance(scan, DatasetRecord) or (isinstance(scan, str) and SCAN_ID.fullmatch(scan)):
+        stored = id_of(scan)
+    else:
+        with progress_bar("Uploading", shown=progress) as step:
+            stored = (yield from upload(connection, scan, step)).id
+    job = yield from submit(connection, stored, method=method, **settings)
+    return (yield from result(connection, (yield from wait(connection, job, progress=progress))))
 
 
-def job(connection: Connection, job_id: str) -> Flow[JobRecord]:
-    """Get the current record of a job."""
-    return (yield from _record(JobRecord, "GET", f"/v1/jobs/{job_id}"))
-
-
-def cancel(connection: Connection, job_id: str) -> Flow[JobRecord]:
+def cancel(connection: Connection, job: JobId) -> Flow[JobRecord]:
     """Cancel a job."""
-    return (yield from _record(JobRecord, "POST", f"/v1/jobs/{job_id}/cancel"))
+    response = yield RequestStep("POST", f"/v1/jobs/{id_of(job)}/cancel")
+    return JobRecord.model_validate_json(response.content)
 
 
 def wait(
     connection: Connection,
-    job_id: str,
+    job: JobId,
     on_progress: Callable[[JobRecord], None] | None = None,
     timeout_s: float | None = None,
+    *,
+    progress: bool = False,
 ) -> Flow[JobRecord]:
-    """Wait until a job has succeeded and return its record; ``on_progress`` is called with every record.
+    """Wait until a job has succeeded and return its record.
+
+    Args:
+        job: id or record.
+        on_progress: called with every record.
+        timeout_s: time limit, s; None: none.
+        progress: show a progress bar.
 
     Raises:
         ClientError: when the job failed or was cancelled, or after ``timeout_s``.
     """
-    return (yield from wait_for(job_id, on_progress, timeout_s, connection.poll_s))
+    words = "Waiting" if isinstance(job, str) else job.kind.replace("-", " ").capitalize()
+    with progress_bar(words, shown=progress) as step:
 
+        def show(record: JobRecord) -> None:
+            step(record.progress.done, record.progress.total, record.progress.phase or record.state)
+            if on_progress is not None:
+                on_progress(record)
 
-def volume(connection: Connection, volume_id: str) -> Flow[VolumeRecord]:
-    """Get the record of a volume."""
-    return (yield from _record(VolumeRecord, "GET", f"/v1/volumes/{volume_id}"))
-
-
-def slice_png(connection: Connection, /, volume_id: str, **how: str | float) -> Flow[bytes]:
-    """Get a slice as PNG; ``how``: index, quantity, low, high, colormap."""
-    path = f"/v1/volumes/{volume_id}/slice.png"
-    return bytes((yield RequestStep("GET", path, {"params": how}, repeatable=True)).content)
+        return (yield from wait_for(id_of(job), show, timeout_s, connection.poll_s))
 
 
 def download(
     connection: Connection,
+    volume: VolumeId,
     /,
-    volume_id: str,
     format: Format,  # noqa: A002 - the name of the query parameter
-    path: Path | str,
+    path: os.PathLike[str] | str,
     **how: str | float,
 ) -> Flow[Path]:
     """Download a volume to ``path``, atomically; ``how``: quantity, attenuation, frequency_hz."""
-    yield DownloadStep(f"/v1/volumes/{volume_id}/data", {"params": {"format": format, **how}}, Path(path))
+    place, options = f"/v1/volumes/{volume_of(volume)}/data", {"params": {"format": format, **how}}
+    yield DownloadStep(place, options, Path(path))
     return Path(path)
 
 
 def download_dataset(
-    connection: Connection, dataset_id: str, path: Path | str, on_progress: OnBytes | None = None
+    connection: Connection,
+    dataset: DatasetId,
+    path: os.PathLike[str] | str,
+    on_progress: OnBytes | None = None,
 ) -> Flow[Path]:
     """Download a scan to ``path``; ``on_progress`` as in ``upload``."""
-    yield DownloadStep(f"/v1/datasets/{dataset_id}/file", {}, Path(path), on_progress)
+    yield DownloadStep(f"/v1/datasets/{id_of(dataset)}/file", {}, Path(path), on_progress)
     return Path(path)
 
 
-def result(connection: Connection, volume_id: str) -> Flow[Result]:
-    """Get a volume as arrays with coordinates; ``.to_xarray()`` converts it to a dataset of xarray."""
-    about = yield from volume(connection, volume_id)
+def result(connection: Connection, volume: VolumeId) -> Flow[Result]:
+    """Get a volume, or the result of a job, as a :class:`Result`: arrays with coordinates and units."""
+    about = yield from volume_record(connection, volume)
     with tempfile.TemporaryDirectory() as folder:
-        path = yield from download(connection, volume_id, "hdf5", Path(folder) / "volume.h5")
+        path = yield from download(connection, about.id, "hdf5", Path(folder) / "volume.h5")
         return read_result(path, about)
 
 
-def delete(connection: Connection, stored_id: str) -> Flow[None]:
+def delete(connection: Connection, stored: StoredId) -> Flow[None]:
     """Delete a dataset, volume or mesh with everything derived from it."""
-    kind = PREFIXES.get(stored_id.partition("-")[0])
+    name = id_of(stored)
+    kind = PREFIXES.get(name.partition("-")[0])
     if kind is None:
-        raise ClientError(f"{stored_id!r} is not the id of a dataset, a volume or a mesh")
-    yield RequestStep("DELETE", f"{PLACES[kind]}/{stored_id}")
-
-
-def _record(model: type[Record], method: str, path: str) -> Flow[Record]:
-    response = yield RequestStep(method, path, repeatable=method == "GET")
-    return model.model_validate_json(response.content)
+        raise ClientError(f"{name!r} is not the id of a dataset, a volume or a mesh")
+    yield RequestStep("DELETE", f"{PLACES[kind]}/{name}")
 
 
 def _start(request: dict[str, Any]) -> Flow[JobRecord]:

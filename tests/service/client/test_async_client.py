@@ -1,11 +1,10 @@
 """The client for event loops: the same calls give the same."""
 
 import asyncio
-import inspect
 
 import pytest
 
-from bentray_service.client import AsyncClient, Client, ClientError
+from bentray_service.client import AsyncClient, ClientError
 
 
 def run(serve, call):
@@ -69,15 +68,3 @@ def test_unreachable_service_is_reported():
 
     with pytest.raises(ClientError, match=r"no answer from http://127\.0\.0\.1:9"):
         asyncio.run(call())
-
-
-def test_it_has_every_call_of_the_other():
-    def calls(of):
-        return {
-            name: list(inspect.signature(call).parameters)
-            for name, call in inspect.getmembers(of, inspect.isfunction)
-            if not name.startswith("_")
-        }
-
-    assert calls(AsyncClient) == calls(Client)
-    assert inspect.signature(AsyncClient) == inspect.signature(Client)

@@ -28,6 +28,20 @@ bentray.reconstruct(scan, "gauss")  # wrong: incompatible type "Literal['gauss']
 bentray.reconstruct(scan, nodes="many")  # wrong: incompatible type "str"
 bentray.simulate(elemnts=16)  # wrong: Unexpected keyword argument "elemnts"
 bentray.simulate("table8")  # wrong: incompatible type "Literal['table8']"
+
+client = bentray.Client("http://127.0.0.1:8000", "key", patience_s=0.0)
+client.submit("ds-1", method="sart", relaxation=0.2)
+client.submit("ds-1", relaxtion=0.2)  # wrong: Unexpected keyword argument "relaxtion"
+client.reconstruct(scan, rays="strait")  # wrong: incompatible type "Literal['strait']"
+client.refraction_png("vol-1", widht=64)  # wrong: Unexpected keyword argument "widht"
+client.datsets()  # wrong: has no attribute "datsets"
+bentray.Client("http://127.0.0.1:8000", patience=0.0)  # wrong: Unexpected keyword argument "patience"
+
+
+async def main() -> None:
+    async with bentray.AsyncClient("http://127.0.0.1:8000") as client:
+        await client.submit("ds-1", relaxation=0.2)
+        await client.submit("ds-1", relaxtion=0.2)  # wrong: Unexpected keyword argument "relaxtion"
 """
 
 
@@ -63,10 +77,9 @@ def test_a_type_checker_finds_wrong_names_and_values(tmp_path: Path) -> None:
     package = ROOT / "service" / "bentray_service"
     (tmp_path / "session.py").write_text(CODE)
     # Other modules are not followed: their imports take a minute to check.
-    modules = [
-        str(package / "interactive" / f"{name}.py")
-        for name in ("setting_types", "reconstruction", "simulation")
-    ]
+    interactive = ("setting_types", "reconstruction", "simulation")
+    modules = [str(package / "interactive" / f"{name}.py") for name in interactive]
+    modules += map(str, sorted((package / "client").glob("*.py")))
     done = subprocess.run(
         [
             *(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, Field
 
+from ...html_tables import ShownRecord
 from ...web.problem import Problem
 
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
@@ -14,8 +15,10 @@ State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cance
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class DatasetRecord(BaseModel):
+class DatasetRecord(ShownRecord):
     """One scan, uploaded or simulated."""
+
+    columns: ClassVar = ("id", "title", "elements", "slices", "has_traces", "created")
 
     id: str
     title: str = Field(description="The name given to it, else the title in the file.")
@@ -131,8 +134,10 @@ class EstimateRecord(BaseModel):
     ahead: int = Field(description="Queued jobs that would start before it if jobs run one at a time.")
 
 
-class JobRecord(BaseModel):
+class JobRecord(ShownRecord):
     """One job."""
+
+    columns: ClassVar = ("id", "kind", "state", "name", "dataset", "volume", "seconds", "created")
 
     id: str
     kind: str
@@ -175,8 +180,10 @@ class JobList(BaseModel):
     next: str | None = Field(description="Address of the next page; null on the last page.")
 
 
-class VolumeRecord(BaseModel):
+class VolumeRecord(ShownRecord):
     """One volume: the result of a reconstruction, or an upload."""
+
+    columns: ClassVar = ("id", "title", "source", "shape", "unit", "created")
 
     id: str
     source: Literal["reconstruction", "upload"]

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import BaseModel, Field
 
+from ...html_tables import ShownRecord
 
-class FindingRecord(BaseModel):
+
+class FindingRecord(ShownRecord):
     """One finding about a scan."""
+
+    columns: ClassVar = ("check", "found", "accepted", "action", "elements")
 
     check: str = Field(description="Name of the check.")
     found: str
@@ -27,7 +31,7 @@ class FindingRecord(BaseModel):
     )
 
 
-class QualityRecord(BaseModel):
+class QualityRecord(ShownRecord):
     """The quality report of a scan: checks and findings."""
 
     verdict: Literal["clean", "usable", "refused"]

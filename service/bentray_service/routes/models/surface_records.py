@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import BaseModel, Field
+
+from ...html_tables import ShownRecord
 
 
 class Repairs(BaseModel):
@@ -18,8 +20,10 @@ class Repairs(BaseModel):
     dropped_pieces: int = Field(description="Removed components of an iso-surface, all but the largest.")
 
 
-class MeshRecord(BaseModel):
+class MeshRecord(ShownRecord):
     """One triangle mesh: an upload, or the iso-surface of a volume."""
+
+    columns: ClassVar = ("id", "title", "format", "vertices", "faces", "created")
 
     id: str
     title: str

@@ -1,0 +1,157 @@
+"""Lists, quality and pictures of the client, ids and records alike, and how a notebook shows them."""
+
+import asyncio
+import inspect
+
+import numpy as np
+import pytest
+
+import bentray
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.ranges import Range
+from bentray_service.client import AsyncClient, Client, ClientError
+from bentray_service.client.lists import JobKind
+from bentray_service.html_tables import RecordList
+from bentray_service.jobs.kinds import KINDS
+
+
+@pytest.fixture
+def client(serve, work):
+    with Client(serve(), poll_s=0.02) as client:
+        yield client
+
+
+def test_everything_stored_is_listed_newest_first(client, scan, tmp_path):
+    first, second = client.upload(scan()), client.upload(scan())
+    jobs = [client.submit(first, nodes=16, method="sart", iterations=1) for _ in range(3)]
+    done = [client.wait(job) for job in jobs]
+    assert [one.id for one in client.datasets()] == [second.id, first.id]
+    assert [one.id for one in client.datasets(1)] == [second.id]
+    assert [one.id for one in client.jobs()] == [job.id for job in reversed(jobs)]
+    assert [one.id for one in client.volumes()] == [job.volume for job in reversed(done)]
+    assert client.meshes() == []
+    assert client.dataset(first) == first
+    assert client.volume(done[0]).job == jobs[0].id
+    assert client.jobs(state="failed") == []
+    assert len(client.jobs(kind="reconstruction", text=jobs[1].id)) == 1
+
+
+def test_more_jobs_than_one_request_gives(client, scan, monkeypatch):
+    dataset = client.upload(scan())
+    jobs = [client.submit(dataset, nodes=16, iterations=1).id for _ in range(5)]
+    monkeypatch.setattr("bentray_service.client.lists.LIMIT", Range(1, 2))
+    assert [one.id for one in client.jobs()] == jobs[::-1]
+    assert [one.id for one in client.jobs(3)] == jobs[:1:-1]
+    with pytest.raises(InvalidInput, match="limit: found 0"):
+        client.jobs(0)
+    with pytest.raises(InvalidInput, match="limit: found 3; accepted: a number from 1 to 2"):
+        client.datasets(3)
+
+
+def test_kinds_of_jobs_are_those_of_the_service():
+    assert set(JobKind.__args__) == set(KINDS)
+
+
+def test_a_notebook_shows_records_and_lists(client, scan):
+    dataset = client.upload(scan())
+    assert "<td" in client.datasets()._repr_html_()
+    assert dataset.id in client.datasets()._repr_html_()
+    assert "Sixteen elements" in dataset._repr_html_()
+    assert RecordList()._repr_html_() == "<em>none</em>"
+    assert repr(client) == f"<bentray.Client of {client.url}>"
+
+
+def test_quality_and_pictures(client, scan, tmp_path):
+    dataset = client.upload(scan())
+    quality = client.quality(dataset)
+    assert quality.verdict in ("clean", "usable")
+    assert "verdict" in quality._repr_html_()
+    job = client.wait(client.submit(dataset, nodes=16, iterations=1))
+    picture = client.slice_png(job, size=240)
+    assert picture._repr_png_().startswith(b"\x89PNG")
+    assert "of 240 x " in repr(picture) or "x 240 pixels" in repr(picture)
+    assert picture.save(tmp_path / "slice.png").read_bytes() == picture
+    with pytest.raises(ClientError, match="volume"):
+        client.refraction_png(job)
+    with pytest.raises(InvalidInput, match="widht: found 64; accepted: width is spelt like it"):
+        client.refraction_png(job, widht=64)
+
+
+def test_a_volume_is_rendered(client, tmp_path):
+    values = np.linspace(0.0, 1.0, 512, dtype=np.float32).reshape(8, 8, 8)
+    np.save(tmp_path / "cube.npy", values)
+    volume = client.upload(tmp_path / "cube.npy", kind="volume", spacing_m="0.002")
+    picture = client.refraction_png(
+        volume, iso=(0.3, 0.6), index=(1.2, 1.5), width=24, height=16, fresnel=True
+    )
+    assert repr(picture) == "<bentray.Picture of 24 x 16 pixels>"
+
+
+def test_settings_by_name_join_nested_ones(client, scan):
+    dataset = client.upload(scan())
+    nested = {"sart": {"smoothing_nodes": 2.0}, "iterations": 9}
+    job = client.submit(dataset, nested, method="sart", relaxation=np.float64(0.2), iterations=1, nodes=16)
+    assert job.settings["sart"]["smoothing_nodes"] == 2.0
+    assert (job.settings["sart"]["relaxation"], job.settings["iterations"]) == (0.2, 1)
+    assert nested == {"sart": {"smoothing_nodes": 2.0}, "iterations": 9}
+    with pytest.raises(InvalidInput, match=r"relaxtion: found .*; accepted: relaxation is spelt like it"):
+        client.submit(dataset, relaxtion=0.2)
+    with pytest.raises(ClientError, match=r"settings\.itertions: found 2; accepted: iterations is spelt"):
+        client.submit(dataset, {"itertions": 2})
+    with pytest.raises(InvalidInput, match="elemnts: found 8; accepted: elements is spelt like it"):
+        client.simulate(elemnts=8)
+    assert client.simulate(phantom="detailed", nodes=16, elements=16).settings["phantom"] == "detailed"
+
+
+def test_one_call_from_a_scan_to_its_result(client, scan):
+    own = bentray.read(scan())
+    result = client.reconstruct(own, "sart", nodes=16, iterations=1, progress=False)
+    assert result.speed.max() == 1540.0
+    again = client.reconstruct(client.datasets()[0].id, "sart", nodes=16, progress=False)
+    np.testing.assert_array_equal(again.speed, result.speed)
+    assert result.compare(again).rms == 0.0
+    assert len(client.datasets()) == 1
+    with pytest.raises(InvalidInput, match="accepted: iterations is spelt like it"):
+        client.reconstruct(scan(), itertions=1)
+    assert len(client.datasets()) == 1, "refused before the upload"
+
+
+def test_a_job_without_a_result_says_so(client, scan, work):
+    work.hold.clear()
+    job = client.submit(client.upload(scan()), nodes=16)
+    with pytest.raises(ClientError, match=r"has no volume: wait for it with client\.wait"):
+        client.result(job)
+    client.cancel(job)
+
+
+def test_the_asynchronous_client_does_the_same(serve, work, scan):
+    async def call():
+        async with AsyncClient(serve(), None, poll_s=0.02) as client:
+            result = await client.reconstruct(scan(), "sart", nodes=16, iterations=1, progress=False)
+            (job,) = await client.jobs()
+            assert (await client.slice_png(job)).startswith(b"\x89PNG")
+            return result, await client.result(job)
+
+    result, again = asyncio.run(call())
+    np.testing.assert_array_equal(result.speed, again.speed)
+
+
+def test_both_clients_have_the_same_methods_and_signatures():
+    def methods(of):
+        return {
+            name: inspect.signature(method)
+            for name, method in inspect.getmembers(of, inspect.isfunction)
+            if not name.startswith("_")
+        }
+
+    own, other = methods(Client), methods(AsyncClient)
+    assert own.keys() == other.keys()
+    own.pop("close")
+    other.pop("close")
+    assert own == other
+    assert inspect.signature(Client) == inspect.signature(AsyncClient)
+    assert {"datasets", "jobs", "volumes", "quality", "refraction_png", "slice_png"} <= own.keys()
+    for name, method in inspect.getmembers(AsyncClient, inspect.isfunction):
+        if name in own:
+            assert inspect.iscoroutinefunction(method), name
+            assert method.__doc__ == getattr(Client, name).__doc__
