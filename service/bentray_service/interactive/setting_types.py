@@ -49,6 +49,12 @@ class ReconstructionSettings(TypedDict, total=False):
     amplitudes: Literal["recorded", "ratio", "spectrum"]
     attenuation_solver: Literal["penalised", "sart"]
     focusing: bool
+    reflection: bool
+    delays: Literal["reconstructed", "water"]
+    pixel_m: float | None
+    pair_angle_deg: float
+    coherence_factor: bool
+    gain: Literal["none", "spreading", "attenuation"]
 
 
 class SimulationSettings(TypedDict, total=False):
