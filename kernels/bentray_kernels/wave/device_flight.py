@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from .adjoint import LIGHT_EVERY
-from .device_waves import NOTHING, DeviceWaves, uints
+from .device_waves import NOTHING, DeviceWaves, Launch, filled, uints
 from .points import REACH, Points
 from .time_blocks import Poll
 
 # Time steps between two polls: the device has work for a block while the host waits for the one before.
 BLOCK_STEPS = 64
+
+# Work-items of a group that takes points of one emitter.
+POINTS_GROUP = 64
 
 
 class Flight:
@@ -46,6 +49,8 @@ class Flight:
         self._samples = session.reserve(max(math.prod(self._shape) * kind.itemsize, 1))
         self._stored = session.reserve(max(self._emitters * self._held * size.image * kind.itemsize, 1))
         self._points = (*waves.uploaded(sources), session.upload(pulse.astype(kind)))
+        self._stepping = waves.grid.work_items(self._emitters), (*waves.grid.group, 1)
+        self._over_the_image = waves.over_the_image(self._emitters)
         self._checkpoints: dict[int, list[Any]] = {}
 
     def forward(self) -> None:
@@ -123,24 +128,28 @@ class Flight:
         store = waves.scan.store if storing else NOTHING
         uses = {NOTHING, store}
         # A kernel for each role of the two fields, so that only numbers change from step to step.
+        scattering: list[Any] = []
         stepping, ending = [], []
+        points = (self._samples, *self._points)
         for now, new in (fields, fields[::-1]):
-            arrays = (now, new, self._stored)
-            stepping.append({use: waves.advance(use, *arrays, self._emitters) for use in uses})
-            points = (self._samples, *self._points)
-            ending.append({use: waves.exchange(use, *arrays, *points, reading=reading) for use in uses})
-        receivers = self._shape[2] if reading else 0
-        ends = (receivers + (2 * REACH) ** len(waves.grid.shape), self._emitters)
+            if store:
+                scattering.append(waves.scatter(now, new, self._stored))
+            stepping.append(waves.advance(now, new))
+            ending.append(
+                {use: waves.exchange(use, now, new, self._stored, *points, reading=reading) for use in uses}
+            )
+        ends = self._of_points((self._shape[2] if reading else 0) + (2 * REACH) ** len(waves.grid.shape))
         for n in self._steps(segment):
             use = store if store and n % every == 0 else NOTHING
-            step, end = stepping[n % 2][use], ending[n % 2][use]
+            end = ending[n % 2][use]
             if use:
                 slot = np.uint32(n // every % self._held)
-                step.set_arg(15, slot)
+                scattering[n % 2].set_arg(13, slot)
+                self._session.launch(scattering[n % 2], *self._over_the_image)
                 end.set_arg(17, slot)
-            self._session.launch(step, waves.grid.work_items(self._emitters), (*waves.grid.group, 1))
+            self._session.launch(stepping[n % 2], *self._stepping)
             end.set_arg(18, np.uint32(n))
-            self._session.launch(end, ends, None)
+            self._session.launch(end, *ends)
 
     def _backward(self, adjoint: list[Any], segment: int, sums: list[Any]) -> None:
         """Enqueue the steps of a segment, the last one first."""
@@ -148,19 +157,22 @@ class Flight:
         correlating, stepping, ending = [], [], []
         for now, new in (adjoint, adjoint[::-1]):
             correlating.append(waves.correlate(now, self._stored, *sums))
-            stepping.append(waves.advance(NOTHING, now, new, self._stored, self._emitters))
+            stepping.append(waves.advance(now, new))
             ending.append(waves.inject(new, self._samples))
-        rows = (waves.grid.shape[-1], waves.grid.rows, self._emitters)
+        ends = self._of_points(waves.gathered)
         for n in self._steps(segment, backwards=True):
             if n % every == 0:
                 slot = n // every
                 correlating[n % 2].set_arg(9, np.uint32(slot % self._held))
                 correlating[n % 2].set_arg(10, np.uint32(slot % LIGHT_EVERY == 0))
-                self._session.launch(correlating[n % 2], rows, None)
-            items = waves.grid.work_items(self._emitters)
-            self._session.launch(stepping[n % 2], items, (*waves.grid.group, 1))
-            ending[n % 2].set_arg(10, np.uint32(n))
-            self._session.launch(ending[n % 2], (waves.gathered, self._emitters), None)
+                self._session.launch(correlating[n % 2], *self._over_the_image)
+            self._session.launch(stepping[n % 2], *self._stepping)
+            ending[n % 2].set_arg(11, np.uint32(n))
+            self._session.launch(ending[n % 2], *ends)
+
+    def _of_points(self, number: int) -> Launch:
+        """A launch over taps or nodes of each emitter."""
+        return (filled(number, POINTS_GROUP), self._emitters), (POINTS_GROUP, 1)
 
     def _fields(self) -> list[Any]:
         """Two fields of zeros."""

@@ -32,6 +32,9 @@ PROCESSOR_EMITTERS = 4
 # Part of the device's memory that the arrays of the emitters in flight may take.
 MEMORY_SHARE = 0.5
 
+# Work-items, and those of a group; None: the driver's choice.
+Launch = tuple[tuple[int, ...], tuple[int, ...] | None]
+
 # What a step stores, as ``STORE`` of the program.
 NOTHING = 0
 STORES: dict[Unknown, int] = {"speed": 1, "attenuation": 2}
@@ -84,6 +87,7 @@ class DeviceWaves:
     def __init__(self, session: Session, medium: Medium, scan: Scan, group: Group | None = None) -> None:
         self.session, self.scan, self.kind = session, scan, medium.keep.dtype
         self.grid = DeviceGrid.of(medium, group or _group(session, medium))
+        self._fills = self.grid.group[1] > 1
         self._factors = [session.upload(self.grid.packed(factor)) for factor in medium.factors]
         self._taps = session.upload(weights(medium.order).astype(self.kind))
         self._receivers = self.uploaded(scan.receivers)
@@ -116,18 +120,31 @@ class DeviceWaves:
             return plan
         return plan._replace(emitters=min(plan.emitters, handle.max_compute_units, PROCESSOR_EMITTERS))
 
+    def over_the_image(self, emitters: int) -> Launch:
+        """Work-items, and those of a group, of launches over the nodes of the image."""
+        width, rows = self.grid.shape[-1], self.grid.rows
+        if not self._fills:
+            return (width, rows, emitters), None
+        across, along = self.grid.group
+        return (filled(width, across), filled(rows, along), emitters), (across, along, 1)
+
     def uploaded(self, elements: Points) -> tuple[Any, Any]:
         """Buffers with the corners and the weights of elements."""
         along = np.ascontiguousarray(elements.weights, self.kind)
         return self.session.upload(elements.first.astype(np.uint32)), self.session.upload(along)
 
-    def advance(self, store: int, now: Any, new: Any, stored: Any, emitters: int) -> Any:
-        """The kernel of a step from field ``now``: it replaces the one before, in ``new``, by the next."""
-        grid = self.grid
-        flush = self.kind.type(FLUSH)
-        numbers = (*uints(grid.blocks, emitters), grid.nodes, stored, np.uint32(0))
-        place = (np.uint32(grid.first), *self._strides, *numbers)
-        return self._kernel("advance", store, now, new, *self._factors, self._taps, flush, *place)
+    def advance(self, now: Any, new: Any) -> Any:
+        """The kernel of a step from ``now``: the field before it, in ``new``, becomes the one after it."""
+        place = (np.uint32(self.grid.first), *self._strides, np.uint32(self.grid.blocks))
+        return self._kernel("advance", NOTHING, *self._stepping(now, new), *place)
+
+    def scatter(self, now: Any, before: Any, stored: Any) -> Any:
+        """The kernel that stores what a change of the medium would scatter in the step from ``now``."""
+        place = (np.uint32(self.grid.shift), *self._strides, self.grid.nodes, stored, np.uint32(0))
+        return self._kernel("scatter", self.scan.store, *self._stepping(now, before), *place)
+
+    def _stepping(self, now: Any, before: Any) -> tuple[Any, ...]:
+        return now, before, *self._factors, self._taps, self.kind.type(FLUSH)
 
     def exchange(self, store: int, now: Any, new: Any, stored: Any, *points: Any, reading: bool) -> Any:
         """The kernel that ends a step forwards.
@@ -156,10 +173,8 @@ class DeviceWaves:
         """The kernel that ends a step backwards."""
         assert self.gather is not None
         sizes = uints(self.scan.steps, len(self.scan.receivers.first))
-        plane = np.uint64(self.grid.plane)
-        return self._kernel(
-            "inject", NOTHING, new, self.drive, *self.gather, residual, *sizes, plane, np.uint32(0)
-        )
+        numbers = (np.uint64(self.grid.plane), *uints(self.gathered, 0))
+        return self._kernel("inject", NOTHING, new, self.drive, *self.gather, residual, *sizes, *numbers)
 
     @property
     def _strides(self) -> tuple[Any, ...]:
@@ -171,6 +186,7 @@ class DeviceWaves:
 
     def _kernel(self, name: str, store: int, *arguments: Any) -> Any:
         sizes = {"DIMS": len(self.grid.shape), "HALO": HALO, "TAPS": 2 * REACH, "ROWS": ROWS, "STORE": store}
+        sizes["FILLED"] = int(self._fills)
         return self._own_kernel("wave/waves", name, sizes, arguments)
 
     def _own_kernel(self, source: str, name: str, sizes: dict[str, int], arguments: tuple[Any, ...]) -> Any:
@@ -188,6 +204,11 @@ def tiles(emitters: int, most: int) -> Iterator[slice]:
     number = -(-emitters // most)
     edges = [emitters * k // number for k in range(number + 1)] if number else []
     return (slice(begin, end) for begin, end in pairwise(edges))
+
+
+def filled(number: int, group: int) -> int:
+    """Work-items filled up to whole groups."""
+    return -(-number // group) * group
 
 
 def uints(*values: int) -> tuple[np.uint32, ...]:

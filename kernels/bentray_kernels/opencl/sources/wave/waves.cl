@@ -1,5 +1,5 @@
 // Acoustic waves of several emitters in 2-D or 3-D, and their adjoint; built with REAL (float or double), DIMS,
-// HALO, TAPS, ROWS and STORE.
+// HALO, TAPS, ROWS, STORE and FILLED.
 //
 // The factors of the medium and the weights of the stencil are those of the compiled kernels on the CPU, and
 // sums are taken in the same order, so that fields do not depend on the emitters that share a launch. A grid
@@ -7,8 +7,10 @@
 // row); the grid of the next emitter begins `plane` later. The factors are 0 in the halo and where a grid is
 // filled up to whole groups: fields remain 0 there.
 //
-// STORE   what a step stores of the field, the source that a change of the medium would scatter:
-//         0 nothing, 1 by a change of the speed, 2 by one of the damping.
+// STORE   what is stored of the field, the source that a change of the medium would scatter: 0 nothing, 1 by a
+//         change of the speed, 2 by one of the damping.
+// FILLED  whether launches over the image are filled up to whole groups; a processor needs none, and its compiler
+//         uses vectors only without the test.
 // nodes   of the image: margin of the grid; slabs, rows of a slab (1 in 2-D), nodes of a row.
 
 #pragma OPENCL FP_CONTRACT OFF
@@ -34,6 +36,17 @@ inline REAL laplacian(const REAL *column, global const REAL *row, const int pitc
     return sum;
 }
 
+// Place in the grid of a node of the image.
+inline uint place(const uint row, const uint z, const uint shift, const uint pitch, const uint slab,
+                  const uint4 nodes)
+{
+#if DIMS == 3
+    return (row / nodes.z + nodes.x) * slab + (row % nodes.z + nodes.x) * pitch + z + nodes.x + shift;
+#else
+    return (row + nodes.x) * slab + z + nodes.x + shift;
+#endif
+}
+
 // Turns the field before `now` into the one after it, in place. A work-item takes ROWS nodes along the first
 // axis, a block, so that it reads each of them once. Axis 0 along the last axis of the grid; then the blocks
 // and the emitters, in 3-D the rows, and the blocks of all emitters.
@@ -42,8 +55,7 @@ inline REAL laplacian(const REAL *column, global const REAL *row, const int pitc
 kernel void advance(global const REAL *restrict now, global REAL *restrict old,
                     global const REAL *restrict keep, global const REAL *restrict fade,
                     global const REAL *restrict drive, constant REAL *weights, const REAL flush,
-                    const uint first, const uint pitch, const uint slab, const ulong plane, const uint blocks,
-                    const uint emitters, const uint4 nodes, global REAL *restrict stored, const uint slot)
+                    const uint first, const uint pitch, const uint slab, const ulong plane, const uint blocks)
 {
 #if DIMS == 3
     const uint block = get_global_id(2) % blocks, b = get_global_id(2) / blocks, row = get_global_id(1);
@@ -63,20 +75,11 @@ kernel void advance(global const REAL *restrict now, global REAL *restrict old,
         const REAL bent = laplacian(column + r + HALO, now + emitter + node, pitch, weights);
         const REAL next = (keep[node] * here - fade[node] * before + drive[node] * bent + flush) - flush;
         old[emitter + node] = next;
-#if STORE
-        const uint edge = nodes.x - HALO;
-        const uint x = block * ROWS + r - edge, y = DIMS == 3 ? row - edge : 0, z = get_global_id(0) - edge;
-        if (x < nodes.y && y < nodes.z && z < nodes.w) {
-            const REAL turn = (1 - fade[node]) / (1 + fade[node]);
-            const size_t place = (((size_t)slot * emitters + b) * nodes.y + x) * nodes.z + y;
-            stored[place * nodes.w + z] = STORE == 1 ? bent : (turn + turn) * here - before + next;
-        }
-#endif
     }
 }
 
 // Ends a step forwards: receivers read the field before it, emitters add their sample to the one after it, and
-// to what the step stored. Axis 0: the receivers, then the taps of the emitter; axis 1: the emitters.
+// to what the step stored. Axis 0: the receivers, then the taps of the emitter, filled up; axis 1: the emitters.
 // receiver, emitter   [element][axis], the tap nearest to the origin.
 // reading, sending    [element][axis][tap], weights.
 // traces              [emitter][step][receiver].
@@ -114,6 +117,8 @@ kernel void exchange(global const REAL *restrict now, global REAL *restrict next
         return;
     }
     const uint tap = r - receivers;
+    if (tap >= TAPS * TAPS * (DIMS == 3 ? TAPS : 1))
+        return;
     sending += b * DIMS * TAPS;
     emitter += b * DIMS;
 #if DIMS == 3
@@ -132,10 +137,39 @@ kernel void exchange(global const REAL *restrict now, global REAL *restrict next
 #if STORE
     const uint u = x - nodes.x, v = y - nodes.x, w = z - nodes.x;
     if (u < nodes.y && v < nodes.z && w < nodes.w) {
-        const size_t place = (((size_t)slot * get_global_size(1) + b) * nodes.y + u) * nodes.z + v;
-        stored[place * nodes.w + w] += STORE == 1 ? sample : added;
+        const size_t line = (((size_t)slot * get_global_size(1) + b) * nodes.y + u) * nodes.z + v;
+        stored[line * nodes.w + w] += STORE == 1 ? sample : added;
     }
 #endif
+}
+
+// Stores the source that a change of the medium would scatter in the step from `now`, except for the emitters'
+// part, before the step. Axis 0 along the rows of the image, axis 1 its rows, axis 2 the emitters. It is not a
+// part of `advance`, because stores within the image alone would keep compilers from using vectors there.
+// stored   [slot][emitter][row][node].
+kernel void scatter(global const REAL *restrict now, global const REAL *restrict old,
+                    global const REAL *restrict keep, global const REAL *restrict fade,
+                    global const REAL *restrict drive, constant REAL *weights, const REAL flush,
+                    const uint shift, const uint pitch, const uint slab, const ulong plane, const uint4 nodes,
+                    global REAL *restrict stored, const uint slot)
+{
+    const uint z = get_global_id(0), row = get_global_id(1), node = place(row, z, shift, pitch, slab, nodes);
+    const size_t b = get_global_id(2), rows = nodes.y * nodes.z, at = b * plane + node;
+#if FILLED
+    if (row >= rows || z >= nodes.w)
+        return;
+#endif
+    REAL column[1 + 2 * HALO];
+#pragma unroll
+    for (int k = -HALO; k <= HALO; ++k)
+        column[k + HALO] = now[at + k * (int)slab];
+    REAL value = laplacian(column + HALO, now + at, pitch, weights);
+    if (STORE == 2) {
+        const REAL here = column[HALO], before = old[at], turn = (1 - fade[node]) / (1 + fade[node]);
+        const REAL next = (keep[node] * here - fade[node] * before + drive[node] * value + flush) - flush;
+        value = (turn + turn) * here - before + next;
+    }
+    stored[((slot * get_global_size(2) + b) * rows + row) * nodes.w + z] = value;
 }
 
 // Adds the product of the adjoint field and a stored one to the image of each emitter, and the energy of the
@@ -146,12 +180,11 @@ kernel void correlate(global const REAL *restrict adjoint, global const REAL *re
                       const uint pitch, const uint slab, const ulong plane, const uint4 nodes, const uint slot,
                       const uint lit)
 {
-    const uint z = get_global_id(0), row = get_global_id(1);
-    const size_t b = get_global_id(2), rows = get_global_size(1), here = (b * rows + row) * nodes.w + z;
-#if DIMS == 3
-    const uint node = (row / nodes.z + nodes.x) * slab + (row % nodes.z + nodes.x) * pitch + z + nodes.x + shift;
-#else
-    const uint node = (row + nodes.x) * slab + z + nodes.x + shift;
+    const uint z = get_global_id(0), row = get_global_id(1), node = place(row, z, shift, pitch, slab, nodes);
+    const size_t b = get_global_id(2), rows = nodes.y * nodes.z, here = (b * rows + row) * nodes.w + z;
+#if FILLED
+    if (row >= rows || z >= nodes.w)
+        return;
 #endif
     const REAL wave = stored[slot * get_global_size(2) * rows * nodes.w + here];
     image[here] += adjoint[b * plane + node] * wave;
@@ -160,7 +193,7 @@ kernel void correlate(global const REAL *restrict adjoint, global const REAL *re
 }
 
 // Adds the residuals of all receivers to the adjoint field, in the order of the receivers where their taps
-// meet. Axis 0: the nodes that have a tap; axis 1: the emitters.
+// meet. Axis 0: the nodes that have a tap, `count`, filled up; axis 1: the emitters.
 // node       place in the grid.
 // begin      of the entries of each node, and their end.
 // receiver   of each entry, and its weight.
@@ -169,9 +202,11 @@ kernel void inject(global REAL *restrict next, global const REAL *restrict drive
                    global const uint *restrict node, global const uint *restrict begin,
                    global const uint *restrict receiver, global const REAL *restrict weight,
                    global const REAL *restrict residual, const uint steps, const uint receivers,
-                   const ulong plane, const uint step)
+                   const ulong plane, const uint count, const uint step)
 {
     const uint k = get_global_id(0);
+    if (k >= count)
+        return;
     const size_t b = get_global_id(1);
     global const REAL *samples = residual + (b * steps + step) * receivers;
     REAL sum = 0;
