@@ -40,6 +40,8 @@ class ReconstructionCheckpoint:
         history: of earlier stages.
         state: of the stage in progress.
         values: result of each evaluation after the last stage; None if there is none yet.
+        spacing: of the nodes of the stage, m.
+        origin: position of node 0, m.
     """
 
     stage: int
@@ -47,6 +49,8 @@ class ReconstructionCheckpoint:
     history: tuple[Iteration, ...]
     state: State | Iterate
     values: tuple[Floats | None, ...]
+    spacing: float
+    origin: tuple[float, ...]
 
     @property
     def milestone(self) -> tuple[Any, ...]:
@@ -55,11 +59,7 @@ class ReconstructionCheckpoint:
 
 
 class ReconstructionGraph:
-    """All stages of one slice, then its attenuation and resolution check where requested.
-
-    Attributes:
-        total: emitter passes, at most.
-    """
+    """All stages of one slice, then its attenuation and resolution check where requested."""
 
     def __init__(self, scan: Scan, index: int) -> None:
         self._scan, self._index = scan, index
@@ -68,11 +68,10 @@ class ReconstructionGraph:
         self._passes_before = 0
         self._stage = self._stage_of(0, initial_slowness(scan.problem(index, 0), None))
         self._evaluations = self._evaluated()
-        self.total = sum(
+        self._most = [
             len(scan.problem(index, number).active_emitters) * plan.iterations
             for number, plan in enumerate(self._plans)
-        )
-        self.total += sum(sum(one.sizes) for one in self._evaluations)
+        ]
 
     def _evaluated(self) -> list[Evaluation]:
         """What is computed along the rays of the finished image."""
@@ -87,8 +86,14 @@ class ReconstructionGraph:
         return evaluations
 
     @property
+    def total(self) -> int:
+        """Emitter passes, at most; without those that an early stop has saved."""
+        later = sum(self._most[self._stage.number + 1 :]) + sum(sum(one.sizes) for one in self._evaluations)
+        return self._passes_before + self._stage.total + later
+
+    @property
     def done(self) -> int:
-        """Emitter passes that are made, or not needed after an early stop."""
+        """Emitter passes made."""
         return self._passes_before + self._stage.done + sum(one.done for one in self._evaluations)
 
     @property
@@ -109,9 +114,10 @@ class ReconstructionGraph:
     def checkpoint(self) -> ReconstructionCheckpoint:
         """The state; without rows of an iteration that is not finished."""
         values = tuple(one.value for one in self._evaluations)
-        return ReconstructionCheckpoint(
-            self._stage.number, self._passes_before, self._history, self._stage.state, values
-        )
+        number = self._stage.number
+        problem = self._scan.problem(self._index, number)
+        before = number, self._passes_before, self._history
+        return ReconstructionCheckpoint(*before, self._stage.state, values, problem.spacing, problem.origin)
 
     def restore(self, checkpoint: ReconstructionCheckpoint) -> None:
         """As ``task_graph.ResumableGraph``."""

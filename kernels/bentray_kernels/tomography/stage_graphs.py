@@ -41,7 +41,6 @@ class Stage(ABC):
     Attributes:
         number: from 0.
         state: of the iteration.
-        total: emitter passes, at most.
     """
 
     state: sart_step.State | gauss_newton_step.Iterate
@@ -50,13 +49,16 @@ class Stage(ABC):
         self._at = scan, index, number
         self.number = number
         self._emitters = len(scan.problem(index, number).active_emitters)
-        self.total = self._emitters * scan.stages()[number].iterations
+        self._most = self._emitters * scan.stages()[number].iterations
+
+    @property
+    def total(self) -> int:
+        """Emitter passes: at most, and once the iteration has ended those that it made."""
+        return self.done if self.state.done else self._most
 
     @property
     def done(self) -> int:
-        """Emitter passes that are made, or not needed after an early stop."""
-        if self.state.done:
-            return self.total
+        """Emitter passes made."""
         return self._emitters * self.state.sweep + self.state.emitter
 
     @property

@@ -99,8 +99,14 @@ def test_bounds_hold(scan, method):
 
 
 def test_stopping_rule_ends_early(scan, method):
-    result = reconstruct(scan, plan(method, iterations=50, stop_rms_s=3e-7))
+    seen = []
+    result = reconstruct(scan, plan(method, iterations=50, stop_rms_s=3e-7), seen.append)
     assert len(result.history) < 50
+    # What was saved is not counted as done.
+    done = [progress.done for progress in seen]
+    assert max(np.diff(done)) <= RING.elements
+    assert done[-1] == seen[-1].total == len(result.history) * RING.elements
+    assert seen[0].total == 50 * RING.elements
     assert result.history[-1].residual_rms_s <= 3e-7
     assert result.history[-2].residual_rms_s > 3e-7
 

@@ -56,13 +56,15 @@ class ActiveBand:
 
     Attributes:
         state: of the inversion.
-        origin: of its grid, m.
+        spacing: of the nodes of its grid, m.
+        origin: position of node 0, m.
         emitters: number evaluated in each iteration.
         frozen: (nx, ny), the fixed speed while the attenuation is refined, m/s; else None.
         wavelet: (steps,), the source, if it was estimated anew with the image reached so far.
     """
 
     state: InversionState
+    spacing: float
     origin: tuple[float, float]
     emitters: int
     frozen: Floats | None = None

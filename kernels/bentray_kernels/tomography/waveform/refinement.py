@@ -68,12 +68,14 @@ class Refinement:
         """
         images = _slices(rays, rays.speed)
         passes = self.total // len(images)
+        made = before
         stage = 1 + max(record.stage for record in rays.history)
         history, graphs = rays.history, []
         for index, image in enumerate(images):
             scan = self._scan_of(self._plan, index)
             graphs.append(RefinementGraph(scan, image, index, history, stage))
-            run_graphs(graphs[-1:], before + passes * index, self.total - passes * (index + 1))
+            run_graphs(graphs[-1:], made, self.total - passes * (index + 1))
+            made += graphs[-1].total
             history = graphs[-1].history
         if self._settings.method == "auto" and not predicts_better(graphs):
             summary = _summary(rays, self._plan, graphs)

@@ -52,7 +52,6 @@ class RefinementGraph:
 
     Attributes:
         ends: results of the finished bands.
-        total: largest number of emitter passes, without those of shortened steps.
     """
 
     def __init__(
@@ -69,7 +68,6 @@ class RefinementGraph:
         self.ends: tuple[BandEnd, ...] = ()
         self._band: ActiveBand | None = None
         self._misfits: dict[int, Any] = {}
-        self.total = sum(self._sizes)
 
     @property
     def number(self) -> int:
@@ -82,17 +80,28 @@ class RefinementGraph:
         return self.number == len(self._sizes)
 
     @property
+    def total(self) -> int:
+        """Largest number of emitter passes, without those that an early end of a band has saved."""
+        return self._finished + sum(self._sizes[self.number :])
+
+    @property
     def done(self) -> int:
-        """Emitter passes made, or not needed after an early end."""
-        if self.over:
-            return self.total
-        finished = sum(self._sizes[: self.number])
+        """Emitter passes made, without those of shortened steps."""
         if self._band is None:
-            return finished
+            return self._finished
+        further = len(self._misfits) * self._emitters_of_a_task
+        return self._finished + self._passes(self.number, len(self._band.state.history), further)
+
+    @property
+    def _finished(self) -> int:
+        """Emitter passes of the finished bands."""
+        return sum(self._passes(number, len(end.history)) for number, end in enumerate(self.ends))
+
+    def _passes(self, number: int, iterations: int, further: int = 0) -> int:
+        """Emitter passes of a band that has finished some iterations, at most the planned ones."""
         settings = self._scan.settings()
-        passes = settings.bands[self.number].emitters + settings.held_out
-        passes = passes * len(self._band.state.history) + len(self._misfits) * self._emitters_of_a_task
-        return finished + min(passes, self._sizes[self.number])
+        each = settings.bands[number].emitters + settings.held_out
+        return min(each * iterations + min(further, each), self._sizes[number])
 
     @property
     def history(self) -> tuple[Iteration, ...]:
@@ -158,8 +167,7 @@ class RefinementGraph:
         self._misfits = {}
         self._band = replace(self._band, state=result)
         if result.done:
-            spacing = self._scan.settings().bands[self.number].spacing_m
-            image = self._after_band(Image(result.image, spacing, self._band.origin))
+            image = self._after_band(Image(result.image, self._band.spacing, self._band.origin))
             # The pairs of changes of a finished band are not kept.
             self.ends = (*self.ends, BandEnd(image, result.skipped, result.history))
             self._band = None
@@ -195,9 +203,10 @@ def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
     wavelet = None
     if scan.settings().estimates_source:
         wavelet = estimate_source(problem, speed, scan.settings().window_s)
+    grid = problem.band.spacing_m, problem.origin
     if problem.band.of == "speed":
-        return ActiveBand(band_inversion.begin(speed), problem.origin, count, None, wavelet)
-    return ActiveBand(band_inversion.begin(np.zeros_like(speed)), problem.origin, count, speed, wavelet)
+        return ActiveBand(band_inversion.begin(speed), *grid, count, None, wavelet)
+    return ActiveBand(band_inversion.begin(np.zeros_like(speed)), *grid, count, speed, wavelet)
 
 
 def evaluate_emitter(scan: WaveScan, number: int, model: Model, place: int, count: int = 1) -> EmitterMisfit:

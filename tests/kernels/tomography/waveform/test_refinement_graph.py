@@ -67,13 +67,20 @@ def test_progress_is_monotonic_and_history_records_the_bands():
         (Iteration(2, 1, 1e-7, 24), Iteration(2, 1, 1e-7, 24, 1)),
         2,
     )
-    seen, tasks = [graph.done], graph.first()
+    most = sum((band.iterations + 1) * 10 for band in SETTINGS.bands)
+    assert graph.total == most
+    seen, tasks = [(graph.done, graph.total)], graph.first()
     while tasks:
         task = tasks.pop(0)
         tasks = graph.after(task, task.function(*task.arguments)) + tasks
-        seen.append(graph.done)
-    assert seen == sorted(seen)
-    assert seen[-1] == graph.total == sum((band.iterations + 1) * 10 for band in SETTINGS.bands)
+        seen.append((graph.done, graph.total))
+    done, totals = zip(*seen, strict=True)
+    assert list(done) == sorted(done)
+    # What an early end of a band saves is not made up for by a jump.
+    assert list(totals) == sorted(totals, reverse=True)
+    assert max(np.diff(done)) <= 2
+    evaluated = [len(end.history) for end in graph.ends]
+    assert done[-1] == graph.total == 10 * sum(evaluated) <= most
     assert [sweep.stage for sweep in graph.history[:2]] == [0, 1]
     for number, band in enumerate(SETTINGS.bands):
         told = [sweep for sweep in graph.history if sweep.stage == 2 + number]
@@ -121,7 +128,7 @@ def test_after_a_stop_bands_of_the_speed_are_left_out_and_the_loss_is_not():
     (task,) = graph.after(Task(update_image, ()), state)
     assert task.arguments[1] == 2
     assert [(end.skipped, len(end.history)) for end in graph.ends] == [(True, 1), (True, 0)]
-    assert graph.done == sum((band.iterations + 1) * 10 for band in SETTINGS.bands[:2])
+    assert (graph.done, graph.total) == (10, 10 + (SETTINGS.bands[2].iterations + 1) * 10)
 
 
 def test_nodes_outside_the_array_are_water():

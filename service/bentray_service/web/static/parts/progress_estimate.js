@@ -8,15 +8,22 @@ export class ProgressEstimate {
   constructor() {
     this.phase = null;
     this.reports = [];
-    this.shown = 0;
+    this.begin();
   }
 
-  // A report at a time, s: { done, total, phase }, and the running time of the job, s.
+  // Of a phase: the share that is shown, and the tasks it stands for; null before the first report is shown.
+  begin() {
+    [this.shown, this.tasks] = [0, null];
+  }
+
+  // A report at a time, s: { done, total, phase }, and the running time of the job, s. The total may fall, where
+  // tasks turn out not to be needed, and grow.
   add(now, { done, total, phase }, seconds) {
     if (phase !== this.phase || done < (this.reports.at(-1)?.done ?? 0)) {
       // What was done before the page was opened took as long as the job has run, if there was no phase before.
       const begun = this.phase === null && done ? [{ time: now - seconds, done: 0 }] : [];
-      [this.phase, this.reports, this.shown] = [phase, begun, 0];
+      [this.phase, this.reports] = [phase, begun];
+      this.begin();
     }
     this.total = total;
     if (this.reports.at(-1)?.done === done) return;
@@ -31,14 +38,22 @@ export class ProgressEstimate {
     return last.time > first.time ? (last.done - first.done) / (last.time - first.time) : null;
   }
 
-  // From 0 to 1, never back; between two reports it moves on at the rate so far, by one step at most.
-  share(now) {
+  // Tasks done at a time: after the last report it moves on at the rate so far, by one step at most.
+  reached(now) {
     const last = this.reports.at(-1);
-    if (!this.total || !last) return 0;
     const before = this.reports.at(-2);
-    const ahead = before ? Math.min((this.rate() ?? 0) * Math.max(0, now - last.time), last.done - before.done) : 0;
-    const reached = last.done >= this.total ? 1 : Math.min(FULL, (last.done + ahead) / this.total);
-    this.shown = Math.max(this.shown, reached);
+    return last.done + (before ? Math.min((this.rate() ?? 0) * Math.max(0, now - last.time), last.done - before.done) : 0);
+  }
+
+  // From 0 to 1, never back. Each task takes its part of what is left of the bar, so that a total that changes
+  // changes the pace, and the bar does not jump.
+  share(now) {
+    if (!this.total || !this.reports.length) return 0;
+    if (this.reports.at(-1).done >= this.total) return (this.shown = 1);
+    const tasks = Math.min(this.reached(now), FULL * this.total);
+    if (this.tasks === null) this.shown = tasks / this.total;
+    else if (tasks > this.tasks) this.shown += (1 - this.shown) * ((tasks - this.tasks) / (this.total - this.tasks));
+    this.tasks = Math.max(tasks, this.tasks ?? 0);
     return this.shown;
   }
 
@@ -46,6 +61,6 @@ export class ProgressEstimate {
   left(now) {
     const rate = this.rate();
     if (!rate || !this.total) return null;
-    return ((1 - this.share(now)) * this.total) / rate;
+    return Math.max(0, this.total - this.reached(now)) / rate;
   }
 }
