@@ -32,7 +32,7 @@ def test_values_of_the_checkpoint_for_its_owner_alone(start, uploaded, submitted
     assert (none_yet.status_code, none_yet.json()["type"]) == (409, "/problems/no-preview")
     assert "before its first image" in none_yet.json()["found"]
     speed = 1500.0 + np.arange(20.0).reshape(5, 4)
-    checkpoint = ReconstructionCheckpoint(0, 0, (), sart_step.begin(1.0 / speed), ())
+    checkpoint = ReconstructionCheckpoint(0, 0, (), sart_step.begin(1.0 / speed), (), 2e-3, (-0.01, 0.0))
     Checkpoints(parts.files.of(Tenant("acme")).checkpoints(job)).save("0-00000", checkpoint)
     answer = http.get(here)
     assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
@@ -40,6 +40,7 @@ def test_values_of_the_checkpoint_for_its_owner_alone(start, uploaded, submitted
     values = np.frombuffer(base64.b64decode(body["speed"]), dtype="<f4").reshape(body["shape"])
     np.testing.assert_array_equal(values, speed.astype(np.float32))
     assert body["range_mps"] == [1500.0, 1519.0]
+    assert (body["spacing_m"], body["origin_m"]) == ([2e-3, 2e-3], [-0.01, 0.0])
     stranger = http.get(here, headers=auth["other"])
     assert (stranger.status_code, stranger.json()["type"]) == (404, "/problems/unknown-id")
     work.hold.set()

@@ -26,8 +26,9 @@ def checkpoint(sweep, emitter=0, seed=0):
     state = replace(
         sart_step.begin(image), sweep=sweep, emitter=emitter, squares=0.1 + emitter, history=history
     )
+    values = None, image[:, 0], float("inf")
     return ReconstructionCheckpoint(
-        1, 24, (Iteration(0, 1, float("nan"), 8),), state, (None, image[:, 0], float("inf"))
+        1, 24, (Iteration(0, 1, float("nan"), 8),), state, values, 1e-3, (0.0, 0.0)
     )
 
 

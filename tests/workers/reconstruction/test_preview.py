@@ -30,7 +30,7 @@ def speeds(*shape, seed=0):
 
 def by_rays(speed, sweep=2, stage=1):
     state = replace(sart_step.begin(1.0 / speed), sweep=sweep)
-    return ReconstructionCheckpoint(stage, 0, (), state, (None,))
+    return ReconstructionCheckpoint(stage, 0, (), state, (None,), 2e-3, (-0.01, -0.02, 0.03)[: speed.ndim])
 
 
 def shown(record):
@@ -54,6 +54,8 @@ def test_large_images_are_reduced_to_nodes_of_them(tmp_path, order):
     Checkpoints(tmp_path).save("0-00000", by_rays(speed))
     record = checkpoint_image(tmp_path)
     assert record["every"] == 3
+    assert record["spacing_m"] == pytest.approx([6e-3, 6e-3])
+    assert record["origin_m"] == [-0.01, -0.02]
     np.testing.assert_allclose(shown(record), speed[::3, ::3], rtol=1e-6)
 
 
@@ -76,15 +78,19 @@ def test_the_middle_slice_of_the_newest_group(tmp_path):
 def test_full_waveform_images(tmp_path):
     first, second = speeds(6, 6, seed=1), speeds(9, 9, seed=2)
     kept = Checkpoints(tmp_path)
-    kept.save("0-00000", RefinementCheckpoint((), ActiveBand(band_inversion.begin(first), (0.0, 0.0), 4)))
-    np.testing.assert_allclose(shown(checkpoint_image(tmp_path)), first, rtol=1e-6)
+    active = ActiveBand(band_inversion.begin(first), 3e-3, (0.01, 0.02), 4)
+    kept.save("0-00000", RefinementCheckpoint((), active))
+    record = checkpoint_image(tmp_path)
+    np.testing.assert_allclose(shown(record), first, rtol=1e-6)
+    assert (record["spacing_m"], record["origin_m"]) == ([3e-3, 3e-3], [0.01, 0.02])
     end = BandEnd(Image(second, 1e-3, (0.0, 0.0)), False, (band_inversion.Evaluation(0.5, 0.6, True),))
     kept.save("0-00000", RefinementCheckpoint((end,), None))
     record = checkpoint_image(tmp_path)
     np.testing.assert_allclose(shown(record), second, rtol=1e-6)
     assert (record["stage"], record["iteration"]) == (1, 1)
+    assert (record["spacing_m"], record["origin_m"]) == ([1e-3, 1e-3], [0.0, 0.0])
     # While the attenuation is refined, the state holds no speed.
-    losses = ActiveBand(band_inversion.begin(np.zeros((9, 9))), (0.0, 0.0), 4, frozen=second)
+    losses = ActiveBand(band_inversion.begin(np.zeros((9, 9))), 1e-3, (0.0, 0.0), 4, frozen=second)
     kept.save("0-00000", RefinementCheckpoint((end,), losses))
     np.testing.assert_allclose(shown(checkpoint_image(tmp_path)), second, rtol=1e-6)
 
@@ -123,3 +129,5 @@ def test_a_running_reconstruction_sharpens(scan, tmp_path):
     np.testing.assert_allclose(shown(seen[-1]), middle, rtol=1e-6)
     of_it = {one["iteration"]: np.abs(shown(one) - middle).max() for one in seen if one["part"] == 2}
     assert of_it[1] > of_it[2] > of_it[3]
+    assert tuple(seen[-1]["spacing_m"]) == result.spacing_m[:2]
+    assert tuple(seen[-1]["origin_m"]) == result.origin_m[:2]

@@ -34,12 +34,17 @@ FILE = re.compile(r"(\d+)-(\d{5})-(\d{6})\.npz")
 
 
 class _Place(NamedTuple):
-    """Where the image of a checkpoint is: number of its array, and whether that is the slowness, s/m."""
+    """Where the image of a checkpoint is: number of its array, and whether that is the slowness, s/m.
+
+    Its nodes are ``spacing`` apart, m; node 0 is at ``origin``, (x, y[, z]), m.
+    """
 
     array: int
     slowness: bool
     stage: int
     iteration: int
+    spacing: float
+    origin: tuple[float, ...]
 
 
 def checkpoint_image(folder: Path) -> dict[str, Any] | None:
@@ -52,7 +57,8 @@ def checkpoint_image(folder: Path) -> dict[str, Any] | None:
 
     Returns:
         JSON values: ``speed`` is base64 of float32, little endian, (nx, ny), m/s; ``every``: of the nodes
-        along a side, each n-th is in it. None while there is no image.
+        along a side, each n-th is in it; ``spacing_m`` between these, and ``origin_m``, (x, y) of the first.
+        None while there is no image.
     """
     named = [(found, path) for path in folder.glob("*.npz") if (found := FILE.fullmatch(path.name))]
     for group in sorted({int(found[1]) for found, _ in named}, reverse=True):
@@ -90,6 +96,8 @@ def _read(path: Path) -> dict[str, Any] | None:
         "every": every,
         "speed": base64.b64encode(speed.astype("<f4").tobytes()).decode(),
         "range_mps": [float(speed.min()), float(speed.max())],
+        "spacing_m": [every * place.spacing] * 2,
+        "origin_m": list(place.origin[:2]),
         "stage": place.stage + 1,
         "iteration": place.iteration,
     }
@@ -98,13 +106,17 @@ def _read(path: Path) -> dict[str, Any] | None:
 def _place(checkpoint: Any) -> _Place | None:
     if isinstance(checkpoint, ReconstructionCheckpoint):
         state = checkpoint.state
-        return _Place(cast(int, state.slowness), True, checkpoint.stage, state.sweep)
+        grid = checkpoint.spacing, checkpoint.origin
+        return _Place(cast(int, state.slowness), True, checkpoint.stage, state.sweep, *grid)
     if isinstance(checkpoint, RefinementCheckpoint):
         band, ends = checkpoint.band, checkpoint.ends
         if band is not None and band.frozen is None:
-            return _Place(cast(int, band.state.base), False, len(ends), len(band.state.history))
+            grid = band.spacing, band.origin
+            return _Place(cast(int, band.state.base), False, len(ends), len(band.state.history), *grid)
         if ends:
-            return _Place(cast(int, ends[-1].image.speed), False, len(ends) - 1, len(ends[-1].history))
+            image, iteration = ends[-1].image, len(ends[-1].history)
+            grid = image.spacing, image.origin
+            return _Place(cast(int, image.speed), False, len(ends) - 1, iteration, *grid)
     return None
 
 

@@ -18,6 +18,12 @@ class PreviewRecord(BaseModel):
     range_mps: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
         description="Minimum and maximum, m/s."
     )
+    spacing_m: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
+        description="Spacing of the nodes of the image in x and y, m."
+    )
+    origin_m: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
+        description="Position (x, y) of the first node, m."
+    )
     reconstruction: int = Field(
         description="Number of the reconstruction, from 1; auto tries several methods, one after another."
     )

@@ -12,9 +12,9 @@ import { loadTitles, titleOfJob } from "./titles.js";
 
 const TICK_MS = 500;
 // Between two images, and between two questions to the workers while nothing is done yet.
-const PREVIEW_MS = 2000;
+const PREVIEW_MS = 1000;
 const WORKERS_MS = 3000;
-const HISTORY_MS = 1500;
+const HISTORY_MS = 1000;
 
 const PHASES = { examining: "Examining the scan", picking: "Picking first arrivals in the traces" };
 const COMPILING = "The workers compile their kernels for this processor. That happens once and takes up to some minutes.";
@@ -213,6 +213,7 @@ export function liveJob(root, first, onSuccess) {
       over = true;
       clearInterval(ticking);
       followed.close();
+      picture?.close();
     },
   };
 }

@@ -7,7 +7,7 @@ const MISSING = 0xffe4e4e4;
 const BAR_SHARE = 0.3;
 const FILL = 0.97;
 
-export function coloured(plane, low, high, map) {
+function coloured(plane, low, high, map) {
   const { na, nb, values } = plane;
   const image = new ImageData(na, nb);
   const pixels = new Uint32Array(image.data.buffer);

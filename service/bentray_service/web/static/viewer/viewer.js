@@ -1,6 +1,7 @@
 // Results on canvases with one range of colours and one cursor: quantities, planes, window, profile, region.
 import { make } from "../parts/dom.js";
-import { coloursOf, NAMES } from "./colormaps.js";
+import { showColourBar } from "./colour_bar.js";
+import { NAMES } from "./colormaps.js";
 import { AXES, difference } from "./field.js";
 import { ImageView } from "./image_view.js";
 import { choices, PAGE } from "./layout.js";
@@ -197,12 +198,7 @@ export function viewer(root, panes, state, keep) {
   }
 
   function showColours(low, high) {
-    const bar = find(".colour-bar canvas").getContext("2d");
-    const image = new ImageData(256, 1);
-    new Uint32Array(image.data.buffer).set(coloursOf(map()));
-    bar.putImageData(image, 0, 0);
-    const marks = [0, 0.25, 0.5, 0.75, 1].map((share) => make("span", "", Number((low + share * (high - low)).toPrecision(5))));
-    find(".colour-bar .ticks").replaceChildren(...marks);
+    showColourBar(find(".colour-bar"), low, high, map());
     const { words, unit } = quantity();
     find(".colour-bar .unit").textContent = `${comparing() ? "difference of " : ""}${words}${unit ? ` (${unit})` : ""}`;
     for (const [name, value] of [["low", low], ["high", high]]) {
