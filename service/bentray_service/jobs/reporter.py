@@ -58,10 +58,16 @@ class Reporter:
         self.lost = False
 
     def report(self, progress: Progress) -> None:
-        """Remember the progress, and store it if the last write is long enough ago."""
+        """Remember the progress, and store it if the last write is long enough ago, else by ``stop``."""
         self._pending = progress
+        self._store()
+
+    def _store(self) -> None:
+        """Store the last progress, unless it is stored or the last write is too recent."""
+        if self._pending is None:
+            return
         # Long histories are stored less often.
-        wait = INTERVAL_SECONDS * (1.0 + min(len(progress.history), MAX_SWEEPS) / 100.0)
+        wait = INTERVAL_SECONDS * (1.0 + min(len(self._pending.history), MAX_SWEEPS) / 100.0)
         if self._clock() - self._written < wait:
             return
         try:
@@ -103,6 +109,8 @@ class Reporter:
         """Whether to stop: after a cancellation or takeover, or when this service stops."""
         if self._leaving() or self._stopped:
             return True
+        # A report that came soon after another is not kept back until a long task ends.
+        self._store()
         if self._clock() - self._asked >= INTERVAL_SECONDS:
             self._asked = self._clock()
             try:

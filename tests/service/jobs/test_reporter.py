@@ -59,6 +59,19 @@ def test_writes_are_throttled_and_the_last_one_arrives():
     assert [done for done, _, _, _ in jobs.written].count(1000) == 1
 
 
+def test_a_report_soon_after_another_is_written_while_a_task_takes_long():
+    jobs, clock = FakeJobs(), Clock()
+    reporter = Reporter(jobs, "job", lambda: False, clock)
+    reporter.report(Progress(1, 9))
+    clock.now += 0.01
+    reporter.report(Progress(2, 9))
+    assert [done for done, *_ in jobs.written] == [1]
+    for _ in range(20):
+        clock.now += 0.05
+        assert not reporter.stop()
+    assert [done for done, *_ in jobs.written] == [1, 2]
+
+
 def test_a_residual_that_json_cannot_hold():
     jobs = FakeJobs()
     Reporter(jobs, "job", lambda: False).report(Progress(1, 1, (Iteration(0, 1, float("nan"), 0, 2),)))
