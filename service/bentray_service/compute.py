@@ -12,9 +12,10 @@ from bentray_workers.cluster.worker_health import WorkerHealth, health_of
 from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.files.dataset.summary import counts_in
 from bentray_workers.reconstruction import planning
-from bentray_workers.rendering import picture_cost
-from bentray_workers.rendering.refraction_view import RefractionView, check_even
+from bentray_workers.rendering import turntable_planning
+from bentray_workers.rendering.refraction_view import check_even
 from bentray_workers.rendering.scene_cache import check_size
+from bentray_workers.rendering.turntable import Turntable
 from bentray_workers.simulation import simulation_planning
 from bentray_workers.simulation.request import PhantomScan
 
@@ -92,14 +93,9 @@ class Compute:
         """Plan a simulation in the same way."""
         return simulation_planning.plan_simulation(request, self._known(capacities_of)).to_dict()
 
-    def check_turntable(self, shape: Sequence[int], view: RefractionView) -> None:
-        """Reject a turntable whose images no connected worker has enough memory for.
-
-        Raises:
-            InvalidInput: naming ``volume``, with the bytes found and accepted.
-        """
-        cost = picture_cost.Cost(0.0, picture_cost.refraction_bytes(shape, view))
-        picture_cost.check_memory("volume", f"shape {tuple(shape)}", cost, self._known(capacities_of))
+    def plan_turntable(self, shape: Sequence[int], turntable: Turntable) -> dict[str, Any]:
+        """Plan a turntable in the same way."""
+        return turntable_planning.plan_turntable(shape, turntable, self._known(capacities_of)).to_dict()
 
     def _known(self, capacities: Callable[[Any], tuple[WorkerCapacity, ...]]) -> tuple[WorkerCapacity, ...]:
         """Capacities of the connected workers; none without scheduler, for which a job waits."""

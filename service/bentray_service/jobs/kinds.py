@@ -157,9 +157,10 @@ class RefractionKind(Kind[RefractionRequest]):
     def plan(self, request: RefractionRequest, tenant: Tenant, sources: Sources) -> Order:
         volume, settings = sources.volumes.get(tenant, request.volume), request.settings
         check_renderable(volume)
-        sources.compute.check_turntable(volume["shape"], settings)
+        plan = sources.compute.plan_turntable(volume["shape"], settings)
         low, high = volume["value_range"]
-        return Order(settings.within(low, high).plain(), settings.largest_bytes, {"volume_id": volume["id"]})
+        stored = settings.within(low, high).plain()
+        return Order(stored, settings.largest_bytes, {"volume_id": volume["id"]}, plan)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
         return files.volume(job["volume_id"] or "")

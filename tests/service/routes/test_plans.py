@@ -1,7 +1,11 @@
 """POST /v1/plans: what a job would be, its time from jobs of the tenant, its place in the queue."""
 
+import io
+
+import numpy as np
 import pytest
 
+from bentray_service.jobs import kinds
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import Tenant
@@ -93,6 +97,36 @@ def test_a_tenant_learns_nothing_of_the_jobs_of_another(start, scan, until, work
     assert (mine["minutes"], mine["compared"]) == (pytest.approx(60.0), 3)
     refused = planned(http, scans["acme"], headers=auth["other"])
     assert (refused.status_code, refused.json()["field"]) == (404, "dataset")
+
+
+def test_turntables_take_times_in_proportion_to_their_frames(start, until, monkeypatch):
+    monkeypatch.setattr(kinds, "draw_turntable", lambda *args, **control: args[3].write_bytes(b"pictures"))
+    http = start()
+    values = io.BytesIO()
+    np.save(values, np.arange(8.0**3).reshape(8, 8, 8))
+    stream = {"Content-Type": "application/octet-stream"}
+    volume = http.post("/v1/volumes", content=values.getvalue(), headers=stream).json()["id"]
+
+    def body(**settings):
+        return {"kind": "refraction", "volume": volume, "settings": settings}
+
+    first = http.post("/v1/plans", json=body(frames=100)).json()
+    assert (first["rough"], first["compared"]) == (True, 0)
+    assert first["minutes"] == pytest.approx(first["plan"]["work_s"] / 60.0)
+    assert (first["plan"]["decomposition"], first["plan"]["workers"]) == ("frames", 1)
+    for _ in range(3):
+        job = http.post("/v1/jobs", json=body(frames=100)).json()
+        assert job["plan"] == first["plan"]
+        until(http, job["id"], "succeeded")
+        done_in(http, job["id"], 50.0)
+    same, more, lit = (
+        http.post("/v1/plans", json=body(**one)).json()
+        for one in ({"frames": 100}, {"frames": 300}, {"frames": 100, "mode": "shaded"})
+    )
+    assert (same["minutes"], same["rough"], same["compared"]) == (pytest.approx(50.0 / 60.0), False, 3)
+    # The volume is filtered once.
+    assert 2.9 * same["minutes"] < more["minutes"] < 3.0 * same["minutes"]
+    assert (lit["compared"], lit["rough"]) == (0, True)
 
 
 def test_the_place_in_the_queue(start, uploaded):

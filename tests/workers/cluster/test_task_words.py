@@ -9,6 +9,8 @@ from bentray_kernels.tomography import Settings
 from bentray_workers.cluster.task_words import TASK_WORDS, task_in_words
 from bentray_workers.files.dataset.counts import Summary, Traces
 from bentray_workers.reconstruction.planning import plan
+from bentray_workers.rendering.turntable import Turntable
+from bentray_workers.rendering.turntable_planning import plan_turntable
 from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_planning import plan_simulation
 
@@ -34,11 +36,13 @@ def plans():
 def test_every_task_of_a_plan_has_words():
     names = {name for one in plans() for name in one.call_bytes}
     names |= set(plan_simulation(PhantomScan(), ()).call_bytes)
+    names |= set(plan_turntable((8, 8, 8), Turntable(), ()).call_bytes)
     assert names == set(TASK_WORDS)
 
 
 def test_sentences_name_no_function():
     said = [one.why for one in plans()] + [plan_simulation(PhantomScan(), ()).why]
+    said.append(plan_turntable((8, 8, 8), Turntable(), ()).why)
     assert all("_" not in one for one in said)
     assert all(any(f"({words})" in one for words in TASK_WORDS.values()) for one in said)
 

@@ -30,6 +30,8 @@ TASK_WORDS = MappingProxyType(
         "sum_emissions": "summing echoes",
         "make_part": "simulating a part of the scan",
         "write_scan": "writing the scan",
+        "draw_frame_tile": "drawing rows of a frame",
+        "write_frame": "writing a frame",
     }
 )
 

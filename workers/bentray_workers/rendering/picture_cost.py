@@ -83,21 +83,30 @@ def refraction_cost(stored: VolumeFile, view: RefractionView) -> Cost:
     Raises:
         InvalidInput: for a picture that takes more than ``MAX_SECONDS``.
     """
-    spacing = view.ray_spacing if view.mode == "refract" else 1
-    rays, depth = _rays(view) // spacing**2, 1 if view.mode == "shaded" else view.depth
-    # Filters of a higher degree use more nodes per value.
-    order = int(view.filter[-1]) if view.filter.startswith("bspline") else 3
-    ray_s = (RAY_S + SURFACE_S * depth) * (1.0 + 0.5 * max(0, order - 3))
-    scene = FLOOR_SECONDS + SMOOTH_SCENE_S * math.prod(stored.shape)
+    scene, rays = refraction_seconds(stored.shape, view)
     _check_seconds(
         "width, height, depth",
-        f"{view.width} x {view.height} pixels of {view.times**2} rays and depth {depth}",
-        rays * ray_s,
+        f"{view.width} x {view.height} pixels of {view.times**2} rays and depth {_depth(view)}",
+        rays,
         view.width,
         view.height,
         ", or submit a job of kind `refraction` (frames: 1)",
     )
-    return Cost(scene + rays * ray_s, refraction_bytes(stored.shape, view))
+    return Cost(scene + rays, refraction_bytes(stored.shape, view))
+
+
+def refraction_seconds(shape: Sequence[int], view: RefractionView) -> tuple[float, float]:
+    """CPU time to filter the volume, once on each worker, and of the rays of one picture, s."""
+    spacing = view.ray_spacing if view.mode == "refract" else 1
+    # Filters of a higher degree use more nodes per value.
+    order = int(view.filter[-1]) if view.filter.startswith("bspline") else 3
+    ray_s = (RAY_S + SURFACE_S * _depth(view)) * (1.0 + 0.5 * max(0, order - 3))
+    return FLOOR_SECONDS + SMOOTH_SCENE_S * math.prod(shape), _rays(view) // spacing**2 * ray_s
+
+
+def _depth(view: RefractionView) -> int:
+    """Largest number of surfaces on a ray; a lit surface is the only one."""
+    return 1 if view.mode == "shaded" else view.depth
 
 
 def refraction_bytes(shape: Sequence[int], view: RefractionView) -> int:

@@ -83,8 +83,10 @@ class SweepRecord(BaseModel):
 class PlanRecord(BaseModel):
     """The planned decomposition of a job into tasks."""
 
-    decomposition: str = Field(description="Parallel slices or emitters, or a volume.")
-    lane: str = Field(description="Worker resource of the tasks: recon, or opencl for workers with a device.")
+    decomposition: str = Field(description="Parallel slices, emitters or frames, or a volume.")
+    lane: str = Field(
+        description="Worker resource of the tasks: recon, opencl for workers with a device, or render."
+    )
     tasks: int = Field(description="Approximate number of tasks.")
     workers: int = Field(description="Number of workers with enough memory for each task.")
     call_bytes: dict[str, int] = Field(description="Memory of each kind of task.")
@@ -106,10 +108,10 @@ class PlanRecord(BaseModel):
         None, description="Method and rays of a reconstruction; with method auto, its candidates."
     )
     work_class: str | None = Field(
-        None, description="Reconstructions of one class take times in proportion to `work_s`."
+        None, description="Reconstructions or turntables of one class take times in proportion to `work_s`."
     )
     work_s: float | None = Field(
-        None, description="Time of the counted work of a reconstruction on as many cores of 2020, s."
+        None, description="Time of the counted work on as many cores of a known machine, s."
     )
     speed_known: bool | None = Field(
         None,
@@ -152,9 +154,7 @@ class JobRecord(ShownRecord):
         description="Id of the input of a reconstruction, or of the result of a simulation."
     )
     settings: dict[str, Any]
-    plan: PlanRecord | None = Field(
-        description="Of a reconstruction or a simulation; null for jobs of earlier versions."
-    )
+    plan: PlanRecord | None = Field(description="Null for geometry fields, and for jobs of earlier versions.")
     advice: str | None = Field(
         description="Method chosen by auto, and the reason; and whether the water was assumed."
     )

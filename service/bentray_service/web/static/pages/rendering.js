@@ -9,6 +9,7 @@ import { withKey } from "../parts/key.js";
 import { orbit } from "../parts/orbit.js";
 import { fillSelect, startJob } from "../parts/panel.js";
 import { pictureStream, rateOf } from "../parts/picture_stream.js";
+import { planOf, queueInWords, timeInWords } from "../parts/plan_estimate.js";
 import { load, titleOf } from "../parts/titles.js";
 import { uploads } from "../parts/uploads.js";
 import { glassOf, queryOf } from "../parts/views.js";
@@ -21,6 +22,8 @@ const LINKED_PX = 1024;
 // Steps of the slider of iso-values.
 const STEPS = 500;
 const CAMERA = ["azimuth_deg", "elevation_deg", "zoom"];
+// After the last change until the time of a turntable is asked for.
+const PLAN_MS = 400;
 
 const PAGE = `
   <h1>Volume rendering</h1>
@@ -84,6 +87,7 @@ const PAGE = `
           <button id="reset-view" type="button" class="quiet">Reset the view</button>
           <a id="picture-link" hidden>Open the picture</a>
         </div>
+        <p id="turn-plan" class="facts" role="status"></p>
       </form>
     </div>
   </section>
@@ -198,6 +202,32 @@ export async function open(root, { id, query }) {
     at("picture-link").href = addressOf({ width: LINKED_PX, height: LINKED_PX });
   }
 
+  // The turntable of the present view.
+  function turntable() {
+    const { iso, index, ...rest } = view();
+    const lists = { ...(iso !== undefined && { iso: [iso].flat() }), ...(index !== undefined && { index: [index].flat() }) };
+    return { kind: "refraction", volume: at("volume").value, settings: { ...rest, ...lists, frames: Number(field("frames").value), format: "apng" } };
+  }
+
+  let planning = 0;
+  let planned = "";
+
+  // The time of a turntable, which the camera does not change; asked again once a job has ended.
+  function showPlan() {
+    const job = turntable();
+    const key = JSON.stringify({ ...job, settings: { ...job.settings, ...Object.fromEntries(CAMERA.map((name) => [name, 0])) } });
+    if (key === planned) return;
+    planned = key;
+    clearTimeout(planning);
+    planning = setTimeout(async () => {
+      const words = await planOf(job).then(
+        (estimate) => `Turntable: ${[timeInWords(estimate), queueInWords(estimate)].filter(Boolean).join(", ")}`,
+        (problem) => problem.message,
+      );
+      if (root.isConnected && key === planned) at("turn-plan").textContent = words;
+    }, PLAN_MS);
+  }
+
   let keeping = 0;
 
   // Show the values of the form; moving: as one of many steps.
@@ -209,6 +239,7 @@ export async function open(root, { id, query }) {
       return;
     }
     markIso();
+    showPlan();
     const [preview, full] = addresses();
     if (moving) stream.move(preview, full, drawerHere());
     else stream.set(full);
@@ -293,13 +324,22 @@ export async function open(root, { id, query }) {
   orbit(at("stage"), { turn, zoom, reset });
   at("reset-view").addEventListener("click", reset);
   withKey(at("picture-link"));
-  const jobs = jobList(at("turntables"), { empty: "No turntable yet", wanted: (job) => job.kind === "refraction" });
+  let ended = null;
+  const jobs = jobList(at("turntables"), {
+    empty: "No turntable yet",
+    wanted: (job) => job.kind === "refraction",
+    onJobs(all) {
+      const now = all.filter((job) => job.finished).length;
+      if (ended !== null && now !== ended) {
+        planned = "";
+        if (chosen() && form.checkValidity()) showPlan();
+      }
+      ended = now;
+    },
+  });
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    const { iso, index, ...rest } = view();
-    const lists = { ...(iso !== undefined && { iso: [iso].flat() }), ...(index !== undefined && { index: [index].flat() }) };
-    const settings = { ...rest, ...lists, frames: Number(field("frames").value), format: "apng" };
-    startJob({ kind: "refraction", volume: at("volume").value, settings }, "look-error", jobs.refresh);
+    startJob(turntable(), "look-error", jobs.refresh);
   });
   fillDefaults(form, "Turntable")
     .then(() => {
@@ -311,6 +351,7 @@ export async function open(root, { id, query }) {
     .catch((error) => showError("look-error", error));
   return () => {
     clearTimeout(keeping);
+    clearTimeout(planning);
     stream.close();
     local.close();
     jobs.close();

@@ -1,9 +1,9 @@
-// What a reconstruction would be and how long it would take, asked before it is started.
+// What a job would be and how long it would take, asked before it is started.
 import { request } from "./api.js";
 
-export function planOf(dataset, settings) {
-  const body = JSON.stringify({ kind: "reconstruction", dataset, settings });
-  return request("/v1/plans", { method: "POST", headers: { "Content-Type": "application/json" }, body });
+// job: as for POST /v1/jobs.
+export function planOf(job) {
+  return request("/v1/plans", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(job) });
 }
 
 function time(minutes) {
