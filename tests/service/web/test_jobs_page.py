@@ -6,6 +6,7 @@ import time
 import httpx
 import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import expect
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
@@ -14,8 +15,14 @@ from bentray_service.jobs import kinds
 pytestmark = pytest.mark.browser
 
 
-def test_a_turntable_is_shown(page, serve, scan, work, monkeypatch):
-    monkeypatch.setattr(kinds, "draw_turntable", lambda *args, **control: args[3].write_bytes(b"pictures"))
+def two_frames(client, path, turntable, target, work_dir, **control):
+    """In place of ``draw_turntable``."""
+    first, second = (Image.new("RGB", (7, 5), colour) for colour in ("red", "blue"))
+    first.save(target, "PNG", save_all=True, append_images=[second])
+
+
+def test_a_turntable_is_shown_and_plays_when_asked(page, serve, scan, work, monkeypatch):
+    monkeypatch.setattr(kinds, "draw_turntable", two_frames)
     address = serve()
     values = io.BytesIO()
     np.save(values, sampled(ONE_HOLE, 12))
@@ -37,7 +44,21 @@ def test_a_turntable_is_shown(page, serve, scan, work, monkeypatch):
     image = job.get_by_role("img")
     image.scroll_into_view_if_needed()
     expect(image).to_have_js_property("naturalWidth", 300)
-    assert "iso=0.3&iso=0.6&" in image.get_attribute("src")
+    still = image.get_attribute("src")
+    assert "iso=0.3&iso=0.6&" in still
+    assert job.get_by_role("button", name="Play").count() == 0
+    asked["settings"]["format"] = "apng"
+    made = httpx.post(f"{address}/v1/jobs", json=asked).json()
+    page.goto(f"{address}/#/jobs/{made['id']}")
+    play = job.get_by_role("button", name="Play")
+    play.wait_for()
+    expect(image).to_have_attribute("src", still)
+    play.focus()
+    page.keyboard.press("Enter")
+    expect(image).to_have_js_property("naturalWidth", 7)
+    assert image.get_attribute("src").endswith("/animation")
+    page.keyboard.press("Enter")
+    expect(image).to_have_attribute("src", still)
 
 
 def test_simulated_scan_can_be_reconstructed(page, serve, monkeypatch):

@@ -2,7 +2,7 @@
 import { inWords, request } from "./api.js";
 import { make } from "./dom.js";
 import { duration } from "./job_words.js";
-import { showOnceNear, withKey } from "./key.js";
+import { show, showOnceNear, withKey } from "./key.js";
 import { glassOf, queryOf } from "./views.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -90,6 +90,22 @@ async function showVolume(column, job, title) {
   column.append(drawn(address, `Volume rendering, ${title}`), make("p", "caption", "Volume rendering"));
 }
 
+// A turntable rests at its first frame; an animated picture plays when asked.
+function turntable(job, words) {
+  const still = firstFrame(job);
+  const frame = drawn(still, words);
+  if (job.settings.format !== "apng") return [frame];
+  const image = frame.querySelector("img");
+  const play = make("button", "quiet", "Play");
+  play.type = "button";
+  play.addEventListener("click", () => {
+    const plays = play.textContent === "Play";
+    play.textContent = plays ? "Stop" : "Play";
+    show(image, plays ? job.links.animation : still);
+  });
+  return [frame, play];
+}
+
 // The first picture of a turntable.
 function firstFrame(job) {
   const { frames, turn_deg: turn, format, ...view } = job.settings;
@@ -104,8 +120,7 @@ function pictures(job, title) {
     column.append(make("div", "picture"));
     showVolume(column, job, title).catch(() => {});
   } else if (job.links.animation) {
-    const moving = job.settings.format === "apng";
-    column.append(drawn(moving ? job.links.animation : firstFrame(job), `Volume rendering, ${title}`));
+    column.append(...turntable(job, `Volume rendering, ${title}`));
   } else {
     const ended = job.state === "failed" || job.state === "cancelled";
     const words = job.kind === "simulation" ? "A scan; it has no image yet" : "The image follows";
