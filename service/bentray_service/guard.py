@@ -20,7 +20,7 @@ from .wiring import Parts
 log = logging.getLogger("bentray.access")
 
 # Public paths: pages without data, and health checks. All other paths need authentication.
-PUBLIC = frozenset({"/", "/docs", "/openapi.json", "/health/live", "/health/ready"})
+PUBLIC = frozenset({"/", "/docs", "/docs/formats", "/openapi.json", "/health/live", "/health/ready"})
 PUBLIC_FOLDERS = ("/static/", "/problems/")
 
 UNMATCHED = "unmatched"

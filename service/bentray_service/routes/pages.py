@@ -1,4 +1,4 @@
-"""The web pages: viewer at /, REST reference at /docs, and static files."""
+"""The web pages: viewer at /, REST reference at /docs, file formats at /docs/formats."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse
 
+from ..web.formats import formats_page
 from ..web.reference import reference_page
 
 WEB = Path(__file__).parent.parent / "web"
@@ -24,6 +25,12 @@ def viewer() -> FileResponse:
 def docs(request: Request) -> HTMLResponse:
     """The REST reference, generated from the OpenAPI description."""
     return HTMLResponse(reference_page(request.app.openapi()))
+
+
+@router.get("/docs/formats")
+def formats(request: Request) -> HTMLResponse:
+    """The formats of files that are read."""
+    return HTMLResponse(formats_page(request.app.version))
 
 
 @router.get("/problems/{slug}")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from html import escape
 from typing import Any
 
+from .documents import document, table
 from .errors import FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
 
 Node = dict[str, Any]
@@ -27,33 +28,14 @@ curl -H "Authorization: Bearer $BENTRAY_KEY" http://127.0.0.1:8000/v1/access"""
 UNSAID = "Successful Response"
 
 
-def reference_page(document: Node) -> str:
-    """The OpenAPI ``document`` as one HTML page."""
-    operations = list(_operations(document))
+def reference_page(description: Node) -> str:
+    """The OpenAPI document as one HTML page."""
+    operations = list(_operations(description))
     contents = "".join(
         f'<li><a href="#{_anchor(o)}"><code>{o[0].upper()} {escape(o[1])}</code></a></li>' for o in operations
     )
-    schemas = document["components"]["schemas"]
-    return f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<title>Bentray: REST reference</title>
-<link rel="icon" href="/static/icon.svg" type="image/svg+xml">
-<link rel="stylesheet" href="/static/style.css">
-<script src="/static/theme.js"></script>
-</head>
-<body>
-<header class="top">
-<div class="brand"><img src="/static/icon.svg" alt="" width="32" height="32">
-<div><h1>Bentray {escape(document["info"]["version"])}</h1><small>REST reference</small></div></div>
-<nav><a href="/">Viewer</a><a href="/openapi.json">openapi.json</a></nav>
-<button id="theme" type="button" class="quiet">Dark</button>
-</header>
-<main class="reference">
-<p>{escape(document["info"]["description"])}</p>
+    schemas = description["components"]["schemas"]
+    content = f"""<p>{escape(description["info"]["description"])}</p>
 <h2>In four steps</h2><pre tabindex="0">{escape(EXAMPLE)}</pre>
 <h2>Addresses</h2><ul class="toc">{contents}</ul>
 {"".join(_operation(o) for o in operations)}
@@ -61,12 +43,12 @@ def reference_page(document: Node) -> str:
 <p>Every error is <code>application/problem+json</code> (RFC 9457).</p>
 {_problems()}
 <h2>Records</h2>
-{"".join(_schema(name, schemas[name]) for name in sorted(schemas))}
-</main></body></html>"""
+{"".join(_schema(name, schemas[name]) for name in sorted(schemas))}"""
+    return document("REST reference", description["info"]["version"], content)
 
 
-def _operations(document: Node) -> Iterator[tuple[str, str, Node]]:
-    for path, methods in document["paths"].items():
+def _operations(description: Node) -> Iterator[tuple[str, str, Node]]:
+    for path, methods in description["paths"].items():
         for method, operation in methods.items():
             yield method, path, operation
 
@@ -84,17 +66,17 @@ def _operation(operation: tuple[str, str, Node]) -> str:
     ]
     if parameters := what.get("parameters"):
         known = [(p["name"], p["in"], type_words(p["schema"]), p.get("description", "")) for p in parameters]
-        parts.append(_table(("Parameter", "In", "Type", "Meaning"), known))
+        parts.append(table(("Parameter", "In", "Type", "Meaning"), known))
     if body := what.get("requestBody"):
         parts.append("<h3>Body</h3>")
         bodies = [(media, type_words(content["schema"])) for media, content in body["content"].items()]
-        parts.append(_table(("Media type", "Content"), bodies))
+        parts.append(table(("Media type", "Content"), bodies))
     responses = [
         (code, _answer(response), "" if response["description"] == UNSAID else response["description"])
         for code, response in what["responses"].items()
         if code != "default"
     ]
-    parts.append("<h3>Answers</h3>" + _table(("Status", "Content", "Meaning"), responses))
+    parts.append("<h3>Answers</h3>" + table(("Status", "Content", "Meaning"), responses))
     return "".join(parts) + "</section>"
 
 
@@ -134,20 +116,12 @@ def _schema(name: str, schema: Node) -> str:
         need = " (required)" if field in required else ""
         rows.append((field, type_words(what) + default + need, what.get("description", "")))
     about = "".join(f"<p>{escape(text)}</p>" for text in schema.get("description", "").split("\n\n")[:1])
-    table = _table(("Field", "Type", "Meaning"), rows)
-    return f'<section class="panel" id="{escape(name)}"><h3>{escape(name)}</h3>{about}{table}</section>'
+    fields = table(("Field", "Type", "Meaning"), rows)
+    return f'<section class="panel" id="{escape(name)}"><h3>{escape(name)}</h3>{about}{fields}</section>'
 
 
 def _problems() -> str:
     kinds = [*PROBLEMS.values(), INVALID_REQUEST, NOT_FOUND, FAILED, INTERNAL]
-    return _table(
+    return table(
         ("Type", "Status", "Title"), [(f"/problems/{k.slug}", str(k.status), k.title) for k in kinds]
     )
-
-
-def _table(head: tuple[str, ...], rows: Sequence[Sequence[object]]) -> str:
-    top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows
-    )
-    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'

@@ -11,7 +11,7 @@ ASSETS = sorted(
 )
 
 
-@pytest.mark.parametrize("path", ["/", "/docs", *ASSETS])
+@pytest.mark.parametrize("path", ["/", "/docs", "/docs/formats", *ASSETS])
 def test_pages_load_only_own_files(start, path):
     answer = start().get(path)
     assert answer.status_code == 200
@@ -21,7 +21,7 @@ def test_pages_load_only_own_files(start, path):
     assert [one for found in loaded for one in found if "//" in one] == []
 
 
-@pytest.mark.parametrize("path", ["/", "/docs"])
+@pytest.mark.parametrize("path", ["/", "/docs", "/docs/formats"])
 def test_pages_keep_to_their_own_policy(start, path):
     text = start().get(path).text
     assert not re.search(r"<script(?![^>]*\bsrc=)|<style|\bstyle=|\bon\w+=", text)

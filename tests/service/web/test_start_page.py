@@ -32,8 +32,12 @@ def test_errors_are_shown_as_text(page, serve, tmp_path):
     page.goto(serve())
     page.set_input_files("#scan-file", tmp_path / "notes.h5")
     alert = page.locator("#scan-error")
-    alert.wait_for()
-    assert "HDF5" in alert.inner_text()
+    expect(alert).to_contain_text("notes.h5 is not a scan that can be read. ")
+    expect(alert).to_contain_text("HDF5")
+    alert.get_by_role("link", name="Accepted formats").click()
+    page.get_by_role("heading", name="Scans", exact=True).wait_for()
+    assert page.url.endswith("/docs/formats#scans")
+    page.get_by_role("heading", name="openUSCT (HDF5)").wait_for()
 
 
 def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_rejected(page, serve, tmp_path):

@@ -7,7 +7,10 @@ const PIECE = 8 * 2 ** 20;
 // Waits before the next try, and the time without progress after which an upload is given up for now, ms.
 const WAITS = [500, 1000, 2000, 4000, 8000];
 const PATIENCE = 120_000;
-const POLL = 300;
+// Between two questions whether a file is stored, the first and the longest; each is twice the one before.
+const POLLS = [40, 300];
+
+const NOUNS = { dataset: "a scan", volume: "a volume", mesh: "a mesh" };
 
 const wait = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
 
@@ -94,7 +97,7 @@ async function begin(file, metadata, key) {
 }
 
 // Sends a file. metadata: kind (dataset, volume or mesh), title and what the file does not state, as strings.
-// onProgress(share, words): from 0 to 1. Gives the stored record.
+// onProgress(share, words): from 0 to 1. Gives the stored record; the error of a refused file has its problem.
 export async function resumableUpload(file, metadata, onProgress) {
   const key = unfinished.key(file, metadata);
   let place = null;
@@ -123,12 +126,16 @@ export async function resumableUpload(file, metadata, onProgress) {
   onProgress(1, `Checking ${file.name}`);
   const record = await ingested(place.address);
   unfinished.set(key, null);
-  if (record.state === "refused") throw new Error(`${file.name} was refused. ${inWords(record.problem)}`);
+  if (record.state === "refused") {
+    const words = `${file.name} is not ${NOUNS[metadata.kind]} that can be read. ${inWords(record.problem)}`;
+    throw Object.assign(new Error(words), { problem: record.problem });
+  }
   return request(record.links.result);
 }
 
 // The record of an upload once it is stored or refused; a restarted service goes on by itself.
 async function ingested(address) {
+  let [pause] = POLLS;
   for (let failures = 0; ; ) {
     try {
       const record = await request(address);
@@ -138,6 +145,7 @@ async function ingested(address) {
       failures += 1;
       if (failures > 100) throw error;
     }
-    await wait(POLL);
+    await wait(pause);
+    pause = Math.min(2 * pause, POLLS[1]);
   }
 }

@@ -1,6 +1,14 @@
 // A drop zone for files: uploads one, and shows progress and errors.
-import { at } from "./dom.js";
+import { at, make } from "./dom.js";
 import { resumableUpload } from "./resumable_upload.js";
+
+const SECTIONS = { scan: "scans", volume: "volumes", mesh: "meshes" };
+
+function formatsLink(prefix) {
+  const link = make("a", "", "Accepted formats");
+  link.href = `/docs/formats#${SECTIONS[prefix]}`;
+  return link;
+}
 
 // metadataOf(file): see resumableUpload. The drop zone replaces the element prefix-place; its data-prompt and data-formats are the texts, data-accept is that of
 // the file input. An element prefix-own, if any, is opened when a file is rejected. Returns a function that sends the
@@ -44,6 +52,7 @@ export function uploads(prefix, metadataOf, onStored) {
       if (!part("bar")) return;
       part("upload").hidden = true;
       part("error").textContent = error.message;
+      if (error.problem) part("error").append(" ", formatsLink(prefix));
       part("error").hidden = false;
       if (part("own")) part("own").open = true;
     } finally {

@@ -1,0 +1,47 @@
+"""HTML of pages that are generated as a whole: head, title and navigation; tables with escaped cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+
+def document(title: str, version: str, content: str) -> str:
+    """A whole page.
+
+    Args:
+        title: as text.
+        version: of the service, as text.
+        content: HTML.
+    """
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>Bentray: {escape(title)}</title>
+<link rel="icon" href="/static/icon.svg" type="image/svg+xml">
+<link rel="stylesheet" href="/static/style.css">
+<script src="/static/theme.js"></script>
+</head>
+<body>
+<header class="top">
+<div class="brand"><img src="/static/icon.svg" alt="" width="32" height="32">
+<div><h1>Bentray {escape(version)}</h1><small>{escape(title)}</small></div></div>
+<nav><a href="/">Viewer</a><a href="/docs">REST reference</a><a href="/docs/formats">File formats</a>
+<a href="/openapi.json">openapi.json</a></nav>
+<button id="theme" type="button" class="quiet">Dark</button>
+</header>
+<main class="reference">
+{content}
+</main></body></html>"""
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A table as HTML; head and cells are text."""
+    top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
