@@ -229,6 +229,9 @@ def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
     expect(quality.locator("ul:not(details *) > li")).to_have_count(len(report["findings"]))
     for finding in report["findings"]:
         expect(quality).to_contain_text(finding["found"])
+    page.get_by_text("Matrix and histogram of the travel times").click()
+    report = page.get_by_role("img", name="matrix and histogram of the travel times")
+    expect(report).not_to_have_js_property("naturalWidth", 0)
     assert httpx.get(page.get_by_role("link", name="Quality report").evaluate("one => one.href")).is_success
     drawing = page.get_by_role("img", name="12 elements, 12 emit, 12 receive")
     expect(drawing.locator(".emitter")).to_have_count(12)
@@ -312,6 +315,19 @@ def test_name_notes_and_water_are_edited(page, traced, work):
     page.get_by_role("button", name="Fast").click()
     page.locator(".job").get_by_text("succeeded").wait_for()
     assert [call[1].water_temperature_c for call in work.calls] == [31.5]
+    # A setting of one reconstruction goes before what is stated of the scan.
+    page.get_by_text("All settings").click()
+    setting = page.locator("#run-settings .setting", has=page.locator('[name="water_temperature_c"]'))
+    field = setting.get_by_label("Water temperature (°C)")
+    expect(field).to_have_value("")
+    expect(setting).to_contain_text("Empty: as the scan states it.")
+    field.fill("200")
+    expect(setting.get_by_role("alert")).to_contain_text("Found 200; accepted: a number from ")
+    field.fill("20")
+    expect(setting.get_by_role("alert")).to_be_hidden()
+    page.get_by_role("button", name="Start").click()
+    expect(page.locator(".job").get_by_text("succeeded")).to_have_count(2)
+    assert [call[1].water_temperature_c for call in work.calls] == [31.5, 20.0]
     page.reload()
     expect(page.get_by_role("heading", level=1)).to_have_text("Left, warm")
     page.get_by_role("button", name="Edit name").click()

@@ -2,7 +2,7 @@
 import { request } from "../parts/api.js";
 import { at, make, showError } from "../parts/dom.js";
 import { jobList } from "../parts/job_list.js";
-import { withKey } from "../parts/key.js";
+import { show, withKey } from "../parts/key.js";
 import { startJob } from "../parts/panel.js";
 import { planInWords, planOf, queueInWords, timeInWords } from "../parts/plan_estimate.js";
 import { drawElements, inWordsOf } from "../parts/scan_drawing.js";
@@ -48,10 +48,14 @@ const PAGE = `
         <p id="geometry-error" class="error" role="alert" hidden></p>
         <h3>Quality</h3>
         <div id="quality"><p class="facts">Checking the scan</p></div>
-        <p><a id="quality-page" target="_blank" rel="noopener">Quality report as an image</a></p>
         <p id="quality-error" class="error" role="alert" hidden></p>
       </div>
     </div>
+    <details id="quality-more">
+      <summary>Matrix and histogram of the travel times, excluded pairs</summary>
+      <img id="quality-picture" class="report" alt="Traces with picks, matrix and histogram of the travel times, excluded pairs with reasons, findings">
+      <p><a id="quality-page" target="_blank" rel="noopener">Quality report as an image</a></p>
+    </details>
   </section>
   <section aria-labelledby="shot-title" class="panel" id="traces" hidden></section>`;
 
@@ -76,7 +80,7 @@ function presetTimes(scan) {
       const show = (textContent, title = "") => {
         if (mine === number && at(`${name}-time`)) Object.assign(at(`${name}-time`), { textContent, title });
       };
-      planOf(scan.id, settings).then(
+      planOf({ kind: "reconstruction", dataset: scan.id, settings }).then(
         (estimate) => show([timeInWords(estimate), queueInWords(estimate)].filter(Boolean).join(", "), estimate.basis),
         (error) => show(error.message),
       );
@@ -107,7 +111,7 @@ async function showSettings(scan, from) {
     let words = "";
     let refused = null;
     try {
-      const estimate = await planOf(scan.id, settings);
+      const estimate = await planOf({ kind: "reconstruction", dataset: scan.id, settings });
       words = `${planInWords(estimate)}. ${estimate.basis}`;
     } catch (error) {
       refused = error;
@@ -139,7 +143,17 @@ function showGeometry(scan, geometry, correctWater) {
 
 // What workers read from the scan, each part on its own, so that one that fails hides no other. Returns close().
 function showScan(scan, correctWater) {
-  at("quality-page").href = `/v1/datasets/${scan.id}/quality.png`;
+  const page = `/v1/datasets/${scan.id}/quality.png`;
+  at("quality-page").href = page;
+  let drawn = false;
+  const drawPage = () => {
+    if (drawn || !at("quality-more").open) return;
+    drawn = true;
+    // Another fragment after another temperature, or the browser would keep the picture that it has.
+    show(at("quality-picture"), `${page}#${scan.water_temperature_c ?? ""}`);
+  };
+  at("quality-more").ontoggle = drawPage;
+  drawPage();
   at("quality").replaceChildren(make("p", "facts", "Checking the scan"));
   for (const id of ["geometry-error", "quality-error"]) showError(id, null);
   // What arrives after the page, or this view of the scan, was closed is left out.
