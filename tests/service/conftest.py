@@ -6,7 +6,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from fastapi import FastAPI
 
 from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography.result import Iteration, Progress, Reconstruction, Trial
@@ -183,40 +182,46 @@ def convert_in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.
     With the marker ``ingest_process`` they have one, as in the service.
     """
 
-    def convert(
-        what: str, source: Path, target: Path, *, given: Any, reserve: Callable[[int], None], **_: Any
-    ) -> dict[str, Any]:
-        return summary_in(convert_upload(what, source, target, dict(given), reserve))
-
     if request.node.get_closest_marker("ingest_process") is None:
-        monkeypatch.setattr(canonical, "ingest", convert)
+        monkeypatch.setattr(canonical, "ingest", ingest_here)
+
+
+def ingest_here(
+    what: str, source: Path, target: Path, *, given: Any, reserve: Callable[[int], None], **_: Any
+) -> dict[str, Any]:
+    """In place of ``canonical.ingest``: in this process."""
+    return summary_in(convert_upload(what, source, target, dict(given), reserve))
 
 
 @pytest.fixture
 def scan(tmp_path: Path) -> Callable[..., Path]:
-    """Write a ring of 16 elements with straight travel times; ``change(file)`` spoils it."""
+    """Write the small scan; ``change(file)`` spoils it."""
 
     def write(change: Callable[[h5py.File], None] | None = None, name: str = "scan.h5") -> Path:
-        path = tmp_path / name
-        angle = 2 * np.pi * np.arange(16) / 16
-        position = 0.05 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        with h5py.File(path, "w") as file:
-            file.attrs.update(
-                format="uct-transmission", format_version="1.0", dimension=2, title="Sixteen elements"
-            )
-            file.create_group("geometry").attrs.update(array_type="ring", radius_m=0.05)
-            file["geometry/element_position_m"] = position
-            file.create_group("acquisition").attrs.update(center_frequency_hz=1e6, t0_s=0.0)
-            file["acquisition/tx"] = np.arange(16)
-            file["acquisition/rx"] = np.arange(16)
-            file.create_group("water").attrs["sound_speed_mps"] = 1500.0
-            distance = np.linalg.norm(position[:, None] - position[None], axis=-1)
-            file["traveltime/delta_tof_s"] = -0.02 * distance / 1500.0
-            if change is not None:
-                change(file)
-        return path
+        return write_scan(tmp_path / name, change)
 
     return write
+
+
+def write_scan(path: Path, change: Callable[[h5py.File], None] | None = None) -> Path:
+    """Write a ring of 16 elements with straight travel times."""
+    angle = 2 * np.pi * np.arange(16) / 16
+    position = 0.05 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    with h5py.File(path, "w") as file:
+        file.attrs.update(
+            format="uct-transmission", format_version="1.0", dimension=2, title="Sixteen elements"
+        )
+        file.create_group("geometry").attrs.update(array_type="ring", radius_m=0.05)
+        file["geometry/element_position_m"] = position
+        file.create_group("acquisition").attrs.update(center_frequency_hz=1e6, t0_s=0.0)
+        file["acquisition/tx"] = np.arange(16)
+        file["acquisition/rx"] = np.arange(16)
+        file.create_group("water").attrs["sound_speed_mps"] = 1500.0
+        distance = np.linalg.norm(position[:, None] - position[None], axis=-1)
+        file["traveltime/delta_tof_s"] = -0.02 * distance / 1500.0
+        if change is not None:
+            change(file)
+    return path
 
 
 @pytest.fixture
@@ -283,25 +288,31 @@ def until() -> Callable[..., dict[str, Any]]:
 @pytest.fixture
 def serve(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., str]]:
     """Start the service behind a real socket; returns its address."""
-    running: list[tuple[FastAPI, Server, threading.Thread]] = []
+    with ExitStack() as stack:
 
-    def go(**settings: Any) -> str:
-        given = ServiceSettings(data_dir=tmp_path / "served", **settings)
-        app = create_app(given, cluster)
-        server, listening = Server(app, given), Listening()
-        listening.bind(("127.0.0.1", 0))
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
-        thread.start()
-        running.append((app, server, thread))
+        def go(**settings: Any) -> str:
+            given = ServiceSettings(data_dir=tmp_path / "served", **settings)
+            return stack.enter_context(serving(given, cluster))
+
+        yield go
+
+
+@contextmanager
+def serving(settings: ServiceSettings, cluster: FakeCluster) -> Iterator[str]:
+    """A service behind a real socket; gives its address."""
+    app = create_app(settings, cluster)
+    server, listening = Server(app, settings), Listening()
+    listening.bind(("127.0.0.1", 0))
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
+    thread.start()
+    try:
         deadline = time.monotonic() + PATIENCE_S
         while not server.started:
             assert thread.is_alive()
             assert time.monotonic() < deadline
             time.sleep(0.02)
-        return f"http://127.0.0.1:{listening.getsockname()[1]}"
-
-    yield go
-    for app, server, thread in running:
+        yield f"http://127.0.0.1:{listening.getsockname()[1]}"
+    finally:
         # As ``bentray serve`` does: streams of events end first.
         app.state.leaving.set()
         server.should_exit = True

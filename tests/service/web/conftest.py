@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from playwright.sync_api import expect, sync_playwright
+
+from bentray_service.ingest import canonical
+from bentray_service.settings import ServiceSettings
+from bentray_workers.reconstruction import reconstruction_run
+
+from ..conftest import FakeCluster, FakeWork, ingest_here, serving, write_scan
 
 CHROMIUM = Path("/usr/bin/chromium")
 # A machine under load may be slow, and the first picture waits for kernels that are not compiled yet.
@@ -40,3 +47,35 @@ def page(browser: Any) -> Iterator[Any]:
         )
         yield page
         assert wrong == []
+
+
+class SharedService(NamedTuple):
+    """A service for all tests of a file, which leave its scans and jobs as they are.
+
+    Attributes:
+        address: of the service.
+        scan: writes the small scan.
+        work: of its jobs.
+        monkeypatch: of the file.
+        folder: for files.
+    """
+
+    address: str
+    scan: Callable[..., Path]
+    work: FakeWork
+    monkeypatch: pytest.MonkeyPatch
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SharedService]:
+    """As ``serve``, once for a file."""
+    folder = tmp_path_factory.mktemp("shared")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(canonical, "ingest", ingest_here)
+        work = FakeWork()
+        monkeypatch.setattr(reconstruction_run, "reconstruct", work)
+        # Tests look at it faster than a person.
+        settings = ServiceSettings(data_dir=folder / "data", renders_per_minute=0)
+        with serving(settings, FakeCluster()) as address:
+            yield SharedService(address, partial(write_scan, folder / "scan.h5"), work, monkeypatch, folder)

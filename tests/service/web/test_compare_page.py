@@ -14,9 +14,9 @@ pytestmark = pytest.mark.browser
 FIRST, SECOND = known((24, 16)), 20.0 + known((24, 16), seed=1)
 
 
-@pytest.fixture
-def both(serve, scan, work, monkeypatch):
-    address = serve()
+@pytest.fixture(scope="module")
+def both(shared_service):
+    address, scan, work, monkeypatch, _ = shared_service
     ids = [finished(address, scan, work, monkeypatch, one) for one in (FIRST, SECOND)]
     return f"{address}/#/compare/{','.join(ids)}"
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import time
+
 import httpx
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
+from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import write_dataset
 
 from ...kernels.acquisition.traces import scan as trace_scan
+from ..conftest import PATIENCE_S
 from .finished_results import finished, known
+from .live_results import in_turns, started
 
 pytestmark = pytest.mark.browser
 
@@ -22,28 +27,40 @@ RULES = {
         "values": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
     }
 }
-# Width and height: a small telephone and a 4K screen.
-SIZES = ((360, 740), (3840, 2160))
+TELEPHONE, LAPTOP = (390, 844), (1400, 900)
+# Width and height when a page is opened, and after it: of telephones, and of 4K and a laptop.
+SIZES = (((360, 740), TELEPHONE), ((3840, 2160), LAPTOP))
 
 
-@pytest.fixture
-def places(serve, scan, work, monkeypatch, tmp_path):
-    """The address of the service, and every page with a text that is there once it is complete."""
-    address = serve()
+@pytest.fixture(scope="module")
+def places(shared_service):
+    """The address of a service, and every page with a text that is there once it is complete."""
+    address, scan, work, monkeypatch, folder = shared_service
     plane = [finished(address, scan, work, monkeypatch, known((12, 10), seed)) for seed in (0, 1)]
     volume = finished(address, scan, work, monkeypatch, known((6, 5, 4)))
-    write_dataset(tmp_path / "traced.h5", trace_scan(elements=12))
-    content = (tmp_path / "traced.h5").read_bytes()
+    write_dataset(folder / "traced.h5", trace_scan(elements=12))
+    content = (folder / "traced.h5").read_bytes()
     sent = httpx.post(
         f"{address}/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"}
     )
+    work.error = InvalidInput("settings", "no finite speed at 3 nodes", "smaller relaxation")
+    failed = started(address, scan)
+    until(address, failed, lambda job: job["finished"])
+    work.error, turns = None, in_turns(work, monkeypatch)
+    live = started(address, scan)
+    for number in (1, 2):
+        turns.put(None)
+        until(address, live, lambda job, number=number: len(job["history"]) == number)
     marks = "profile=-8,-15,0,-5&ellipse=-8,-15,0,-5"
-    pages = {
+    return address, {
         "/": "Sixteen elements",
         # With the form of all settings open.
         f"/scans/{sent.json()['id']}?from={plane[0]}": "Receiving element 0",
         f"/jobs/{plane[0]}?{marks}": "node ",
         f"/jobs/{volume}?planes=3": "node ",
+        # Under way, with an image and a curve; and failed.
+        f"/jobs/{live['id']}": "Stage 1, iteration 2",
+        f"/jobs/{failed['id']}": "no finite speed at 3 nodes",
         f"/compare/{','.join(plane)}?{marks}": "m/s · B",
         f"/compare/{','.join(plane)}?mode=swipe": "m/s · B",
         "/jobs": "Sixteen elements",
@@ -51,7 +68,18 @@ def places(serve, scan, work, monkeypatch, tmp_path):
         "/surfaces": "Surface rendering",
         "/service": "worker",
     }
-    return address, pages
+
+
+def until(address, job, reached):
+    """Wait until the record of a job is as it should be."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not reached(httpx.get(f"{address}/v1/jobs/{job['id']}").json()):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def resized(page, size):
+    page.set_viewport_size({"width": size[0], "height": size[1]})
 
 
 def opened(page, address, path, text):
@@ -66,25 +94,31 @@ def test_axe_finds_nothing_serious(page, places, scheme):
     page.emulate_media(color_scheme=scheme)
     found = {}
     for path, text in pages.items():
+        resized(page, LAPTOP)
         opened(page, address, path, text)
-        report = Axe().run(page, options=RULES).response
-        assert len(report["passes"]) > 20, path
-        for one in report["violations"]:
-            if one["impact"] in SERIOUS:
-                where = [node["html"][:120] for node in one["nodes"][:3]]
-                found[f"{path.partition('?')[0]} {one['id']}"] = where
+        # Pages of jobs on a telephone, too.
+        for size in (LAPTOP, TELEPHONE) if path.startswith("/jobs/") else (LAPTOP,):
+            resized(page, size)
+            report = Axe().run(page, options=RULES).response
+            assert len(report["passes"]) > 20, path
+            for one in report["violations"]:
+                if one["impact"] in SERIOUS:
+                    where = [node["html"][:120] for node in one["nodes"][:3]]
+                    found[f"{path.partition('?')[0]} {size[0]} {one['id']}"] = where
     assert found == {}
 
 
 def test_nothing_scrolls_sideways(page, places):
     address, pages = places
     wide = []
-    for width, height in SIZES:
-        page.set_viewport_size({"width": width, "height": height})
+    for first, second in SIZES:
         for path, text in pages.items():
+            resized(page, first)
             opened(page, address, path, text)
-            if page.evaluate("document.documentElement.scrollWidth > innerWidth"):
-                wide.append((width, path))
+            for size in (first, second):
+                resized(page, size)
+                if page.evaluate("document.documentElement.scrollWidth > innerWidth"):
+                    wide.append((size[0], path))
     assert wide == []
 
 

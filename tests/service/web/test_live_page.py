@@ -2,63 +2,36 @@
 
 from __future__ import annotations
 
-import queue
-from dataclasses import replace
-
-import httpx
 import numpy as np
 import pytest
 from playwright.sync_api import expect
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.task_graph import Cancelled
-from bentray_kernels.tomography.reconstruction_graph import ReconstructionCheckpoint
-from bentray_kernels.tomography.result import Iteration, Progress
-from bentray_kernels.tomography.sart import sart_step
-from bentray_workers.cluster.checkpoints import Checkpoints
-from bentray_workers.reconstruction import reconstruction_run
+
+from .live_results import ITERATIONS, SHAPE, in_turns, started
 
 pytestmark = pytest.mark.browser
-
-# Of the image of each iteration.
-CONTRASTS_MPS = (20.0, 40.0, 20.0, 30.0, 40.0, 50.0)
-ITERATIONS = len(CONTRASTS_MPS)
 
 
 @pytest.fixture
 def turns(work, monkeypatch):
-    """A queue; for each of its items a reconstruction makes one iteration and saves its image."""
-    waiting: queue.Queue[None] = queue.Queue()
-
-    def reconstruct(client, path, settings, on_progress, stop, work_dir, on_saved, share):
-        kept, history = Checkpoints(work_dir / reconstruction_run.CHECKPOINTS), ()
-        on_progress(Progress(0, 8 * ITERATIONS, (), "reconstructing"))
-        for sweep in range(1, ITERATIONS + 1):
-            while True:
-                if stop():
-                    raise Cancelled
-                try:
-                    waiting.get(timeout=0.05)
-                    break
-                except queue.Empty:
-                    pass
-            speed = 1500.0 + CONTRASTS_MPS[sweep - 1] * np.linspace(0.0, 1.0, 48).reshape(8, 6)
-            state = replace(sart_step.begin(1.0 / speed), sweep=sweep)
-            kept.save("0-00000", ReconstructionCheckpoint(0, 0, (), state, ()))
-            history += (Iteration(0, sweep, 2e-6 / sweep, 8),)
-            on_progress(Progress(8 * sweep, 8 * ITERATIONS, history, "reconstructing"))
-        return work(client, path, settings, on_progress, stop, work_dir, on_saved, share)
-
-    monkeypatch.setattr(reconstruction_run, "reconstruct", reconstruct)
-    return waiting
+    return in_turns(work, monkeypatch)
 
 
-def started(address, scan):
-    stream = {"Content-Type": "application/x-hdf5"}
-    with httpx.Client(base_url=address, timeout=60) as http:
-        sent = http.post("/v1/datasets", content=scan().read_bytes(), headers=stream).json()
-        asked = {"kind": "reconstruction", "dataset": sent["id"], "settings": {"method": "sart", "nodes": 16}}
-        return http.post("/v1/jobs", json=asked).json()
+def colour_at(canvas, x, y):
+    """Red, green and blue of a pixel of a canvas."""
+    pixel = "(it, [x, y]) => [...it.getContext('2d').getImageData(x, y, 1, 1).data.slice(0, 3)]"
+    return canvas.evaluate(pixel, [round(x), round(y)])
+
+
+def tab_to(page, text):
+    """Press Tab from the header on until an element with this text has the focus."""
+    page.locator("#skip").focus()
+    for _ in range(30):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.textContent") == text:
+            return
+    raise AssertionError(f"{text} has not been reached")
 
 
 def test_it_sharpens_until_the_result_is_shown(page, serve, scan, turns):
@@ -70,24 +43,33 @@ def test_it_sharpens_until_the_result_is_shown(page, serve, scan, turns):
     picture, curve = page.locator("canvas.preview"), page.locator(".misfit svg")
     turns.put(None)
     expect(picture).to_have_attribute("aria-label", "Sound speed so far, 1500 to 1520 m/s")
-    # The image has x to the right and y up: the largest value is at the upper right.
-    assert picture.evaluate("it => [it.width, it.height]") == [8, 6]
-    corner = "it => [...it.getContext('2d').getImageData(7, 0, 1, 1).data]"
-    # The last colour of viridis.
-    np.testing.assert_allclose(picture.evaluate(corner), [253, 231, 37, 255], atol=2)
-    expect(page.locator(".colour-bar .ticks")).to_have_text("150015101520")
+    # x is to the right and y up: the largest value is at the upper right, in the last colour of viridis.
+    width, height = picture.evaluate("it => [it.width, it.height]")
+    pixels_per_mm = 0.97 * min(width / SHAPE[0], height / SHAPE[1])
+    corner = width / 2 + 23.5 * pixels_per_mm, height / 2 - 17.5 * pixels_per_mm
+    np.testing.assert_allclose(colour_at(picture, *corner), [253, 231, 37], atol=2)
+    # The white bar has a round length, at most three tenths of the width.
+    most_mm = 0.3 * width / pixels_per_mm
+    bar_mm = max(step for step in (1, 2, 5, 10, 20, 50) if step <= most_mm)
+    end = 14 + bar_mm * pixels_per_mm
+    assert colour_at(picture, end - 3, height - 14) == [255, 255, 255]
+    assert colour_at(picture, end + 4, height - 14) != [255, 255, 255]
+    ticks = page.locator(".colour-bar .ticks")
+    expect(ticks).to_have_text("15001505151015151520")
     page.get_by_text("2.00e+3 ns in the first iteration").wait_for()
     turns.put(None)
     expect(curve).to_have_attribute("data-points", "2")
     page.get_by_text("iteration 2 of at most").wait_for()
     share = float(page.get_by_label("Progress").get_attribute("value"))
-    assert share >= 2 / ITERATIONS
+    assert share > 2 / ITERATIONS - 1e-9
     expect(picture).to_have_attribute("aria-label", "Sound speed so far, 1500 to 1540 m/s")
     # The range widens at once, and narrows half of the way.
-    expect(page.locator(".colour-bar .ticks")).to_have_text("150015201540")
+    expect(ticks).to_have_text("15001510152015301540")
     turns.put(None)
     expect(curve).to_have_attribute("data-points", "3")
-    expect(page.locator(".colour-bar .ticks")).to_have_text("150015151530")
+    # As that of a result it leaves out a thousandth of the nodes at each end.
+    expect(picture).to_have_attribute("aria-label", "Sound speed so far, 1500 to 1700 m/s")
+    expect(ticks).to_have_text("15001507.515151522.51530")
     label = "Misfit of 3 iterations: 2.00e+3 to 667 ns"
     expect(page.get_by_role("img", name=label)).to_be_visible()
     assert curve.locator("path.curve").get_attribute("d").count("L") == 2
@@ -104,11 +86,15 @@ def test_it_can_be_cancelled_and_run_again(page, serve, scan, turns):
     job = started(address, scan)
     page.goto(f"{address}/#/jobs/{job['id']}")
     page.get_by_text("The image appears after the first iteration").wait_for()
-    page.get_by_role("button", name="Cancel").click()
+    tab_to(page, "Cancel")
+    page.keyboard.press("Enter")
     page.get_by_text("Cancelled", exact=True).wait_for()
     again = page.get_by_role("link", name="Run again with changes")
     assert again.get_attribute("href") == f"#/scans/{job['dataset']}?from={job['id']}"
     assert page.locator("main .error:visible").count() == 0
+    tab_to(page, "Run again with changes")
+    page.keyboard.press("Enter")
+    expect(page.get_by_label("Nodes per side")).to_have_value("16")
 
 
 def test_a_failure_is_explained(page, serve, scan, work):
@@ -124,8 +110,8 @@ def test_a_failure_is_explained(page, serve, scan, work):
     page.get_by_role("heading", level=1, name="Sixteen elements").wait_for()
 
 
-def test_progress_between_two_reports_is_even(page, serve):
-    page.goto(serve())
+def test_progress_between_two_reports_is_even(page, shared_service):
+    page.goto(shared_service.address)
     shares, left, next_phase = page.evaluate(
         """async () => {
           const { ProgressEstimate } = await import("/static/parts/progress_estimate.js");
@@ -146,3 +132,30 @@ def test_progress_between_two_reports_is_even(page, serve):
     np.testing.assert_allclose(np.diff(shares)[5:], 0.02, atol=1e-9)
     assert left == pytest.approx(10.0)
     assert next_phase == 0
+
+
+def test_a_total_that_changes_changes_the_pace_and_the_bar_never_jumps(page, shared_service):
+    page.goto(shared_service.address)
+    shares, left = page.evaluate(
+        """async () => {
+          const { ProgressEstimate } = await import("/static/parts/progress_estimate.js");
+          const one = new ProgressEstimate();
+          const shares = [], left = [];
+          // Trials end early: fewer tasks than planned. Later there are some more.
+          const totalAt = (now) => (now < 20 ? 400 : now < 40 ? 160 : 200);
+          for (let now = 0; now <= 100; now += 1) {
+            if (now % 5 === 0) one.add(now, { done: 2 * now, total: totalAt(now), phase: "picking" }, now);
+            shares.push(one.share(now));
+            left.push(one.left(now));
+          }
+          return [shares, left];
+        }"""
+    )
+    steps = np.diff(shares)
+    assert steps.min() >= 0.0
+    # At the fall, 40 of 400 tasks are done, and then 120 are left in place of 360: three times the pace.
+    np.testing.assert_allclose(steps[6:19], 2 / 400, atol=1e-9)
+    np.testing.assert_allclose(steps[21:39], (1 - shares[20]) * 2 / 120, atol=1e-9)
+    np.testing.assert_allclose(steps[41:98], (1 - shares[40]) * 2 / 120, atol=1e-9)
+    assert (shares[-1], left[-1]) == (1.0, 0.0)
+    np.testing.assert_allclose(left[20:40], np.arange(60, 40, -1), atol=1e-9)

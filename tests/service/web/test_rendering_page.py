@@ -5,6 +5,7 @@ import re
 import time
 from urllib.parse import parse_qs, urlsplit
 
+import httpx
 import numpy as np
 import pytest
 from PIL import Image
@@ -33,11 +34,20 @@ def settings_of(address):
     return {name: values[0] for name, values in parse_qs(urlsplit(address).query).items()}
 
 
+@pytest.fixture(scope="module")
+def stored(shared_service):
+    """The address of the view of a ball with a hole."""
+    values = io.BytesIO()
+    np.save(values, sampled(ONE_HOLE, 12))
+    stream = {"Content-Type": "application/octet-stream"}
+    address = f"{shared_service.address}/v1/volumes"
+    volume = httpx.post(address, content=values.getvalue(), headers=stream, timeout=60).json()
+    return f"{shared_service.address}/#/rendering/{volume['id']}"
+
+
 @pytest.fixture
-def ball(page, serve, tmp_path):
-    page.goto(serve() + "/#/rendering")
-    page.set_input_files("#volume-file", saved(tmp_path, sampled(ONE_HOLE, 12)))
-    page.get_by_text("ball.npy is stored").wait_for()
+def ball(page, stored):
+    page.goto(stored)
     whole(page)
     return page
 
@@ -61,6 +71,7 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
     page.get_by_label("Smoothing").fill("0.5")
     page.get_by_label("Frames per turn").fill("7")
     whole(page, mode="refract", iso="0.4", azimuth_deg="75", backdrop="warped-picture")
+    expect(page.locator("#turn-plan")).to_have_text(re.compile(r"^Turntable: about \d+ \w+, rough$"))
     expect(image).to_have_attribute(
         "data-address", re.compile("smoothing=0.5&.*supersampling=real&degree=2&")
     )

@@ -22,15 +22,35 @@ DX, DY = (1e3 * one for one in SPACING_M[:2])
 X0, Y0 = (1e3 * one for one in ORIGIN_M[:2])
 
 
+MORE = {
+    "attenuation": np.linspace(0.0, 20.0, SPEED.size).reshape(SPEED.shape),
+    "coverage": SPEED - 1300.0,
+}
+
+
+@pytest.fixture(scope="module")
+def result(shared_service):
+    """The address of a result in a plane, for tests that leave it as it is."""
+    address, scan, work, monkeypatch, _ = shared_service
+    return f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, SPEED, **MORE)}"
+
+
 @pytest.fixture
-def result(serve, scan, work, monkeypatch):
-    """The address of a result in a plane."""
+def own_result(serve, scan, work, monkeypatch):
+    """The address of a result in a plane, in a service of its own."""
     address = serve()
-    more = {
-        "attenuation": np.linspace(0.0, 20.0, SPEED.size).reshape(SPEED.shape),
-        "coverage": SPEED - 1300.0,
-    }
-    return f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, SPEED, **more)}"
+    return f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, SPEED, **MORE)}"
+
+
+@pytest.fixture
+def volume(shared_service):
+    """The address of a volume with these values."""
+
+    def make(values):
+        address, scan, work, monkeypatch, _ = shared_service
+        return f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, values)}"
+
+    return make
 
 
 def ready(page, address):
@@ -214,20 +234,19 @@ def test_the_image_is_used_by_keys_alone(page, result):
     page.wait_for_url(re.compile("^((?!view-z).)*$"))
 
 
-def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, serve, scan, work, monkeypatch):
-    address = serve()
-    volume = known((8, 6, 5))
-    ready(page, f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, volume)}")
+def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, volume):
+    values = known((8, 6, 5))
+    ready(page, volume(values))
     slider = page.get_by_label("Slice across z")
     slider.focus()
     page.keyboard.press("ArrowRight")
     page.get_by_text("Slice 3 of 0 to 4, z = 14 mm").wait_for()
     node, value, _ = node_below(page, 0.45, 0.4)
-    assert value == volume[(*node, 3)]
+    assert value == values[(*node, 3)]
     page.get_by_label("Axis across the slice").select_option("x")
     page.get_by_text("Slice 4 of 0 to 7, x = -6 mm").wait_for()
     node, value, _ = node_below(page, 0.45, 0.4)
-    assert value == volume[(4, *node)]
+    assert value == values[(4, *node)]
     page.get_by_label("Three planes").check()
     expect(page.locator("canvas.plane")).to_have_count(3)
     # A click on the plane across z sets the slices of the two others.
@@ -238,9 +257,8 @@ def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, serve, scan, w
     page.get_by_text(f"Slice {node[1]} of 0 to 5").wait_for()
 
 
-def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, serve, scan, work, monkeypatch):
-    address = serve()
-    ready(page, f"{address}/#/jobs/{finished(address, scan, work, monkeypatch, known((8, 6, 5)))}")
+def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, volume):
+    ready(page, volume(known((8, 6, 5))))
     asked = []
     page.on("request", lambda request: asked.append(request.url))
     slider = page.get_by_label("Slice across z")
@@ -250,8 +268,8 @@ def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, serve, sca
     assert asked == []
 
 
-def test_a_result_is_run_again_with_changes(page, result, work):
-    ready(page, result)
+def test_a_result_is_run_again_with_changes(page, own_result, work):
+    ready(page, own_result)
     page.get_by_role("link", name="Run again with changes").click()
     expect(page.get_by_label("Nodes per side")).to_have_value("16")
     expect(page.get_by_label("Method", exact=True)).to_have_value("sart")
@@ -280,8 +298,8 @@ def test_the_copied_code_reads_the_values(page, result):
     np.testing.assert_array_equal(np.load(io.BytesIO(httpx.get(words[3]).content)), SPEED - 1300.0)
 
 
-def test_a_result_is_exported_and_deleted(page, result):
-    ready(page, result)
+def test_a_result_is_exported_and_deleted(page, own_result):
+    ready(page, own_result)
     page.get_by_text("Export", exact=True).click()
     page.locator(".export select").select_option("coverage")
     with page.expect_download() as download:
@@ -294,8 +312,8 @@ def test_a_result_is_exported_and_deleted(page, result):
     page.get_by_text("Nothing has run yet").wait_for()
 
 
-def test_a_result_is_renamed(page, result):
-    ready(page, result)
+def test_a_result_is_renamed(page, own_result):
+    ready(page, own_result)
     page.get_by_role("button", name="Rename").click()
     page.get_by_label("Name", exact=True).fill("With the new water speed")
     page.locator("#rename").get_by_role("button", name="Rename").click()

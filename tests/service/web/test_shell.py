@@ -66,14 +66,14 @@ def test_page_requests_and_sends_a_key(page, serve, scan, work, tmp_path):
         ("/service", "Service"),
     ],
 )
-def test_every_page_opens_by_its_address(page, serve, path, heading):
-    page.goto(f"{serve()}/#{path}")
+def test_every_page_opens_by_its_address(page, shared_service, path, heading):
+    page.goto(f"{shared_service.address}/#{path}")
     page.get_by_role("heading", level=1, name=heading, exact=True).wait_for()
     assert page.locator("main .error:visible").count() == 0
 
 
-def test_unknown_addresses_are_named(page, serve):
-    address = serve()
+def test_unknown_addresses_are_named(page, shared_service):
+    address = shared_service.address
     page.goto(f"{address}/#/nowhere")
     page.get_by_text("There is no page /nowhere").wait_for()
     page.goto(f"{address}/#/scans/ds-none")
@@ -82,9 +82,9 @@ def test_unknown_addresses_are_named(page, serve):
     page.get_by_role("alert").get_by_text("job-none").wait_for()
 
 
-def test_the_colours_are_chosen_and_kept(page, serve):
+def test_the_colours_are_chosen_and_kept(page, shared_service):
     page.emulate_media(color_scheme="light")
-    page.goto(serve())
+    page.goto(shared_service.address)
     root = page.locator("html")
     expect(root).to_have_attribute("data-theme", "light")
     page.get_by_role("button", name="Switch to dark").click()

@@ -1,0 +1,77 @@
+"""A reconstruction of known images, each made when a test says so, as a job that a browser watches."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from bentray_kernels.task_graph import Cancelled
+from bentray_kernels.tomography.reconstruction_graph import ReconstructionCheckpoint
+from bentray_kernels.tomography.result import Iteration, Progress
+from bentray_kernels.tomography.sart import sart_step
+from bentray_workers.cluster.checkpoints import Checkpoints
+from bentray_workers.reconstruction import reconstruction_run
+
+from ..conftest import FakeWork
+
+# Of the image of each iteration.
+CONTRASTS_MPS = (20.0, 40.0, 20.0, 30.0, 40.0, 50.0)
+ITERATIONS = len(CONTRASTS_MPS)
+# Nodes; their spacing and the position of the first one, m.
+SHAPE, SPACING_M, ORIGIN_M = (48, 36), 1e-3, (-0.02, -0.01)
+# A wrong value at one node of the third image, m/s.
+SPIKE_MPS = 1700.0
+
+
+def in_turns(work: FakeWork, monkeypatch: pytest.MonkeyPatch) -> queue.Queue[None]:
+    """A queue; for each of its items a reconstruction makes one iteration and saves its image."""
+    waiting: queue.Queue[None] = queue.Queue()
+
+    def reconstruct(
+        client: Any,
+        path: Path,
+        settings: Any,
+        on_progress: Any,
+        stop: Any,
+        work_dir: Path,
+        on_saved: Any,
+        share: Any,
+    ) -> Any:
+        kept, history = Checkpoints(work_dir / reconstruction_run.CHECKPOINTS), ()
+        on_progress(Progress(0, 8 * ITERATIONS, (), "reconstructing"))
+        for sweep in range(1, ITERATIONS + 1):
+            while True:
+                if stop():
+                    raise Cancelled
+                try:
+                    waiting.get(timeout=0.05)
+                    break
+                except queue.Empty:
+                    pass
+            speed = 1500.0 + CONTRASTS_MPS[sweep - 1] * np.linspace(0.0, 1.0, np.prod(SHAPE)).reshape(SHAPE)
+            if sweep == 3:
+                speed[20, 15] = SPIKE_MPS
+            state = replace(sart_step.begin(1.0 / speed), sweep=sweep)
+            kept.save("0-00000", ReconstructionCheckpoint(0, 0, (), state, (), SPACING_M, ORIGIN_M))
+            history += (Iteration(0, sweep, 2e-6 / sweep, 8),)
+            on_progress(Progress(8 * sweep, 8 * ITERATIONS, history, "reconstructing"))
+        return work(client, path, settings, on_progress, stop, work_dir, on_saved, share)
+
+    monkeypatch.setattr(reconstruction_run, "reconstruct", reconstruct)
+    return waiting
+
+
+def started(address: str, scan: Callable[..., Path]) -> dict[str, Any]:
+    """The record of a reconstruction of the scan that has just been submitted."""
+    stream = {"Content-Type": "application/x-hdf5"}
+    with httpx.Client(base_url=address, timeout=60) as http:
+        sent = http.post("/v1/datasets", content=scan().read_bytes(), headers=stream).json()
+        asked = {"kind": "reconstruction", "dataset": sent["id"], "settings": {"method": "sart", "nodes": 16}}
+        return dict(http.post("/v1/jobs", json=asked).json())
