@@ -9,13 +9,15 @@ import io
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
+import httpx
 import matplotlib.pyplot as plt
 import numpy as np
 import trimesh
@@ -41,6 +43,20 @@ FOLDER = Path(__file__).parent / "pictures"
 CHROMIUM = Path("/usr/bin/chromium")
 BENTRAY = [sys.executable, "-m", "bentray_service.cli"]
 MM = 1e3
+# Of a page: the machine may compile kernels first.
+PATIENCE_MS = 600_000.0
+
+# A simulated scan with traces, as that of the start page.
+SAMPLE = {
+    "phantom": "table6",
+    "waveform": True,
+    "nodes": 64,
+    "elements": 64,
+    "emissions": 32,
+    "frequency_hz": 3e5,
+    "side_m": 0.06,
+    "snr": 30,
+}
 
 
 def fronts() -> Image.Image:
@@ -184,6 +200,47 @@ def comparison() -> Image.Image:
     return _page(None, ways, (1200, 1080), lambda jobs: f"#/compare/{','.join(jobs)}?profile=-75,0,75,0")
 
 
+def scan_page() -> Image.Image:
+    """The page of a scan with traces: elements, quality, the traces of an emission."""
+    with _service() as service, _browser((1200, 1700)) as page:
+        made = service.client.wait(service.client.simulate(SAMPLE).id).dataset
+        page.goto(f"{service.url}/#/scans/{made}")
+        page.get_by_label("Emission number").fill("8")
+        page.keyboard.press("Tab")
+        page.locator("#shot-facts").filter(has_text="Emission 8").wait_for()
+        page.locator("#quality").get_by_text("pairs").first.wait_for()
+        return _shot(page)
+
+
+def live_page() -> Image.Image:
+    """The page of a running job, after some iterations."""
+    with _service() as service, _browser((1200, 900)) as page:
+        slow = {"method": "sart", "nodes": 128, "iterations": 60}
+        job = service.client.submit(service.uploaded(), slow)
+        page.goto(f"{service.url}/#/jobs/{job.id}")
+        page.wait_for_function("() => document.querySelector('.misfit svg')?.dataset.points >= 8")
+        page.locator(".live-time").filter(has_text="left").wait_for()
+        return _shot(page)
+
+
+def jobs_page() -> Image.Image:
+    """The table of jobs: some succeeded, one under way, one cancelled."""
+    with _service() as service, _browser((1200, 620)) as page:
+        client, scan = service.client, service.uploaded()
+        for rays, name in {"straight": "Straight rays", "curved": "Bent rays"}.items():
+            job = client.wait(client.submit(scan, {"method": "sart", "nodes": 64, "rays": rays}).id)
+            httpx.patch(f"{service.url}/v1/jobs/{job.id}", json={"name": name}).raise_for_status()
+        client.wait(client.simulate(SAMPLE).id)
+        long = {"method": "sart", "nodes": 128, "iterations": 200}
+        for seed in range(2):
+            job = client.submit(scan, {**long, "seed": seed})
+        client.cancel(job.id)
+        page.goto(f"{service.url}/#/jobs")
+        for state in ("running", "cancelled"):
+            page.locator(".job-table .state").get_by_text(state, exact=True).first.wait_for()
+        return _shot(page)
+
+
 def _page(
     scan: Dataset | None,
     ways: Sequence[Mapping[str, Any]],
@@ -191,23 +248,52 @@ def _page(
     address_of: Callable[[list[str]], str],
 ) -> Image.Image:
     """The web page with the results of a scan in these ways."""
+    with _service() as service, _browser(size) as page:
+        client, uploaded = service.client, service.uploaded(scan)
+        jobs = [client.wait(client.submit(uploaded, dict(one)).id).id for one in ways]
+        page.goto(f"{service.url}/{address_of(jobs)}")
+        page.locator(".readout").filter(has_text="m/s").wait_for()
+        return _shot(page)
+
+
+class _Service(NamedTuple):
+    """A running service, and a folder for its files."""
+
+    url: str
+    client: Client
+    folder: Path
+
+    def uploaded(self, scan: Dataset | None = None) -> str:
+        """The id of a scan, by default of the phantom in slow water."""
+        usual = SimulationSettings(nodes=96, elements=64, coupling_mps=1375.0)
+        write_dataset(self.folder / "phantom.h5", scan or simulate(usual, lambda _: None))
+        return self.client.upload(self.folder / "phantom.h5").id
+
+
+@contextmanager
+def _service() -> Iterator[_Service]:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with running_service(folder / "data", folder / "log") as url, Client(url) as client:
+            yield _Service(url, client, folder)
+
+
+@contextmanager
+def _browser(size: tuple[int, int]) -> Iterator[Any]:
+    """A page of Chromium of this width and height, pixels."""
     from playwright.sync_api import sync_playwright
 
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        file = Path(folder) / "phantom.h5"
-        usual = SimulationSettings(nodes=96, elements=64, coupling_mps=1375.0)
-        write_dataset(file, scan or simulate(usual, lambda _: None))
-        with running_service(Path(folder) / "data", Path(folder) / "log") as url, Client(url) as client:
-            uploaded = client.upload(file).id
-            jobs = [client.wait(client.submit(uploaded, dict(one)).id).id for one in ways]
-            browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-            page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-            page.goto(f"{url}/{address_of(jobs)}")
-            page.locator(".readout").filter(has_text="m/s").wait_for()
-            page.get_by_text("ready, ").wait_for()
-            shot = page.screenshot()
-            browser.close()
-    return Image.open(io.BytesIO(shot))
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        page.set_default_timeout(PATIENCE_MS)
+        yield page
+        browser.close()
+
+
+def _shot(page: Any) -> Image.Image:
+    page.get_by_text("ready, ").wait_for()
+    return Image.open(io.BytesIO(page.screenshot()))
 
 
 def _run(*words: object) -> None:
@@ -253,7 +339,20 @@ def _drawn(figure: Figure) -> Image.Image:
 
 
 PICTURES: dict[str, Callable[[], Image.Image]] = {
-    one.__name__: one for one in (overview, fronts, coupling, fresnel, glass, mesh, viewer, comparison)
+    one.__name__: one
+    for one in (
+        overview,
+        fronts,
+        coupling,
+        fresnel,
+        glass,
+        mesh,
+        viewer,
+        comparison,
+        scan_page,
+        live_page,
+        jobs_page,
+    )
 }
 
 
