@@ -145,10 +145,10 @@ function showGeometry(scan, geometry, correctWater) {
 function showScan(scan, correctWater) {
   const page = `/v1/datasets/${scan.id}/quality.png`;
   at("quality-page").href = page;
-  let drawn = false;
+  let reported = false;
   const drawPage = () => {
-    if (drawn || !at("quality-more").open) return;
-    drawn = true;
+    if (reported || !at("quality-more").open) return;
+    reported = true;
     // Another fragment after another temperature, or the browser would keep the picture that it has.
     show(at("quality-picture"), `${page}#${scan.water_temperature_c ?? ""}`);
   };
