@@ -43,7 +43,7 @@ SCRUB = """async ([steps]) => {
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
-    """First paint of the page of scans and of a result, and scrubbing, with the load that they began under."""
+    """First paint of the page of scans and of a result, and scrubbing, with the load that they began at."""
     nodes = QUICK_NODES if context.quick else NODES
     labels = (
         ("first paint, page of scans", FIRST_PAINT_GOAL_MS),

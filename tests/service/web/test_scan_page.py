@@ -201,19 +201,36 @@ def test_by_keyboard_alone(page, serve, scan, work):
     page.locator(".job").wait_for()
 
 
-@pytest.fixture
-def traced(page, serve, tmp_path):
-    """The page of a scan with traces, and the scan as the service tells it."""
-    made = trace_scan(blob_delay(12), elements=12, noise=0.01)
-    write_dataset(tmp_path / "traced.h5", made)
-    address = serve(renders_per_minute=0)
-    content = (tmp_path / "traced.h5").read_bytes()
-    sent = httpx.post(
-        f"{address}/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"}
-    )
-    here = f"{address}{sent.json()['links']['self']}"
-    page.goto(f"{address}/#/scans/{sent.json()['id']}")
+def with_traces(address, folder):
+    """The record of a scan with traces that has just been uploaded."""
+    write_dataset(folder / "traced.h5", trace_scan(blob_delay(12), elements=12, noise=0.01))
+    content, stream = (folder / "traced.h5").read_bytes(), {"Content-Type": "application/x-hdf5"}
+    return httpx.post(f"{address}/v1/datasets", content=content, headers=stream, timeout=60.0).json()
+
+
+def opened(page, address, scan):
+    """Open the page of a scan; returns what the service tells about it, by the end of the address."""
+    here = f"{address}{scan['links']['self']}"
+    page.goto(f"{address}/#/scans/{scan['id']}")
     return lambda what: httpx.get(f"{here}/{what}".rstrip("/"), timeout=60.0).json()
+
+
+@pytest.fixture(scope="module")
+def shared_scan(shared_service):
+    return with_traces(shared_service.address, shared_service.folder)
+
+
+@pytest.fixture
+def traced(page, shared_service, shared_scan):
+    """The page of a scan with traces, for tests that leave it as it is; see ``opened``."""
+    return opened(page, shared_service.address, shared_scan)
+
+
+@pytest.fixture
+def own_traced(page, serve, tmp_path):
+    """The same in a service of its own."""
+    address = serve(renders_per_minute=0)
+    return opened(page, address, with_traces(address, tmp_path))
 
 
 def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
@@ -281,7 +298,8 @@ def test_a_telephone_scrolls_only_down(page, traced):
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
 
 
-def test_name_notes_and_water_are_edited(page, traced, work):
+def test_name_notes_and_water_are_edited(page, own_traced, work):
+    traced = own_traced
     expect(page.locator("#shot-values")).to_contain_text("Receiving element 0")
     straight = traced("traces?emission=0")["straight_s"][5]
     # No name is left behind by notes alone.
@@ -322,7 +340,7 @@ def test_name_notes_and_water_are_edited(page, traced, work):
     expect(field).to_have_value("")
     expect(setting).to_contain_text("Empty: as the scan states it.")
     field.fill("200")
-    expect(setting.get_by_role("alert")).to_contain_text("Found 200; accepted: a number from ")
+    expect(setting.get_by_role("alert")).to_contain_text("Found 200.0; accepted: a number from 0 to 95")
     field.fill("20")
     expect(setting.get_by_role("alert")).to_be_hidden()
     page.get_by_role("button", name="Start").click()
