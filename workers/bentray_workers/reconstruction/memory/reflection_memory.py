@@ -20,8 +20,8 @@ from .ray_memory import field_bytes
 # Overhead of Python in any task.
 FLOOR_BYTES = 7 * MIB // 2
 
-# Bytes per pixel of the sums, of the mask, and of the sums that are added to them.
-PIXEL_BYTES = 2 * 16 + 1
+# Bytes per pixel of the sums, and of their copy for another process.
+SUMS_BYTES = 2 * 16
 
 # Bytes per sample of an upsampled signal while one emission is transformed: a complex spectrum, the complex
 # signal, its copy; and per recorded sample: traces and window in double precision.
@@ -56,7 +56,7 @@ def reflection_task_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     views = 16 * (batch + traces.receivers) * TILE**2
     # As sent, joined, and a selection of them.
     times = 3 * elements * field
-    images = 2 * REAL * nodes**2 + PIXEL_BYTES * side**2
+    image = 2 * REAL * nodes**2 + side**2
     reading = 2 * traces.read_bytes + traces.receivers * traces.samples * TRACE_BYTES
     return {
         "solve_element_times": FLOOR_BYTES
@@ -65,13 +65,14 @@ def reflection_task_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         + ELEMENTS * field,
         "measure_scan_pulse": FLOOR_BYTES
         + times
-        + images
+        + image
         + reading
         + min(PULSE_EMISSIONS, traces.emissions) * traces.bytes_of(1)
         + TRANSFORM_BYTES * traces.receivers * traces.samples,
         "sum_emissions": FLOOR_BYTES
         + times
-        + images
+        + image
+        + SUMS_BYTES * side**2
         + reading
         + 8 * batch * signals
         + TRANSFORM_BYTES * signals
