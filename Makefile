@@ -30,6 +30,8 @@ demo: install ## simulate a scan, submit it to a service, compare straight and b
 serve: install ## start the service; HOST=127.0.0.1 PORT=8000
 	@$(BIN)/bentray serve --host $(HOST) --port $(PORT)
 
+# Threads of one matrix product wait for each other spinning, and all cores are taken by tests already.
+test test-all: export OPENBLAS_NUM_THREADS = 1
 test: install-tests ## run the tests, up to four files at once; ARGS="tests/kernels -x" narrows them
 	@$(BIN)/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder -m "not nightly" $(ARGS)
 
