@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start hundreds of Python processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint docs bench bench-device mutants lock clean
+.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint docs bench bench-device mutants release lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -58,6 +58,13 @@ bench-device: install ## compare each engine on the OpenCL device of this machin
 
 mutants: install-tests ## plant faults in the numerics one at a time and run the nearest tests (hours); ARGS="--count 20" narrows it
 	@PYTHONPATH=tests $(BIN)/python -m mutation $(ARGS)
+
+release: install ## build wheel, sdist, bill of materials and checksums into dist/
+	@rm -rf dist
+	@set -e; export SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct); \
+	  $(BIN)/python -m hatchling build -d dist -t sdist -t wheel; \
+	  $(BIN)/python deploy/sbom.py > dist/bentray.cdx.json
+	@cd dist && sha256sum -- * > SHA256SUMS && cat SHA256SUMS
 
 lock: ## update the lock files (needs uv on the PATH)
 	@command -v uv >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }

@@ -25,6 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TEXTS = (
     "README.md",
     "CONTRIBUTING.md",
+    "SECURITY.md",
     "deploy/README.md",
     "deploy/SCALING.md",
     "docs/how-to/use-over-http.md",

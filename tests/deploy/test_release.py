@@ -1,0 +1,123 @@
+"""The release: complete packages that work without the repository, and a bill of materials."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PROJECT = PYPROJECT["project"]
+RELEASED = {"SOURCE_DATE_EPOCH": "1767225600"}
+PACKAGES = PYPROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
+# Of the service; what they answer is in the wheel.
+ADDRESSES = ("/", "/docs", "/static/app.js", "/openapi.json")
+
+
+def run(*command: str, folder: Path) -> str:
+    done = subprocess.run(
+        [sys.executable, *command],
+        cwd=folder,
+        env=os.environ | RELEASED,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Wheel and sdist of this tree."""
+    folder = tmp_path_factory.mktemp("dist")
+    run("-m", "hatchling", "build", "-d", str(folder), "-t", "sdist", "-t", "wheel", folder=ROOT)
+    return folder
+
+
+def only(folder: Path, pattern: str) -> Path:
+    (found,) = folder.glob(pattern)
+    return found
+
+
+def test_the_wheel_holds_the_packages_and_nothing_else(dist: Path) -> None:
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", *PACKAGES], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    committed = {name.partition("/")[2] for name in listed.stdout.split("\0") if (ROOT / name).is_file()}
+    packed = set(zipfile.ZipFile(only(dist, "*.whl")).namelist())
+    assert {name for name in packed if ".dist-info/" not in name} == committed
+    assert any(name.endswith(".dist-info/licenses/LICENSE") for name in packed)
+
+
+def test_the_source_distribution_gives_the_same_wheel(dist: Path, tmp_path: Path) -> None:
+    with tarfile.open(only(dist, "*.tar.gz")) as packed:
+        packed.extractall(tmp_path, filter="data")
+    source = only(tmp_path, "bentray-*")
+    for name in ("Makefile", "tests", "docs", "deploy", "requirements.lock", "CITATION.cff", "SECURITY.md"):
+        assert (source / name).exists(), name
+    run("-m", "hatchling", "build", "-d", str(tmp_path / "again"), "-t", "wheel", folder=source)
+    assert only(tmp_path / "again", "*.whl").read_bytes() == only(dist, "*.whl").read_bytes()
+
+
+@pytest.mark.nightly
+def test_page_and_reference_are_served_from_the_wheel(dist: Path, tmp_path: Path) -> None:
+    zipfile.ZipFile(only(dist, "*.whl")).extractall(tmp_path / "installed")
+    code = f"""
+import sys, warnings
+warnings.simplefilter("ignore")
+sys.path.insert(0, {str(tmp_path / "installed")!r})
+import bentray, bentray_kernels, bentray_workers, bentray_service
+from pathlib import Path
+from fastapi.testclient import TestClient
+from bentray_service.app import create_app
+from bentray_service.settings import ServiceSettings
+for package in (bentray, bentray_kernels, bentray_workers, bentray_service):
+    assert Path(package.__file__).is_relative_to({str(tmp_path / "installed")!r}), package
+app = TestClient(create_app(ServiceSettings(data_dir=Path("data"))), base_url="http://localhost")
+for address in {ADDRESSES}:
+    answer = app.get(address)
+    print(address, answer.status_code, len(answer.content) > 1000)
+print(bentray.__version__)
+"""
+    said = run("-c", code, folder=tmp_path).splitlines()
+    assert said == [*(f"{one} 200 True" for one in ADDRESSES), PROJECT["version"]]
+
+
+def test_the_bill_lists_every_locked_package() -> None:
+    text = run("deploy/sbom.py", folder=ROOT)
+    assert run("deploy/sbom.py", folder=ROOT) == text
+    bill: dict[str, Any] = json.loads(text)
+    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.6")
+    assert bill["metadata"]["timestamp"] == "2026-01-01T00:00:00Z"
+    assert bill["metadata"]["component"]["purl"] == f"pkg:pypi/bentray@{PROJECT['version']}"
+    locked = re.findall(r"^([\w.-]+)==(\S+)", (ROOT / "requirements.lock").read_text(), re.MULTILINE)
+    names = [(one["name"], one["version"]) for one in bill["components"]]
+    assert names == [(re.sub(r"[-_.]+", "-", name).lower(), version) for name, version in locked]
+    references = [one["bom-ref"] for one in bill["components"]]
+    assert len(set(references)) == len(references)
+    (direct,) = bill["dependencies"]
+    # A lock for several versions of Python pins some packages twice.
+    pinned = {re.fullmatch(r"pkg:pypi/(.+)@.+", one)[1] for one in direct["dependsOn"]}  # type: ignore[index]
+    assert pinned == {re.split(r"[^A-Za-z0-9._-]", one)[0].lower() for one in PROJECT["dependencies"]}
+    licensed = [one for one in bill["components"] if "licenses" in one]
+    assert len(licensed) > 0.9 * len(names)
+
+
+def test_the_citation_has_the_version_and_the_licence() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert {"cff-version", "message", "title", "authors"} <= citation.keys()
+    assert str(citation["version"]) == PROJECT["version"]
+    assert citation["license"] == PROJECT["license"]
+    assert f"version {PROJECT['version']}" in (ROOT / "README.md").read_text()
