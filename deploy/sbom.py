@@ -1,4 +1,4 @@
-"""Software bill of materials of a release (CycloneDX 1.6, JSON): python deploy/sbom.py > bentray.cdx.json"""
+"""Software bill of materials of a release in CycloneDX 1.6: ``python deploy/sbom.py`` prints it as JSON."""
 
 from __future__ import annotations
 
