@@ -87,12 +87,13 @@ def check_reflection(settings: Settings, *, traces: bool, in_space: bool) -> Non
     """Check that a reflection image is possible, if the settings request one.
 
     Raises:
-        InvalidInput: for a scan without traces, or elements in space.
+        InvalidInput: for a scan without traces or centre frequency, or elements in space.
     """
     if not settings.reflection.enabled:
         return
     if not traces:
-        raise InvalidInput("reflection", True, "false: the scan has no traces (waveform/object)")
+        accepted = "false: the scan has no traces (waveform/object), or no centre frequency"
+        raise InvalidInput("reflection", True, accepted)
     if in_space or settings.decomposition == "volume":
         raise InvalidInput("reflection", True, "false for a volume: it works on slices")
 

@@ -38,7 +38,7 @@ export function exportMenu(result, state) {
   const sheet = make("div", "sheet");
   const data = volume.links.data;
   const group = (title, nodes) => sheet.append(make("h3", "", title), ...nodes);
-  group("All quantities", WHOLE.map(([format, title]) => withKey(link(title, `${data}?format=${format}`), `${data}?format=${format}`)));
+  group(summary.quantities.includes("reflection") ? "All quantities (reflection: HDF5)" : "All quantities", WHOLE.map(([format, title]) => withKey(link(title, `${data}?format=${format}`), `${data}?format=${format}`)));
   const label = make("label", "", "Quantity ");
   const choice = make("select");
   for (const one of summary.quantities) choice.append(new Option(NAMES[one], one));
