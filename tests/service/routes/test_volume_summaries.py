@@ -64,7 +64,7 @@ def test_a_summary_names_quantities_candidates_and_errors(http, result):
     assert found["truth"]["rmse_mps"] == pytest.approx(np.sqrt(np.mean(inside**2)), rel=1e-9)
 
 
-@pytest.mark.parametrize("quantity", ["attenuation", "recovery", "colour"])
+@pytest.mark.parametrize("quantity", ["attenuation", "recovery", "reflection", "colour"])
 def test_a_quantity_that_is_missing_is_named(http, result, quantity):
     answer = http.get(f"{result}/data", params={"format": "npy", "quantity": quantity})
     assert (answer.status_code, answer.json()["field"]) == (422, "quantity")
@@ -80,6 +80,7 @@ def test_a_scan_without_truth_has_none(http, uploaded, work, submitted, until):
     here = f"/v1/volumes/{until(http, submitted(http, uploaded(http))['id'])['volume']}"
     assert http.get(f"{here}/summary").json() == {
         "quantities": ["speed", "coverage"],
+        "grids": {},
         "candidates": [],
         "reason": "",
         "truth": None,
