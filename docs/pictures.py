@@ -202,7 +202,7 @@ def comparison() -> Image.Image:
 
 def scan_page() -> Image.Image:
     """The page of a scan with traces: elements, quality, the traces of an emission."""
-    with _service() as service, _browser((1200, 1700)) as page:
+    with _service() as service, _browser((1400, 1650)) as page:
         made = service.client.wait(service.client.simulate(SAMPLE).id).dataset
         page.goto(f"{service.url}/#/scans/{made}")
         page.get_by_label("Emission number").fill("8")
@@ -214,7 +214,7 @@ def scan_page() -> Image.Image:
 
 def live_page() -> Image.Image:
     """The page of a running job, after some iterations."""
-    with _service() as service, _browser((1200, 900)) as page:
+    with _service() as service, _browser((1400, 1240)) as page:
         slow = {"method": "sart", "nodes": 128, "iterations": 60}
         job = service.client.submit(service.uploaded(), slow)
         page.goto(f"{service.url}/#/jobs/{job.id}")
@@ -225,7 +225,7 @@ def live_page() -> Image.Image:
 
 def jobs_page() -> Image.Image:
     """The table of jobs: some succeeded, one under way, one cancelled."""
-    with _service() as service, _browser((1200, 620)) as page:
+    with _service() as service, _browser((1400, 640)) as page:
         client, scan = service.client, service.uploaded()
         for rays, name in {"straight": "Straight rays", "curved": "Bent rays"}.items():
             job = client.wait(client.submit(scan, {"method": "sart", "nodes": 64, "rays": rays}).id)

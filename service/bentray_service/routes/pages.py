@@ -7,7 +7,6 @@ from pathlib import Path
 from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse
 
-from ..web.formats import formats_page
 from ..web.reference import reference_page
 
 WEB = Path(__file__).parent.parent / "web"
@@ -30,6 +29,9 @@ def docs(request: Request) -> HTMLResponse:
 @router.get("/docs/formats")
 def formats(request: Request) -> HTMLResponse:
     """The formats of files that are read."""
+    # With it come all readers, which the service itself does not use.
+    from ..web.formats import formats_page
+
     return HTMLResponse(formats_page(request.app.version))
 
 
