@@ -313,6 +313,13 @@ class Settings:
         "Only the region of interest of the file may change (mask/roi).",
         label="Region of interest only",
     )
+    device: Literal["auto", "cpu", "opencl"] = setting(
+        "auto",
+        "Where full waveforms are simulated. opencl: on an OpenCL device, many emitters at a time; cpu and "
+        "auto: in compiled code. The images differ by rounding.",
+        label="Compute full waveforms on",
+        words={"auto": "Automatic", "cpu": "Processor", "opencl": "OpenCL device"},
+    )
     seed: int = setting(0, "Seed of the random order of emitters.", SEED, label="Random seed")
     resolution_check: bool = setting(
         False,

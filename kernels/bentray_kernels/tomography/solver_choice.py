@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..eikonal import METHODS
+from ..wave.emissions import Engine
 from .settings import DEVIATION, Settings
 
 
@@ -36,8 +37,18 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
     return Solver(False, None if straight else settings.ray_eikonal)
 
 
+def wave_engine(settings: Settings) -> Engine:
+    """What simulates full waveforms, for a refinement and for the validation of an image by ``auto``."""
+    return "opencl" if settings.device == "opencl" and settings.selects_model else "compiled"
+
+
 def needs_device(settings: Settings) -> bool:
-    """Whether a call of the reconstruction tracks wave fronts on an OpenCL device."""
+    """Whether a call of the reconstruction computes on an OpenCL device."""
+    return tracks_on_device(settings) or wave_engine(settings) == "opencl"
+
+
+def tracks_on_device(settings: Settings) -> bool:
+    """Whether wave fronts are tracked on an OpenCL device."""
     # Candidate models have curved rays whatever the setting.
     straight = settings.rays == "straight" and not settings.selects_model
     return not straight and METHODS[settings.ray_eikonal].on_device

@@ -34,6 +34,7 @@ class ReconstructionSettings(TypedDict, total=False):
     iterations: int
     speed_bounds_mps: tuple[float, float]
     roi: bool
+    device: Literal["auto", "cpu", "opencl"]
     seed: int
     resolution_check: bool
     minutes: float | None

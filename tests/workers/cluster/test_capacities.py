@@ -45,6 +45,12 @@ def test_without_a_device_the_method_is_rejected(fresh, monkeypatch):
     assert "opencl" not in lanes(fresh)
 
 
+def test_without_a_device_waveforms_on_a_device_are_rejected(fresh, monkeypatch):
+    monkeypatch.setattr(capacities, "_has_device", lambda: False)
+    with pytest.raises(InvalidInput, match="device: found 'opencl', which no connected worker has"):
+        capacities.resources_for(fresh, Settings(method="waveform", device="opencl"))
+
+
 def test_a_device_is_offered_once_it_has_passed(fresh, monkeypatch):
     asked = []
     monkeypatch.setattr(capacities, "_has_device", lambda: not asked.append(None))

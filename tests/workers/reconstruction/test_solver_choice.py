@@ -11,7 +11,7 @@ from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart import sart_update
 from bentray_kernels.tomography.sart.sart_step import advance, begin
 from bentray_kernels.tomography.settings import DEVIATION
-from bentray_kernels.tomography.solver_choice import needs_device, solver_of
+from bentray_kernels.tomography.solver_choice import needs_device, solver_of, wave_engine
 from bentray_workers.cluster.capacities import MIB, resource_of
 from bentray_workers.files.dataset.counts import Summary
 from bentray_workers.reconstruction.memory.ray_memory import call_bytes
@@ -85,4 +85,13 @@ def test_device_resource_is_requested_where_a_device_is_used(method, rays, eikon
         pytest.skip("refused")
     used = eikonal in ON_DEVICE and (rays == "curved" or method == "auto")
     assert needs_device(settings) is used
+    assert resource_of(settings) == ("opencl" if used else "recon")
+
+
+@pytest.mark.parametrize("device", ["auto", "cpu", "opencl"])
+@pytest.mark.parametrize("method", ["sart", "gauss-newton", "auto", "waveform"])
+def test_waves_are_simulated_on_a_device_that_is_requested(method, device):
+    settings = Settings(method=method, device=device)
+    used = device == "opencl" and method in ("auto", "waveform")
+    assert wave_engine(settings) == ("opencl" if used else "compiled")
     assert resource_of(settings) == ("opencl" if used else "recon")

@@ -12,6 +12,7 @@ from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_kernels.tomography.waveform.inversion_state import Image
+from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.reference import reference_path
 from bentray_workers.reconstruction import reconstruction_run
@@ -42,6 +43,16 @@ def same(result, expected):
         assert getattr(result, name) == getattr(expected, name), name
     stated = {"quality": "nothing found", "frequency_hz": repr(scan().center_frequency_hz)}
     assert {**expected.provenance, **stated} == {**result.provenance}
+
+
+@pytest.mark.opencl
+def test_waves_of_a_device_make_the_image_of_compiled_code(path, expected, tmp_path):
+    with open_cluster(workers=1, local_directory=tmp_path, processes=False) as cluster:
+        found = reconstruction_run.reconstruct(cluster.client, path, replace(PLAN, device="opencl"))
+    assert 0.0 < np.abs(found.speed - expected.speed).max() < 0.01
+    assert found.settings == replace(expected.settings, device="opencl")
+    assert "on OpenCL devices" in found.provenance["waveform"]
+    assert "on OpenCL devices" not in expected.provenance["waveform"]
 
 
 def test_waves_make_the_image_of_rays_better(expected):

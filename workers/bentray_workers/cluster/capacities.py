@@ -12,7 +12,7 @@ from distributed import Client, LocalCluster
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import choose
 from bentray_kernels.tomography.settings import Settings
-from bentray_kernels.tomography.solver_choice import needs_device
+from bentray_kernels.tomography.solver_choice import needs_device, tracks_on_device
 
 from .connected import connected_workers
 from .resources import OPENCL, RECONSTRUCTION
@@ -48,8 +48,16 @@ class WorkerCapacity:
 
 
 def resource_of(settings: Settings) -> Lane:
-    """The resource that tasks of a reconstruction need: OpenCL where wave fronts are computed on a device."""
+    """The resource that tasks of a reconstruction need: OpenCL where wave fronts or waves need a device."""
     return "opencl" if needs_device(settings) else "recon"
+
+
+def without_device(settings: Settings) -> InvalidInput:
+    """The error of settings that need a device that no connected worker has."""
+    if tracks_on_device(settings):
+        found, accepted = f"{settings.eikonal!r}, which no connected worker has", "a method without a device"
+        return InvalidInput("eikonal", found, accepted)
+    return InvalidInput("device", f"{settings.device!r}, which no connected worker has", "auto or cpu")
 
 
 def capacities_of(client: Client) -> tuple[WorkerCapacity, ...]:
@@ -90,9 +98,7 @@ def resources_for(client: Client, settings: Settings) -> dict[str, int]:
     if resource_of(settings) != "opencl":
         return RECONSTRUCTION
     if not any("opencl" in capacity.resources for capacity in probed_capacities(client, settings)):
-        raise InvalidInput(
-            "eikonal", f"{settings.eikonal!r}, which no connected worker has", "a method without a device"
-        )
+        raise without_device(settings)
     return {**RECONSTRUCTION, **OPENCL}
 
 

@@ -16,7 +16,7 @@ from bentray_kernels.tomography.requirements import check_waveform
 from bentray_kernels.tomography.settings import MIN_NODES, Settings
 from bentray_kernels.tomography.stage_graphs import BATCH
 
-from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of
+from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of, without_device
 from ..cluster.checkpoints import KEPT
 from ..cluster.task_words import task_in_words
 from ..files.dataset.counts import Summary
@@ -115,9 +115,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     lane: Lane = "opencl" if resource_of(settings) == "opencl" else "recon"
     fitting = [one for one in capacities if lane in one.resources]
     if capacities and not fitting:
-        raise InvalidInput(
-            "eikonal", f"{settings.eikonal!r}, which no connected worker has", "a method without a device"
-        )
+        raise without_device(settings)
     methods = [settings]
     if settings.selects_model:
         methods = [final_settings(settings, changes) for changes in CANDIDATES]

@@ -12,6 +12,7 @@ from ...errors import InvalidInput
 from ..numerics import BANDS
 from ..requirements import check_waveform
 from ..settings import Settings
+from ..solver_choice import wave_engine
 from .waveform_cost import core_seconds
 from .waveform_settings import Band, WaveSettings, bands, loss_band
 
@@ -117,4 +118,5 @@ def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
         seed=settings.seed,
         roi=settings.roi,
         opening_angle_deg=settings.opening_angle_deg,
+        engine=wave_engine(settings),
     )

@@ -188,6 +188,8 @@ def _summary(rays: Reconstruction, plan: WaveSettings, graphs: Sequence[Refineme
     ratio = misfit_ratio(graphs)
     gain = f"{100.0 * (1.0 - ratio):.0f} % better" if ratio < 1.0 else "no better"
     text = f"full waveform, {corners}, predicts held-out emitters {gain} than its initial image ({start})"
+    if plan.engine == "opencl":
+        text += "; waves simulated on OpenCL devices"
     if len(speed) < len(plan.bands):
         text += "; attenuation is experimental"
     for number, band in enumerate(plan.bands):

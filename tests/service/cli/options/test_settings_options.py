@@ -29,6 +29,7 @@ CHOICES = [
     (["--iterations", "7"], "iterations", 7),
     (["--speed-bounds", "1400", "1600"], "speed_bounds_mps", (1400.0, 1600.0)),
     (["--roi"], "roi", True),
+    (["--device", "opencl"], "device", "opencl"),
     (["--seed", "5"], "seed", 5),
     (["--resolution-check"], "resolution_check", True),
     (["--minutes", "2.5"], "minutes", 2.5),

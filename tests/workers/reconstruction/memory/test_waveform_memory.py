@@ -7,18 +7,26 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bentray_kernels.opencl import session_or_warning
 from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wave_settings
+from bentray_kernels.tomography.waveform.band_inversion import Model
+from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
+from bentray_kernels.tomography.waveform.refinement_graph import evaluate_emitter
+from bentray_kernels.wave.device_waves import DeviceWaves, Scan
+from bentray_kernels.wave.simulation import place_elements
 from bentray_workers.cluster.capacities import MIB
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import Traces
 from bentray_workers.files.dataset.summary import summary_of
 from bentray_workers.reconstruction.memory.waveform_memory import wave_task_bytes, wave_tasks
 
-from ....kernels.tomography.waveform.scans import CENTRE_HZ, ELEMENTS, RATE_HZ, WATER, scan
+from ....kernels.tomography.waveform.scans import CENTRE_HZ, ELEMENTS, RADIUS, RATE_HZ, WATER, scan
 
 PROGRAM = Path(__file__).with_name("wave_task_memory.py")
 ROOT = Path(__file__).parents[4]
@@ -80,6 +88,31 @@ def test_planned_memory_is_monotonic(bands, emissions, samples, width):
         assert all(other[name] > size for name, size in found.items())
     more = wave_task_bytes(traces, width, settings.changed(bands=bands + 1))
     assert all(more[name] >= size for name, size in found.items())
+
+
+@pytest.mark.opencl
+def test_the_plan_holds_the_arrays_of_a_device():
+    settings = Settings.of(method="waveform", nodes=32, bands=2, emitters=5, device="opencl")
+    data = scan()
+    plan = wave_settings(scale_of(data, settings, data.waveform.object.shape[-1], 1), settings)
+    assert plan.engine == "opencl"
+    waves = MemoryWaveScan(data, plan)
+    looks = plan.bands[1].emitters + plan.held_out
+    problem = waves.problem(1)
+    model = Model(np.full(problem.region.shape, WATER))
+    evaluate_emitter(waves, 1, model, 0, looks)
+    kept = [array for emitter in problem.used.tolist() for array in problem.observed(emitter, plan.window_s)]
+    receivers = place_elements(problem.medium(model.speed), problem.receivers)
+    sizes = Scan(receivers, problem.clock.steps, problem.every)
+    device = DeviceWaves(session_or_warning(""), problem.medium(model.speed), sizes)
+    needed = sum(array.nbytes for array in kept) + device.plan().emitters * device.size.bytes(1)
+    told = wave_task_bytes(
+        replace(SCAN, emissions=12, receivers=ELEMENTS, samples=120), 2.0 * RADIUS, settings
+    )
+    assert needed < told["evaluate_emitter"] < 4 * needed + 16 * MIB
+    without = wave_task_bytes(SCAN, 0.1, settings.changed(device="cpu"))
+    assert without == wave_task_bytes(SCAN, 0.1, settings.changed(device="auto"))
+    assert without["evaluate_emitter"] < wave_task_bytes(SCAN, 0.1, settings)["evaluate_emitter"]
 
 
 def test_plan_covers_every_automatic_choice():

@@ -6,11 +6,14 @@ Compared with measured peaks in ``tests/workers/reconstruction/memory/test_wavef
 from __future__ import annotations
 
 from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.tomography.solver_choice import wave_engine
 from bentray_kernels.tomography.waveform.automatic_settings import WaveScale
 from bentray_kernels.tomography.waveform.band_grid import Extent
 from bentray_kernels.tomography.waveform.source_calibration import SHOTS
 from bentray_kernels.tomography.waveform.validation import validation_settings
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
+from bentray_kernels.wave.device_memory import FlightSize
+from bentray_kernels.wave.device_waves import PROCESSOR_EMITTERS
 
 from ...files.dataset.counts import Traces
 
@@ -20,6 +23,13 @@ FLOOR_BYTES = 13 * 2**20 // 2
 # Bytes per sample: simulated and recorded water shots, spectra and windows; traces, window and residuals of
 # one emitter; entries of the resampler while it is made.
 SHOT_BYTES, LOOK_BYTES, SAMPLER_BYTES = 144, 96, 64
+
+# Bytes per sample of the recorded traces that are kept for devices, with their weights; per node of the
+# images that an emitter brings back from one.
+OBSERVED_BYTES, FOUND_BYTES = 8, 12
+
+# Nodes of a field on a device over those of the padded image, at most: rows are filled up to groups.
+FILLED = 1.5
 
 # Bytes per node: medium and fields; images of an update, without L-BFGS pairs.
 MEDIUM_BYTES, STEP_BYTES = 72, 280
@@ -95,17 +105,23 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
     cached = traces.bytes_of(looks) + 4 * traces.samples * extent.steps
     base = FLOOR_BYTES + cached
     medium = MEDIUM_BYTES * padded
+    stored = -(-extent.steps // extent.every)
+    in_flight = 4 * extent.nodes**2 * stored
+    if wave_engine(settings) == "opencl":
+        base += OBSERVED_BYTES * samples * looks
+        field = int(FILLED * padded)
+        flight = FlightSize(field, extent.nodes**2, stored, samples, 4).bytes(1)
+        # A processor as a device has its arrays in the memory of the worker; a GPU holds more emitters.
+        in_flight = (
+            PROCESSOR_EMITTERS * flight + (OBSERVED_BYTES * samples + FOUND_BYTES * extent.nodes**2) * looks
+        )
     return {
         "start_band": base
         + 2 * traces.read_bytes
         + max(SAMPLER_BYTES * traces.samples * extent.steps, SHOTS * SHOT_BYTES * samples)
         + medium
         + 12 * image,
-        "evaluate_emitter": base
-        + 4 * extent.nodes**2 * -(-extent.steps // extent.every)
-        + LOOK_BYTES * samples
-        + medium
-        + 4 * image,
+        "evaluate_emitter": base + in_flight + LOOK_BYTES * samples + medium + 4 * image,
         # The results of all emitters, and the L-BFGS pairs before and after.
         "update_image": base
         + 2 * image * looks
