@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from bentray_kernels.opencl import Session, choose
+from bentray_kernels.opencl import VARIABLE, Session, choose
 
 from . import opencl, postgresql
 from . import small_disk as small
@@ -161,10 +161,22 @@ def opencl_session() -> Session:
 
 
 @pytest.fixture(autouse=True)
-def _device_for_marked_tests(request: pytest.FixtureRequest) -> None:
-    """A test marked ``opencl`` needs the device, whether it asks for the session or not."""
-    if request.node.get_closest_marker("opencl"):
+def _device_for_marked_tests(request: pytest.FixtureRequest) -> Iterator[None]:
+    """A test marked ``opencl`` needs the device, whether it asks for the session or not.
+
+    Pictures and jobs of other tests do not depend on what is faster on this machine; kernels choose by name.
+    """
+    marked = request.node.get_closest_marker("opencl") is not None
+    if marked:
         request.getfixturevalue("opencl_session")
+    before = os.environ.get(VARIABLE)
+    if not marked and request.path.relative_to(TESTS).parts[0] != "kernels":
+        os.environ[VARIABLE] = "cpu"
+    yield
+    if before is None:
+        os.environ.pop(VARIABLE, None)
+    else:
+        os.environ[VARIABLE] = before
 
 
 @pytest.fixture

@@ -24,6 +24,7 @@ def fast_iterative_opencl(problem: PointSource, *, tolerance: float = 1e-12) -> 
 
     Raises:
         InvalidInput: for a negative tolerance, or a ``BENTRAY_OPENCL_DEVICE`` that does not match one device.
+        DeviceLostError: when the device fails.
 
     Warns:
         OpenCLFallbackWarning: once, where no device passes its self-test and ``fim`` computes instead.
@@ -48,6 +49,7 @@ def fast_iterative_opencl_many(
     # Imported here, so that OpenCL is loaded only when it is used.
     from ..opencl.blocks import travel_times
     from ..opencl.choice import session_or_warning
+    from ..opencl.lost_device import computing_on
 
     session = session_or_warning(instead="fim")
     if session is None:
@@ -66,4 +68,5 @@ def fast_iterative_opencl_many(
         nodes, starts = problem.seeds()
         places = np.array(np.unravel_index(nodes, problem.padded_shape)) - 1
         seeds.append((np.ravel_multi_index(tuple(places), problem.slowness.shape), starts))
-    times[...] = travel_times(session, crossings, seeds, tolerance)
+    with computing_on(session):
+        times[...] = travel_times(session, crossings, seeds, tolerance)

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
-from .devices import NONE, WISH, Device, find_devices, hidden, select_devices
+from .devices import WISH, Device, find_devices, hidden, select_devices
+from .lost_device import DeviceLostError, cpu_only
 from .session import Session
 from .verdict import verdict_on
 
@@ -38,8 +39,8 @@ class Choice:
         """Why there is no device; empty where there is one."""
         if self.device is not None:
             return ""
-        if hidden():
-            return f"{WISH}={NONE} hides every device"
+        if reason := hidden():
+            return f"{reason} hides every device"
         return "; ".join(self.refusals) or "this machine has no OpenCL device"
 
 
@@ -61,19 +62,32 @@ def choose() -> Choice:
 def session_or_warning(instead: str) -> Session | None:
     """The chosen device, open; or None after a warning that names what is used instead.
 
+    None without a warning where this thread may not use a device, see ``lost_device.on_cpu``.
+
     Args:
         instead: the method that takes over.
 
     Raises:
         InvalidInput: as ``choose``.
+        DeviceLostError: after the device failed in this process.
     """
+    if cpu_only():
+        return None
     # Only one thread may test or open a device at a time.
     with _OPENING:
-        found = _found(os.environ.get(WISH))
-        if isinstance(found, Session):
-            return found
-        _warn_once(instead, found)
-        return None
+        found = _found(os.environ.get(WISH), hidden())
+        if isinstance(found, str):
+            _warn_once(instead, found)
+            return None
+    if found.lost:
+        raise DeviceLostError(found.lost)
+    return found
+
+
+def open_session(device: Device) -> Session:
+    """The device, open; the same for every caller in this process."""
+    with _OPENING:
+        return _opened(device)
 
 
 def scene_or_warning(build: Callable[[Session], Placed], instead: str) -> Placed | None:
@@ -104,12 +118,15 @@ _OPENING = threading.Lock()
 
 
 @cache
-def _found(selection: str | None) -> Session | str:
+def _opened(device: Device) -> Session:
+    return Session(device)
+
+
+@cache
+def _found(_selection: str | None, _hidden: str) -> Session | str:
     """The open device, or the reason for none; once per selection and process."""
     choice = choose()
-    if choice.device is not None:
-        return Session(choice.device)
-    return choice.reason
+    return choice.reason if choice.device is None else _opened(choice.device)
 
 
 @cache

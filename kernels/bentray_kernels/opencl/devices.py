@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import InvalidInput
@@ -16,6 +16,11 @@ from .pocl import prepare
 # The environment variable that selects the device, and its value for none.
 WISH = "BENTRAY_OPENCL_DEVICE"
 NONE = "none"
+
+# The environment variable that decides for this machine whether devices compute, see ``placement``, and its
+# value for never.
+VARIABLE = "BENTRAY_DEVICE"
+NEVER = "cpu"
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,7 @@ class Device:
         double_precision: whether it computes in float64.
         library: path of the driver's shared library; empty if unknown.
         package: name and version of the Python package that contains it; empty for one of the system.
+        memory_bytes, buffer_bytes: of its memory, and of the largest buffer in it; 0: unknown.
     """
 
     index: int
@@ -43,6 +49,9 @@ class Device:
     double_precision: bool
     library: str = ""
     package: str = ""
+    # A driver may count memory that is free now.
+    memory_bytes: int = field(default=0, compare=False, repr=False)
+    buffer_bytes: int = field(default=0, compare=False, repr=False)
 
     @property
     def label(self) -> str:
@@ -52,7 +61,7 @@ class Device:
 def find_devices() -> tuple[Device, ...]:
     """Every OpenCL device, in the order of the platforms.
 
-    Empty where OpenCL is not installed, and where ``BENTRAY_OPENCL_DEVICE`` is ``none``.
+    Empty where OpenCL is not installed, and where the environment hides every device.
     """
     return tuple(_described(index, handle) for index, handle in enumerate(_handles()))
 
@@ -69,9 +78,12 @@ def handle_of(device: Device) -> Any:
     raise LookupError(f"{device.label} is no longer OpenCL device {device.index}")
 
 
-def hidden() -> bool:
-    """Whether ``BENTRAY_OPENCL_DEVICE`` hides every device."""
-    return os.environ.get(WISH, "").strip().lower() == NONE
+def hidden() -> str:
+    """The variable that hides every device, with its value; empty if none does."""
+    for name, value in ((WISH, NONE), (VARIABLE, NEVER)):
+        if os.environ.get(name, "").strip().lower() == value:
+            return f"{name}={value}"
+    return ""
 
 
 def select_devices(devices: Sequence[Device], selection: str | None) -> tuple[Device, ...]:
@@ -143,4 +155,6 @@ def _described(index: int, handle: Any) -> Device:
         bool(handle.double_fp_config) if "cl_khr_fp64" in handle.extensions else False,
         library,
         package_of(library),
+        int(handle.global_mem_size),
+        int(handle.max_mem_alloc_size),
     )

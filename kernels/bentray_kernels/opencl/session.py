@@ -17,14 +17,18 @@ class Session:
     """A device in use. Hold ``lock`` while setting arguments and launching: kernels store them.
 
     Attributes:
+        device: its description.
         lock: for one task at a time.
         handle: the ``pyopencl.Device``.
         queue: in-order command queue.
+        lost: why it cannot be used any more; empty while it can.
     """
 
     def __init__(self, device: Device) -> None:
         import pyopencl as cl
 
+        self.device = device
+        self.lost = ""
         self.lock = threading.RLock()
         self.handle = handle_of(device)
         self.context = cl.Context([self.handle])

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
-import platform
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
-from importlib import resources
 from pathlib import Path
 
+from .child_process import answers_of
 from .devices import Device
-from .processor import processor
+from .records import read_record, record_file, write_record
 from .self_test import NEEDED, STAGES, WIDTHS
 
 # Building all kernels takes seconds; the machine may be busy with starting workers.
@@ -60,6 +54,11 @@ def verdict_on(device: Device) -> Verdict:
     return verdict
 
 
+def stored_verdict(device: Device) -> Verdict | None:
+    """The verdict in the cache, without a test; None without one."""
+    return _kept(device) if device.double_precision else None
+
+
 def examine(device: Device, child: Child) -> Verdict:
     """Run all stages; if the device ends or stops the child, run the rest in another one."""
     faults: dict[str, str] = {}
@@ -84,46 +83,21 @@ def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tupl
     Returns:
         The faults of the completed stages, and how the process ended in the next one.
     """
-    command = [sys.executable, "-m", f"{__package__}.self_test", str(device.index), device.label, *stages]
-    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as errors:
-        try:
-            code = subprocess.run(  # noqa: S603 - our own module
-                command, stdout=out, stderr=errors, stdin=subprocess.DEVNULL, timeout=time_out_s, check=False
-            ).returncode
-            ending = f"ended by signal {-code}" if code < 0 else f"ended with exit code {code}"
-        except subprocess.TimeoutExpired:
-            ending = f"no answer in {time_out_s:g} s"
-        out.seek(0)
-        errors.seek(0)
-        said = errors.read().strip().splitlines() or [""]
-        # The error of a compiler is more useful than the last line, which may be a remark.
-        last = ([line for line in said if "error:" in line.lower()] or said)[-1].strip()
-        answers: Answers = {}
-        for line in out.read().splitlines():
-            try:
-                answer = json.loads(line)
-                answers[str(answer["stage"])] = str(answer["fault"])
-            except (ValueError, KeyError, TypeError):  # a driver's own remark
-                continue
-    return answers, f"{ending} ({last[:200]})" if last else ending
+    answers, ending = answers_of(f"{__package__}.self_test", device, stages, time_out_s)
+    known = [answer for answer in answers if {"stage", "fault"} <= answer.keys()]
+    return {str(answer["stage"]): str(answer["fault"]) for answer in known}, ending
 
 
 def _file(device: Device) -> Path:
-    """File of the cached verdict; driver, processor, program and self-test determine its name."""
-    # Hosts with a common home may have different processors of the same generic name.
-    digest = hashlib.sha256(repr((device, platform.machine(), sorted(processor()))).encode())
-    package = resources.files(__package__)
-    for name in ("self_test.py", "blocks.py", "session.py", "pocl.py", "link/shared_library.py"):
-        digest.update(package.joinpath(name).read_bytes())
-    for source in sorted(Path(str(package / "sources")).rglob("*.cl")):
-        digest.update(source.read_bytes())
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return home / "bentray" / f"opencl-{digest.hexdigest()[:32]}.json"
+    package = Path(__file__).parent
+    names = ("self_test.py", "blocks.py", "session.py", "pocl.py", "link/shared_library.py")
+    sources = (*(package / name for name in names), *sorted((package / "sources").rglob("*.cl")))
+    return record_file("opencl", device, (source.read_bytes() for source in sources))
 
 
 def _kept(device: Device) -> Verdict | None:
     try:
-        content = json.loads(_file(device).read_text())
+        content = read_record(_file(device))
         widths = tuple(int(width) for width in content["widths"])
         return Verdict("", widths, {str(k): str(v) for k, v in content["faults"].items()})
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError):
@@ -132,11 +106,6 @@ def _kept(device: Device) -> Verdict | None:
 
 def _keep(device: Device, verdict: Verdict) -> None:
     """Store only success: a failure may be due to a busy machine."""
-    try:
-        file = _file(device)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=file.parent, delete=False) as partial:
-            json.dump(asdict(verdict), partial)
-        Path(partial.name).replace(file)
-    except (OSError, RuntimeError):  # no home to write to: the next process tries the device again
-        return
+    # Without a home there is no folder.
+    with suppress(OSError, RuntimeError):
+        write_record(_file(device), asdict(verdict))

@@ -12,7 +12,7 @@ from ..errors import InvalidInput
 from ..isosurface import crossing
 from ..isosurface.crossing import Search
 from ..isosurface.roots import STEPS
-from ..opencl import OpenCLFallbackWarning, Session, scene_or_warning
+from ..opencl import OpenCLFallbackWarning, Session, Work, computing_on, scene_or_warning
 from ..opencl.session import set_arguments
 from .camera import perspective
 from .caster import RefractiveMedium, Traced, allocate_results, cast
@@ -93,6 +93,7 @@ class OpenCLCaster:
 
         Raises:
             InvalidInput: for a medium of another scene.
+            DeviceLostError: when the device fails after its self-test.
 
         Warns:
             OpenCLFallbackWarning: once for each root finder for which the device fails its self-test and
@@ -107,8 +108,17 @@ class OpenCLCaster:
                 name = self.session.handle.name
                 message = f"{name} casts rays wrong ({way.lower()}), caster.cast takes over: {fault}"
                 warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
-        follow = cast if self._faults[way] else self.follow
-        follow(medium, search, camera, places, depth, traced)
+        rays = medium, search, camera, places, depth, traced
+        if self._faults[way]:
+            cast(*rays)
+        else:
+            with computing_on(self.session):
+                self.follow(*rays)
+
+    @property
+    def fault(self) -> str:
+        """Why ``caster.cast`` takes over; empty if it does not."""
+        return next(filter(None, self._faults.values()), "")
 
     def fault_of(self, medium: RefractiveMedium, search: Search) -> str:
         """Difference from ``caster.cast`` for rays at the object, as a message; empty if correct."""
@@ -224,6 +234,14 @@ class OpenCLCaster:
             f"UNPROVED={crossing.UNPROVED}",
             f"DEEPEST={STEPS}",
         )
+
+
+def work_of(scene: Scene, rays: int) -> Work:
+    """The rays of a picture of a scene, as work for ``opencl.place``; rays are cast in parts that fit."""
+    parts = (scene.field.coefficients, scene.octree.masks, scene.octree.bend)
+    sizes = [part.nbytes for part in parts]
+    # Rays take a quarter of the memory, see ``Session.doubles_at_once``.
+    return Work("refraction", rays, 4 * sum(sizes) // 3, max(sizes))
 
 
 def _way(search: Search) -> str:

@@ -91,6 +91,7 @@ def simulate_emissions(
     Raises:
         InvalidInput: as ``simulate``; for a device that cannot hold one emission, and where
             ``BENTRAY_OPENCL_DEVICE`` does not match one device.
+        DeviceLostError: when the device fails.
 
     Warns:
         OpenCLFallbackWarning: once, where no device passes its self-test and compiled code is used instead.
@@ -102,17 +103,19 @@ def simulate_emissions(
             at, until = emissions.receivers[valid], emissions.needed(k)
             yield simulate(medium, emitter, at, emissions.wavelet, poll, until)
         return
+    from ..opencl.lost_device import computing_on
     from .device_flight import Flight
     from .device_waves import DeviceWaves, Scan, tiles
 
-    waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
-    plan = waves.plan(memory_bytes)
-    pulse, scale = _normalised(medium, emissions.wavelet)
-    for tile in tiles(len(emissions.emitters), plan.emitters):
-        flight = Flight(waves, _some(sources, tile), pulse, 1, poll)
-        flight.forward()
-        for k, samples in enumerate(flight.traces(), tile.start):
-            yield _traces(emissions, k, samples, scale)
+    with computing_on(session):
+        waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
+        plan = waves.plan(memory_bytes)
+        pulse, scale = _normalised(medium, emissions.wavelet)
+        for tile in tiles(len(emissions.emitters), plan.emitters):
+            flight = Flight(waves, _some(sources, tile), pulse, 1, poll)
+            flight.forward()
+            for k, samples in enumerate(flight.traces(), tile.start):
+                yield _traces(emissions, k, samples, scale)
 
 
 def emission_misfits(
@@ -130,16 +133,18 @@ def emission_misfits(
         simulated = simulate_emissions(medium, emissions, poll, engine, memory_bytes)
         yield from (misfit(k, traces)[0] for k, traces in enumerate(simulated))
         return
+    from ..opencl.lost_device import computing_on
     from .device_flight import Flight
     from .device_waves import DeviceWaves, Scan, tiles
 
     sources, receivers = place_scan(medium, *emissions.elements, emissions.wavelet)
-    waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
-    pulse, scale = _normalised(medium, emissions.wavelet)
-    for tile in tiles(len(emissions.emitters), waves.plan(memory_bytes).emitters):
-        flight = Flight(waves, _some(sources, tile), pulse, 1, poll)
-        flight.forward()
-        yield from _compared(flight, observed, tile, scale)[0].tolist()
+    with computing_on(session):
+        waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
+        pulse, scale = _normalised(medium, emissions.wavelet)
+        for tile in tiles(len(emissions.emitters), waves.plan(memory_bytes).emitters):
+            flight = Flight(waves, _some(sources, tile), pulse, 1, poll)
+            flight.forward()
+            yield from _compared(flight, observed, tile, scale)[0].tolist()
 
 
 def misfit_gradients(
@@ -185,24 +190,26 @@ def misfit_gradients(
             until = emissions.needed(k)
             yield misfit_gradient(medium, emitter, at, emissions.wavelet, compare, every, by, poll, until)
         return
+    from ..opencl.lost_device import computing_on
     from .device_flight import Flight
     from .device_waves import DeviceWaves, Scan, tiles
 
-    waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size, every, by))
-    plan = waves.plan(memory_bytes)
-    pulse, scale = _normalised(medium, emissions.wavelet)
-    for tile in tiles(len(emissions.emitters), plan.emitters):
-        flight = Flight(waves, _some(sources, tile), pulse, plan.segments, poll)
-        flight.forward()
-        if observed is None:
-            values, factors = _compared_here(flight, emissions, misfit, tile, scale)
-        else:
-            values, divisors = _compared(flight, observed, tile, scale)
-            # The residuals are derivatives by samples in the unit of the device.
-            factors = 1.0 / (divisors * scale)
-        for value, factor, image, light in zip(values, factors, *flight.backward(), strict=True):
-            summed = factor * image.astype(np.float64)
-            yield gradient_of(medium, scale, float(value), summed, light.astype(np.float64), every, by)
+    with computing_on(session):
+        waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size, every, by))
+        plan = waves.plan(memory_bytes)
+        pulse, scale = _normalised(medium, emissions.wavelet)
+        for tile in tiles(len(emissions.emitters), plan.emitters):
+            flight = Flight(waves, _some(sources, tile), pulse, plan.segments, poll)
+            flight.forward()
+            if observed is None:
+                values, factors = _compared_here(flight, emissions, misfit, tile, scale)
+            else:
+                values, divisors = _compared(flight, observed, tile, scale)
+                # The residuals are derivatives by samples in the unit of the device.
+                factors = 1.0 / (divisors * scale)
+            for value, factor, image, light in zip(values, factors, *flight.backward(), strict=True):
+                summed = factor * image.astype(np.float64)
+                yield gradient_of(medium, scale, float(value), summed, light.astype(np.float64), every, by)
 
 
 def _compared(flight: Flight, observed: Observed, tile: slice, scale: float) -> tuple[Floats, Floats]:

@@ -1,53 +1,156 @@
-"""`bentray devices`: list and test the OpenCL devices."""
+"""`bentray devices`: list, test and measure the OpenCL devices."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from bentray_kernels.errors import InvalidInput
 
 from .opencl_help import help_of
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from bentray_kernels.opencl import Choice, Device, Verdict
+    from bentray_kernels.device_engines import Comparison
+    from bentray_kernels.opencl import Choice, Device, Trial, Verdict
 
 
-def devices(as_json: AsJson = False) -> None:
-    """List and test the OpenCL devices, and show which one the method fim-opencl uses.
+def devices(
+    bench: Annotated[
+        bool, typer.Option("--bench", help="Also measure every engine on the chosen device: minutes.")
+    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="With --bench: small problems only.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """List and test the OpenCL devices, and show what computes on the chosen one.
 
-    A device that computes wrong results, aborts or hangs is rejected with the reason. Without a usable
-    device, the computation runs without OpenCL. GPUs are preferred over CPUs. The variable
-    BENTRAY_OPENCL_DEVICE selects a device by index or name; "none" hides all.
+    A device that computes wrong results, aborts or hangs is rejected with the reason. On the chosen device a
+    trial measures each engine beside compiled code; `--device auto` follows it. Test and trial are stored
+    until the driver or Bentray changes. GPUs are preferred over CPUs. The variable BENTRAY_OPENCL_DEVICE
+    selects a device by index or name, "none" hides all; BENTRAY_DEVICE is auto, cpu or opencl.
 
-    Example:  bentray devices --json
+    Example:  bentray devices --bench
     """
-    from bentray_kernels.opencl import choose, find_devices, verdict_on
+    from bentray_kernels.opencl import choose, find_devices, requested, trial_of, verdict_on
 
+    if quick and not bench:
+        raise InvalidInput("--quick", "given without --bench", "--bench --quick")
+    request = requested()
     records = find_devices()
     verdicts: list[Verdict] = []
     with progress_bar("Testing OpenCL devices") as step:
         for device in records:
-            step(len(verdicts), len(records), device.name)
+            step(len(verdicts), len(records) + 1, device.name)
             verdicts.append(verdict_on(device))
-    choice = choose()
-    chosen = choice.device.index if choice.device is not None else None
+        choice = choose()
+        trial = None if choice.device is None else trial_of(choice.device)
+    compared = _compared(quick=quick) if bench and choice.device is not None else []
     if as_json:
-        rows = [_figures(device, verdict) for device, verdict in zip(records, verdicts, strict=True)]
-        print_json({"chosen": chosen, "reason": choice.reason, "help": help_of(choice), "devices": rows})
+        print_json(_figures(records, verdicts, choice, trial, compared) | {"device": request})
         return
     if records:
-        columns = ("index", "platform", "device", "kind", "driver", "verdict", "remarks")
+        columns = ("index", "platform", "device", "kind", "memory", "driver", "verdict", "remarks")
         cells = [
-            (d.index, d.platform, d.name, d.kind, d.driver, "usable" if v.usable else "refused", _remarks(v))
+            (
+                d.index,
+                d.platform,
+                d.name,
+                d.kind,
+                f"{d.memory_bytes / 2**30:.1f} GiB" if d.memory_bytes else "unknown",
+                d.driver,
+                "usable" if v.usable else "refused",
+                _remarks(v),
+            )
             for d, v in zip(records, verdicts, strict=True)
         ]
         print_table("OpenCL devices", columns, cells)
         print_lines(f"device {device.index} comes from {_source(device)}" for device in records)
+    if trial is not None:
+        _print_trial(trial)
+    if compared and choice.device is not None:
+        _print_compared(compared, choice.device)
     print_lines(_summary(choice, bool(records)))
 
 
-def _figures(device: Device, verdict: Verdict) -> dict[str, object]:
-    return {**asdict(device), "usable": verdict.usable, **asdict(verdict)}
+def _compared(*, quick: bool) -> list[Comparison]:
+    from bentray_kernels.device_engines import compare
+
+    found: list[Comparison] = []
+    with progress_bar("Measuring engines") as step:
+        for one in compare(quick):
+            found.append(one)
+            step(len(found), 7, one.engine.name)
+    return found
+
+
+def _figures(
+    records: tuple[Device, ...],
+    verdicts: list[Verdict],
+    choice: Choice,
+    trial: Trial | None,
+    compared: list[Comparison],
+) -> dict[str, object]:
+    timings = {} if trial is None else trial.timings
+    return {
+        "chosen": None if choice.device is None else choice.device.index,
+        "reason": choice.reason,
+        "help": help_of(choice),
+        "devices": [
+            {**asdict(device), "usable": verdict.usable, **asdict(verdict)}
+            for device, verdict in zip(records, verdicts, strict=True)
+        ],
+        "trial": {name: [one._asdict() for one in pair] for name, pair in timings.items()},
+        "trial_faults": {} if trial is None else dict(trial.faults),
+        "bench": [
+            {
+                "engine": one.engine.name,
+                "compiled_s": one.compiled_s,
+                "device_s": one.device_s,
+                "difference": one.difference,
+                "bound": one.engine.bound,
+                "difference_unit": one.engine.error_unit,
+                "bandwidth_share": one.bandwidth_share,
+            }
+            for one in compared
+        ],
+    }
+
+
+def _print_trial(trial: Trial) -> None:
+    """The trial, and what ``auto`` concludes from it."""
+    cells: list[tuple[Any, ...]] = [
+        (
+            engine,
+            f"{one.size:,.0f}",
+            f"{1e3 * one.compiled_s:.3g} ms",
+            f"{1e3 * one.device_s:.3g} ms",
+            "device" if trial.faster(engine, one.size) else "compiled",
+        )
+        for engine, pair in trial.timings.items()
+        for one in pair
+    ]
+    cells += [(engine, "", "", fault, "compiled") for engine, fault in trial.faults.items()]
+    print_table("Trial", ("engine", "size", "compiled", "device", "auto takes"), cells)
+
+
+def _print_compared(compared: list[Comparison], device: Device) -> None:
+    cells = [
+        (
+            one.engine.name,
+            "wrong" if one.compiled_s is None else f"{1e3 * one.compiled_s:.3g} ms",
+            "wrong" if one.device_s is None else f"{1e3 * one.device_s:.3g} ms",
+            "" if not one.device_s else f"{(one.compiled_s or 0.0) / one.device_s:.2f}",
+            "" if one.bandwidth_share is None else f"{one.bandwidth_share:.1%}",
+            ""
+            if one.difference is None
+            else f"{one.difference:.2g} of {one.engine.bound:g} {one.engine.error_unit}",
+        )
+        for one in compared
+    ]
+    columns = ("engine", "compiled", "device", "times the speed", "of its bandwidth", "difference")
+    print_table(f"Engines on {device.label}", columns, cells)
 
 
 def _remarks(verdict: Verdict) -> str:
@@ -63,6 +166,6 @@ def _source(device: Device) -> str:
 def _summary(choice: Choice, found: bool) -> list[str]:
     device = choice.device
     if device is not None:
-        return [f"fim-opencl uses device {device.index}, {device.label}"]
+        return [f"chosen: device {device.index}, {device.label}"]
     reason = "no device passed" if found else choice.reason
-    return [f"{reason}; fim-opencl computes without OpenCL, as fim", f"suggestion: {help_of(choice)}"]
+    return [f"{reason}; compiled code computes everything", f"suggestion: {help_of(choice)}"]

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 def help_of(choice: Choice) -> str:
     """The command, with a comment after ``#``; empty if a device is chosen."""
-    from bentray_kernels.opencl.devices import WISH, hidden
+    from bentray_kernels.opencl.devices import hidden
 
     if choice.device is not None:
         return ""
-    if hidden():
-        return f"unset {WISH}  # shows the devices of this machine again"
+    if reason := hidden():
+        return f"unset {reason.partition('=')[0]}  # shows the devices of this machine again"
     if Path(sys.prefix, "conda-meta").is_dir():
         return "conda install -c conda-forge pyopencl pocl  # a new PoCL, for x86-64 and Arm"
     if shutil.which("apt-get"):

@@ -78,12 +78,15 @@ def render(
 
     Example:  bentray render -o glass.png --phantom two-holes --index 1.5 --backdrop picture
     """
+    from bentray_kernels.opencl import check_available
+
     if (file is None) == (phantom is None):
         found = "neither a file nor --phantom" if file is None else "a file and --phantom"
         raise InvalidInput("file", found, "one of the two")
     if phantom is not None:
         _refuse({"--shape": shape, "--dtype": dtype, "--spacing": spacing})
     view, picture = options.view()
+    check_available(view.device)
     outputs = {"--output": output, "--map": position_map}
     check_apart(outputs, {"the volume": file, "the backdrop": picture})
     png = output_file(output, force=force, suffix=".png")
@@ -94,6 +97,7 @@ def render(
     from bentray_workers.files.atomic import write_bytes
     from bentray_workers.files.volume_formats import VolumeMetadata, import_volume
     from bentray_workers.images.png import png_of, read_picture
+    from bentray_workers.rendering.drawing_device import devices_of
     from bentray_workers.rendering.scene_cache import build_scene, check_size, filter_volume
 
     card = None if picture is None else read_picture(picture)
@@ -113,10 +117,11 @@ def render(
         strips = _drawn(scene, view, card, step)
     seconds = time.perf_counter() - built
     image, position = _joined(strips)
-    write_bytes(png, png_of(image))
+    device = devices_of([strip.drawn for strip in strips])
+    write_bytes(png, png_of(image, device))
     if placed is not None:
         _save(placed, position)
-    _show(volume, view, png, placed, (built - started, seconds), as_json=as_json)
+    _show(volume, view, png, placed, device, (built - started, seconds), as_json=as_json)
 
 
 def _refuse(given: dict[str, object]) -> None:
@@ -148,10 +153,16 @@ def _sampled(phantom: SampledPhantom, nodes: int) -> Volume:
 def _drawn(
     scene: Scene, view: RefractionView, card: Colours | None, step: Callable[[int, int], None]
 ) -> list[Tile]:
+    from bentray_kernels.opencl import computed
+    from bentray_workers.rendering.drawing_device import caster_for
     from bentray_workers.rendering.refraction import draw_tile
 
     tiles: list[Tile] = []
     rows = min(ROWS, max(1, RAYS // (view.width * view.times**2)))
+    rays = view.width * view.height * (view.times / view.ray_spacing) ** 2
+    if view.mode == "refract" and computed(lambda: caster_for(scene, int(rays), view.device))[0] is not None:
+        # A device casts all rays together.
+        rows = view.height
     pool = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
     try:
         drawn = [
@@ -190,6 +201,7 @@ def _show(
     view: RefractionView,
     png: Path,
     placed: Path | None,
+    device: str,
     seconds: tuple[float, float],
     *,
     as_json: bool,
@@ -203,6 +215,7 @@ def _show(
             "shape": list(volume.values.shape),
             "range": list(volume.range()),
             "rays": rays,
+            "device": device,
             "build_seconds": round(seconds[0], 4),
             "render_seconds": round(seconds[1], 4),
             "view": view.plain(),
@@ -215,6 +228,7 @@ def _show(
         ("volume", f"{' by '.join(map(str, volume.values.shape))} nodes, {low:g} to {high:g}"),
         ("surfaces", surfaces),
         ("filter", view.filter),
+        ("drawn by", device),
         ("time", f"{seconds[0]:.2f} s to build, {seconds[1]:.2f} s for {rays} rays"),
     ]
     print_table(volume.title or "Volume", ("figure", "value"), rows)

@@ -71,7 +71,7 @@ def test_without_a_device_fim_runs_with_a_warning(monkeypatch):
     speeds, sources = rough_problems(9, (12, 15), 3)
     expected = eikonal.solve_many(speeds, 1.0, sources, "fim")
     monkeypatch.setattr(
-        choice, "_found", lambda wish: "Fast Platform:GPU 9000 was refused: double1: wrong sqrt"
+        choice, "_found", lambda *_: "Fast Platform:GPU 9000 was refused: double1: wrong sqrt"
     )
     choice._warn_once.cache_clear()
     with pytest.warns(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bentray_kernels.opencl import Device, Session, choice, verdict
+from bentray_kernels.opencl import Device, Session, choice, placement, trial, verdict
 
 GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True)
 
@@ -35,7 +35,15 @@ def fresh(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     """Nothing remembered of any device, in the process or on disk; gives the folder of the latter."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
-    remembered = (verdict.verdict_on, choice._found, choice._warn_once)
+    monkeypatch.delenv("BENTRAY_DEVICE", raising=False)
+    remembered = (
+        verdict.verdict_on,
+        trial.trial_of,
+        choice._found,
+        choice._opened,
+        choice._warn_once,
+        placement._devices,
+    )
     for function in remembered:
         function.cache_clear()
     yield tmp_path / "bentray"

@@ -11,7 +11,7 @@ from .solids import distance
 
 
 def test_without_a_device_there_is_no_caster(monkeypatch):
-    monkeypatch.setattr(choice, "_found", lambda wish: "this machine has no OpenCL device")
+    monkeypatch.setattr(choice, "_found", lambda *_: "this machine has no OpenCL device")
     choice._warn_once.cache_clear()
     ball = Scene.build(Spline(0.3 - distance(12)), Layers((0.0,), (1.0, 1.5)), 1.0 / 11)
     with pytest.warns(OpenCLFallbackWarning, match="takes over: this machine has no"):

@@ -48,7 +48,7 @@ def test_many_points_are_read_in_parts(monkeypatch):
 
 
 def test_without_a_device_the_spline_itself_answers(monkeypatch):
-    monkeypatch.setattr(choice, "_found", lambda wish: "this machine has no OpenCL device")
+    monkeypatch.setattr(choice, "_found", lambda *_: "this machine has no OpenCL device")
     choice._warn_once.cache_clear()
     spline = Spline(rough_volume(0, (6, 5)))
     with pytest.warns(OpenCLFallbackWarning, match="Spline takes over: this machine has no"):

@@ -10,7 +10,8 @@ import pytest
 from typer.testing import Result
 
 from bentray_kernels import opencl
-from bentray_kernels.opencl import Choice, Device, OpenCLFallbackWarning, Verdict
+from bentray_kernels.opencl import Choice, Device, OpenCLFallbackWarning, Trial, Verdict
+from bentray_kernels.opencl.trial import Timing
 from bentray_service.cli import opencl_help
 from bentray_service.cli.output.terminal import show_warnings_on_one_line
 
@@ -18,6 +19,11 @@ GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True,
 CPU = Device(
     1, "Slow Platform", "Processor", "cpu", "OpenCL 3.0", "3.0-rc2", True, "/site/libslow.so", "slow 3.0"
 )
+
+
+@pytest.fixture(autouse=True)
+def _nothing_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("BENTRAY_DEVICE", raising=False)
 
 
 @pytest.fixture
@@ -30,6 +36,9 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(opencl, "find_devices", lambda: (GPU, CPU))
     monkeypatch.setattr(opencl, "verdict_on", verdicts.__getitem__)
     monkeypatch.setattr(opencl, "choose", lambda: Choice(CPU, ("GPU 9000 was refused",)))
+    timings = {"refraction": (Timing(1e3, 0.01, 0.02), Timing(1e5, 1.0, 0.5))}
+    trial = Trial(timings, {"wave": "ended by signal 6"})
+    monkeypatch.setattr(opencl, "trial_of", {CPU: trial}.__getitem__)
 
 
 def test_each_device_has_its_verdict_and_reason(bentray: Callable[..., Result], machine: None) -> None:
@@ -39,11 +48,17 @@ def test_each_device_has_its_verdict_and_reason(bentray: Callable[..., Result], 
     assert "refused" in words
     assert "wrong travel" in words
     assert "double8" in words
-    assert result.stdout.splitlines()[-3:] == [
-        "device 0 comes from /usr/lib/libfast.so.1",
-        "device 1 comes from slow 3.0: /site/libslow.so",
-        "fim-opencl uses device 1, Slow Platform:Processor",
-    ]
+    lines = result.stdout.splitlines()
+    assert "device 0 comes from /usr/lib/libfast.so.1" in lines
+    assert "device 1 comes from slow 3.0: /site/libslow.so" in lines
+    assert lines[-1] == "chosen: device 1, Slow Platform:Processor"
+
+
+def test_the_trial_shows_what_auto_takes(bentray: Callable[..., Result], machine: None) -> None:
+    rows = [line.replace("│", " ").split() for line in bentray("devices").stdout.splitlines()]
+    assert ["refraction", "1,000", "10", "ms", "20", "ms", "compiled"] in rows
+    assert ["refraction", "100,000", "1e+03", "ms", "500", "ms", "device"] in rows
+    assert ["wave", "ended", "by", "signal", "6", "compiled"] in rows
 
 
 def test_json_has_every_figure(bentray: Callable[..., Result], machine: None) -> None:
@@ -55,6 +70,8 @@ def test_json_has_every_figure(bentray: Callable[..., Result], machine: None) ->
     assert (cpu["library"], cpu["package"]) == ("/site/libslow.so", "slow 3.0")
     assert (figures["reason"], figures["help"]) == ("", "")
     assert cpu["faults"] == {"double8": "ended by signal 6"}
+    assert figures["trial"]["refraction"][1] == {"size": 1e5, "compiled_s": 1.0, "device_s": 0.5}
+    assert figures["trial_faults"] == {"wave": "ended by signal 6"}
 
 
 def test_without_devices_a_remedy_is_shown(
@@ -65,7 +82,7 @@ def test_without_devices_a_remedy_is_shown(
     monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
     monkeypatch.setattr(opencl_help.shutil, "which", lambda name: f"/usr/bin/{name}")
     first, second = bentray("devices").stdout.splitlines()
-    assert first == "this machine has no OpenCL device; fim-opencl computes without OpenCL, as fim"
+    assert first == "this machine has no OpenCL device; compiled code computes everything"
     assert second.startswith("suggestion: ")
     assert "apt-get install pocl-opencl-icd" in second
     figures = json.loads(bentray("devices", "--json").stdout)
@@ -90,16 +107,28 @@ def test_where_all_are_rejected_one_command_helps(
     monkeypatch.setattr(opencl_help.shutil, "which", lambda name: None)
     monkeypatch.setattr(opencl_help.platform, "machine", lambda: machine)
     lines = bentray("devices").stdout.splitlines()
-    assert lines[-2] == "no device passed; fim-opencl computes without OpenCL, as fim"
+    assert lines[-2] == "no device passed; compiled code computes everything"
     assert command in lines[-1]
     assert "double1: unknown" in " ".join(bentray("devices").stdout.replace("│", " ").split())
 
 
-def test_hidden_devices_are_reported(bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("BENTRAY_OPENCL_DEVICE", "none")
+@pytest.mark.parametrize(("name", "value"), [("BENTRAY_OPENCL_DEVICE", "none"), ("BENTRAY_DEVICE", "cpu")])
+def test_hidden_devices_are_reported(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, name: str, value: str
+) -> None:
+    monkeypatch.setenv(name, value)
     first, second = bentray("devices").stdout.splitlines()
-    assert first.startswith("BENTRAY_OPENCL_DEVICE=none hides every device; ")
-    assert second.startswith("suggestion: unset BENTRAY_OPENCL_DEVICE")
+    assert first.startswith(f"{name}={value} hides every device; ")
+    assert second.startswith(f"suggestion: unset {name} ")
+
+
+def test_an_unknown_request_of_the_machine_is_rejected(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BENTRAY_DEVICE", "gpu")
+    result = bentray("devices")
+    assert result.exit_code == 2
+    assert result.stderr == "bentray: BENTRAY_DEVICE: found 'gpu'; accepted: one of auto, cpu, opencl\n"
 
 
 def test_unknown_device_lists_the_devices(

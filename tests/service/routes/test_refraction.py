@@ -67,6 +67,7 @@ def test_every_parameter_changes_the_picture_or_its_tag(http):
         "backdrop_distance": 2,
         "width": 31,
         "height": 31,
+        "device": "cpu",
     }
     assert set(other) == set(RefractionView().plain())
     tags = {http.get(here, params=SMALL).headers["etag"]}

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables.reference_field import MAX_REFERENCE_SAMPLES
+from bentray_kernels.opencl.placement import DESCRIPTION, REQUESTS, DeviceRequest
 from bentray_kernels.ranges import Range
 from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
 
@@ -24,7 +25,8 @@ OBJECTS = {"object": 0, "mirror-ball": 3, "two-mirrors": 2}
 # Of an object from the centre of the ground, which has a radius of 7 m.
 POSITION_M = Range(-5.0, 5.0, unit="m")
 
-CHOICES = {
+CHOICES: dict[str, tuple[str, ...]] = {
+    "device": REQUESTS,
     "scene": ("object", "mirror-ball", "two-mirrors"),
     "mode": ("reflect", "refract", "refract-single", "self", "self-only", "diffuse"),
     "lookup": tuple(LOOKUPS),
@@ -90,6 +92,7 @@ class FieldView:
     height: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
     rays: int = setting(1, "Along each side of a pixel.", Range(1, 8))
     depth: int = setting(4, "Largest number of surfaces on a ray.", Range(0, 64))
+    device: DeviceRequest = setting("auto", DESCRIPTION)  # noqa: RUF009 - a string, by its alias
 
     def __post_init__(self) -> None:
         check(self, CHOICES)

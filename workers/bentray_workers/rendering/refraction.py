@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bentray_kernels.arrays import Floats
+from bentray_kernels.opencl import check_available, computed
 from bentray_kernels.refraction import (
     Backdrop,
     Camera,
@@ -30,6 +31,7 @@ from ..cluster.task_cancellation import cancellation_check
 from ..images.backdrop_card import backdrop_card
 from ..images.png import Colours, png_of
 from . import tiles
+from .drawing_device import PROCESSOR, Drawn, caster_for, name_of
 from .refraction_view import RefractionView
 from .scene_cache import scene_at
 
@@ -49,10 +51,17 @@ class Tile(NamedTuple):
         image: (rows, width, 3) 8-bit RGB.
         position_m: (rows, width, 2) where each ray meets the backdrop, from its centre, right and down, m;
             NaN where it meets none; None for a shaded picture. With real supersampling the mean of a pixel.
+        device: that drew them.
     """
 
     image: Colours
     position_m: Floats | None
+    device: str = PROCESSOR
+
+    @property
+    def drawn(self) -> Drawn:
+        """The picture alone."""
+        return Drawn(self.image, self.device)
 
 
 def picture_png(path: Path, view: RefractionView) -> bytes:
@@ -61,17 +70,19 @@ def picture_png(path: Path, view: RefractionView) -> bytes:
     Raises:
         InvalidInput: as ``scene_at``.
     """
-    return png_of(viewer_tile(path, view, 0, view.height))
+    return png_of(*viewer_tile(path, view, 0, view.height))
 
 
-def viewer_tile(path: Path, view: RefractionView, first: int, last: int) -> Colours:
+def viewer_tile(path: Path, view: RefractionView, first: int, last: int) -> Drawn:
     """Task: as ``tile_image``, in threads."""
-    return draw_tile(scene_at(path, view), view, first, last, threads=tiles.viewer_threads()).image
+    check_available(view.device)
+    return draw_tile(scene_at(path, view), view, first, last, threads=tiles.viewer_threads()).drawn
 
 
-def tile_image(path: Path, view: RefractionView, first: int, last: int) -> Colours:
+def tile_image(path: Path, view: RefractionView, first: int, last: int) -> Drawn:
     """Task: the rows ``first`` to ``last`` of it, the last one not included."""
-    return draw_tile(scene_at(path, view), view, first, last).image
+    check_available(view.device)
+    return draw_tile(scene_at(path, view), view, first, last).drawn
 
 
 def tasks_of(path: Path, view: RefractionView) -> tiles.PictureTasks:
@@ -94,8 +105,19 @@ def draw_tile(
         view: what to draw.
         first, last: rows, the last one not included.
         card: picture for the backdrop, 8-bit RGB; None: the test card.
-        threads: that trace rays.
+        threads: that trace rays, where compiled code does.
+
+    Raises:
+        InvalidInput: for a device that is requested and cannot be used.
     """
+    tile, lost = computed(lambda: _draw_tile(scene, view, (first, last), card, threads))
+    return tile._replace(device=f"{PROCESSOR}: {lost}") if lost else tile
+
+
+def _draw_tile(
+    scene: Scene, view: RefractionView, rows_drawn: tuple[int, int], card: Colours | None, threads: int
+) -> Tile:
+    first, last = rows_drawn
     # Post-refraction supersampling uses the adjacent rows.
     margin = 1 if view.supersampling == "prss" else 0
     top, bottom = max(first - margin, 0), min(last + margin, view.height)
@@ -117,9 +139,13 @@ def draw_tile(
         seed=top,
         threads=threads,
     )
-    picture = render(scene, camera, _backdrop(scene, view, card), settings, pause=cancellation_check())
+    rays = rows * view.width * (view.times / view.ray_spacing) ** 2
+    caster = caster_for(scene, math.ceil(rays), view.device)
+    backdrop = _backdrop(scene, view, card)
+    picture = render(scene, camera, backdrop, settings, caster, cancellation_check())
     position = picture.position_m.reshape(rows, view.times, view.width, view.times, 2).mean(axis=(1, 3))
-    return Tile(picture.image[own], position[own])
+    device = name_of(caster.session, caster.fault) if caster else PROCESSOR
+    return Tile(picture.image[own], position[own], device)
 
 
 def camera_of(scene: Scene, view: RefractionView) -> Camera:

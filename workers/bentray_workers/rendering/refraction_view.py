@@ -10,6 +10,7 @@ import numpy as np
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.isosurface.octree import MAX_ISOS
+from bentray_kernels.opencl.placement import DESCRIPTION, REQUESTS, DeviceRequest
 from bentray_kernels.ranges import Range
 from bentray_kernels.refraction import Layers
 from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
@@ -21,7 +22,8 @@ INDEX = Range(0.01, 100.0)
 # Of a B-spline through 8-bit integers: their steps, at every node, would scatter refracted rays.
 SMOOTHING_8_BIT = 30.0
 
-CHOICES = {
+CHOICES: dict[str, tuple[str, ...]] = {
+    "device": REQUESTS,
     "filter": tuple(FILTERS),
     "camera": ("orthographic", "perspective"),
     "backdrop": ("checkerboard", "picture", "warped-checkerboard", "warped-picture"),
@@ -108,6 +110,7 @@ class RefractionView:
         "Largest number of surfaces on a ray; beyond it the picture is dark grey.",
         Range(1, 256),
     )
+    device: DeviceRequest = setting("auto", DESCRIPTION)  # noqa: RUF009 - a string, by its alias
 
     def __post_init__(self) -> None:
         check(self, CHOICES)

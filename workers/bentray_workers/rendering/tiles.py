@@ -11,7 +11,8 @@ import numpy as np
 from distributed import Client, Future
 
 from ..cluster.resources import RENDER
-from ..images.png import Colours, png_of
+from ..images.png import png_of
+from .drawing_device import Drawn, devices_of
 
 # Rays of one task: about a second of work.
 TASK_RAYS = 2**19
@@ -55,12 +56,12 @@ class PictureTasks(NamedTuple):
     """
 
     tiles: list[tuple[Any, ...]]
-    stack: Callable[[Sequence[Colours]], bytes] | None
+    stack: Callable[[Sequence[Drawn]], bytes] | None
 
 
 def tasks_of(
     whole: Callable[[Path, Any], bytes],
-    tile: Callable[[Path, Any, int, int], Colours],
+    tile: Callable[[Path, Any, int, int], Drawn],
     path: Path,
     view: View,
 ) -> PictureTasks:
@@ -97,6 +98,6 @@ def submit(
     return drawn[0] if tasks.stack is None else client.submit(tasks.stack, drawn, **how)
 
 
-def stack_png(tiles: Sequence[Colours]) -> bytes:
+def stack_png(tiles: Sequence[Drawn]) -> bytes:
     """Task: tiles, stacked from top to bottom, as PNG."""
-    return png_of(np.concatenate(tiles))
+    return png_of(np.concatenate([tile.image for tile in tiles]), devices_of(tiles))

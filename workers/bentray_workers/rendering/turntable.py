@@ -20,7 +20,8 @@ from bentray_kernels.task_graph import Task
 from ..cluster.capacities import capacities_by_address
 from ..cluster.task_pool import JobControl, Placement, run_job
 from ..files.atomic import atomic_replace, write_bytes
-from ..images.png import Colours
+from ..images.png import device_of, stated
+from .drawing_device import Drawn
 from .picture_cost import placed, refraction_bytes
 from .refraction import tile_image
 from .refraction_view import RefractionView
@@ -155,12 +156,12 @@ def draw_turntable(
     run_job(client, graph, work_dir, lane="render", placement=placement, priority=PRIORITY, **control)
 
 
-def draw_frame_tile(path: Path, turntable: Turntable, number: int, first: int, last: int) -> Colours:
+def draw_frame_tile(path: Path, turntable: Turntable, number: int, first: int, last: int) -> Drawn:
     """Task: the rows ``first`` to ``last`` of a frame, the last one not included."""
     return tile_image(path, turntable.frame(number), first, last)
 
 
-def write_frame(frame: Path, tiles: Sequence[Colours]) -> None:
+def write_frame(frame: Path, tiles: Sequence[Drawn]) -> None:
     """Task: tiles, stacked from top to bottom, as PNG file."""
     write_bytes(frame, stack_png(tiles))
 
@@ -174,9 +175,11 @@ def write_zip(frames: Sequence[Path], target: Path) -> None:
 
 def write_apng(frames: Sequence[Path], target: Path) -> None:
     """Task: pictures in an animated PNG that repeats."""
+    device = stated("; ".join(sorted({device_of(frame) for frame in frames} - {""})))
     with atomic_replace(target) as partial, Image.open(frames[0]) as first:
         later = _Opened(frames[1:])
-        first.save(partial, "PNG", save_all=True, append_images=later, duration=FRAME_MS, loop=0)
+        how = {"save_all": True, "append_images": later, "duration": FRAME_MS, "loop": 0}
+        first.save(partial, "PNG", pnginfo=device, **how)
 
 
 class _Opened:

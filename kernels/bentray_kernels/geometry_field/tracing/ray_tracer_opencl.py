@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING
-from ...opencl import OpenCLFallbackWarning, Session, scene_or_warning
+from ...opencl import OpenCLFallbackWarning, Session, Work, computing_on, scene_or_warning
 from ...opencl.session import set_arguments
 from ...refraction.backdrop import Colours
 from ...refraction.camera import Camera
@@ -78,6 +78,9 @@ class OpenCLTracer:
 
         The lookups of (u, v) always run on the CPU.
 
+        Raises:
+            DeviceLostError: when the device fails after its self-test.
+
         Warns:
             OpenCLFallbackWarning: once, where the device fails its self-test and ``ray_tracer.trace`` takes
                 over.
@@ -90,7 +93,15 @@ class OpenCLTracer:
                 name = self.session.handle.name
                 message = f"{name} traces rays wrong, tracing.trace takes over: {self._fault}"
                 warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
-        return trace(self.world, camera, settings) if self._fault else self.follow(camera, settings)
+        if self._fault:
+            return trace(self.world, camera, settings)
+        with computing_on(self.session):
+            return self.follow(camera, settings)
+
+    @property
+    def fault(self) -> str:
+        """Why ``ray_tracer.trace`` takes over; empty if it does not."""
+        return self._fault or ""
 
     def fault_of(self, camera: Camera) -> str:
         """Difference from ``ray_tracer.trace`` in a small image, as a message; empty if correct."""
@@ -151,6 +162,13 @@ class OpenCLTracer:
             f"MAX_STEPS={accurate_lookup.STEPS}",
             f"WAITING={WAITING}",
         )
+
+
+def work_of(world: World, rays: int) -> Work:
+    """The rays of a picture of a world, as work for ``opencl.place``."""
+    sizes = [array.nbytes for array in (*world.surface, *world) if isinstance(array, np.ndarray)]
+    # The colours of the picture.
+    return Work("field", rays, sum(sizes) + 3 * rays, max(sizes))
 
 
 def on_the_device(world: World, precision: str | None = None) -> OpenCLTracer | None:

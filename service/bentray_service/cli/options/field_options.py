@@ -51,6 +51,7 @@ VIEW = {
     "height": Option("--height", int, "512", "Image height, pixels."),
     "rays": Option("--rays", int, "1", "Rays per side of a pixel."),
     "depth": Option("--depth", int, "4", "Maximum number of reflections and refractions of a ray."),
+    "device": Option("--device", str, "auto", "auto, cpu or opencl; see bentray devices."),
 }
 OPTIONS = {**SETTINGS, **VIEW}
 

@@ -58,6 +58,7 @@ OPTIONS = {
     "width": Option("--width", int, "512", "Image width, pixels."),
     "height": Option("--height", int, "512", "Image height, pixels."),
     "depth": Option("--depth", int, "16", "Maximum number of surfaces that a ray intersects."),
+    "device": Option("--device", str, "auto", "auto, cpu or opencl; see bentray devices."),
 }
 
 

@@ -1,0 +1,54 @@
+"""Trial of a device, run as a child process, because drivers may abort or hang.
+
+``python -m bentray_kernels.device_engines.trial_process INDEX LABEL ENGINE…`` prints one line of JSON for
+each engine, ``{"engine", "fault", "timings"}``: see ``opencl.trial``. A device that ends the process omits
+the line.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from typing import Any
+
+from ..opencl.choice import choose
+from ..opencl.devices import WISH
+from .comparison import measured
+from .problems import trial_problems
+
+REPEATS = 3
+
+
+def answer(engine: str) -> dict[str, Any]:
+    """Times of a small and a large problem, or why the device may not compute this engine."""
+    timings: list[tuple[float, float, float]] = []
+    for problem in trial_problems(engine):
+        found = measured(problem, None, REPEATS)
+        if found.compiled_s is None or found.device_s is None:
+            return _fault(engine, "it computes wrong results")
+        if not found.right:
+            reason = f"{problem.name} differs by {found.difference:.3g} {problem.error_unit}"
+            return _fault(engine, f"{reason}, {problem.bound:g} is allowed")
+        timings.append((problem.size, found.compiled_s, found.device_s))
+    return {"engine": engine, "fault": "", "timings": timings}
+
+
+def _fault(engine: str, fault: str) -> dict[str, Any]:
+    return {"engine": engine, "fault": fault, "timings": []}
+
+
+def main(arguments: list[str]) -> None:
+    """Try the engines named on the command line on one device."""
+    index, label, *engines = arguments
+    os.environ[WISH] = index
+    choice = choose()
+    if choice.device is None or choice.device.label != label:
+        raise SystemExit(choice.reason or f"{label} is no longer OpenCL device {index}")
+    for engine in engines:
+        sys.stdout.write(json.dumps(answer(engine)) + "\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,136 @@
+"""Where an engine computes, on the OpenCL device or in compiled code: the one place that decides it."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from typing import Literal, NamedTuple, get_args
+
+from ..errors import InvalidInput
+from .choice import choose, open_session
+from .devices import VARIABLE, WISH, Device, find_devices, hidden, select_devices
+from .lost_device import DeviceLostError, cpu_only
+from .session import Session
+from .trial import stored_trial, trial_of
+from .verdict import stored_verdict
+
+DeviceRequest = Literal["auto", "cpu", "opencl"]
+REQUESTS: tuple[str, ...] = get_args(DeviceRequest)
+
+DESCRIPTION = (
+    "Where to compute what exists for OpenCL devices too. auto: on the device where a trial on this machine "
+    "was faster; cpu: never on a device; opencl: on the device, an error without one."
+)
+
+
+class Work(NamedTuple):
+    """A problem of one engine.
+
+    Attributes:
+        engine: one of ``trial.ENGINES``.
+        size: in the unit of the engine's trial: nodes, node updates or rays.
+        memory_bytes, buffer_bytes: device memory that it cannot do without, and the largest buffer of it.
+    """
+
+    engine: str
+    size: float
+    memory_bytes: int = 0
+    buffer_bytes: int = 0
+
+
+def requested(device: str = "auto") -> str:
+    """What a request means on this machine: ``auto``, ``cpu`` or ``opencl``.
+
+    ``BENTRAY_DEVICE`` takes the place of ``auto``; ``BENTRAY_DEVICE=cpu`` forbids devices.
+
+    Raises:
+        InvalidInput: for another word, and for ``opencl`` where devices are forbidden.
+    """
+    if device not in REQUESTS:
+        raise InvalidInput("device", repr(device), "one of " + ", ".join(REQUESTS))
+    here = os.environ.get(VARIABLE, "").strip().lower() or "auto"
+    if here not in REQUESTS:
+        raise InvalidInput(VARIABLE, repr(here), "one of " + ", ".join(REQUESTS))
+    if device == "opencl" and here == "cpu":
+        raise InvalidInput("device", "'opencl'", f"auto or cpu, because this machine has {VARIABLE}=cpu")
+    return here if device == "auto" else device
+
+
+def place(work: Work, device: str = "auto") -> Session | None:
+    """The open device that computes a problem; None: compiled code does.
+
+    A processor is also an OpenCL device, but ``auto`` tests GPUs only: a processor is considered once
+    ``bentray devices`` has tested it.
+
+    Args:
+        work: the problem.
+        device: the request.
+
+    Raises:
+        InvalidInput: as ``requested``; with ``opencl`` without a device that passes its self-test, or with
+            too little memory.
+        DeviceLostError: with ``opencl``, after the device failed in this process.
+    """
+    request = requested(device)
+    if request == "cpu" or cpu_only():
+        return None
+    if request == "auto":
+        candidate = _tested_device()
+        if candidate is None or misfit(work, candidate) or not trial_of(candidate).faster(*work[:2]):
+            return None
+        session = open_session(candidate)
+        return None if session.lost else session
+    chosen = _required()
+    if reason := misfit(work, chosen):
+        raise InvalidInput("device", f"'opencl', but {reason}", "auto or cpu, or a smaller problem")
+    session = open_session(chosen)
+    if session.lost:
+        raise DeviceLostError(session.lost)
+    return session
+
+
+def check_available(device: str) -> None:
+    """Check, before any work, that a device that is requested exists and passes its self-test.
+
+    Raises:
+        InvalidInput: as ``place``.
+    """
+    if requested(device) == "opencl" and not cpu_only():
+        _required()
+
+
+def misfit(work: Work, device: Device) -> str:
+    """Why a problem does not fit into the memory of a device; empty if it does."""
+    limits = (
+        ("device memory", work.memory_bytes, device.memory_bytes),
+        ("one buffer", work.buffer_bytes, device.buffer_bytes),
+    )
+    for what, needed, limit in limits:
+        if limit and needed > limit:
+            return f"it needs {needed} bytes of {what}, and {device.name} has {limit}"
+    return ""
+
+
+def _required() -> Device:
+    chosen = choose()
+    if chosen.device is None:
+        found = f"'opencl', but {chosen.reason}"
+        raise InvalidInput("device", found, "auto or cpu, or see `bentray devices`")
+    return chosen.device
+
+
+def _tested_device() -> Device | None:
+    """The device that ``auto`` may use."""
+    devices = _devices(os.environ.get(WISH), hidden())
+    if any(device.kind in ("gpu", "accelerator") for device in devices):
+        return choose().device
+    for device in devices:
+        if stored_verdict(device) is not None and stored_trial(device) is not None:
+            return device
+    return None
+
+
+@cache
+def _devices(selection: str | None, _hidden: str) -> tuple[Device, ...]:
+    """Those to test, in order; they are listed once per process and selection."""
+    return select_devices(find_devices(), selection)

@@ -1,0 +1,73 @@
+"""The comparison of engines on a device with compiled code: right, wrong, and as shares of bandwidth."""
+
+from dataclasses import replace
+
+import pytest
+
+from bentray_kernels.device_engines.comparison import compare, copy_bytes_per_s, measured
+from bentray_kernels.device_engines.problems import (
+    field,
+    gradients,
+    projection,
+    refraction,
+    traces,
+    trial_problems,
+)
+from bentray_kernels.opencl import choice
+from bentray_kernels.opencl.trial import ENGINES
+
+pytestmark = pytest.mark.opencl
+
+
+@pytest.mark.parametrize(
+    "engine",
+    [
+        lambda: projection(12, 2),
+        lambda: traces(40, 60, 2),
+        lambda: gradients(40, 60, 2),
+        pytest.param(lambda: refraction(32), marks=pytest.mark.slow),
+        pytest.param(lambda: field(32), marks=pytest.mark.slow),
+    ],
+    ids=["eikonal", "traces", "wave", "refraction", "field"],
+)
+def test_the_device_agrees_with_compiled_code_within_the_bound(engine):
+    found = measured(engine(), 1e9, 1)
+    assert found.compiled_s > 0.0
+    assert found.device_s > 0.0
+    assert 0.0 <= found.difference <= found.engine.bound
+    assert found.right
+    bounded = found.engine.least_bytes is not None
+    assert (found.bandwidth_share is not None) is bounded
+    if bounded:
+        assert found.bandwidth_share == pytest.approx(found.engine.least_bytes / found.device_s / 1e9)
+
+
+def test_a_wrong_result_is_seen():
+    engine = traces(40, 60, 1)
+    there = engine.there
+    found = measured(replace(engine, there=lambda: 1.01 * there()), None, 1)
+    assert found.difference == pytest.approx(0.01, rel=0.01)
+    assert not found.right
+    assert found.bandwidth_share is None
+    unable = measured(replace(engine, there=None), 1e9, 1)
+    assert (unable.device_s, unable.difference, unable.right) == (None, None, False)
+
+
+def test_a_copy_measures_the_bandwidth(opencl_session):
+    assert 1e6 < copy_bytes_per_s(opencl_session) < 1e14
+
+
+def test_every_engine_of_the_trial_has_a_small_and_a_large_problem():
+    for name in ("eikonal", "wave"):
+        small, large = trial_problems(name)
+        assert small.engine == large.engine == name
+        assert small.size < large.size
+    assert set(ENGINES) == {"eikonal", "wave", "refraction", "field"}
+
+
+def test_without_a_device_there_is_nothing_to_compare(monkeypatch):
+    monkeypatch.setattr(choice, "_found", lambda *_: "this machine has no OpenCL device")
+    choice._warn_once.cache_clear()
+    with pytest.warns(choice.OpenCLFallbackWarning):
+        assert list(compare(True)) == []
+    choice._warn_once.cache_clear()

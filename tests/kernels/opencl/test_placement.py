@@ -1,0 +1,124 @@
+"""Where an engine computes: requests, the machine's variable, the trial, and the memory of the device."""
+
+from dataclasses import replace
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.opencl import Choice, DeviceLostError, Session, Verdict, Work, placement, requested
+from bentray_kernels.opencl.lost_device import on_cpu
+from bentray_kernels.opencl.placement import misfit, place
+from bentray_kernels.opencl.trial import Timing, Trial
+
+# Faster on the device from 100 units on.
+TRIAL = Trial({"field": (Timing(10.0, 0.1, 1.0), Timing(1000.0, 10.0, 1.0))}, {})
+SMALL, LARGE = Work("field", 50.0), Work("field", 200.0)
+
+
+class Opened:
+    """In place of a session."""
+
+    lost = ""
+
+    def __init__(self, device):
+        self.device = device
+
+
+@pytest.fixture
+def machine(monkeypatch, gpu, fresh):
+    """A GPU that passes its tests; the fixture gives what was asked of it."""
+    asked = []
+    sessions = {}
+    monkeypatch.setattr(placement, "find_devices", lambda: asked.append("devices") or (gpu,))
+    monkeypatch.setattr(placement, "choose", lambda: asked.append("verdict") or Choice(gpu, ()))
+    monkeypatch.setattr(placement, "trial_of", lambda device: asked.append("trial") or TRIAL)
+    monkeypatch.setattr(placement, "open_session", lambda device: sessions.setdefault(device, Opened(device)))
+    return asked
+
+
+def test_auto_takes_what_is_faster_for_the_size(machine, gpu):
+    assert place(SMALL) is None
+    assert place(LARGE).device == gpu
+    assert place(Work("eikonal", 1e9)) is None, "an engine that was not tried"
+
+
+def test_cpu_asks_for_no_device(machine, monkeypatch):
+    assert place(LARGE, "cpu") is None
+    monkeypatch.setenv("BENTRAY_DEVICE", "cpu")
+    assert place(LARGE) is None
+    assert machine == []
+
+
+def test_opencl_takes_the_device_whatever_the_trial(machine, gpu):
+    assert place(SMALL, "opencl").device == gpu
+    assert "trial" not in machine
+
+
+def test_opencl_without_a_device_is_an_error_before_any_work(machine, monkeypatch):
+    monkeypatch.setattr(placement, "choose", lambda: Choice(None, ("GPU 9000 was refused: wrong sqrt",)))
+    with pytest.raises(InvalidInput, match="device: found 'opencl', but GPU 9000 was refused: wrong sqrt"):
+        place(SMALL, "opencl")
+    assert place(LARGE, "cpu") is None
+
+
+def test_the_machine_decides_what_auto_means(machine, monkeypatch, gpu):
+    monkeypatch.setenv("BENTRAY_DEVICE", "opencl")
+    assert requested() == "opencl"
+    assert place(SMALL).device == gpu
+    assert place(SMALL, "cpu") is None
+    monkeypatch.setenv("BENTRAY_DEVICE", "cpu")
+    with pytest.raises(InvalidInput, match="BENTRAY_DEVICE=cpu"):
+        place(SMALL, "opencl")
+    monkeypatch.setenv("BENTRAY_DEVICE", "")
+    assert requested() == "auto"
+
+
+@pytest.mark.parametrize(("name", "word"), [("BENTRAY_DEVICE", "gpu"), ("device", "cuda")])
+def test_other_words_are_rejected(monkeypatch, name, word):
+    monkeypatch.setenv("BENTRAY_DEVICE", word if name == "BENTRAY_DEVICE" else "auto")
+    with pytest.raises(InvalidInput, match=f"{name}: found '{word}'; accepted: one of auto, cpu, opencl"):
+        requested("auto" if name == "BENTRAY_DEVICE" else word)
+
+
+def test_what_does_not_fit_the_memory_is_computed_here_or_refused_by_number(machine, monkeypatch, gpu):
+    small = replace(gpu, memory_bytes=1000, buffer_bytes=400)
+    monkeypatch.setattr(placement, "find_devices", lambda: (small,))
+    monkeypatch.setattr(placement, "choose", lambda: Choice(small, ()))
+    assert place(LARGE._replace(memory_bytes=1000, buffer_bytes=400)) is not None
+    for work, words in (
+        (LARGE._replace(memory_bytes=1001), "1001 bytes of device memory, and GPU 9000 has 1000"),
+        (LARGE._replace(buffer_bytes=401), "401 bytes of one buffer, and GPU 9000 has 400"),
+    ):
+        assert place(work) is None
+        with pytest.raises(InvalidInput, match=words):
+            place(work, "opencl")
+    assert misfit(LARGE._replace(memory_bytes=10**15), gpu) == "", "a driver that does not say"
+
+
+def test_auto_does_not_test_a_processor_by_itself(monkeypatch, three, fresh):
+    cpu = three[0]
+    monkeypatch.setattr(placement, "find_devices", lambda: (cpu,))
+    monkeypatch.setattr(placement, "choose", lambda: pytest.fail("tested"))
+    assert place(LARGE) is None
+    # Once `bentray devices` has tested it, it is as good as another.
+    monkeypatch.setattr(placement, "stored_verdict", lambda device: Verdict("", (1,), {}))
+    monkeypatch.setattr(placement, "stored_trial", lambda device: TRIAL)
+    monkeypatch.setattr(placement, "trial_of", lambda device: TRIAL)
+    monkeypatch.setattr(placement, "open_session", Opened)
+    assert place(LARGE).device == cpu
+    assert place(SMALL) is None
+
+
+def test_a_lost_device_is_not_used_again(machine, gpu):
+    place(LARGE).lost = "Fast Platform:GPU 9000 failed: OUT_OF_RESOURCES"
+    assert place(LARGE) is None
+    with pytest.raises(DeviceLostError, match="OUT_OF_RESOURCES"):
+        place(LARGE, "opencl")
+    assert on_cpu(lambda: place(LARGE, "opencl")) is None
+
+
+@pytest.mark.opencl
+def test_the_device_of_this_machine_can_be_requested():
+    session = place(Work("eikonal", 1.0), "opencl")
+    assert isinstance(session, Session)
+    assert session.device.memory_bytes >= session.device.buffer_bytes > 0
