@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from bentray_kernels.opencl import verdict
+from bentray_kernels.opencl import records, verdict
 from bentray_kernels.opencl.self_test import STAGES
 from bentray_kernels.opencl.verdict import Verdict, examine, in_a_child, verdict_on
 
@@ -117,7 +117,7 @@ def test_a_pass_is_remembered_on_disk_until_the_driver_or_the_processor_changes(
     assert len(child.calls) == tried
     verdict_on(replace(gpu, driver="1.2.4"))
     assert len(child.calls) == 2 * tried
-    monkeypatch.setattr(verdict, "processor", lambda: frozenset({"model name: another", "avx2"}))
+    monkeypatch.setattr(records, "processor", lambda: frozenset({"model name: another", "avx2"}))
     verdict_on.cache_clear()
     verdict_on(gpu)
     assert len(child.calls) == 3 * tried
