@@ -11,6 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 from bentray_kernels.arrays import Floats
 from bentray_kernels.compiled import kernel
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.wave.light_cone import everywhere
 from bentray_kernels.wave.medium import EDGE_NODES, Medium
 from bentray_kernels.wave.simulation import place_scan
 from bentray_kernels.wave.stencil import HALO, longest_step, weights
@@ -84,7 +85,9 @@ class Absorbing:
         lost = 2.0 * loss * turn / speed
         fast = turn / np.sqrt((turn / speed) ** 2 - loss**2 - lost)
         medium = Medium.of(fast, spacing, time_step_s, edge_nodes=edge_nodes, dtype=np.float64)
-        lagging = np.pad(2.0 * lost * (fast / turn) ** 2, medium.margin, mode="edge")
+        behind = np.subtract(medium.keep.shape, loss.shape) - medium.margin
+        widths = [(medium.margin, int(width)) for width in behind]
+        lagging = np.pad(2.0 * lost * (fast / turn) ** 2, widths, mode="edge")
         sponge = (1.0 - medium.fade) / (1.0 + medium.fade)
         step = turn * time_step_s
         turned = sponge + 0.5 * lagging * step
@@ -149,6 +152,7 @@ def simulate_absorbed(
         detectors.weights,
         (wavelet / scale).astype(kind),
         traces,
+        everywhere(medium)[0],
     )
     traces *= kind.type(scale)
     return traces
@@ -172,11 +176,12 @@ def _simulate(
     detector_along: Any,
     wavelet: Any,
     traces: Any,
+    spans: Any,
 ) -> None:
     for n in range(wavelet.size):
         for r in range(traces.shape[0]):
             traces[r, n] = read(now, detector_first[r], detector_along[r])
-        advance(now, old, keep, fade, drive, weights)
+        advance(now, old, keep, fade, drive, weights, spans)
         inject(old, drive, first, along, wavelet[n])
         _relax(now, old, lag, pull, gain, stay)
         now, old = old, now

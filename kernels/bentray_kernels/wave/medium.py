@@ -113,11 +113,16 @@ class Medium:
         turn = damping * time_step_s
         del damping
         # Converted one after the other: in 3-D they dominate the memory.
-        keep, fade, drive = (zeros(c.shape, dtype) for _ in range(3))
-        keep[...] = (2.0 - turn**2) / (1.0 + turn)
-        fade[...] = (1.0 - turn) / (1.0 + turn)
-        drive[...] = (c * time_step_s / spacing) ** 2 / (1.0 + turn)
+        keep = _converted((2.0 - turn**2) / (1.0 + turn), dtype)
+        fade = _converted((1.0 - turn) / (1.0 + turn), dtype)
+        drive = _converted((c * time_step_s / spacing) ** 2 / (1.0 + turn), dtype)
         return cls(keep, fade, drive, speed, spacing, time_step_s, margin, order)
+
+
+def _converted(values: Floats, dtype: DTypeLike) -> NDArray[np.floating]:
+    found = zeros(values.shape, dtype)
+    found[...] = values
+    return found
 
 
 def _padding(shape: tuple[int, ...], margin: int) -> list[tuple[int, int]]:
