@@ -102,3 +102,4 @@ class RefractionSettings(TypedDict, total=False):
     width: int
     height: int
     depth: int
+    device: Literal["auto", "cpu", "opencl"]

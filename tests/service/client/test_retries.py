@@ -17,7 +17,7 @@ import pytest
 import uvicorn
 
 from bentray_service.app import create_app
-from bentray_service.client import AsyncClient, Client, ClientError, flows, retries, uploading
+from bentray_service.client import AsyncClient, Client, ClientError, flows, lists, retries, uploading
 from bentray_service.client.connection import Connection
 from bentray_service.client.errors import NoAnswer
 from bentray_service.client.retries import Retries
@@ -103,7 +103,7 @@ def test_wait_timeout_is_honoured(walk: Walk) -> None:
 
 def test_service_that_never_answered_fails_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
-    flow = Retries(300.0, told.append).through(flows.job(HERE, "job-1"))
+    flow = Retries(300.0, told.append).through(lists.job(HERE, "job-1"))
     assert isinstance(next(flow), RequestStep)
     with pytest.raises(NoAnswer, match="refused"):
         flow.throw(REFUSED)

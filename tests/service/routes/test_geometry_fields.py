@@ -119,6 +119,7 @@ OTHER = {
     "height": 31,
     "rays": 2,
     "depth": 2,
+    "device": "cpu",
 }
 
 
