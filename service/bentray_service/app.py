@@ -40,7 +40,7 @@ from .jobs.kinds import KINDS
 from .jobs.runner import Runner
 from .metrics import Metrics
 from .pictures import Pictures
-from .readiness import Readiness
+from .readiness import Readiness, Threaded
 from .routes import (
     access,
     cluster_health,
@@ -237,7 +237,11 @@ def _open(
     stack.callback(housekeeper.stop)
     pictures = Pictures(cluster, store.fetch)
     stack.callback(pictures.stop)
-    threads: dict[str, Runner | UploadIngest] = {"runner": runner, "ingest": upload_ingest}
+    threads: dict[str, Threaded] = {
+        "runner": runner,
+        "ingest": upload_ingest,
+        "housekeeping": housekeeper,
+    }
     readiness = Readiness(database, files, compute, threads, settings.min_free_bytes)
     stack.callback(readiness.stop)
     return Parts(
@@ -266,4 +270,5 @@ def _open(
         feed=EventFeed(Jobs(database), leaving.is_set),
         audit=Audit(files.audit),
         readiness=readiness,
+        threads=threads,
     )

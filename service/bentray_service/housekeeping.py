@@ -84,6 +84,10 @@ class Housekeeper:
     def start(self) -> None:
         self._thread.start()
 
+    def alive(self) -> bool:
+        """Whether the thread is alive."""
+        return self._thread.is_alive()
+
     def stop(self) -> None:
         self._leaving.set()
         self._thread.join(STOP_SECONDS)

@@ -1,4 +1,4 @@
-"""Prometheus metrics of requests, jobs, workers and disk.
+"""Prometheus metrics of requests, jobs, workers, stored files, threads and the process.
 
 Names start with ``bentray_`` and end with the unit in the plural (``_seconds``, ``_bytes``), counters with
 ``_total``. No label has values that clients can choose.
@@ -11,12 +11,14 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
-from prometheus_client.core import GaugeMetricFamily
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
+from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from .rows.checksums import Checksums
 from .rows.schema import STATES
 
 if TYPE_CHECKING:
@@ -54,6 +56,8 @@ class Metrics:
         self._in_flight = Gauge(
             "bentray_http_requests_in_flight", "Requests in progress.", registry=self.registry
         )
+        # Memory, processor time and open files of this process; empty except on Linux.
+        self.registry.register(_Sentences(ProcessCollector("bentray", registry=None)))
 
     def watch(self, parts: Parts) -> None:
         """Add metrics of an open service, collected on request."""
@@ -109,27 +113,59 @@ class _ServiceCollector(Collector):
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
 
-    def describe(self) -> list[GaugeMetricFamily]:
+    def describe(self) -> list[Metric]:
         return []
 
-    def collect(self) -> Iterator[GaugeMetricFamily]:
+    def collect(self) -> Iterator[Metric]:
         parts = self._parts
-        waiting = GaugeMetricFamily("bentray_jobs", "Jobs by state.", labels=["state"])
-        try:
-            counts, oldest = parts.queue.load()
-        except SQLAlchemyError:
-            pass
-        else:
-            for state in STATES:
-                waiting.add_metric([state], counts.get(state, 0))
-            yield waiting
-            age = 0.0 if oldest is None else max(0.0, time.time() - oldest)
-            yield _gauge("bentray_jobs_oldest_queued_seconds", "Age of the oldest queued job.", age)
+        yield from self._from_database()
         yield _gauge("bentray_workers", "Connected Dask workers.", parts.compute.workers())
         up = float(parts.files.store.fault() is None)
         yield _gauge("bentray_storage_up", "Whether the store is available.", up)
-        free = shutil.disk_usage(parts.files.root).free
-        yield _gauge("bentray_disk_free_bytes", "Free space in the data folder.", free)
+        disk, least = shutil.disk_usage(parts.files.root), parts.settings.min_free_bytes
+        yield _gauge("bentray_disk_free_bytes", "Free space in the data folder.", disk.free)
+        yield _gauge("bentray_disk_total_bytes", "Size of the disk of the data folder.", disk.total)
+        yield _gauge("bentray_disk_needed_bytes", "Free space without which no job starts.", least)
+        threads = GaugeMetricFamily(
+            "bentray_threads_up", "Whether all threads of a part are alive.", labels=["part"]
+        )
+        for name, part in parts.threads.items():
+            threads.add_metric([name], float(part.alive()))
+        yield threads
+        lost = CounterMetricFamily("bentray_audit_lost_total", "Entries missing from the audit log.")
+        lost.add_metric([], parts.audit.lost)
+        yield lost
+
+    def _from_database(self) -> Iterator[Metric]:
+        """The metrics of stored jobs and files."""
+        parts = self._parts
+        try:
+            counts, oldest = parts.queue.load()
+            damaged = Checksums(parts.database).count_damaged()
+        except SQLAlchemyError:
+            return
+        waiting = GaugeMetricFamily("bentray_jobs", "Jobs by state.", labels=["state"])
+        for state in STATES:
+            waiting.add_metric([state], counts.get(state, 0))
+        yield waiting
+        age = 0.0 if oldest is None else max(0.0, time.time() - oldest)
+        yield _gauge("bentray_jobs_oldest_queued_seconds", "Age of the oldest queued job.", age)
+        yield _gauge("bentray_files_damaged", "Stored items known to be damaged.", damaged)
+
+
+class _Sentences(Collector):
+    """The metrics of another collector, with descriptions that end as ours do."""
+
+    def __init__(self, inner: Collector) -> None:
+        self._inner = inner
+
+    def describe(self) -> list[Metric]:
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        for one in self._inner.collect():
+            one.documentation = one.documentation.rstrip(".") + "."
+            yield one
 
 
 def _gauge(name: str, words: str, value: float) -> GaugeMetricFamily:

@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Protocol
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -15,12 +16,17 @@ from bentray_kernels.errors import InvalidInput
 from .compute import Compute
 from .errors import NotReady
 from .files.data_folder import Files
-from .ingest.upload_ingest import UploadIngest
-from .jobs.runner import Runner
 from .rows.database import Database
 
 # Time limit of the check, s.
 WITHIN_S = 3.0
+
+
+class Threaded(Protocol):
+    """A part with threads of its own."""
+
+    def alive(self) -> bool:
+        """Whether all of them are alive."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +52,7 @@ class Readiness:
         database: Database,
         files: Files,
         compute: Compute,
-        threads: Mapping[str, Runner | UploadIngest],
+        threads: Mapping[str, Threaded],
         min_free_bytes: int,
     ) -> None:
         """Args:

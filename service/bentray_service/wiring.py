@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, cast
 
@@ -23,7 +24,7 @@ from .ingest.upload_limits import UploadLimits
 from .jobs.feed import EventFeed
 from .jobs.runner import Runner
 from .pictures import Pictures
-from .readiness import Readiness
+from .readiness import Readiness, Threaded
 from .rows.database import Database
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
@@ -35,7 +36,7 @@ from .settings import ServiceSettings
 
 @dataclass(frozen=True)
 class Parts:
-    """All parts of a running service."""
+    """All parts of a running service; ``threads`` are those with threads, by name."""
 
     settings: ServiceSettings
     database: Database
@@ -62,6 +63,7 @@ class Parts:
     feed: EventFeed
     audit: Audit
     readiness: Readiness
+    threads: Mapping[str, Threaded]
 
 
 def parts_of(request: Request) -> Parts:

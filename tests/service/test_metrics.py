@@ -1,8 +1,6 @@
 """Metrics: named by one rule, counted by the route's own words, and true."""
 
-import json
 import re
-from pathlib import Path
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
@@ -99,9 +97,25 @@ def test_each_application_has_its_own(start, work):
     assert value(other, "bentray_http_requests_total", **labels) == 0
 
 
-def test_dashboard_uses_existing_metrics(http):
-    dashboard = json.loads((Path(__file__).parents[2] / "deploy/grafana/dashboard.json").read_text())
-    asked = " ".join(one["expr"] for panel in dashboard["panels"] for one in panel["targets"])
-    http.get("/health/live")
-    there = {sample.name for family in read(http).values() for sample in family.samples}
-    assert {found.group() for found in NAME.finditer(asked)} <= there
+def test_threads_and_damage_are_seen(http, uploaded):
+    dataset = uploaded(http)
+    assert value(http, "bentray_threads_up", part="housekeeping") == 1
+    http.app.state.parts.runner.stop()
+    assert value(http, "bentray_threads_up", part="runner") == 0
+    assert value(http, "bentray_threads_up", part="ingest") == 1
+    assert value(http, "bentray_files_damaged") == 0
+    path = next(http.app.state.parts.files.root.glob("tenants/local/datasets/*.h5"))
+    path.write_bytes(path.read_bytes()[:-1])
+    assert http.get(f"/v1/datasets/{dataset}/geometry").status_code == 500
+    assert value(http, "bentray_files_damaged") == 1
+
+
+def test_lost_audit_entries_are_counted(http):
+    folder = http.app.state.parts.files.audit
+    assert value(http, "bentray_audit_lost_total") == 0
+    for path in folder.iterdir():
+        path.unlink()
+    folder.rmdir()
+    http.get("/v1/datasets")
+    # The entry of the request for the metrics comes after its answer.
+    assert value(http, "bentray_audit_lost_total") == 1

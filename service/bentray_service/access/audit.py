@@ -32,11 +32,15 @@ class Audit:
 
     An entry has ``time``, ``request``, ``tenant``, ``how``, ``who``, ``method``, ``route``, ``ids``,
     ``status``, ``received`` and ``sent`` (bytes), but no query, header or content.
+
+    Attributes:
+        lost: number of entries that could not be stored since the start.
     """
 
     def __init__(self, folder: Path, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> None:
         self._folder = folder
         self._now = now
+        self.lost = 0
 
     def append(self, entry: Entry) -> None:
         """Append one entry; an entry that cannot be stored is written to the log."""
@@ -53,6 +57,7 @@ class Audit:
             finally:
                 os.close(handle)
         except OSError as error:
+            self.lost += 1
             log.error("the audit log could not be written (%s): %s", error.strerror, line)
 
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Collection
 from typing import cast
 
-from sqlalchemy import Connection, delete, insert, select, update
+from sqlalchemy import Connection, delete, func, insert, select, update
 
 from .database import Database
 from .digests import Digest
@@ -65,6 +65,12 @@ class Checksums:
         """The checksums of all tenants."""
         query = select(checksums).order_by(checksums.c.tenant, checksums.c.path)
         return cast(list[ChecksumRow], self._database.rows(query))
+
+    def count_damaged(self) -> int:
+        """The number of items of all tenants that are known to be damaged."""
+        query = select(func.count()).select_from(checksums).where(checksums.c.damaged.is_not(None))
+        with self._database.read() as connection:
+            return int(connection.execute(query).scalar_one())
 
     def damaged(self, tenant: Tenant, name: str, since: float | None) -> None:
         """Store since when an item is damaged, s since 1970; None: it is not damaged."""
