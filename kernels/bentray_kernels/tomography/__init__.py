@@ -11,14 +11,16 @@ from .settings import (
 )
 
 if TYPE_CHECKING:
-    from .errors_against_truth import mean_absolute_error, rmse
+    from .errors_against_truth import correlation, mean_absolute_error, rmse, structural_similarity
     from .problem import Problem
     from .reconstruction import reconstruct
+    from .regions import RegionStatistics, RoundRegion, region_statistics
     from .result import RESIDUAL_EDGES_S, Iteration, Progress, Reconstruction, Trial
 else:
     MODULES = {
-        "errors_against_truth": ("mean_absolute_error", "rmse"),
+        "errors_against_truth": ("correlation", "mean_absolute_error", "rmse", "structural_similarity"),
         "problem": ("Problem",),
+        "regions": ("RegionStatistics", "RoundRegion", "region_statistics"),
         "reconstruction": ("reconstruct",),
         "result": ("RESIDUAL_EDGES_S", "Progress", "Reconstruction", "Iteration", "Trial"),
     }
@@ -46,10 +48,15 @@ __all__ = [
     "Problem",
     "Progress",
     "Reconstruction",
+    "RegionStatistics",
+    "RoundRegion",
     "SartSettings",
     "Settings",
     "Trial",
+    "correlation",
     "mean_absolute_error",
     "reconstruct",
+    "region_statistics",
     "rmse",
+    "structural_similarity",
 ]

@@ -9,6 +9,7 @@ import typer
 from . import (
     audit,
     bench,
+    compare,
     convert,
     demo,
     devices,
@@ -51,6 +52,7 @@ for command in (
     reproduce.reproduce,
     quality.quality,
     convert.convert,
+    compare.compare,
     export.export,
     simulate.simulate,
     bench.bench,

@@ -11,6 +11,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import (
+    RegionStatistics,
+    RoundRegion,
+    correlation,
+    region_statistics,
+    structural_similarity,
+)
+
 from ..html_tables import figures_html, picture_html
 from .plotting import draw_plane, new_axes
 
@@ -31,6 +40,7 @@ class Comparison:
         region: nodes that the figures are of, at least one.
         region_choice: description of the region.
         spacing_m, origin_m: of the nodes per axis (x, y[, z]), m.
+        uncertainty: standard deviation of the first image at each node, or None.
     """
 
     names: tuple[str, str]
@@ -42,6 +52,7 @@ class Comparison:
     region_choice: str
     spacing_m: tuple[float, ...]
     origin_m: tuple[float, ...]
+    uncertainty: Floats | None = None
 
     @property
     def difference(self) -> Floats:
@@ -71,9 +82,42 @@ class Comparison:
     @property
     def correlation(self) -> float:
         """Pearson's correlation of the two images in the region; NaN if one of them is constant."""
-        first, second = (one[self.region] - one[self.region].mean() for one in (self.image, self.other))
-        norm = math.sqrt(float(first @ first) * float(second @ second))
-        return float(first @ second) / norm if norm > 0.0 else math.nan
+        return correlation(self.image, self.other, self.region)
+
+    @property
+    def ssim(self) -> float:
+        """Structural similarity in the region, for the range of the second image; see ``bentray compare``.
+
+        NaN if the region holds no window of 7 × 7 nodes, or the second image is constant.
+        """
+        spread = float(np.nanmax(self.other) - np.nanmin(self.other))
+        return (
+            structural_similarity(self.image, self.other, self.region, spread) if spread > 0.0 else math.nan
+        )
+
+    def statistics(
+        self, centre_m: Sequence[float] | None = None, radius_m: float | None = None
+    ) -> tuple[RegionStatistics, RegionStatistics]:
+        """Mean, spread, size and contrast of both images in a disc or ball, or in the whole region.
+
+        Args:
+            centre_m: (x, y[, z]), m; None: the region of the comparison, which has no surroundings.
+            radius_m: of the disc or ball, m.
+
+        Returns:
+            Of the first and of the second image. The contrast is that to a ring from 1.25 to 2 radii.
+
+        Raises:
+            InvalidInput: naming the argument, also for a disc without a node.
+        """
+        nodes = round_nodes(centre_m, radius_m, self.image.shape, self.spacing_m, self.origin_m)
+        inside, beside = (self.region, None) if nodes is None else nodes
+        deviations = (self.uncertainty, None)
+        first, second = (
+            region_statistics(one, inside, self.spacing_m, beside, deviation)
+            for one, deviation in zip((self.image, self.other), deviations, strict=True)
+        )
+        return first, second
 
     def plot(self, *, axis: str = "z", index: int | None = None) -> list[Axes]:
         """Draw both images with the same colours, and their difference.
@@ -115,23 +159,48 @@ class Comparison:
             f"mean absolute {self.mean_absolute:.4g}, bias {self.bias:.4g} {self.unit}>"
         )
 
-    def _repr_html_(self) -> str:
+    def to_png(self) -> bytes:
+        """Both images and their difference as a PNG file; of a volume the middle slice."""
         from bentray_workers.images.canvas import drawing, new_figure, to_png
 
         with drawing():
             figure = new_figure(13.0, 3.9)
             self._draw(figure.subplots(1, 3), "z", None)
-            png = to_png(figure)
+            return to_png(figure)
+
+    def _repr_html_(self) -> str:
         rows = [
             ("root mean square", f"{self.rms:.4g} {self.unit}"),
             ("mean absolute", f"{self.mean_absolute:.4g} {self.unit}"),
             ("bias", f"{self.bias:.4g} {self.unit}"),
             ("largest", f"{self.largest:.4g} {self.unit}"),
             ("correlation", f"{self.correlation:.4f}"),
+            ("SSIM", f"{self.ssim:.4f}"),
             ("region", f"{self.region_choice}, {int(self.region.sum())} nodes"),
         ]
         first, second = self.names
-        return picture_html(png, "comparison") + figures_html(f"{first} minus {second}", rows)
+        return picture_html(self.to_png(), "comparison") + figures_html(f"{first} minus {second}", rows)
+
+
+def round_nodes(
+    centre_m: Sequence[float] | None,
+    radius_m: float | None,
+    shape: tuple[int, ...],
+    spacing_m: Sequence[float],
+    origin_m: Sequence[float],
+) -> tuple[Bools, Bools] | None:
+    """Nodes of a disc or ball and of its surroundings; None without one.
+
+    Raises:
+        InvalidInput: naming ``centre_m`` or ``radius_m``, also if only one of them is given.
+    """
+    if centre_m is None and radius_m is None:
+        return None
+    if centre_m is None or radius_m is None:
+        missing = "centre_m" if centre_m is None else "radius_m"
+        raise InvalidInput(missing, "none", "both centre_m and radius_m, or neither")
+    region = RoundRegion(tuple(float(one) for one in centre_m), float(radius_m))
+    return region.nodes(shape, spacing_m, origin_m)
 
 
 def at_nodes(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import Iteration, Reconstruction, Settings, Trial
+from bentray_kernels.tomography import (
+    Iteration,
+    Reconstruction,
+    RegionStatistics,
+    Settings,
+    Trial,
+    region_statistics,
+)
 from bentray_workers.files.export.optional_library import import_optional
 from bentray_workers.files.volume import Volume
 
@@ -148,12 +155,21 @@ class Result:
         self._draw(axes, quantity, (axis, index), (low, high))
         return axes
 
-    def compare(self, other: Result | Scan | None = None, quantity: str = "speed") -> Comparison:
-        """Compare with another image, or with the truth of a simulated scan, at the nodes of this image.
+    def compare(
+        self,
+        other: Result | Scan | str | os.PathLike[str] | None = None,
+        quantity: str = "speed",
+        *,
+        spacing_m: float | Sequence[float] | None = None,
+    ) -> Comparison:
+        """Compare with another image, or with a truth, at the nodes of this image.
 
         Args:
-            other: a result, interpolated linearly; or a scan with a truth; None: the truth of the own scan.
+            other: a result, interpolated linearly; a scan with a truth; the path of a file with the truth: a
+                dataset, another result, or speeds as NumPy, NRRD, NIfTI or HDF5; None: that of the own scan.
             quantity: ``speed`` or another name of ``values``; of a truth ``speed`` or ``attenuation``.
+            spacing_m: node spacing of a NumPy file, m, which is then centred on 0; None: it is on the nodes
+                of this image.
 
         Returns:
             The difference and its figures. Of two results they are over the nodes that rays of both cross; of
@@ -164,12 +180,38 @@ class Result:
         """
         if isinstance(other, Result):
             return self._compared(other, quantity)
+        if isinstance(other, str | os.PathLike) and not isinstance(other, Scan):
+            from bentray_workers.files.truth_file import read_truth
+
+            steps = [float(one) for one in np.atleast_1d(spacing_m)] if spacing_m is not None else None
+            known = read_truth(Path(other), self._reconstruction(), steps)
+            return self._against_truth(known.truth, known.roi, quantity)
         truth = self.truth if other is None else other.truth
         roi = self.roi if other is None else other.dataset.roi
         if truth is None:
             found = "no other image, of a scan without a truth" if other is None else f"{other!r}, no truth"
             raise InvalidInput("other", found, "a result of bentray.reconstruct, or a simulated scan")
         return self._against_truth(truth, roi, quantity)
+
+    def statistics(
+        self, centre_m: Sequence[float], radius_m: float, quantity: str = "speed"
+    ) -> RegionStatistics:
+        """Mean, spread, size and contrast of a disc of a slice, or of a ball of a volume.
+
+        Args:
+            centre_m: (x, y[, z]), m.
+            radius_m: m. The contrast is that to a ring from 1.25 to 2 radii.
+            quantity: a name of ``values``.
+
+        Raises:
+            InvalidInput: naming the argument, also for a disc without a node.
+        """
+        from .comparison import round_nodes
+
+        image, (spacing, origin) = self._of(quantity), self._grid(quantity)
+        nodes = round_nodes(centre_m, radius_m, image.shape, spacing, origin)
+        assert nodes is not None
+        return region_statistics(image, nodes[0], spacing, nodes[1], self._uncertainty(quantity))
 
     def to_xarray(self) -> xarray.Dataset:
         """Convert to a dataset of xarray, with the units in ``attrs``.
@@ -274,6 +316,10 @@ class Result:
             raise InvalidInput("quantity", repr(quantity), "one of " + ", ".join(self.values))
         return self.values[quantity]
 
+    def _uncertainty(self, quantity: str) -> Floats | None:
+        """Standard deviation of the nodes of a quantity, where the result has it: of the speed."""
+        return self.values.get("uncertainty") if quantity == "speed" else None
+
     def _grid(self, quantity: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Spacing and position of node 0 of a quantity, m."""
         image = self._image()
@@ -342,7 +388,8 @@ class Result:
             raise InvalidInput("other", "an image without a common node", "one that overlaps with this one")
         names = ("this image", "the other")
         unit = self.units[quantity]
-        return Comparison(names, quantity, unit, image, there, region, choice, *nodes)
+        deviation = self._uncertainty(quantity)
+        return Comparison(names, quantity, unit, image, there, region, choice, *nodes, deviation)
 
     def _against_truth(self, truth: Truth, roi: Bools | None, quantity: str) -> Comparison:
         from bentray_workers.images.truth_comparison import NotComparable, compare
@@ -365,8 +412,9 @@ class Result:
         nodes = (self.spacing_m, self.origin_m)
         image = np.asarray(self._of(quantity), np.float64)
         names = ("reconstruction", "truth")
+        unit, deviation = self.units[quantity], self._uncertainty(quantity)
         return Comparison(
-            names, quantity, self.units[quantity], image, true, found.region, found.region_choice, *nodes
+            names, quantity, unit, image, true, found.region, found.region_choice, *nodes, deviation
         )
 
 

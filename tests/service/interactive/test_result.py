@@ -116,6 +116,27 @@ def test_figures_of_a_comparison(result: Result) -> None:
     assert "rms" in repr(found)
 
 
+def test_a_file_is_a_truth(result: Result, tmp_path: Path) -> None:
+    np.save(tmp_path / "true.npy", result.speed - 3.0)
+    found = result.compare(str(tmp_path / "true.npy"))
+    assert found.rms == pytest.approx(3.0)
+    assert result.compare(tmp_path / "true.npy", spacing_m=SPACING_M).rms == pytest.approx(3.0)
+    with pytest.raises(bentray.InvalidInput, match="truth"):
+        result.compare(tmp_path / "none.npy")
+
+
+def test_statistics_of_a_disc(result: Result) -> None:
+    of_image, of_truth = result.compare().statistics((0.0, 0.0), 5e-3)
+    assert result.statistics((0.0, 0.0), 5e-3) == of_image
+    assert of_image.nodes == of_truth.nodes
+    assert of_image.mean == pytest.approx(of_truth.mean, abs=2.0)
+    assert of_truth.contrast is not None
+    everything, _ = result.compare().statistics()
+    assert (everything.nodes, everything.contrast) == (int(result.compare().region.sum()), None)
+    with pytest.raises(bentray.InvalidInput, match="radius_m"):
+        result.compare().statistics((0.0, 0.0))
+
+
 def test_nodes_without_rays_do_not_count(result: Result) -> None:
     image = made(nodes=12)
     coverage = image.coverage.copy()

@@ -62,6 +62,9 @@ def test_a_summary_names_quantities_candidates_and_errors(http, result):
     inside = values(http, result, "speed") - values(http, result, "truth")
     assert 0 < found["truth"]["nodes"] <= inside.size
     assert found["truth"]["rmse_mps"] == pytest.approx(np.sqrt(np.mean(inside**2)), rel=1e-9)
+    assert found["truth"]["mean_absolute_error_mps"] == pytest.approx(np.abs(inside).mean(), rel=1e-9)
+    assert found["truth"]["true_mean_mps"] == pytest.approx(found["truth"]["mean_mps"] - inside.mean())
+    assert -1.0 <= found["truth"]["ssim"] <= 1.0
 
 
 @pytest.mark.parametrize("quantity", ["attenuation", "recovery", "reflection", "colour"])

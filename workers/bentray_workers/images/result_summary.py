@@ -23,7 +23,8 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         ``candidates``: the models that were compared, the chosen one first, each with ``label``,
         ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s`` and
         ``chosen``; ``reason``: of this choice, empty without candidates; ``truth``: None without a truth,
-        else ``region``, ``nodes`` and ``rmse_mps``, or ``region`` with the reason why it is not compared.
+        else ``region``, ``nodes``, errors, similarities (None if they do not exist), mean and spread of
+        image and truth there; or ``region`` with the reason why it is not compared, and ``nodes``.
 
     Raises:
         InvalidInput: naming the field of a file.
@@ -41,11 +42,21 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         try:
             found = compare(own, dataset.truth, dataset.roi)
         except NotComparable as reason:
-            errors = {"region": f"not compared: {reason}", "nodes": 0, "rmse_mps": None}
+            errors = {"region": f"not compared: {reason}", "nodes": 0}
         else:
             quantities.append("truth")
-            nodes = int(found.region.sum())
-            errors = {"region": found.region_choice, "nodes": nodes, "rmse_mps": found.rmse_mps}
+            errors = {
+                "region": found.region_choice,
+                "nodes": int(found.region.sum()),
+                "rmse_mps": found.rmse_mps,
+                "mean_absolute_error_mps": found.mean_absolute_error_mps,
+                "ssim": _number(found.ssim),
+                "correlation": _number(found.correlation),
+                "mean_mps": found.image_statistics.mean,
+                "spread_mps": found.image_statistics.spread,
+                "true_mean_mps": found.true_statistics.mean,
+                "true_spread_mps": found.true_statistics.spread,
+            }
     return {
         "quantities": quantities,
         "grids": {
@@ -72,6 +83,11 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
     }
 
 
+def _number(value: float) -> float | None:
+    """A number for JSON."""
+    return value if math.isfinite(value) else None
+
+
 def _or_none(lengths: tuple[float, ...]) -> list[float | None]:
     """Lengths for JSON; None for the uneven spacing of heights."""
-    return [one if math.isfinite(one) else None for one in lengths]
+    return [_number(one) for one in lengths]

@@ -1,7 +1,8 @@
-"""Comparison of a reconstruction with the truth: region, true speed and errors."""
+"""Comparison of a reconstruction with the truth: region, true speed, errors and statistics."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
 
 from bentray_kernels.acquisition import Truth
-from bentray_kernels.tomography import Reconstruction, mean_absolute_error, rmse
+from bentray_kernels.tomography import (
+    Reconstruction,
+    RegionStatistics,
+    correlation,
+    mean_absolute_error,
+    region_statistics,
+    rmse,
+    structural_similarity,
+)
 
 from .truth_on_grid import NotComparable, on_grid
 
@@ -33,6 +42,11 @@ class Comparison:
         true_range_mps: lowest and highest true speed in the region.
         mean_absolute_error_of_range: relative to that range (chapter 6.4); None if the range is 0.
         rmse_mps: root mean square error.
+        mean_absolute_error_mps: mean absolute error.
+        ssim: structural similarity, with the range of the truth over all nodes that it covers; NaN if the
+            region is smaller than a window or the truth is constant.
+        correlation: Pearson's correlation; NaN if the truth or the image is constant.
+        image_statistics, true_statistics: of the region, m/s.
     """
 
     true_speed_mps: Floats
@@ -41,6 +55,11 @@ class Comparison:
     true_range_mps: tuple[float, float]
     mean_absolute_error_of_range: float | None
     rmse_mps: float
+    mean_absolute_error_mps: float
+    ssim: float
+    correlation: float
+    image_statistics: RegionStatistics
+    true_statistics: RegionStatistics
 
     def __str__(self) -> str:
         """The errors as a caption."""
@@ -76,6 +95,7 @@ def compare(result: Reconstruction, truth: Truth, roi: Bools | None = None) -> C
     elif outline.any():
         choice, region = "the outline of what is not water in the truth", outline
     low, high = float(true_speed[region].min()), float(true_speed[region].max())
+    whole = float(np.ptp(true_speed[covered]))
     return Comparison(
         true_speed_mps=true_speed,
         region=region,
@@ -85,6 +105,11 @@ def compare(result: Reconstruction, truth: Truth, roi: Bools | None = None) -> C
             mean_absolute_error(result.speed, true_speed, region, high - low) if high > low else None
         ),
         rmse_mps=rmse(result.speed, true_speed, region),
+        mean_absolute_error_mps=mean_absolute_error(result.speed, true_speed, region),
+        ssim=structural_similarity(result.speed, true_speed, region, whole) if whole > 0.0 else math.nan,
+        correlation=correlation(result.speed, true_speed, region),
+        image_statistics=region_statistics(result.speed, region, result.spacing_m),
+        true_statistics=region_statistics(true_speed, region, result.spacing_m),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any
 
@@ -69,7 +70,14 @@ def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None =
         "region_nodes": int(comparison.region.sum()),
         "true_range_mps": list(comparison.true_range_mps),
         "mean_absolute_error_of_range": comparison.mean_absolute_error_of_range,
+        "mean_absolute_error_mps": comparison.mean_absolute_error_mps,
         "rmse_mps": comparison.rmse_mps,
+        "ssim": comparison.ssim,
+        "correlation": comparison.correlation,
+        "statistics": {
+            "image": asdict(comparison.image_statistics),
+            "truth": asdict(comparison.true_statistics),
+        },
         "registration": "none",
         "axes": truth.axes,
     }
@@ -109,5 +117,9 @@ def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
             )
         if "rmse_mps" in truth:
             rows.append(("rms error", f"{truth['rmse_mps']:.1f} m/s"))
+            similarities = {"SSIM": truth["ssim"], "correlation": truth["correlation"]}
+            known = [f"{name} {value:.3f}" for name, value in similarities.items() if math.isfinite(value)]
+            if known:
+                rows.append(("similarity", ", ".join(known)))
         rows.append(("error region", truth["region"]))
     return rows

@@ -20,11 +20,21 @@ class CandidateRecord(BaseModel):
 
 
 class TruthErrors(BaseModel):
-    """Errors of the speed against the truth of the scan."""
+    """Errors of the speed against the truth of the scan; null where they do not exist."""
 
     region: str = Field(description="The nodes that count, or why there are no errors.")
     nodes: int = Field(description="Number of these nodes.")
-    rmse_mps: float | None = Field(description="Root mean square error, m/s.")
+    rmse_mps: float | None = Field(None, description="Root mean square error, m/s.")
+    mean_absolute_error_mps: float | None = Field(None, description="Mean absolute error, m/s.")
+    ssim: float | None = Field(
+        None,
+        description="Structural similarity: windows of 7 by 7 nodes in the region, range of the whole truth.",
+    )
+    correlation: float | None = Field(None, description="Pearson's correlation coefficient.")
+    mean_mps: float | None = Field(None, description="Mean speed of the image in the region, m/s.")
+    spread_mps: float | None = Field(None, description="Its standard deviation there, m/s.")
+    true_mean_mps: float | None = Field(None, description="Mean of the true speed, m/s.")
+    true_spread_mps: float | None = Field(None, description="Its standard deviation, m/s.")
 
 
 class GridRecord(BaseModel):

@@ -24,12 +24,18 @@ from ....workers.images.squares import WATER, disc, image, truth
 
 def test_the_errors_are_those_of_compare_as_plain_values() -> None:
     found = errors(image(disc() + 10.0), truth(disc()))
+    statistics = found.pop("statistics")
+    assert statistics["image"]["mean"] == pytest.approx(statistics["truth"]["mean"] + 10.0)
+    assert statistics["image"]["size"] == pytest.approx(81e-6)
     assert json.loads(json.dumps(found)) == {
         "region": "the outline of what is not water in the truth",
         "region_nodes": 81,
         "true_range_mps": [1450.0, 1550.0],
         "mean_absolute_error_of_range": pytest.approx(0.1),
+        "mean_absolute_error_mps": pytest.approx(10.0),
         "rmse_mps": pytest.approx(10.0),
+        "ssim": pytest.approx(1.0, abs=1e-4),
+        "correlation": pytest.approx(1.0),
         "registration": "none",
         "axes": "x,y",
     }
@@ -97,6 +103,7 @@ def test_summary_shows_errors_and_region_only_with_a_truth() -> None:
     with_truth = dict(summary(figures(image(disc() + 10.0), dataset(truth(disc())), 1.0)))
     assert with_truth["rms error"] == "10.0 m/s"
     assert with_truth["mean absolute error"] == "10.0 % of the range"
+    assert with_truth["similarity"] == "SSIM 1.000, correlation 1.000"
     assert with_truth["error region"] == "the outline of what is not water in the truth"
 
 

@@ -6,7 +6,7 @@ import { copyButton } from "../parts/copying.js";
 import { make, showError } from "../parts/dom.js";
 import { exportMenu } from "../parts/export_menu.js";
 import { provenanceTable } from "../parts/provenance.js";
-import { choiceTable, facts, planTable } from "../parts/result_tables.js";
+import { choiceTable, facts, planTable, truthTable } from "../parts/result_tables.js";
 import { loadResult, methodOf, nameOf } from "../parts/results.js";
 import { QUANTITIES } from "../viewer/quantities.js";
 import { stateOf } from "../viewer/state.js";
@@ -119,6 +119,6 @@ export async function open(root, { id, query }) {
     if (!rename.hidden) rename.elements.name.focus();
   }));
   compareMenu(job).then((menu) => menu && part("result-actions")?.prepend(menu), () => {});
-  part("result-tables").append(...[choiceTable(summary, job), planTable(job), provenanceTable(result)].filter(Boolean));
+  part("result-tables").append(...[choiceTable(summary, job), truthTable(summary), planTable(job), provenanceTable(result)].filter(Boolean));
   return shown.close;
 }

@@ -1,4 +1,4 @@
-// How a result was made, as tables: what auto compared, and the plan.
+// How a result was made and how good it is, as tables: errors against the truth, what auto compared, the plan.
 import { make } from "./dom.js";
 import { duration } from "./job_words.js";
 import { methodOf } from "./results.js";
@@ -65,6 +65,21 @@ export function choiceTable({ candidates, reason }, job) {
   const box = section("Automatic choice", make("p", "", reason), area);
   box.classList.add("whole-row");
   return box;
+}
+
+// Errors and statistics against the truth of the scan; null without one.
+export function truthTable({ truth }) {
+  if (truth?.rmse_mps == null) return null;
+  const number = (value, digits) => (value === null ? "–" : value.toFixed(digits));
+  const speed = (mean, spread) => `${number(mean, 1)} ± ${number(spread, 1)} m/s`;
+  return section("Against the truth", make("p", "", `In ${truth.region}, ${truth.nodes} nodes.`), pairs([
+    ["RMSE", `${number(truth.rmse_mps, 2)} m/s`],
+    ["MAE", `${number(truth.mean_absolute_error_mps, 2)} m/s`],
+    ["SSIM", number(truth.ssim, 3)],
+    ["PCC", number(truth.correlation, 3)],
+    ["Mean ± spread", speed(truth.mean_mps, truth.spread_mps)],
+    ["True mean ± spread", speed(truth.true_mean_mps, truth.true_spread_mps)],
+  ]));
 }
 
 export function planTable({ plan }) {

@@ -1,0 +1,73 @@
+"""Statistics of discs and balls: nodes, size, contrast to the surroundings, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import RoundRegion, region_statistics
+
+GRID = ((41, 41), (1e-3, 1e-3), (-0.02, -0.02))
+
+
+def test_a_lesion_has_the_contrast_that_was_put_in() -> None:
+    x, y = np.meshgrid(*(1e-3 * np.arange(41) - 0.02,) * 2, indexing="ij")
+    away = np.hypot(x - 0.004, y + 0.002)
+    # Alternating nodes give the surroundings a known spread.
+    values = np.where(away <= 0.0052, 1560.0, 1500.0 + 3.0 * (-1.0) ** np.add(*np.indices((41, 41))))
+    inside, beside = RoundRegion((0.004, -0.002), 0.0052).nodes(*GRID)
+    found = region_statistics(values, inside, GRID[1], beside, np.full((41, 41), 2.5))
+    assert found.nodes == (away <= 0.0052).sum()
+    assert found.size == pytest.approx(found.nodes * 1e-6)
+    assert found.size == pytest.approx(math.pi * 0.0052**2, rel=0.1)
+    assert (found.mean, found.spread) == (pytest.approx(1560.0), 0.0)
+    assert found.contrast == pytest.approx(60.0, abs=0.5)
+    assert found.contrast_to_noise == pytest.approx(20.0, rel=0.02)
+    assert found.uncertainty == 2.5
+
+
+def test_the_gap_between_region_and_surroundings_does_not_count() -> None:
+    inside, beside = RoundRegion((0.0, 0.0), 0.008).nodes(*GRID)
+    distance = np.hypot(*np.meshgrid(*(1e-3 * np.arange(41) - 0.02,) * 2))
+    assert not (inside & beside).any()
+    assert distance[inside].max() <= 0.008
+    assert 0.010 < distance[beside].min() < 0.0105
+    assert 0.0155 < distance[beside].max() <= 0.016
+
+
+def test_a_ball_has_a_volume() -> None:
+    inside, _ = RoundRegion((0.0, 0.0, 0.01), 0.006).nodes(
+        (21, 21, 11), (1e-3, 1e-3, 2e-3), (-0.01, -0.01, 0.0)
+    )
+    found = region_statistics(np.ones((21, 21, 11)), inside, (1e-3, 1e-3, 2e-3))
+    assert found.size == pytest.approx(4 / 3 * math.pi * 0.006**3, rel=0.1)
+    assert (found.contrast, found.contrast_to_noise, found.uncertainty) == (None, None, None)
+
+
+def test_nodes_without_a_value_do_not_count() -> None:
+    values = np.array([[1.0, np.nan, 3.0]])
+    found = region_statistics(values, np.ones((1, 3), bool), (1.0, 1.0))
+    assert (found.nodes, found.mean, found.spread) == (2, 2.0, 1.0)
+    with pytest.raises(InvalidInput, match="overlaps"):
+        region_statistics(values, np.isnan(values), (1.0, 1.0))
+
+
+def test_bad_regions_are_named() -> None:
+    for centre, radius, field in (
+        ((0.0,), 1.0, "centre_m"),
+        ((0.0, math.nan), 1.0, "centre_m"),
+        ((0.0, 0.0), 0.0, "radius_m"),
+        ((0.0, 0.0), math.inf, "radius_m"),
+    ):
+        with pytest.raises(InvalidInput) as refused:
+            RoundRegion(centre, radius)
+        assert refused.value.field == field
+    with pytest.raises(InvalidInput, match="2 coordinates"):
+        RoundRegion((0.0, 0.0, 0.0), 1.0).nodes(*GRID)
+    with pytest.raises(InvalidInput, match="between all nodes"):
+        RoundRegion((0.0005, 0.0005), 1e-4).nodes(*GRID)
+    with pytest.raises(InvalidInput, match="uneven slices"):
+        RoundRegion((0.0, 0.0, 0.0), 1.0).nodes((3, 3, 3), (1.0, 1.0, math.nan), (0.0, 0.0, 0.0))

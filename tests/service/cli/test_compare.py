@@ -1,0 +1,84 @@
+"""`bentray compare`: figures, statistics of regions, picture, and input that is refused."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import Result
+
+from bentray_kernels.tomography import rmse, structural_similarity
+from bentray_workers.files.reconstruction import write_reconstruction
+
+from ...workers.files.reconstructions import made, truth
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_reconstruction(tmp_path / "reconstruction.h5", made(48))
+    np.save(tmp_path / "truth.npy", truth(48).sound_speed_mps)
+    return tmp_path
+
+
+def test_figures_and_regions_are_printed_and_drawn(bentray: Callable[..., Result], folder: Path) -> None:
+    picture = folder / "comparison.png"
+    words = (folder, folder / "truth.npy", "--region", "9.4,0,18", "-o", picture)
+    result = bentray("compare", *words, "--json")
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(result.stdout)
+    image, true = made(48).speed, truth(48).sound_speed_mps
+    object_ = true != 1500.0
+    assert found["nodes"] == object_.sum()
+    assert found["rmse"] == pytest.approx(rmse(image, true, object_))
+    assert found["ssim"] == pytest.approx(structural_similarity(image, true, object_, 40.0))
+    assert found["statistics"]["truth"]["mean"] == pytest.approx(1540.0)
+    assert found["statistics"]["truth"]["size"] == pytest.approx(object_.sum() * 4e-6)
+    (region,) = found["regions"]
+    assert region["truth"]["contrast"] == pytest.approx(40.0, rel=0.3)
+    assert region["image"]["contrast"] == pytest.approx(region["truth"]["contrast"], abs=2.0)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    table = bentray("compare", *words, "--force").stdout
+    assert f"{found['rmse']:.4g} m/s" in table
+    assert "(9.4, 0) mm" in table
+
+
+def test_a_volume_has_balls(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    solid = replace(made(nodes=10, slices=5), spacing_m=(2e-3, 2e-3, 3e-3))
+    write_reconstruction(tmp_path / "reconstruction.h5", solid)
+    result = bentray("compare", tmp_path, tmp_path, "--region", "0,0,16,4", "--json")
+    found = json.loads(result.stdout)
+    assert (found["rmse"], found["correlation"]) == (0.0, pytest.approx(1.0))
+    assert found["regions"][0]["image"] == found["regions"][0]["truth"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--region", "1,2"), "X,Y,RADIUS"),
+        (("--region", "1,2,-3"), "X,Y,RADIUS"),
+        (("--region", "90,90,3"), "between all nodes"),
+        (("--quantity", "coverage"), "one of speed"),
+        (("-o", "picture.jpg"), "a name ending in .png"),
+    ],
+)
+def test_bad_input_is_named(
+    bentray: Callable[..., Result], folder: Path, words: tuple[str, ...], said: str
+) -> None:
+    result = bentray("compare", folder, folder / "truth.npy", *words)
+    assert result.exit_code == 2
+    assert said in result.stderr
+
+
+def test_missing_files_are_named(bentray: Callable[..., Result], folder: Path) -> None:
+    for words, said in (
+        ((folder / "none.h5", folder / "truth.npy"), "no such file"),
+        ((folder, folder / "none.npy"), "No such file"),
+    ):
+        result = bentray("compare", *words)
+        assert result.exit_code == 2
+        assert said in result.stderr
