@@ -32,8 +32,8 @@ class Part:
         benchmark: its name.
         settings: on which its rows depend; a part is complete for the same ones only.
         measured: date.
-        seconds: computing time of the benchmark, s.
-        load: load average at the end.
+        seconds: computing time of the benchmark, s; None of recorded rows.
+        load: load average at the end; None of recorded rows.
         rows: in the form of ``Row.to_dict``.
         pictures: names of files in the folder of its pictures.
         error: why the benchmark stopped; empty if it did not.
@@ -43,8 +43,8 @@ class Part:
     benchmark: str
     settings: dict[str, Any]
     measured: str
-    seconds: float
-    load: float
+    seconds: float | None
+    load: float | None
     rows: list[dict[str, Any]] = field(default_factory=list)
     pictures: list[str] = field(default_factory=list)
     error: str = ""

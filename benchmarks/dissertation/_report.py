@@ -22,7 +22,12 @@ STATES = (REPRODUCED, PARTLY, MISSED, NO_VALUES, DRAWN, REPLACED, SKETCH, NOT_ME
 
 
 def report_of(
-    parts: Mapping[str, Part], *, quick: bool, cluster: str, chapters: Sequence[Chapter] = CHAPTERS
+    parts: Mapping[str, Part],
+    *,
+    quick: bool,
+    cluster: str,
+    recorded: bool = False,
+    chapters: Sequence[Chapter] = CHAPTERS,
 ) -> dict[str, Any]:
     """The report for JSON; a missing part leaves its items "not measured"."""
     described = [
@@ -42,12 +47,13 @@ def report_of(
     missing = [name for name in wanted if name not in parts or parts[name].error]
     return {
         "quick": quick,
+        "recorded": recorded,
         "complete": not missing,
         "version": version("bentray"),
         "measured": dates[:: len(dates) - 1] if len(dates) > 1 else dates,
         "machine": f"{os.cpu_count()} processors, {platform.machine()}, {platform.system()}",
         "cluster": cluster,
-        "seconds": sum(part.seconds for part in parts.values()),
+        "seconds": sum(part.seconds or 0.0 for part in parts.values()),
         "items": {state: states[state] for state in STATES if states[state]},
         "rows": {
             "met": sum(row["met"] for row in rows),

@@ -1,8 +1,7 @@
-"""The recorded report on the dissertation's tables and figures, rendered as by the command that writes it."""
+"""The report on the dissertation's tables and figures from the recorded rows, as its command renders it."""
 
 from __future__ import annotations
 
-import json
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -12,11 +11,14 @@ RESULTS = ROOT / "benchmarks" / "results"
 
 
 def dissertation() -> str:
-    """Raw HTML; with pictures only for a full run, whose pictures are the recorded ones."""
+    """Raw HTML with the recorded pictures."""
     # The benchmarks are a namespace package of the checkout.
     if str(ROOT) not in sys.path:
         sys.path.insert(0, str(ROOT))
-    fragment = import_module("benchmarks.dissertation._page").fragment
-    report = json.loads((RESULTS / "dissertation.json").read_text())
-    html = fragment(report, lambda benchmark, name: None if report["quick"] else RESULTS / name)
+    recorded, report, page = (
+        import_module(f"benchmarks.dissertation.{name}") for name in ("_recorded", "_report", "_page")
+    )
+    parts = recorded.recorded_parts(RESULTS)
+    made = report.report_of(parts, quick=False, cluster=recorded.RECORDED, recorded=True)
+    html = page.fragment(made, lambda benchmark, name: RESULTS / name)
     return f"```{{raw}} html\n{html}\n```"

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import pytest
 from benchmarks.dissertation._outline import CHAPTERS, items
 from benchmarks.dissertation._page import fragment, page
+from benchmarks.dissertation._recorded import RECORDED, recorded_parts
 from benchmarks.dissertation._report import MISSED, PARTLY, REPRODUCED, SKETCH, report_of
 from benchmarks.dissertation._summary import CASES
 
@@ -154,15 +155,20 @@ def test_the_page_is_self_contained_and_escaped(tmp_path: Path, monkeypatch: pyt
     assert "Quick run." not in page(made | {"quick": False}, lambda benchmark, name: None)
 
 
-def test_the_recorded_report_lists_every_item_and_is_a_page_of_the_documentation(
+def test_the_page_of_the_documentation_shows_every_item_by_its_recorded_rows(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    recorded = json.loads((ROOT / "benchmarks/results/dissertation.json").read_text())
-    listed = [item["name"] for chapter in recorded["chapters"] for item in chapter["items"]]
-    assert listed == [item.name for item in items()]
+    results = ROOT / "benchmarks/results"
+    made = report_of(recorded_parts(results), quick=False, cluster=RECORDED, recorded=True)
+    assert made["complete"], [part["benchmark"] for part in made["parts"] if not part["measured"]]
+    rows = {row["target"]: row for row in json.loads((results / "table5.json").read_text())}
+    assert of(made, "Table 5")["rows"] == [row for row in rows.values() if row in of(made, "Table 5")["rows"]]
+    assert of(made, "Table 5")["rows"]
     assert "<!-- from the code: dissertation -->" in (ROOT / "docs/explanation/how-good-is-it.md").read_text()
     monkeypatch.syspath_prepend(str(ROOT / "docs"))
     text = import_module("from_code.dissertation").dissertation()
-    assert ("Quick run." in text) is recorded["quick"]
-    assert ("<img" in text) is not recorded["quick"]
-    assert all(f"<h3>{name}</h3>" in text for name in listed)
+    assert "recorded rows" in text
+    assert "Quick run." not in text
+    assert "Incomplete." not in text
+    assert text.count("<img") == len({file for item in items() for file in item.pictures})
+    assert all(f"<h3>{item.name}</h3>" in text for item in items())
