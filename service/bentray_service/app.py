@@ -55,6 +55,7 @@ from .routes import (
     plans,
     previews,
     refraction,
+    sign_in,
     tus,
     volumes,
 )
@@ -65,6 +66,7 @@ from .rows.job_queue import Queue
 from .rows.jobs import Jobs
 from .rows.keys import Keys
 from .rows.observed_time import ObservedTime
+from .rows.sessions import Sessions
 from .rows.stored_tables import Datasets, GeometryFields, Meshes, UploadedTable, Volumes
 from .rows.uploads import Uploads
 from .settings import ServiceSettings
@@ -156,7 +158,7 @@ def _routes() -> tuple[BaseRoute, ...]:
     ):
         router.include_router(part.router, **CLOSED)
     router.include_router(health.metrics_router, **CLOSED)
-    for public in (health, pages):
+    for public in (health, pages, sign_in):
         router.include_router(public.router)
     return tuple(router.routes)
 
@@ -183,7 +185,8 @@ def _open(
     orphans.begin()
     quota = Quota(database, settings.max_tenant_bytes)
     quota.begin(files, alone=settings.database_url is None)
-    sign_in = SignIn(settings, Keys(database))
+    access_control = SignIn(settings, Keys(database), Sessions(database))
+    stack.callback(access_control.close)
     if cluster is None:
         cluster = stack.enter_context(
             open_cluster(
@@ -265,8 +268,8 @@ def _open(
         compute=compute,
         pictures=pictures,
         runner=runner,
-        sign_in=sign_in,
-        key_watch=KeyWatch(Keys(database)),
+        sign_in=access_control,
+        key_watch=KeyWatch(Keys(database), Sessions(database)),
         feed=EventFeed(Jobs(database), leaving.is_set),
         audit=Audit(files.audit),
         readiness=readiness,

@@ -199,6 +199,20 @@ class DatabaseFull(Rejection, StorageFull, SQLAlchemyError):  # noqa: N818 - a r
         InvalidInput.__init__(self, "database", "no space to write a row", "more free disk space")
 
 
+class NoSignIn(Rejection):
+    """The service has no OpenID provider."""
+
+    def __init__(self) -> None:
+        super().__init__("sign-in", "no OpenID provider", "an API key; BENTRAY_OIDC_ISSUER names a provider")
+
+
+class ProviderUnavailable(Rejection):
+    """The provider of sign-ins does not answer, or not as OpenID Connect says."""
+
+    def __init__(self, found: str) -> None:
+        super().__init__("OpenID provider", found, "a later request; see the log of the service")
+
+
 class Busy(InvalidInput):
     """No worker was available in time."""
 

@@ -20,7 +20,21 @@ from .wiring import Parts
 log = logging.getLogger("bentray.access")
 
 # Public paths: pages without data, and health checks. All other paths need authentication.
-PUBLIC = frozenset({"/", "/docs", "/docs/formats", "/openapi.json", "/health/live", "/health/ready"})
+# Sign-in and sign-out authenticate by themselves.
+PUBLIC = frozenset(
+    {
+        "/",
+        "/docs",
+        "/docs/formats",
+        "/openapi.json",
+        "/health/live",
+        "/health/ready",
+        "/sign-in",
+        "/sign-in/callback",
+        "/sign-in/provider",
+        "/sign-out",
+    }
+)
 PUBLIC_FOLDERS = ("/static/", "/problems/")
 
 UNMATCHED = "unmatched"
@@ -46,8 +60,8 @@ class Guard:
             await problem_response(error, scope["path"])(scope, receive, seen.sending(send))
         else:
             arguments = scope, seen.receiving(receive), seen.sending(send)
-            if caller is not None and caller.how == "key":
-                await answer_while_valid(self.app, *arguments, _parts(scope).key_watch, caller.who)
+            if caller is not None and caller.ends:
+                await answer_while_valid(self.app, *arguments, _parts(scope).key_watch, caller.ends)
             else:
                 await self.app(*arguments)
         finally:
@@ -57,7 +71,7 @@ class Guard:
 def _authenticate(scope: Scope, seen: _RequestLog) -> Caller:
     sign_in = _parts(scope).sign_in
     headers, peer = Headers(scope=scope), scope.get("client")
-    seen.caller = sign_in.caller(headers, peer[0] if peer else "")
+    seen.caller = sign_in.caller(headers, peer[0] if peer else "", scope["method"])
     sign_in.check(seen.caller, scope["method"], scope["path"])
     return seen.caller
 
@@ -109,6 +123,8 @@ class _RequestLog:
             "received": self.received,
             "sent": self.sent,
         }
+        # Of a request that signs in or out.
+        self.caller = self.caller or self._scope.get("state", {}).get("caller")
         if self.caller is not None:
             who = {"tenant": self.caller.tenant, "how": self.caller.how, "who": self.caller.who}
             figures |= who

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import AliasChoices, Field, ValidationError
+from pydantic import AliasChoices, Field, Json, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError
@@ -109,6 +109,51 @@ class ServiceSettings(BaseSettings):
         "X-Forwarded-User",
         pattern=r"^[A-Za-z0-9-]+$",
         description="Header with the user name from such a proxy; the user is the tenant.",
+    )
+    public_url: str | None = Field(
+        None,
+        pattern=r"^https?://[^/?#@\s]+$",
+        description="Address of the service for browsers, without a path; needed with oidc_issuer.",
+    )
+    oidc_issuer: str | None = Field(
+        None,
+        pattern=r"^https?://[^?#@\s]+$",
+        description="Issuer of an OpenID Connect provider, at which users of the page sign in.",
+    )
+    oidc_name: str | None = Field(
+        None, max_length=60, description="Name of the provider on the page; default: its host name."
+    )
+    oidc_client_id: str | None = Field(None, description="Client id of this service at the provider.")
+    oidc_client_secret_file: Path | None = Field(
+        None, description="File with the client secret in its first line; default: a public client."
+    )
+    oidc_scope: str = Field(
+        "openid profile email",
+        pattern=r"^(.* )?openid( .*)?$",
+        description="Scopes requested from the provider, with spaces.",
+    )
+    oidc_user_claim: str = Field(
+        "sub",
+        description="Claim with the name of the user, unique at the provider and never given to another.",
+    )
+    oidc_tenant_claim: str | None = Field(
+        None,
+        description="Claim with the tenant or the groups of the user, nested ones with dots; default: "
+        "each user is a tenant.",
+    )
+    oidc_tenants: Json[dict[str, str]] | None = Field(
+        None,
+        description='Tenants by value of that claim, as {"/lab": "lab"}; the first that the user has counts.',
+    )
+    oidc_role_claim: str | None = Field(
+        None, description="Claim with the roles of the user, nested ones with dots."
+    )
+    oidc_roles: Json[dict[str, str]] | None = Field(
+        None,
+        description='Scopes by value of that claim, as {"viewer": "read"}; default: read,write.',
+    )
+    session_hours: float = Field(
+        12.0, gt=0, le=24 * 30, description="Time after which a user signs in again, in hours."
     )
     connections_per_address: int | None = Field(
         None,

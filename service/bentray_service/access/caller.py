@@ -29,15 +29,17 @@ class Caller:
 
     Attributes:
         tenant: whose data it accesses.
-        how: method of authentication: ``open`` (not required), ``key`` or ``proxy``.
-        who: id of the key, or user name from the proxy.
+        how: method of authentication: ``open`` (not required), ``key``, ``proxy`` or ``session``.
+        who: id of the key, or user name from the proxy or the OpenID provider.
         scopes: permissions.
+        ends: id of the key or session whose end ends its requests; empty if there is none.
     """
 
     tenant: Tenant
-    how: Literal["open", "key", "proxy"]
+    how: Literal["open", "key", "proxy", "session"]
     who: str
     scopes: frozenset[str]
+    ends: str = ""
 
 
 ANYONE = Caller(LOCAL, "open", "", frozenset(SCOPES))

@@ -1,4 +1,4 @@
-"""Ends requests in progress when their key is revoked or expires, polling the database once a second."""
+"""Ends requests in progress when their key or session ends, polling the database once a second."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ..errors import DatabaseUnavailable, NotAuthenticated
 from ..rows.keys import Keys
+from ..rows.sessions import Sessions
 from ..web.errors import problem_response
 
 log = logging.getLogger("bentray.access")
@@ -23,20 +24,20 @@ EVENTS = b"text/event-stream"
 
 
 class KeyWatch:
-    """The requests in progress of each key.
+    """The requests in progress of each key and session.
 
-    Keys are revoked by another process, therefore the database is polled. Most requests end before the first
-    poll.
+    Another process may end them, therefore the database is polled. Most requests end before the first poll.
     """
 
-    def __init__(self, keys: Keys) -> None:
+    def __init__(self, keys: Keys, sessions: Sessions) -> None:
         self._keys = keys
+        self._sessions = sessions
         self._under_way: dict[str, set[Callable[[], None]]] = {}
         self._polling: asyncio.Task[None] | None = None
 
     @contextmanager
     def during(self, key_id: str, end: Callable[[], None]) -> Iterator[None]:
-        """Within the block, call ``end`` once if the key is revoked or expires."""
+        """Within the block, call ``end`` once if the key or session ends."""
         self._under_way.setdefault(key_id, set()).add(end)
         if self._polling is None:
             self._polling = asyncio.create_task(self._poll())
@@ -48,6 +49,9 @@ class KeyWatch:
             if not mine:
                 self._under_way.pop(key_id, None)
 
+    def _ended(self, ids: list[str]) -> list[str]:
+        return [*self._keys.ended(ids), *self._sessions.ended(ids)]
+
     async def _poll(self) -> None:
         # A thread of its own, so that polling does not wait for other work.
         limiter = anyio.CapacityLimiter(1)
@@ -58,10 +62,10 @@ class KeyWatch:
                     return
                 try:
                     ended = await anyio.to_thread.run_sync(
-                        self._keys.ended, list(self._under_way), limiter=limiter
+                        self._ended, list(self._under_way), limiter=limiter
                     )
                 except (SQLAlchemyError, DatabaseUnavailable) as error:
-                    log.warning("revoked keys could not be read: %s", error)
+                    log.warning("ended keys and sessions could not be read: %s", error)
                     continue
                 for key_id in ended:
                     for end in self._under_way.pop(key_id, set()):
@@ -73,14 +77,16 @@ class KeyWatch:
 async def answer_while_valid(
     app: ASGIApp, scope: Scope, receive: Receive, send: Send, watch: KeyWatch, key_id: str
 ) -> None:
-    """Answer a request until its key is revoked or expires.
+    """Answer a request until its key or session ends.
 
     Before the response has started, it becomes 401. An event stream ends; the connection of any other
     response is aborted, so that the client does not take a part of a file for the whole.
     """
     cancelling = anyio.CancelScope()
     ended = begun = events = replaced = complete = False
-    refusal = NotAuthenticated("Authorization", "a key revoked or expired during the request", "a valid key")
+    refusal = NotAuthenticated(
+        "Authorization", "a key or session that ended during the request", "a valid key or session"
+    )
 
     def end() -> None:
         nonlocal ended

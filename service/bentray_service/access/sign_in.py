@@ -1,4 +1,4 @@
-"""Authentication of requests by API key or trusted proxy, before the body is read."""
+"""Authentication of requests by API key, trusted proxy or session, before the body is read."""
 
 from __future__ import annotations
 
@@ -13,52 +13,69 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import Forbidden, NotAuthenticated, RateLimited
 from ..rows.api_key import PREFIX, ApiKey
 from ..rows.keys import Keys
+from ..rows.sessions import Sessions
 from ..rows.tenants import LOCAL, tenant_of_user
 from ..settings import ServiceSettings
 from ..web.addresses import is_loopback, names_loopback, networks, within
+from .browser_sessions import BrowserSessions
 from .caller import ANYONE, SCOPES, USUAL, Caller, scope_of
 from .rate_limits import RateLimits
 
 log = logging.getLogger("bentray.access")
+
+# Sign-ins that an address may begin per minute.
+SIGN_INS_PER_MINUTE = 60
 
 # Time for which the absence of keys is cached, s.
 NO_KEYS_S = 1.0
 
 ACCEPTED_HOSTS = (
     "127.0.0.1; or a first key, created with `bentray keys create`; or BENTRAY_TRUSTED_PROXIES, "
-    "the addresses of authenticating proxies"
+    "the addresses of authenticating proxies; or BENTRAY_OIDC_ISSUER, an OpenID provider"
 )
 
 
 class SignIn:
     """Authenticates callers.
 
-    Without any key and without trusted proxies, a service on a loopback address needs no authentication;
-    every caller is the tenant ``local``. Otherwise every caller needs a key or a trusted proxy.
+    Without any key, trusted proxy and OpenID provider, a service on a loopback address needs no
+    authentication; every caller is the tenant ``local``. Otherwise every caller needs a key, a trusted
+    proxy or a session.
+
+    Attributes:
+        browsers: sessions of users who signed in at the OpenID provider; None without one.
     """
 
-    def __init__(self, settings: ServiceSettings, keys: Keys) -> None:
+    def __init__(self, settings: ServiceSettings, keys: Keys, sessions: Sessions) -> None:
         """Raises:
         InvalidInput: if the service would be open to other machines, or for an invalid setting.
         """
         self._keys = keys
         self._trusted = networks(settings.trusted_proxies or "")
         self._user_header = settings.proxy_user_header
+        self.browsers = None if settings.oidc_issuer is None else BrowserSessions(settings, sessions)
+        self._guarded = bool(self._trusted) or self.browsers is not None
+        self._sign_ins = RateLimits(SIGN_INS_PER_MINUTE)
         self._requests = RateLimits(settings.requests_per_minute)
         self._renders = RateLimits(settings.renders_per_minute)
         self._no_keys_until = -math.inf
         if settings.first_key_file is not None and not keys.any():
             self._create_first_key(settings)
-        if not self._trusted and not keys.any():
+        if not self._guarded and not keys.any():
             if not is_loopback(settings.host):
                 raise InvalidInput(
                     "host", f"{settings.host}, reachable by others, without any key", ACCEPTED_HOSTS
                 )
             log.info("no key required: every caller on this machine is the tenant %s", LOCAL)
 
+    def close(self) -> None:
+        """Close the connection to the provider."""
+        if self.browsers is not None:
+            self.browsers.close()
+
     def open(self) -> bool:
         """Whether authentication is not required; a new key is noticed after a second."""
-        if self._trusted or self._no_keys_until == math.inf:
+        if self._guarded or self._no_keys_until == math.inf:
             return False
         if time.monotonic() < self._no_keys_until:
             return True
@@ -67,12 +84,12 @@ class SignIn:
         self._no_keys_until = math.inf if any_key else time.monotonic() + NO_KEYS_S
         return not any_key
 
-    def caller(self, headers: Headers, address: str) -> Caller:
-        """Authenticate a request by its headers and client address.
+    def caller(self, headers: Headers, address: str, method: str = "GET") -> Caller:
+        """Authenticate a request by its headers, client address and method.
 
         Raises:
-            NotAuthenticated: without a valid key or a user from a trusted proxy.
-            Forbidden: without authentication, for requests of other web sites.
+            NotAuthenticated: without a valid key, a user from a trusted proxy or a session.
+            Forbidden: without authentication or with a session, for requests of other web sites.
         """
         if self.open():
             return self._local_caller(headers)
@@ -84,7 +101,13 @@ class SignIn:
             user = users[0].strip()
             return Caller(tenant_of_user(user), "proxy", user, frozenset(USUAL))
         found = "nothing" if not scheme else "something that is not a key"
-        raise NotAuthenticated("Authorization", found, "Bearer and a key; see `bentray keys create`")
+        accepted = "Bearer and a key; see `bentray keys create`"
+        if self.browsers is not None:
+            caller = self.browsers.caller(headers, method) if not scheme else None
+            if caller is not None:
+                return caller
+            accepted += f"; or a session: sign in at {self.browsers.name}"
+        raise NotAuthenticated("Authorization", found, accepted)
 
     def check(self, caller: Caller, method: str, path: str) -> None:
         """Check the scopes and the rate limit of a caller.
@@ -110,6 +133,17 @@ class SignIn:
         """
         self._take(self._renders, "renders", caller, share)
 
+    def check_sign_in(self, address: str) -> None:
+        """Check the rate limit of an address for sign-ins; trusted proxies have limits of their own.
+
+        Raises:
+            RateLimited: when it is exceeded.
+        """
+        wait_s = 0.0 if within(address, self._trusted) else self._sign_ins.take(address)
+        if wait_s > 0.0:
+            found = f"more than {SIGN_INS_PER_MINUTE} per minute"
+            raise RateLimited("sign-ins", found, "a lower rate; see Retry-After", wait_s)
+
     def _take(self, rates: RateLimits, what: str, caller: Caller, share: float = 1.0) -> None:
         wait_s = rates.take(caller.tenant, share) if caller.how != "open" else 0.0
         if wait_s > 0.0:
@@ -134,7 +168,7 @@ class SignIn:
             raise NotAuthenticated(
                 "Authorization", "a key that is unknown, revoked or expired", "a valid key"
             )
-        return Caller(row["tenant"], "key", row["id"], frozenset(row["scopes"]))
+        return Caller(row["tenant"], "key", row["id"], frozenset(row["scopes"]), row["id"])
 
     def _create_first_key(self, settings: ServiceSettings) -> None:
         path = settings.first_key_file

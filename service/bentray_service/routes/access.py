@@ -20,10 +20,11 @@ class AccessRecord(BaseModel):
     """The caller: identity, scopes, storage and rate limits."""
 
     tenant: str = Field(description="Owner of the data.")
-    how: Literal["open", "key", "proxy"] = Field(
-        description="Authentication method; open: not required on this machine."
+    how: Literal["open", "key", "proxy", "session"] = Field(
+        description="Authentication method; open: not required on this machine; session: signed in at the "
+        "OpenID provider."
     )
-    who: str = Field(description="Id of the key, or user name from the proxy.")
+    who: str = Field(description="Id of the key, or user name from the proxy or provider.")
     scopes: list[str]
     bytes_stored: int = Field(description="Bytes stored by the tenant.")
     bytes_reserved: int = Field(description="Bytes reserved for uploads and unfinished jobs.")

@@ -131,6 +131,12 @@ def _to_6(connection: Connection) -> None:
     connection.execute(text("ALTER TABLE datasets ADD COLUMN water_temperature_c FLOAT"))
 
 
+def _to_7(connection: Connection) -> None:
+    """Version 7: sessions of browsers, and sign-ins under way."""
+    for new in (schema.sessions, schema.pending_sign_ins):
+        new.create(connection)
+
+
 def _count_stored_bytes(connection: Connection) -> None:
     """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
@@ -142,5 +148,5 @@ def _count_stored_bytes(connection: Connection) -> None:
 
 
 STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType(
-    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6}
+    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6, 6: _to_7}
 )

@@ -20,7 +20,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 6
+VERSION = 7
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -258,6 +258,34 @@ keys = Table(
     Column("expires", Float),
     Column("revoked", Float),
     Column("used", Float),
+)
+
+# Sessions of browsers whose users signed in at an OpenID provider. Only the digest of the secret is stored.
+sessions = Table(
+    "sessions",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    _tenant(),
+    Column("who", String(200), nullable=False),
+    Column("sha256", String(64), nullable=False, unique=True),
+    Column("scopes", JSON, nullable=False),
+    Column("created", Float, nullable=False),
+    Column("expires", Float, nullable=False),
+)
+
+# Sign-ins whose user is at the provider. A row is deleted by the first response.
+pending_sign_ins = Table(
+    "pending_sign_ins",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("state_sha256", String(64), nullable=False, unique=True),
+    Column("browser_sha256", String(64), nullable=False),
+    Column("nonce", String(64), nullable=False),
+    Column("verifier", String(64), nullable=False),
+    # The part of the page to return to.
+    Column("address", String(500), nullable=False),
+    Column("expires", Float, nullable=False),
 )
 
 # The unique id of this database, to match it with a bucket; at most one row.

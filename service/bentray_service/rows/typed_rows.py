@@ -168,6 +168,31 @@ class KeyRow(TypedDict):
     used: float | None
 
 
+class SessionRow(TypedDict):
+    """A session of a browser without its secret."""
+
+    number: int
+    id: str
+    tenant: Tenant
+    who: str
+    sha256: str
+    scopes: list[str]
+    created: float
+    expires: float
+
+
+class PendingSignInRow(TypedDict):
+    """A sign-in whose user is at the provider; ``address`` is the part of the page to return to."""
+
+    number: int
+    state_sha256: str
+    browser_sha256: str
+    nonce: str
+    verifier: str
+    address: str
+    expires: float
+
+
 class ChecksumRow(TypedDict):
     """The checksum of a stored file, and since when its content is known to differ."""
 

@@ -1,4 +1,4 @@
-// The API key of this tab: entered where the service requires one, kept until the tab is closed, in no address.
+// Who uses this tab: with an API key, kept until the tab is closed and in no address, or signed in at an OpenID provider.
 import { at } from "./dom.js";
 
 const STORED = "bentray-key";
@@ -79,8 +79,26 @@ export function withKey(anchor, fixed) {
   return anchor;
 }
 
+// Where the service has an OpenID provider, the form offers it; it leads back to the view that is open.
+async function offerSignIn() {
+  const response = await fetch("/sign-in/provider").catch(() => null);
+  const { name } = response?.ok ? await response.json() : { name: null };
+  at("sign-in").hidden = !name;
+  if (!name) return;
+  const anchor = at("sign-in").querySelector("a");
+  anchor.textContent = `Sign in with ${name}`;
+  anchor.href = `/sign-in?address=${encodeURIComponent(location.hash || "#/")}`;
+}
+
+async function signOut() {
+  const response = await fetch("/sign-out", { method: "POST" });
+  const { address } = response.ok ? await response.json() : { address: null };
+  location.assign(address ?? "/");
+}
+
 function requestKey(why) {
   at("key").hidden = false;
+  offerSignIn();
   at("key-error").textContent = hasKey() ? why : "";
   at("key-error").hidden = !hasKey();
 }
@@ -93,16 +111,23 @@ export async function admitted(request) {
     sessionStorage.setItem(STORED, new FormData(event.target).get("key").trim());
     location.reload();
   });
-  at("forget").addEventListener("click", () => {
+  let leave = () => {
     sessionStorage.removeItem(STORED);
     location.reload();
-  });
+  };
+  at("forget").addEventListener("click", () => leave());
   at("forget").hidden = !hasKey();
   try {
-    const { tenant, how, scopes } = await request("/v1/access");
-    at("access").textContent = how === "open" ? "Open to this machine" : `Tenant ${tenant}`;
+    const { tenant, how, who, scopes } = await request("/v1/access");
+    const names = { open: "Open to this machine", session: who };
+    at("access").textContent = names[how] ?? `Tenant ${tenant}`;
     // The page of the service lists the scopes; here they would take a second row.
     at("access").title = how === "open" ? "" : `${tenant}: ${scopes.join(", ")}`;
+    if (how === "session") {
+      leave = signOut;
+      at("forget").textContent = "Sign out";
+      at("forget").hidden = false;
+    }
     return true;
   } catch (error) {
     // Other errors than a missing key are shown with their reason.

@@ -1,0 +1,122 @@
+"""From the claims of an OpenID provider about a user to tenant, name and scopes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from bentray_kernels.errors import InvalidInput
+
+from ..errors import Forbidden
+from ..rows.tenants import LOCAL, Tenant, checked_tenant, tenant_of_user
+from ..settings import ServiceSettings
+from .caller import USUAL, checked_scopes
+
+Checked = TypeVar("Checked")
+
+
+@dataclass(frozen=True)
+class Identity:
+    """A user as the service knows it."""
+
+    tenant: Tenant
+    who: str
+    scopes: tuple[str, ...]
+
+
+class ClaimMapping:
+    """The rules of the settings from claims to an identity."""
+
+    def __init__(self, settings: ServiceSettings) -> None:
+        """Raises:
+        InvalidInput: for an invalid tenant or scope in the settings.
+        """
+        self._user = settings.oidc_user_claim
+        self._tenant = settings.oidc_tenant_claim
+        self._role = settings.oidc_role_claim
+        self._tenants = {
+            value: _checked("OIDC_TENANTS", checked_tenant, tenant)
+            for value, tenant in (settings.oidc_tenants or {}).items()
+        }
+        self._roles = {
+            value: _checked("OIDC_ROLES", checked_scopes, scopes)
+            for value, scopes in (settings.oidc_roles or {}).items()
+        }
+        for name, table, claim in (
+            ("TENANT", self._tenants, self._tenant),
+            ("ROLE", self._roles, self._role),
+        ):
+            if table and claim is None:
+                raise InvalidInput(f"BENTRAY_OIDC_{name}_CLAIM", "nothing", "the claim that the table reads")
+
+    def names(self) -> tuple[str, ...]:
+        """The claims that must be known."""
+        return tuple(one for one in (self._user, self._tenant, self._role) if one is not None)
+
+    def identity(self, claims: Mapping[str, Any]) -> Identity:
+        """The identity of a user.
+
+        Args:
+            claims: of the provider, verified.
+
+        Raises:
+            Forbidden: without a tenant or a role for the user.
+        """
+        users = values_of(claims, self._user)
+        if len(users) != 1:
+            raise Forbidden(self._user, _shown(users), "one name of the user, as text")
+        if self._user == "email" and claims.get("email_verified") is False:
+            raise Forbidden("email_verified", "false", "true: an address that the provider has verified")
+        return Identity(self._tenant_of(users[0], claims), users[0], self._scopes(claims))
+
+    def _tenant_of(self, user: str, claims: Mapping[str, Any]) -> Tenant:
+        if self._tenant is None:
+            return tenant_of_user(user)
+        values = values_of(claims, self._tenant)
+        if self._tenants:
+            # The order of the settings decides, not that of the provider.
+            for value, tenant in self._tenants.items():
+                if value in values:
+                    return tenant
+            raise Forbidden(self._tenant, _shown(values), "a group that may use this service")
+        if len(values) != 1 or values[0] == LOCAL:
+            raise Forbidden(self._tenant, _shown(values), f"one tenant, not {LOCAL}")
+        return tenant_of_user(values[0])
+
+    def _scopes(self, claims: Mapping[str, Any]) -> tuple[str, ...]:
+        if not self._roles or self._role is None:
+            return USUAL
+        values = values_of(claims, self._role)
+        scopes = [scope for value in values for scope in self._roles.get(value, ())]
+        if not scopes:
+            raise Forbidden(self._role, _shown(values), "a role that may use this service")
+        return tuple(dict.fromkeys(scopes))
+
+
+def values_of(claims: Mapping[str, Any], name: str) -> tuple[str, ...]:
+    """The texts of a claim: one, or a list; a name with dots leads into nested claims.
+
+    A claim whose own name has dots, as an address, comes first.
+    """
+    found: Any = claims.get(name)
+    if found is None:
+        found = claims
+        for part in name.split("."):
+            found = found.get(part) if isinstance(found, Mapping) else None
+    if isinstance(found, str):
+        found = [found]
+    if not isinstance(found, list):
+        return ()
+    return tuple(one.strip() for one in found if isinstance(one, str) and one.strip())
+
+
+def _shown(values: tuple[str, ...]) -> str:
+    return repr(", ".join(values))[:120] if values else "nothing"
+
+
+def _checked(name: str, check: Callable[[str], Checked], text: str) -> Checked:
+    try:
+        return check(text)
+    except InvalidInput as error:
+        raise InvalidInput(f"BENTRAY_{name}", error.value, error.accepted) from None

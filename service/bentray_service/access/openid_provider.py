@@ -1,0 +1,283 @@
+"""A provider of OpenID Connect: its discovery document, its keys, and verified claims in exchange for a code.
+
+References: OpenID Connect Core 1.0 and Discovery 1.0; RFC 7636 (PKCE); RFC 9207 (issuer in the response).
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import logging
+import threading
+import time
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import quote_plus, urlencode, urlsplit
+
+import httpx
+from joserfc import jwt
+from joserfc.errors import BadSignatureError, ClaimError, InvalidKeyIdError, JoseError
+from joserfc.jwk import KeySet
+
+from bentray_kernels.errors import InvalidInput
+
+from ..errors import NotAuthenticated, ProviderUnavailable
+from ..settings import ServiceSettings
+from ..web.addresses import names_loopback
+
+log = logging.getLogger("bentray.access")
+
+# Asymmetric signatures alone: with HS256 the public key, or the client secret, would sign.
+ALGORITHMS = (
+    "RS256",
+    "RS384",
+    "RS512",
+    "PS256",
+    "PS384",
+    "PS512",
+    "ES256",
+    "ES384",
+    "ES512",
+    "EdDSA",
+    "Ed25519",
+)
+PATIENCE_S = 10.0
+# Age at which the discovery document and the keys are read again, s.
+FRESH_S = 3600.0
+# Shortest interval between two readings for an unknown key: providers rotate keys, attackers invent them, s.
+ROTATION_S = 30.0
+# Difference of clocks that is tolerated, s.
+LEEWAY_S = 60
+MAX_BYTES = 1 << 20
+NEEDED = ("authorization_endpoint", "token_endpoint", "jwks_uri")
+OPTIONAL = ("userinfo_endpoint", "end_session_endpoint")
+
+
+class Provider:
+    """The provider that the settings name, for one client (this service). Safe in threads."""
+
+    def __init__(self, settings: ServiceSettings) -> None:
+        """Nothing is read from the provider yet, so that the service starts without it.
+
+        Raises:
+            InvalidInput: for an invalid or a missing setting.
+        """
+        assert settings.oidc_issuer is not None
+        self.issuer = settings.oidc_issuer
+        if not _is_safe(self.issuer):
+            raise InvalidInput("BENTRAY_OIDC_ISSUER", self.issuer, "an https address")
+        if settings.oidc_client_id is None:
+            raise InvalidInput("BENTRAY_OIDC_CLIENT_ID", "nothing", "the client id from the provider")
+        self._client_id = settings.oidc_client_id
+        self._secret = _secret(settings)
+        self._scope = settings.oidc_scope
+        # One for all: the certificates of authorities are read once.
+        self._http = httpx.Client(timeout=PATIENCE_S)
+        self._lock = threading.Lock()
+        self._read_at = self._keys_at = -FRESH_S
+        self._document: dict[str, Any] = {}
+        self._keys: KeySet | None = None
+
+    def close(self) -> None:
+        self._http.close()
+
+    def authorization_url(self, redirect_uri: str, state: str, nonce: str, verifier: str) -> str:
+        """Address of the provider at which the user signs in.
+
+        Raises:
+            ProviderUnavailable: when the discovery document cannot be read.
+        """
+        challenge = base64.urlsafe_b64encode(hashlib.sha256(verifier.encode()).digest()).rstrip(b"=").decode()
+        query = {
+            "response_type": "code",
+            "client_id": self._client_id,
+            "redirect_uri": redirect_uri,
+            "scope": self._scope,
+            "state": state,
+            "nonce": nonce,
+            "code_challenge": challenge,
+            "code_challenge_method": "S256",
+        }
+        return _with_query(self._discovered()["authorization_endpoint"], query)
+
+    def logout_url(self, back: str) -> str | None:
+        """Address that ends the session at the provider and leads back; None if it offers none."""
+        end = self._discovered().get("end_session_endpoint")
+        query = {"client_id": self._client_id, "post_logout_redirect_uri": back}
+        return None if end is None else _with_query(end, query)
+
+    def claims(
+        self, code: str, redirect_uri: str, nonce: str, verifier: str, names: tuple[str, ...]
+    ) -> dict[str, Any]:
+        """Exchange a code for the verified claims of the user.
+
+        Args:
+            code: from the response of the provider.
+            redirect_uri, nonce, verifier: of the request.
+            names: claims that are read from the user info endpoint if the ID token lacks one.
+
+        Raises:
+            NotAuthenticated: when the provider refuses the code, or its answer is not valid.
+            ProviderUnavailable: when it does not answer.
+        """
+        form = {"grant_type": "authorization_code", "code": code, "redirect_uri": redirect_uri}
+        form |= {"code_verifier": verifier, "client_id": self._client_id}
+        document = self._discovered()
+        methods = document.get("token_endpoint_auth_methods_supported", ["client_secret_basic"])
+        by_header = "client_secret_basic" in methods
+        auth = None
+        if self._secret is not None and by_header:
+            # RFC 6749, 2.3.1: both are form-encoded first.
+            auth = httpx.BasicAuth(quote_plus(self._client_id), quote_plus(self._secret))
+        elif self._secret is not None:
+            form["client_secret"] = self._secret
+        answer = self._fetch("POST", document["token_endpoint"], data=form, auth=auth)
+        if answer is None or not isinstance(answer.get("id_token"), str):
+            raise NotAuthenticated("code", "one that the provider does not accept", "a new sign-in")
+        claims = self._verified(answer["id_token"], nonce)
+        address = document.get("userinfo_endpoint")
+        missing = any(name.partition(".")[0] not in claims and name not in claims for name in names)
+        if missing and address is not None and isinstance(answer.get("access_token"), str):
+            more = self._fetch("GET", address, headers={"Authorization": f"Bearer {answer['access_token']}"})
+            # OpenID Connect Core 5.3.2: else they may be those of another user.
+            if more is None or more.get("sub") != claims["sub"]:
+                raise NotAuthenticated("sub", "another user in the user info", "the user of the ID token")
+            claims = {**more, **claims}
+        return claims
+
+    def _verified(self, token: str, nonce: str) -> dict[str, Any]:
+        """The claims of an ID token, verified as in OpenID Connect Core 3.1.3.7."""
+        rules = jwt.JWTClaimsRegistry(
+            leeway=LEEWAY_S,
+            iss={"essential": True, "value": self.issuer},
+            sub={"essential": True},
+            aud={"essential": True, "value": self._client_id},
+            exp={"essential": True},
+            iat={"essential": True},
+            nonce={"essential": True, "value": nonce},
+        )
+        try:
+            try:
+                claims = jwt.decode(token, self._key_set(), algorithms=ALGORITHMS).claims
+            except (InvalidKeyIdError, BadSignatureError):
+                # The provider may have changed its keys.
+                if not self._forget_keys():
+                    raise
+                claims = jwt.decode(token, self._key_set(), algorithms=ALGORITHMS).claims
+            rules.validate(claims)
+        except (JoseError, ValueError) as error:
+            # The message of the library names the claim, not the token.
+            raise NotAuthenticated("ID token", _words(error), "one signed for this sign-in") from error
+        audience = claims["aud"]
+        party = claims.get("azp")
+        several = isinstance(audience, list) and len(audience) > 1
+        if party != self._client_id and (party is not None or several):
+            raise NotAuthenticated("ID token", "the authorized party of another client", self._client_id)
+        return dict(claims)
+
+    def _discovered(self) -> dict[str, Any]:
+        with self._lock:
+            if time.monotonic() - self._read_at < FRESH_S:
+                return self._document
+            try:
+                self._document = self._read_document()
+                self._read_at = time.monotonic()
+            except ProviderUnavailable:
+                # An older document is better than none.
+                if not self._document:
+                    raise
+            return self._document
+
+    def _read_document(self) -> dict[str, Any]:
+        found = self._fetch("GET", f"{self.issuer.rstrip('/')}/.well-known/openid-configuration")
+        if found is None or found.get("issuer") != self.issuer:
+            shown = "nothing" if found is None else repr(found.get("issuer"))[:120]
+            raise ProviderUnavailable(f"a discovery document of the issuer {shown} in place of {self.issuer}")
+        for name in (*NEEDED, *OPTIONAL):
+            address = found.get(name)
+            if address is None and name in OPTIONAL:
+                continue
+            if not (isinstance(address, str) and _is_safe(address)):
+                raise ProviderUnavailable(f"a discovery document whose {name} is not an https address")
+        return found
+
+    def _key_set(self) -> KeySet:
+        address = self._discovered()["jwks_uri"]
+        with self._lock:
+            if self._keys is None or time.monotonic() - self._keys_at >= FRESH_S:
+                found = self._fetch("GET", address)
+                try:
+                    self._keys = KeySet.import_key_set(_signing(found))
+                except (JoseError, KeyError, TypeError, ValueError) as error:
+                    raise ProviderUnavailable("keys that cannot be read") from error
+                self._keys_at = time.monotonic()
+            return self._keys
+
+    def _forget_keys(self) -> bool:
+        """Read the keys again for the next token; not more often than every ``ROTATION_S``."""
+        with self._lock:
+            if time.monotonic() - self._keys_at < ROTATION_S:
+                return False
+            self._keys = None
+            return True
+
+    def _fetch(
+        self, method: str, address: str, headers: Mapping[str, str] | None = None, **request: Any
+    ) -> dict[str, Any] | None:
+        """The JSON object at an address; None if the provider refuses. Redirects are not followed."""
+        accept = {"Accept": "application/json", **(headers or {})}
+        body = b""
+        try:
+            with self._http.stream(method, address, headers=accept, **request) as answer:
+                for piece in answer.iter_bytes():
+                    body += piece
+                    if len(body) > MAX_BYTES:
+                        raise ProviderUnavailable(f"an answer of more than {MAX_BYTES} bytes")
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
+            raise ProviderUnavailable(f"no answer ({type(error).__name__})") from error
+        if answer.status_code >= httpx.codes.INTERNAL_SERVER_ERROR:
+            raise ProviderUnavailable(f"status {answer.status_code}")
+        if answer.status_code != httpx.codes.OK:
+            # As {"error": "invalid_client"}, for the operator.
+            log.warning("%s answered %d: %r", address, answer.status_code, body[:200])
+            return None
+        try:
+            found = json.loads(body)
+        except ValueError as error:
+            raise ProviderUnavailable("an answer that is not JSON") from error
+        return found if isinstance(found, dict) else None
+
+
+def _signing(found: dict[str, Any] | None) -> Any:
+    """The keys of a key set that sign; keys for encryption are left out."""
+    keys = [] if found is None else found["keys"]
+    return {"keys": [key for key in keys if key.get("use", "sig") == "sig"]}
+
+
+def _secret(settings: ServiceSettings) -> str | None:
+    path = settings.oidc_client_secret_file
+    if path is None:
+        return None
+    try:
+        return path.read_text().partition("\n")[0].strip()
+    except (OSError, UnicodeDecodeError) as error:
+        found = f"{path} ({getattr(error, 'strerror', None) or 'not text'})"
+        raise InvalidInput("BENTRAY_OIDC_CLIENT_SECRET_FILE", found, "a readable file") from error
+
+
+def _is_safe(address: str) -> bool:
+    """Whether an address is encrypted, or of this machine."""
+    parts = urlsplit(address)
+    return parts.scheme == "https" or (parts.scheme == "http" and names_loopback(parts.netloc))
+
+
+def _with_query(address: str, query: Mapping[str, str]) -> str:
+    return f"{address}{'&' if '?' in address else '?'}{urlencode(query)}"
+
+
+def _words(error: Exception) -> str:
+    """What is wrong with a token, in words."""
+    if isinstance(error, ClaimError):
+        return f"a wrong {error.claim}"
+    return "an invalid signature" if isinstance(error, JoseError) else "an invalid one"
