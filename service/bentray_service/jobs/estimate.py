@@ -1,8 +1,8 @@
 """Estimated duration of a job: its counted work times what the tenant's finished jobs of its class took.
 
 Only jobs of the same tenant are read, so that no duration tells one tenant about the work of another. Until
-there are any, the speed of another machine gives the order of magnitude; a class without such a speed has no
-estimate.
+there are any, the jobs of other classes tell how fast this machine is, and until there are any of those the
+speed of another machine gives the order of magnitude; a class without such a speed has no estimate.
 """
 
 from __future__ import annotations
@@ -49,20 +49,20 @@ def estimate(plan: Mapping[str, Any] | None, finished: Sequence[tuple[Mapping[st
     if planned is None:
         return Estimate(None, 0, "No estimate yet: jobs of this kind are not counted.")
     name, seconds, known = planned
-    ratios = []
-    for other, took in finished:
-        work = _work(other)
-        if work is not None and work[0] == name:
-            ratios.append(took / work[1])
-    ratios = ratios[:COMPARED]
+    counted = [(work, took) for other, took in finished if (work := _work(other)) is not None]
+    ratios = [took / work[1] for work, took in counted if work[0] == name][:COMPARED]
     if ratios:
         jobs = "one finished job" if len(ratios) == 1 else f"{len(ratios)} finished jobs"
         return Estimate(median(ratios) * seconds / 60.0, len(ratios), f"From {jobs} of the same method.")
     if not known:
         return Estimate(None, 0, "No estimate yet: no job of this method has finished here.")
-    return Estimate(
-        seconds / 60.0, 0, "Rough, from another machine: no job of this method has finished here."
-    )
+    none = "no job of this method has finished here."
+    others = [(work[1], took) for work, took in counted if work[2]][:COMPARED]
+    if not others:
+        return Estimate(seconds / 60.0, 0, f"Rough, from another machine: {none}")
+    # The sums, since what every job takes at its start would make small ones look slow.
+    ratio = sum(took for _, took in others) / sum(work for work, _ in others)
+    return Estimate(ratio * seconds / 60.0, 0, f"Rough, from jobs of other methods: {none}")
 
 
 def _work(plan: Mapping[str, Any] | None) -> tuple[str, float, bool] | None:

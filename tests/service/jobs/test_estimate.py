@@ -29,11 +29,22 @@ def test_the_last_jobs_count():
     assert estimate(plan(30.0), finished).minutes == pytest.approx(1.0)
 
 
-def test_jobs_of_other_classes_and_of_earlier_versions_do_not_count():
-    finished = [(plan(1.0, "gauss-newton"), 50.0), ({}, 3.0), ({"tasks": 3, "work_s": None}, 3.0)]
+def test_jobs_of_earlier_versions_and_of_classes_without_a_speed_do_not_count():
+    unknown = plan(1.0, "volume", known=False)
+    finished = [(unknown, 50.0), ({}, 3.0), ({"tasks": 3, "work_s": None}, 3.0)]
     found = estimate(plan(90.0), finished)
     assert (found.minutes, found.compared, found.rough) == (1.5, 0, True)
     assert "another machine" in found.basis
+
+
+def test_jobs_of_other_classes_tell_the_speed_of_this_machine():
+    # A start of 4 s each: the long job says more about the speed than the short one.
+    finished = [(plan(1.0, "gauss-newton"), 7.0), (plan(99.0, "automatic"), 301.0)]
+    found = estimate(plan(90.0), finished)
+    assert (found.minutes, found.compared, found.rough) == (pytest.approx(1.5 * 3.08), 0, True)
+    assert "other methods" in found.basis
+    # One of its own class counts alone.
+    assert estimate(plan(90.0), [*finished, (plan(10.0), 20.0)]).minutes == pytest.approx(3.0)
 
 
 def test_without_a_known_speed_only_jobs_give_an_estimate():
