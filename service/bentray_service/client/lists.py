@@ -65,7 +65,8 @@ def jobs(
     Args:
         limit: largest number of jobs; more than 1000 take several requests.
         state, kind: only these.
-        text: only jobs with this text in id, name, notes or owner, or in the title of scan, volume or mesh.
+        text: only jobs with this text in id, name, notes or owner, or in the id or title of scan, volume or
+            mesh.
     """
     if limit < 1:
         raise InvalidInput("limit", limit, "a number from 1")

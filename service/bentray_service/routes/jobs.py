@@ -95,8 +95,8 @@ def list_jobs(
         Query(
             max_length=200,
             pattern=TEXT,
-            description="Only jobs with this text in their id, name, notes or owner, or in the title of "
-            "their scan, volume or mesh, in capitals or small letters.",
+            description="Only jobs with this text in their id, name, notes or owner, or in the id or title "
+            "of their scan, volume or mesh, in capitals or small letters.",
         ),
     ] = None,
 ) -> JobList:

@@ -13,7 +13,7 @@ ESCAPE = "\\"
 
 
 def matches(tenant: Tenant, words: str) -> ColumnElement[bool]:
-    """Whether a job has a text: in its id, name, notes or owner, or in the title of its scan, volume or mesh.
+    """Whether a job has a text: in id, name, notes or owner, or in the id or title of scan, volume or mesh.
 
     Letters match in both cases (with SQLite only those of ASCII). Titles of other tenants match nothing.
 
@@ -33,6 +33,7 @@ def matches(tenant: Tenant, words: str) -> ColumnElement[bool]:
     )
     return or_(
         _any(words, jobs.c.id, jobs.c.name, jobs.c.notes, jobs.c.started_by),
+        _any(words, jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id),
         jobs.c.dataset_id.in_(scans),
         jobs.c.id.in_(made_here),
         jobs.c.volume_id.in_(reconstructed),

@@ -264,6 +264,7 @@ def test_text_filters_by_name_scan_and_owner(http, dataset):
     assert found(http, text="left") == found(http, text="LEFT 100") == [named]
     assert found(http, text="31 °") == [noted]
     assert found(http, text=plain) == [plain]
+    assert found(http, text=dataset, kind="reconstruction") == [noted, named, plain]
     # No character is a pattern, and what is found is what was written, also beyond ASCII.
     for words, expected in (("%", [named]), ("_", [named]), ("\\", [named]), ("Übung", [named]), ("%%", [])):
         assert found(http, text=words) == expected, words

@@ -64,7 +64,7 @@ def test_a_link_restores_filters(page, address, queued):
 
 
 def test_pages_and_actions_by_keyboard(page, address, queued):
-    queued(*(f"Job {k}" for k in range(27)))
+    scan = queued(*(f"Job {k}" for k in range(27)))[0]["dataset"]
     page.goto(f"{address}/#/jobs")
     expect(names(page)).to_have_count(25)
     expect(names(page).first).to_have_text("Job 26")
@@ -86,6 +86,12 @@ def test_pages_and_actions_by_keyboard(page, address, queued):
     row.get_by_role("button", name="Delete").focus()
     page.keyboard.press("Enter")
     expect(names(page)).to_have_text(["Job 1"])
+    # The page of the scan has the newest ones, and leads to the others.
+    page.goto(f"{address}/#/scans/{scan}")
+    expect(page.locator("#of-scan .job h2 a")).to_have_text([f"Job {k}" for k in range(26, 20, -1)])
+    page.get_by_role("link", name="All in the table of jobs").click()
+    expect(names(page)).to_have_count(25)
+    expect(page.get_by_label("Name, scan, notes")).to_have_value(scan)
 
 
 def test_a_telephone_shows_cards(page, address, queued):

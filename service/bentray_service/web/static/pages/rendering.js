@@ -327,7 +327,7 @@ export async function open(root, { id, query }) {
   let ended = null;
   const jobs = jobList(at("turntables"), {
     empty: "No turntable yet",
-    wanted: (job) => job.kind === "refraction",
+    filters: { kind: "refraction" },
     onJobs(all) {
       const now = all.filter((job) => job.finished).length;
       if (ended !== null && now !== ended) {

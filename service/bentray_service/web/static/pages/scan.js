@@ -205,7 +205,7 @@ export async function open(root, { id, query }) {
       states = now;
     },
     empty: "Nothing has run yet. Press Fast or Best. The image appears here.",
-    wanted: (job) => job.dataset === id && job.kind === "reconstruction",
+    filters: { kind: "reconstruction", text: id },
   });
   let own = { close() {} };
   at("run").addEventListener("submit", (event) => {

@@ -223,7 +223,12 @@ export async function open(root, { id, query }) {
     show();
   }
 
-  // Jobs are listed newest first.
+  // Of all jobs, also those that the list no longer has; records and jobs are the newest first.
+  async function loadFields() {
+    const { geometry_fields: records } = await request("/v1/geometry-fields?limit=1000");
+    for (const { mesh, links } of records.reverse()) fields.set(mesh, { ...links, field: links.self });
+  }
+
   function showFields(jobs) {
     const before = fields.get(at("mesh").value)?.field;
     for (const job of [...jobs].reverse()) if (job.field) fields.set(job.mesh, job.links);
@@ -288,7 +293,7 @@ export async function open(root, { id, query }) {
   at("reset-view").addEventListener("click", reset);
   const jobs = jobList(at("of-fields"), {
     empty: "No geometry field yet",
-    wanted: (job) => job.kind === "geometry-field",
+    filters: { kind: "geometry-field" },
     onJobs: showFields,
   });
   form.addEventListener("submit", (event) => {
@@ -296,7 +301,7 @@ export async function open(root, { id, query }) {
     const settings = { samples: Number(value("samples")) };
     startJob({ kind: "geometry-field", mesh: at("mesh").value, settings }, "field-error", jobs.refresh);
   });
-  fillDefaults(form.elements.samples.closest("label"), "FieldSettings")
+  Promise.all([loadFields(), fillDefaults(form.elements.samples.closest("label"), "FieldSettings")])
     .then(() => {
       for (const [name, given] of query) if (form.elements[name]) form.elements[name].value = given;
       showObjects(query.getAll("positions_m").map(Number));

@@ -5,10 +5,24 @@ import { followJobs } from "./followed_jobs.js";
 import { showJobs } from "./job_cards.js";
 import { loadTitles, titleOfJob } from "./titles.js";
 
-const newest = async () => (await request("/v1/jobs")).jobs;
+// The newest ones are shown, the others are in the table of jobs.
+const MOST = 6;
 
-// Show the jobs of read() for which wanted(job) is true in root; onJobs(jobs) is called with all. Returns { refresh, close }.
-export function jobList(root, { empty = "", read = newest, wanted = () => true, onJobs = () => {} }) {
+// A reader of the newest jobs with these filters of the table of jobs: kind, text.
+export const newest = (filters) => async () => (await request(`/v1/jobs?${new URLSearchParams(filters)}`)).jobs;
+
+// The link to the table of jobs with these filters.
+function tableLink(filters) {
+  const line = make("p", "links");
+  const anchor = make("a", "", "All in the table of jobs");
+  anchor.href = `#/jobs?${new URLSearchParams(filters)}`;
+  line.append(anchor);
+  line.hidden = true;
+  return line;
+}
+
+// Show the newest jobs of read() in root, by default those with the filters; onJobs(jobs) is called with all. Returns { refresh, close }.
+export function jobList(root, { empty = "", filters = {}, read = newest(filters), onJobs = () => {} }) {
   const error = make("p", "error");
   error.id = "jobs-error";
   error.setAttribute("role", "alert");
@@ -17,7 +31,8 @@ export function jobList(root, { empty = "", read = newest, wanted = () => true, 
   none.hidden = true;
   const list = make("ul", "jobs");
   list.id = "jobs";
-  root.append(error, none, list);
+  const more = tableLink(filters);
+  root.append(error, none, list, more);
 
   async function cancel(job) {
     try {
@@ -35,9 +50,9 @@ export function jobList(root, { empty = "", read = newest, wanted = () => true, 
       return jobs;
     },
     onJobs(jobs) {
-      const shown = jobs.filter(wanted);
-      none.hidden = shown.length > 0;
-      showJobs(list, shown, titleOfJob, cancel);
+      none.hidden = jobs.length > 0;
+      more.hidden = jobs.length <= MOST;
+      showJobs(list, jobs.slice(0, MOST), titleOfJob, cancel);
       onJobs(jobs);
     },
     onError: (problem) => showError("jobs-error", problem),
