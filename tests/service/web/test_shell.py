@@ -95,3 +95,28 @@ def test_the_colours_are_chosen_and_kept(page, shared_service):
     # The choice of the system: the page follows it again.
     page.emulate_media(color_scheme="dark")
     expect(root).to_have_attribute("data-theme", "dark")
+
+
+def test_a_page_goes_on_by_itself_when_the_service_answers_again(page, shared_service):
+    page.goto(f"{shared_service.address}/#/jobs")
+    page.get_by_role("heading", level=1, name="Jobs").wait_for()
+    banner = page.get_by_role("alert").get_by_text("The service does not answer. The page tries again")
+    page.context.set_offline(True)
+    # Neither a page that has been loaded before nor another one.
+    for name in ("Jobs", "Service"):
+        page.get_by_role("link", name="Scans", exact=True).click()
+        page.get_by_role("link", name=name, exact=True).click()
+        banner.wait_for()
+        page.locator("main .error").get_by_text("The service does not answer.").first.wait_for()
+    page.context.set_offline(False)
+    page.get_by_role("region", name="Table of workers").wait_for()
+    expect(page.locator("#offline")).to_be_hidden()
+    assert page.locator("main .error:visible").count() == 0
+
+
+def test_a_page_that_found_no_service_opens_later(page, shared_service):
+    page.route("**/v1/access", lambda route: route.abort())
+    page.goto(f"{shared_service.address}/#/jobs")
+    page.locator("main").get_by_role("alert").get_by_text("The service does not answer.").wait_for()
+    page.unroute("**/v1/access")
+    page.get_by_role("heading", level=1, name="Jobs").wait_for()

@@ -1,5 +1,5 @@
 // The shell of the viewer: opens the page that the address names, and shows the state of the service.
-import { request } from "./parts/api.js";
+import { lost, request } from "./parts/api.js";
 import { at, make } from "./parts/dom.js";
 import { admitted } from "./parts/key.js";
 import { parse } from "./parts/address.js";
@@ -16,8 +16,11 @@ const PAGES = [
   [/^\/service$/, "service", "#/service"],
 ];
 const HEALTH_MS = 15000;
+const LOST_MS = 2000;
 let closeShown = () => {};
 let visit = 0;
+// Opens again what could not be opened, once the service answers.
+let again = null;
 
 function markMenu(entry) {
   for (const anchor of at("pages").querySelectorAll("a")) {
@@ -26,8 +29,15 @@ function markMenu(entry) {
   }
 }
 
+function showFailure(root, words) {
+  const message = make("p", "error", words);
+  message.setAttribute("role", "alert");
+  root.replaceChildren(message);
+}
+
 async function openPage(first) {
   const mine = ++visit;
+  again = null;
   const { path, query } = parse(location.hash);
   const found = PAGES.find(([pattern]) => pattern.test(path));
   closeShown();
@@ -42,7 +52,11 @@ async function openPage(first) {
   try {
     if (!found) throw new Error(`There is no page ${path}`);
     const [pattern, name] = found;
-    const { open } = await import(`./pages/${name}.js`);
+    const { open } = await import(`./pages/${name}.js`).catch(() => {
+      // Browsers remember a module that they could not read until the page is loaded again.
+      again = () => location.reload();
+      throw lost();
+    });
     if (mine !== visit) return;
     const close = await open(root, { id: pattern.exec(path)[1], query });
     // The reader may have gone on while the page was opened.
@@ -50,12 +64,29 @@ async function openPage(first) {
     else close();
   } catch (error) {
     if (mine !== visit) return;
-    const message = make("p", "error", error.message);
-    message.setAttribute("role", "alert");
-    root.replaceChildren(message);
+    again ??= () => openPage(false);
+    showFailure(root, error.message);
   } finally {
     waiting.remove();
   }
+}
+
+// A line at the top while the service does not answer; what is shown stays, and unfinished jobs are followed again.
+document.addEventListener("connection", ({ detail: answered }) => {
+  const line = at("offline");
+  if (line.hidden !== answered) {
+    line.hidden = answered;
+    line.textContent = answered ? "" : "The service does not answer. The page tries again every two seconds.";
+    if (answered) again?.();
+    else checkHealthIn(LOST_MS);
+  }
+});
+
+let checking = 0;
+
+function checkHealthIn(milliseconds) {
+  clearTimeout(checking);
+  checking = setTimeout(showHealth, milliseconds);
 }
 
 async function showHealth() {
@@ -68,7 +99,7 @@ async function showHealth() {
     sign.textContent = error.message;
     sign.className = "health bad";
   }
-  setTimeout(showHealth, HEALTH_MS);
+  checkHealthIn(at("offline").hidden ? HEALTH_MS : LOST_MS);
 }
 
 at("skip").addEventListener("click", (event) => {
@@ -79,4 +110,7 @@ showHealth();
 if (await admitted(request)) {
   addEventListener("hashchange", () => openPage(false));
   openPage(true);
+} else if (at("key").hidden) {
+  again = () => location.reload();
+  showFailure(at("page"), at("access").textContent);
 }

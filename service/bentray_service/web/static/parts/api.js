@@ -12,13 +12,27 @@ export function inWords(problem) {
   return `${problem.title}: ${problem.detail}`;
 }
 
+const LOST = "The service does not answer.";
+
+// What waits for the service hears of it: whether the newest request was answered, however.
+function report(answered) {
+  document.dispatchEvent(new CustomEvent("connection", { detail: answered }));
+}
+
+// For a request that was not answered: an error to throw.
+export function lost() {
+  report(false);
+  return new Error(LOST);
+}
+
 export async function request(path, options = {}) {
   let response;
   try {
     response = await fetch(path, { ...options, headers: { ...options.headers, ...authorization() } });
   } catch {
-    throw new Error("The service does not answer.");
+    throw lost();
   }
+  report(true);
   const body = await response.json().catch(() => ({ title: "The service failed", detail: `status ${response.status}` }));
   if (response.status === 401) document.dispatchEvent(new CustomEvent("locked", { detail: inWords(body) }));
   if (!response.ok) throw Object.assign(new Error(inWords(body)), { problem: body });
