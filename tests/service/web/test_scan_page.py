@@ -49,7 +49,7 @@ def test_upload_start_watch(page, serve, scan, work):
     job.get_by_text("running").wait_for()
     work.hold.set()
     job.get_by_text("succeeded").wait_for()
-    job.get_by_text("residual 2.00 µs").wait_for()
+    job.get_by_text("residual 2,000 ns").wait_for()
     assert job.get_by_role("heading", name="Straight rays").is_visible()
     assert work.calls[0][1].nodes == 32
     image = job.locator("img")

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.browser
 
 def test_an_empty_list_says_so(page, serve):
     page.goto(serve())
-    page.get_by_text("No scan uploaded yet").wait_for()
+    page.get_by_text("No scan yet").wait_for()
     page.get_by_text("ready, 1 worker").wait_for()
 
 

@@ -106,7 +106,7 @@ def test_two_tenants_see_nothing_of_each_other(page, browser, service, breast, t
         other = context.new_page()
         other.set_default_timeout(PATIENCE_MS)
         enter(other, service, "south")
-        other.get_by_text("No scan uploaded yet").wait_for()
+        other.get_by_text("No scan yet").wait_for()
         other.goto(own)
         other.get_by_role("alert").get_by_text(own.rpartition("/")[2]).wait_for()
         other.goto(f"{service.url}/#/jobs")

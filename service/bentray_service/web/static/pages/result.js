@@ -1,5 +1,6 @@
 // The result of a reconstruction: image to measure in, how it was made, and what can be done with it.
 import { go, keepQuery } from "../parts/address.js";
+import { inTime } from "../parts/amounts.js";
 import { request } from "../parts/api.js";
 import { curlOf, pythonOf } from "../parts/code_snippets.js";
 import { copyButton } from "../parts/copying.js";
@@ -13,7 +14,7 @@ import { stateOf } from "../viewer/state.js";
 import { viewer } from "../viewer/viewer.js";
 
 const PAGE = `
-  <p class="crumb"><a href="#/jobs">Jobs</a></p>
+  <p class="crumb"><a href="#/jobs">Jobs</a> · <a id="result-scan">Scan</a></p>
   <h1 id="result-name"></h1>
   <p id="result-facts" class="facts"></p>
   <div id="result-actions" class="links"></div>
@@ -47,7 +48,7 @@ async function compareMenu(job) {
     const box = make("input");
     Object.assign(box, { type: "checkbox", name: "other", value: one.id });
     const same = one.dataset === job.dataset ? "this scan" : "another scan";
-    label.append(box, ` ${one.name || methodOf(one)}, ${same}, ${new Date(one.created).toLocaleString()}`);
+    label.append(box, ` ${one.name || methodOf(one)}, ${same}, ${inTime(one.created)}`);
     form.append(label);
   }
   const start = make("button", "", "Compare");
@@ -79,6 +80,7 @@ export async function open(root, { id, query }) {
   };
   entitle();
   part("result-facts").textContent = facts(result);
+  part("result-scan").href = `#/scans/${job.dataset}`;
   const shown = viewer(part("result-viewer"), [{ title: nameOf(result), values: result.values, stored: summary.quantities }], stateOf(query), keepQuery);
   const stored = () => QUANTITIES[shown.state.quantity].reads[0];
 

@@ -1,4 +1,5 @@
 // Start: upload a scan, and the list of scans.
+import { inTime } from "../parts/amounts.js";
 import { at, make, showError } from "../parts/dom.js";
 import { go } from "../parts/address.js";
 import { load, titleOf } from "../parts/titles.js";
@@ -31,14 +32,14 @@ const PAGE = `
   </section>
   <section aria-labelledby="sample-title" class="panel">
     <h2 id="sample-title">No scan at hand?</h2>
-    <p>Simulate a small scan of a 2-D breast phantom, with traces and the truth to compare with.</p>
-    <button id="sample" type="button">Simulate a sample scan <small>seconds</small></button>
+    <p>Simulate a small scan of a 2-D breast phantom, with traces and the truth to compare with. It takes some seconds.</p>
+    <button id="sample" type="button">Simulate a sample scan</button>
     <p id="sample-error" class="error" role="alert" hidden></p>
   </section>
   <section aria-labelledby="scans-title">
-    <h2 id="scans-title">Scans</h2>
+    <h2 id="scans-title">Stored scans</h2>
     <p id="scans-error" class="error" role="alert" hidden></p>
-    <p id="empty" class="empty" hidden>No scan uploaded yet</p>
+    <p id="empty" class="empty" hidden>No scan yet. Upload one, or simulate a sample.</p>
     <ul id="scans" class="records"></ul>
   </section>`;
 
@@ -62,7 +63,7 @@ function entry(scan) {
   const item = make("li");
   const link = make("a", "", titleOf(scan));
   link.href = `#/scans/${scan.id}`;
-  const words = `${scan.ntx} emitters × ${scan.nrx} receivers · ${new Date(scan.created).toLocaleString()}`;
+  const words = `${scan.ntx} emitters × ${scan.nrx} receivers · ${inTime(scan.created)}`;
   item.append(link, make("p", "facts", words));
   return item;
 }

@@ -13,7 +13,7 @@ function element(name, attributes) {
 export function drawHistogram(place, { counts, minimum, maximum, unit }, format) {
   const nodes = counts.reduce((sum, one) => sum + one, 0);
   const svg = element("svg", { viewBox: `0 0 ${counts.length} ${HEIGHT}`, preserveAspectRatio: "none", role: "img", class: "histogram" });
-  const label = `Histogram of ${nodes.toLocaleString()} nodes from ${format(minimum)} to ${format(maximum)} ${unit}`.trim();
+  const label = `Histogram of ${nodes.toLocaleString("en")} nodes from ${format(minimum)} to ${format(maximum)} ${unit}`.trim();
   svg.setAttribute("aria-label", label);
   const most = Math.log1p(Math.max(...counts));
   const steps = counts.map((count, bin) => {

@@ -1,4 +1,5 @@
 // The list of jobs: one card a job, kept and updated in place so that the focus and the pictures stay.
+import { inNanoseconds } from "./amounts.js";
 import { inWords, request } from "./api.js";
 import { make } from "./dom.js";
 import { duration } from "./job_words.js";
@@ -168,7 +169,7 @@ function facts(job, title, onCancel) {
   name.href = `#/jobs/${job.id}`;
   heading.append(name);
   heading.append(make("span", `state ${job.state}`, job.state));
-  box.append(heading, make("p", "", title), make("p", "", job.name ? `${what}: ${settings}` : settings));
+  box.append(heading, make("p", "input", title), make("p", "", job.name ? `${what}: ${settings}` : settings));
   if (job.ahead !== null) box.append(make("p", "", placeInQueue(job.ahead)));
   if (job.plan) box.append(planned(job.plan));
   if (job.advice) box.append(make("p", "", job.advice));
@@ -188,8 +189,7 @@ function facts(job, title, onCancel) {
   const course = residuals(job.history);
   const { values } = course;
   if (values.length) {
-    const micro = (value) => `${(value * 1e6).toPrecision(3)} µs`;
-    const words = values.length > 1 ? `${micro(values[0])} → ${micro(values.at(-1))}` : micro(values[0]);
+    const words = values.length > 1 ? `${inNanoseconds(values[0])} → ${inNanoseconds(values.at(-1))}` : inNanoseconds(values[0]);
     box.append(make("p", "", `residual ${words}`));
   }
   if (values.length > 1) box.append(sparkline(course));

@@ -4,6 +4,7 @@ import { request } from "./api.js";
 import { make } from "./dom.js";
 import { followJobs } from "./followed_jobs.js";
 import { jobFilters } from "./job_filters.js";
+import { inTime } from "./amounts.js";
 import { duration, inWords, moment } from "./job_words.js";
 import { methodOf } from "./results.js";
 import { loadTitles, titleOfJob } from "./titles.js";
@@ -73,7 +74,7 @@ function button(text, job, onClick) {
 function when(job) {
   const time = make("time", "", moment(job.created));
   time.dateTime = job.created;
-  time.title = new Date(job.created).toLocaleString();
+  time.title = inTime(job.created);
   return time;
 }
 
@@ -172,6 +173,12 @@ export async function jobTable(root, query) {
     return anchor;
   }
 
+  function scansLink() {
+    const anchor = make("a", "", "To the scans");
+    anchor.href = "#/";
+    return anchor;
+  }
+
   let older = "";
 
   async function read() {
@@ -193,6 +200,9 @@ export async function jobTable(root, query) {
     const none = filtered ? "No job matches these filters." : "Nothing has run yet. Upload a scan and press Fast or Best.";
     const many = `${jobs.length === 1 ? "1 job" : `${jobs.length} jobs`}${older ? " on this page, and older ones" : ""}`;
     told.textContent = jobs.length ? many : none;
+    if (!jobs.length && !filtered) told.append(" ", scansLink());
+    // Nothing to look for yet.
+    filters.form.hidden = !jobs.length && !asked.size;
     const links = [asked.has("before") && pageLink("Newest jobs", ""), older && pageLink("Older jobs", older)].filter(Boolean);
     if (pages.dataset.links !== links.map(String).join(" ")) {
       pages.dataset.links = links.map(String).join(" ");

@@ -1,4 +1,5 @@
 // Jobs in words: kinds and states, durations and times.
+import { inTime } from "./amounts.js";
 
 const KINDS = { reconstruction: "Reconstruction", simulation: "Simulated scan", refraction: "Turntable", "geometry-field": "Geometry field" };
 
@@ -18,6 +19,5 @@ export function duration(seconds) {
 export function moment(text) {
   const time = new Date(text);
   const today = time.toDateString() === new Date().toDateString();
-  const clock = time.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
-  return today ? `today ${clock}` : `${time.toLocaleDateString()} ${clock}`;
+  return today ? `today, ${inTime(text).split(", ")[1]}` : inTime(text);
 }

@@ -1,5 +1,6 @@
 // The misfit of a reconstruction after each iteration, as a curve with axes.
 import { plot } from "../viewer/plot.js";
+import { inNanoseconds } from "./amounts.js";
 import { make } from "./dom.js";
 import { residuals } from "./job_cards.js";
 
@@ -31,16 +32,15 @@ export function misfitCurve(place) {
       const { values, begins } = residuals(history);
       if (values.length === drawn) return;
       drawn = values.length;
-      const nanoseconds = values.map((value) => 1e9 * value);
       box.querySelector("svg")?.remove();
       hint.hidden = drawn > 1;
       // One point is no curve.
-      hint.textContent = drawn ? `${nanoseconds[0].toPrecision(3)} ns in the first iteration` : WAITING;
+      hint.textContent = drawn ? `${inNanoseconds(values[0])} in the first iteration` : WAITING;
       if (drawn < 2) return;
       const stages = begins.length ? ` in ${begins.length + 1} stages` : "";
-      const label = `Misfit of ${drawn} iterations${stages}: ${nanoseconds[0].toPrecision(3)} to ${nanoseconds.at(-1).toPrecision(3)} ns`;
-      const curve = { x: values.map((_, k) => k + 1), y: nanoseconds };
-      const picture = plot([curve], { across: "Iteration", up: "Misfit (ns)", label });
+      const label = `Misfit of ${drawn} iterations${stages}: ${inNanoseconds(values[0])} to ${inNanoseconds(values.at(-1))}`;
+      const curve = { x: values.map((_, k) => k + 1), y: values.map((value) => 1e9 * value) };
+      const picture = plot([curve], { across: "Iteration", up: "Misfit (ns)", label, whole: true });
       picture.dataset.points = drawn;
       hint.before(picture);
     },

@@ -1,4 +1,5 @@
 // Parts that the panels of datasets, volumes and meshes share: a list to choose from, an image, and a job to start.
+import { inTime } from "./amounts.js";
 import { request } from "./api.js";
 import { at, showError } from "./dom.js";
 import { show } from "./key.js";
@@ -8,7 +9,7 @@ export function fillSelect(id, records, titleOf, chosen) {
   const select = at(id);
   const before = chosen || select.value;
   if (!records.length) return;
-  select.replaceChildren(...records.map((one) => new Option(`${titleOf(one)} (${new Date(one.created).toLocaleString()})`, one.id)));
+  select.replaceChildren(...records.map((one) => new Option(`${titleOf(one)} (${inTime(one.created)})`, one.id)));
   select.disabled = false;
   if (records.some((one) => one.id === before)) select.value = before;
 }

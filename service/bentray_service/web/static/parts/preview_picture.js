@@ -48,12 +48,16 @@ export function previewPicture(place) {
   place.append(figure);
   const image = new ImageView(canvas);
   let range = null;
+  let shown = "";
 
   return {
     show(record, what) {
       const plane = planeOf(record);
       const [low, high] = robustLimits([plane.values]);
-      range = range ? [Math.min(low, range[0] + EASE * (low - range[0])), Math.max(high, range[1] + EASE * (high - range[1]))] : [low, high];
+      // The same image again changes nothing.
+      const ease = [record.stage, record.iteration, record.part].join() === shown ? 0 : EASE;
+      shown = [record.stage, record.iteration, record.part].join();
+      range = range ? [Math.min(low, range[0] + ease * (low - range[0])), Math.max(high, range[1] + ease * (high - range[1]))] : [low, high];
       image.show(plane, { low: range[0], high: range[1], map: MAP, centre: null, zoom: 1, marks: {} });
       showColourBar(bar, ...range, MAP);
       bar.hidden = false;

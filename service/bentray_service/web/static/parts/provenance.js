@@ -1,4 +1,5 @@
 // Provenance, settings and numerical parameters of a result as tables in words, and all of it as JSON to copy.
+import { inTime } from "./amounts.js";
 import { copyButton } from "./copying.js";
 import { make } from "./dom.js";
 
@@ -93,7 +94,7 @@ export function provenanceTable({ job, volume }) {
   const versions = Object.entries(SOFTWARE).filter(([name]) => name in provenance).map(([name, words]) => `${words} ${provenance[name]}`);
   const rows = [
     ["Job", job.id], ["Volume", volume.id], ["Scan", job.dataset],
-    ["Finished", new Date(job.finished).toLocaleString()],
+    ["Finished", inTime(job.finished)],
     ["Speed in water", `${volume.water_speed_mps.toFixed(1)} m/s${job.settings.water_temperature_c == null ? "" : `, ${job.settings.water_temperature_c} °C by the user`}`],
     ...said.map(([name, value]) => [SAID[name] ?? named(name)[0], name === "frequency_hz" ? frequency(value) : String(value)]),
     ["Software", versions.join(", ")],

@@ -1,9 +1,8 @@
 // How a result was made and how good it is, as tables: errors against the truth, what auto compared, the plan.
+import { inNanoseconds } from "./amounts.js";
 import { make } from "./dom.js";
 import { duration } from "./job_words.js";
 import { methodOf } from "./results.js";
-
-const nanoseconds = (seconds) => (seconds === null ? "–" : `${(1e9 * seconds).toFixed(0)} ns`);
 
 // The result in a line.
 export function facts({ job, volume, summary }) {
@@ -11,7 +10,7 @@ export function facts({ job, volume, summary }) {
   const spacing = volume.spacing_m[0] === null ? "" : ` of ${Number((1e3 * volume.spacing_m[0]).toPrecision(3))} mm`;
   const parts = [methodOf(job), `${size} nodes${spacing}`, `water ${volume.water_speed_mps.toFixed(1)} m/s`];
   const residual = job.history.at(-1)?.residual_rms_s;
-  if (residual) parts.push(`residual ${nanoseconds(residual)}`);
+  if (residual) parts.push(`residual ${inNanoseconds(residual)}`);
   if (summary.truth?.rmse_mps != null) parts.push(`error ${summary.truth.rmse_mps.toFixed(2)} m/s rms (${summary.truth.region})`);
   if (job.seconds !== null) parts.push(`took ${duration(job.seconds)}`);
   return parts.join(" · ");
@@ -55,7 +54,7 @@ export function choiceTable({ candidates, reason }, job) {
   for (const one of candidates) {
     const row = body.insertRow();
     const label = one.chosen ? `${one.label} (chosen)` : one.label;
-    const cells = [label, nanoseconds(one.held_out_mean_s), nanoseconds(one.held_out_rms_s), nanoseconds(one.training_rms_s)];
+    const cells = [label, inNanoseconds(one.held_out_mean_s), inNanoseconds(one.held_out_rms_s), inNanoseconds(one.training_rms_s)];
     row.append(...cells.map((cell) => make("td", "", cell)));
     if (one.chosen) row.className = "chosen";
   }

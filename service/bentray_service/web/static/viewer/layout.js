@@ -28,7 +28,7 @@ export const PAGE = `
         <label class="other">with <select name="other"></select></label></div>
       <div class="slices"></div>
       <p class="readout" aria-live="off"></p>
-      <div class="colour-bar"><canvas width="256" height="1" aria-hidden="true"></canvas><div class="ticks"></div><p class="unit"></p></div>
+      <div class="colour-bar"><canvas width="256" height="1"></canvas><div class="ticks"></div><p class="unit"></p></div>
     </div>
     <div class="viewer-side">
       <fieldset class="tools"><legend class="caption">Dragging</legend></fieldset>

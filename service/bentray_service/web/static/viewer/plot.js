@@ -10,9 +10,9 @@ function node(name, attributes, text) {
   return made;
 }
 
-// Round values between two limits, about `count` of them.
-export function ticks(low, high, count) {
-  const raw = (high - low) / count || 1;
+// Round values between two limits, about `count` of them, not nearer to each other than `least`.
+export function ticks(low, high, count, least = 0) {
+  const raw = Math.max(least, (high - low) / count) || 1;
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].find((one) => one * power >= raw) * power;
   const found = [];
@@ -20,8 +20,8 @@ export function ticks(low, high, count) {
   return found;
 }
 
-// curves: [{ x, y, name }]; gaps where y is not finite.
-export function plot(curves, { across, up, label }) {
+// curves: [{ x, y, name }]; gaps where y is not finite. whole: the values across are whole numbers.
+export function plot(curves, { across, up, label, whole = false }) {
   const xs = curves.flatMap((one) => one.x);
   const ys = curves.flatMap((one) => one.y).filter(Number.isFinite);
   const picture = node("svg", { class: "plot", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": label });
@@ -35,7 +35,7 @@ export function plot(curves, { across, up, label }) {
   [y0, y1] = [y0 - margin, y1 + margin];
   const px = (x) => LEFT + ((x - x0) / (x1 - x0 || 1)) * (WIDTH - LEFT - RIGHT);
   const py = (y) => HEIGHT - BOTTOM - ((y - y0) / (y1 - y0)) * (HEIGHT - TOP - BOTTOM);
-  for (const x of ticks(x0, x1, 6)) {
+  for (const x of ticks(x0, x1, 6, whole ? 1 : 0)) {
     picture.append(node("line", { class: "grid", x1: px(x), x2: px(x), y1: TOP, y2: HEIGHT - BOTTOM }));
     picture.append(node("text", { x: px(x), y: HEIGHT - BOTTOM + 15, "text-anchor": "middle" }, String(x)));
   }
