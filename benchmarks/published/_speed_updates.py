@@ -88,7 +88,7 @@ def errors(phantom: str, seeds: int = SEEDS) -> dict[str, dict[str, list[float]]
                 state = sart_step.begin(slowness)
                 with (
                     patch.object(sart_update, "propagation_speed", front),
-                    patch.object(sart_update, "_bounds", lambda settings: WIDE),
+                    patch.object(sart_update, "bounds_of", lambda settings: WIDE),
                 ):
                     while not state.done:
                         state = sart_step.advance(problem, settings, state, ELEMENTS)

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from threadpoolctl import threadpool_limits
 
+from .opencl.lost_device import with_cpu_retry
+
 # Longest wait for a result before ``stop`` is polled again, s.
 POLL_S = 0.2
 
@@ -24,11 +26,15 @@ class Task(NamedTuple):
     Attributes:
         keep_on_worker: only other tasks need the result, so it may stay where it was computed;
             ``TaskGraph.after`` then gets a handle, which replaces the value in arguments of later tasks.
+        together: takes a list of arguments of tasks with the same ``together`` and returns a list of their
+            results, which are the same as one by one; None: each task runs by itself. For devices, which are
+            faster with many tasks at a time.
     """
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...] = ()
     keep_on_worker: bool = False
+    together: Callable[[list[tuple[Any, ...]]], list[Any]] | None = None
 
 
 class TaskGraph(Protocol):
@@ -88,6 +94,9 @@ class CheckpointStore(Protocol):
 class Pool(Protocol):
     """Where tasks run: threads of this process, or workers of a cluster."""
 
+    def devices(self) -> int:
+        """Over how many calls tasks with ``together`` are distributed, at least 1."""
+
     def may_submit(self, running: int, ready: int) -> bool:
         """Whether to submit another task.
 
@@ -128,30 +137,54 @@ def run(
         Cancelled: when ``stop`` returned true.
     """
     ready = deque((name, task) for name, graph in graphs.items() for task in graph.first())
-    running: dict[Any, tuple[str, Task]] = {}
+    running: dict[Any, list[tuple[str, Task]]] = {}
     try:
         while ready or running:
             while pool.may_submit(len(running), len(ready)):
-                name, task = ready.popleft()
-                running[pool.submit(task)] = name, task
+                some = _taken(ready, pool)
+                running[pool.submit(_joint(some))] = some
             finished = pool.finished(list(running))
             while finished:
                 handle = finished.pop(0)
-                name, task = running.pop(handle)
+                some = running.pop(handle)
                 retry, result = pool.result(handle)
                 # While anything refers to a result, a cluster computes it again if its worker dies.
                 del handle
                 if retry is not None:
-                    running[retry] = name, task
+                    running[retry] = some
                     continue
-                following = graphs[name].after(task, result)
-                ready.extendleft((name, one) for one in reversed(following))
-                if on_result is not None:
-                    on_result(name)
+                results = [result] if some[0][1].together is None else result
+                del result
+                for name, task in some:
+                    following = graphs[name].after(task, results.pop(0))
+                    ready.extendleft((name, one) for one in reversed(following))
+                    if on_result is not None:
+                        on_result(name)
             if stop is not None and stop():
                 raise Cancelled
     finally:
         pool.cancel(list(running))
+
+
+def _taken(ready: deque[tuple[str, Task]], pool: Pool) -> list[tuple[str, Task]]:
+    """The next task, and those that run together with it; they are no longer ready."""
+    first = ready.popleft()
+    if first[1].together is None:
+        return [first]
+    same = [first, *(one for one in ready if one[1].together is first[1].together)]
+    some = same[: -(-len(same) // pool.devices())]
+    # By identity: arrays among arguments have no truth value.
+    taken = {id(one) for one in some}
+    left = [one for one in ready if id(one) not in taken]
+    ready.clear()
+    ready.extend(left)
+    return some
+
+
+def _joint(some: list[tuple[str, Task]]) -> Task:
+    """One task for several."""
+    task = some[0][1]
+    return task if task.together is None else Task(task.together, ([one.arguments for _, one in some],))
 
 
 def run_resumable(
@@ -193,11 +226,14 @@ class ThreadPool:
         # again. Workers of a cluster have the limit in their environment.
         self._limit = threadpool_limits(1, "blas")
 
+    def devices(self) -> int:
+        return 1
+
     def may_submit(self, running: int, ready: int) -> bool:
         return ready > 0 and running < self._threads
 
     def submit(self, task: Task) -> Future[Any]:
-        return self._executor.submit(task.function, *task.arguments)
+        return self._executor.submit(with_cpu_retry, task.function, *task.arguments)
 
     def finished(self, running: list[Future[Any]]) -> list[Future[Any]]:
         # In the order of submission: so one thread's run is the same each time.

@@ -46,6 +46,11 @@ def relative(found: Floats, expected: Floats) -> float:
     return float(np.abs(found - expected).max() / np.abs(expected).max())
 
 
+def rms_difference(found: Floats, expected: Floats) -> float:
+    """Root of the mean squared difference."""
+    return float(np.sqrt(((found - expected) ** 2).mean()))
+
+
 def odd_pixels(found: Floats, expected: Floats) -> float:
     """Fraction of pixels that differ by more than one of 255."""
     return float((np.abs(found - expected).max(axis=2) > 1.0).mean())

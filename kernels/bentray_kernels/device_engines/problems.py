@@ -7,8 +7,11 @@ from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from .. import eikonal
+from ..acquisition import Dataset
+from ..acquisition.simulation.ring_scan import Ring
 from ..arrays import Floats
 from ..geometry_field.tables.inner_field import build_inner_rows, inner_field, spread_points
 from ..geometry_field.tables.outer_field import build_rows, outer_field
@@ -35,16 +38,23 @@ from ..refraction.caster_opencl import on_the_device as caster_on_the_device
 from ..splines import Spline
 from ..splines.sampling_opencl import OpenCLSpline
 from ..splines.sampling_opencl import on_the_device as spline_on_the_device
+from ..tomography import Problem, Settings
+from ..tomography.grid_schedule import initial_slowness
+from ..tomography.sart.sart_slices import SliceCall, advance_slices
+from ..tomography.sart.sart_step import begin
 from ..wave.emissions import Emissions, misfit_gradients, simulate_emissions
 from ..wave.emissions import Engine as WaveEngine
 from ..wave.medium import Medium
-from .engine import Engine, odd_pixels, relative
+from .engine import Engine, odd_pixels, relative, rms_difference
 
 WATER_MPS = 1500.0
 
 # Of a node in a step in float32: two fields are read and one is written; the three factors of the medium are
 # the same for all emitters and remain in a cache.
 STEP_BYTES = 12.0
+
+# Of a scan for SART.
+SART_EMITTERS, SART_RECEIVERS = 8, 128
 
 # Threads of compiled code that draw a picture, as many as the service uses.
 DRAWING_THREADS = min(4, len(os.sched_getaffinity(0)))
@@ -64,6 +74,7 @@ def engines(quick: bool) -> Iterator[Engine]:
     yield projection(64 if quick else 256, 4 if quick else 64)
     yield traces(60 if quick else 212, 100 if quick else 800, 2 if quick else 8)
     yield gradients(60 if quick else 212, 100 if quick else 800, 2 if quick else 8)
+    yield sart(64 if quick else 128, 2 if quick else 8)
     yield spline(10_000 if quick else 1_000_000)
     yield refraction(64 if quick else 512)
     yield field(64 if quick else 512)
@@ -74,6 +85,7 @@ def trial_problems(engine: str) -> Iterator[Engine]:
     makers = {
         "eikonal": lambda size: projection((32, 256)[size], 1),
         "wave": lambda size: gradients(*((60, 60, 2), (212, 200, 8))[size]),
+        "sart": lambda size: sart(*((64, 1), (128, 8))[size]),
         "refraction": lambda size: refraction((32, 256)[size]),
         "field": lambda size: field((32, 256)[size]),
     }
@@ -161,6 +173,49 @@ def wave_scan(nodes: int, steps: int, emitters: int) -> tuple[Medium, Emissions]
     ring = spacing * (0.5 * (nodes - 1) + 0.45 * nodes * np.column_stack((np.cos(angle), np.sin(angle))))
     senders = ring[np.linspace(0, 64, emitters, endpoint=False).astype(int)]
     return medium, Emissions(senders, ring, [np.arange(64)] * emitters, pulse)
+
+
+def sart(nodes: int, slices: int) -> Engine:
+    """Slices of a ring scan of a phantom, updated by ``SART_EMITTERS`` emitters each."""
+    calls, settings = sart_scan(nodes, slices)
+
+    def speeds(device: str) -> Floats:
+        states = advance_slices(calls, settings.changed(device=device))
+        return np.stack([1.0 / state.slowness for state in states])
+
+    return Engine(
+        "sart",
+        f"Eikonal-SART, {slices} of {nodes}², {SART_EMITTERS} emitters each",
+        lambda: speeds("cpu"),
+        lambda: speeds("opencl"),
+        float(SART_EMITTERS * slices * nodes**2),
+        "nodes",
+        None,
+        rms_difference,
+        "m/s rms",
+        0.05,
+    )
+
+
+def sart_scan(nodes: int, slices: int) -> tuple[list[SliceCall], Settings]:
+    """The begin of a reconstruction of slices that are all the same."""
+    ring, sending = Ring(SART_RECEIVERS, 0.45 * TABLE6_SIDE_M), np.arange(SART_EMITTERS)
+    positions = ring.positions()
+    speed, spacing = table6(WATER_MPS).speed(nodes, TABLE6_SIDE_M), TABLE6_SIDE_M / (nodes - 1)
+    senders = np.linspace(0, ring.elements, SART_EMITTERS, endpoint=False).astype(int)
+    places = positions / spacing + 0.5 * (nodes - 1)
+    times = eikonal.solve_many(
+        np.broadcast_to(speed, (SART_EMITTERS, *speed.shape)), spacing, spacing * places[senders], "fsm"
+    )
+    measured = np.stack([map_coordinates(time, places.T, order=1) for time in times])
+    offset = positions[senders, None] - positions
+    delta = measured - np.sqrt((offset**2).sum(axis=2)) / WATER_MPS
+    delta[sending, senders] = np.nan
+    scan = Dataset(positions, senders, np.arange(ring.elements), WATER_MPS, delta_tof_s=delta)
+    settings = Settings.of(method="sart", nodes=nodes, side_m=TABLE6_SIDE_M, iterations=2)
+    problem = Problem.of(scan, settings)
+    state = begin(initial_slowness(problem, None))
+    return [SliceCall(problem, state, SART_EMITTERS, k) for k in range(slices)], settings
 
 
 def spline(points: int) -> Engine:

@@ -2,7 +2,7 @@
 
 from .choice import Choice, OpenCLFallbackWarning, choose, scene_or_warning, session_or_warning
 from .devices import VARIABLE, WISH, Device, find_devices
-from .lost_device import DeviceLostError, computed, computing_on, on_cpu
+from .lost_device import DeviceLostError, computed, computing_on, on_cpu, with_cpu_retry
 from .placement import DeviceRequest, Work, check_available, place, requested
 from .session import Session
 from .trial import Trial, trial_of
@@ -32,4 +32,5 @@ __all__ = [
     "session_or_warning",
     "trial_of",
     "verdict_on",
+    "with_cpu_retry",
 ]

@@ -39,16 +39,21 @@ def computing_on(session: Session) -> Iterator[None]:
         raise DeviceLostError(reason) from error
 
 
-def computed(work: Callable[[], Result]) -> tuple[Result, str]:
+def computed(work: Callable[..., Result], *arguments: object) -> tuple[Result, str]:
     """The result of work that may use the device, computed again on the CPU, once, if the device is lost.
 
     Returns:
         The result, and why it was computed again; empty if it was not.
     """
     try:
-        return work(), ""
+        return work(*arguments), ""
     except DeviceLostError as error:
-        return on_cpu(work), str(error)
+        return on_cpu(work, *arguments), str(error)
+
+
+def with_cpu_retry(work: Callable[..., Result], *arguments: object) -> Result:
+    """The result of ``computed`` alone; the log has the reason."""
+    return computed(work, *arguments)[0]
 
 
 def on_cpu(work: Callable[..., Result], *arguments: object) -> Result:

@@ -210,6 +210,9 @@ class MemoryScan:
         problem: Problem = self._problem(index, stage % len(self._plans))
         return problem
 
+    def problems(self, indices: tuple[int, ...], stage: int = -1) -> tuple[Problem, ...]:
+        return tuple(self.problem(index, stage) for index in indices)
+
 
 def problem_of(dataset: Dataset, settings: Settings, index: int) -> Problem:
     """The problem of one slice for the method of the settings.

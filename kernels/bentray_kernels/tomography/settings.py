@@ -315,9 +315,9 @@ class Settings:
     )
     device: Literal["auto", "cpu", "opencl"] = setting(
         "auto",
-        "Where full waveforms are simulated. opencl: on an OpenCL device, many emitters at a time; cpu and "
-        "auto: in compiled code. The images differ by rounding.",
-        label="Compute full waveforms on",
+        "Where SART of slices and full waveforms are computed. opencl: on an OpenCL device, many slices or "
+        "emitters at a time; cpu and auto: in compiled code. The images differ by rounding.",
+        label="Compute on",
         words={"auto": "Automatic", "cpu": "Processor", "opencl": "OpenCL device"},
     )
     seed: int = setting(0, "Seed of the random order of emitters.", SEED, label="Random seed")

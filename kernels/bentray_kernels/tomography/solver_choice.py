@@ -37,6 +37,13 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
     return Solver(False, None if straight else settings.ray_eikonal)
 
 
+def sart_engine(settings: Settings, dimensions: int) -> Engine:
+    """What updates slices by SART: a device has the compiled pass, with a wave front in the image itself."""
+    changed = settings.sart.speed_range_mps is not None or settings.numerics.front_smoothing_nodes > 0.0
+    able = solver_of(settings, dimensions).compiled and not (changed and settings.rays == "curved")
+    return "opencl" if settings.device == "opencl" and able else "compiled"
+
+
 def wave_engine(settings: Settings) -> Engine:
     """What simulates full waveforms, for a refinement and for the validation of an image by ``auto``."""
     return "opencl" if settings.device == "opencl" and settings.selects_model else "compiled"
@@ -44,7 +51,10 @@ def wave_engine(settings: Settings) -> Engine:
 
 def needs_device(settings: Settings) -> bool:
     """Whether a call of the reconstruction computes on an OpenCL device."""
-    return tracks_on_device(settings) or wave_engine(settings) == "opencl"
+    waves_or_fronts = tracks_on_device(settings) or wave_engine(settings) == "opencl"
+    return (
+        waves_or_fronts or sart_engine(settings, 3 if settings.decomposition == "volume" else 2) == "opencl"
+    )
 
 
 def tracks_on_device(settings: Settings) -> bool:

@@ -10,6 +10,7 @@ from bentray_kernels.device_engines.problems import (
     gradients,
     projection,
     refraction,
+    sart,
     traces,
     trial_problems,
 )
@@ -25,10 +26,11 @@ pytestmark = pytest.mark.opencl
         lambda: projection(12, 2),
         lambda: traces(40, 60, 2),
         lambda: gradients(40, 60, 2),
+        lambda: sart(32, 2),
         pytest.param(lambda: refraction(32), marks=pytest.mark.slow),
         pytest.param(lambda: field(32), marks=pytest.mark.slow),
     ],
-    ids=["eikonal", "traces", "wave", "refraction", "field"],
+    ids=["eikonal", "traces", "wave", "sart", "refraction", "field"],
 )
 def test_the_device_agrees_with_compiled_code_within_the_bound(engine):
     found = measured(engine(), 1e9, 1)
@@ -62,7 +64,7 @@ def test_every_engine_of_the_trial_has_a_small_and_a_large_problem():
         small, large = trial_problems(name)
         assert small.engine == large.engine == name
         assert small.size < large.size
-    assert set(ENGINES) == {"eikonal", "wave", "refraction", "field"}
+    assert set(ENGINES) == {"eikonal", "wave", "sart", "refraction", "field"}
 
 
 def test_without_a_device_there_is_nothing_to_compare(monkeypatch):

@@ -11,7 +11,7 @@ from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart import sart_update
 from bentray_kernels.tomography.sart.sart_step import advance, begin
 from bentray_kernels.tomography.settings import DEVIATION
-from bentray_kernels.tomography.solver_choice import needs_device, solver_of, wave_engine
+from bentray_kernels.tomography.solver_choice import needs_device, sart_engine, solver_of, wave_engine
 from bentray_workers.cluster.capacities import MIB, resource_of
 from bentray_workers.files.dataset.counts import Summary
 from bentray_workers.reconstruction.memory.ray_memory import call_bytes
@@ -90,8 +90,28 @@ def test_device_resource_is_requested_where_a_device_is_used(method, rays, eikon
 
 @pytest.mark.parametrize("device", ["auto", "cpu", "opencl"])
 @pytest.mark.parametrize("method", ["sart", "gauss-newton", "auto", "waveform"])
-def test_waves_are_simulated_on_a_device_that_is_requested(method, device):
+def test_waves_and_slices_are_computed_on_a_device_that_is_requested(method, device):
     settings = Settings(method=method, device=device)
-    used = device == "opencl" and method in ("auto", "waveform")
-    assert wave_engine(settings) == ("opencl" if used else "compiled")
-    assert resource_of(settings) == ("opencl" if used else "recon")
+    waves = device == "opencl" and method in ("auto", "waveform")
+    slices = device == "opencl" and method == "sart"
+    assert wave_engine(settings) == ("opencl" if waves else "compiled")
+    assert sart_engine(settings, 2) == ("opencl" if slices else "compiled")
+    assert resource_of(settings) == ("opencl" if waves or slices else "recon")
+
+
+@pytest.mark.parametrize(
+    ("changes", "able"),
+    [
+        ({}, True),
+        ({"rays": "straight"}, True),
+        ({"speed_range_mps": (1400.0, 1600.0)}, False),
+        ({"front_smoothing_nodes": 1.0}, False),
+        ({"front_smoothing_nodes": 1.0, "rays": "straight"}, True),
+        ({"eikonal": "fmm"}, False),
+        ({"ray_gradient": "bspline"}, False),
+    ],
+)
+def test_slices_whose_front_is_that_of_the_compiled_pass_run_on_a_device(changes, able):
+    settings = Settings.of(method="sart", device="opencl", **changes)
+    assert sart_engine(settings, 2) == ("opencl" if able else "compiled")
+    assert sart_engine(settings, 3) == "compiled"

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from distributed import Client, Future, KilledWorker
 
+from bentray_kernels.opencl import with_cpu_retry
 from bentray_kernels.task_graph import Task
 
 from .memory_cache import evict_for_job
@@ -112,11 +113,11 @@ def _futures(arguments: Iterable[Any]) -> Iterator[Future]:
 
 
 def marked(marker: Path, evict: bool, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Task: run a function, with a file that exists as long as it runs."""
+    """Task: run a function, on the CPU if a device is lost, with a file that exists as long as it runs."""
     if evict:
         evict_for_job()
     marker.touch()
     try:
-        return function(*arguments)
+        return with_cpu_retry(function, *arguments)
     finally:
         marker.unlink(missing_ok=True)

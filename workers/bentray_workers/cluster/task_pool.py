@@ -12,6 +12,7 @@ from bentray_kernels.task_graph import POLL_S, Pool, Task, TaskGraph, ThreadPool
 from bentray_kernels.tomography.result import Progress
 
 from .attempts import Attempts
+from .capacities import capacities_of
 from .fair_shares import Share, exclusive_share
 from .resources import RECONSTRUCTION
 
@@ -48,6 +49,9 @@ class ClusterPool:
     def __init__(self, attempts: Attempts, client: Client, share: Share, priority: int = 0) -> None:
         self._attempts, self._client, self._share = attempts, client, share
         self._priority = self._next_priority = priority
+
+    def devices(self) -> int:
+        return max(1, sum("opencl" in one.resources for one in capacities_of(self._client)))
 
     def may_submit(self, running: int, ready: int) -> bool:
         self._next_priority = self._priority + self._share.priority(running)

@@ -16,6 +16,7 @@ TASK_WORDS = MappingProxyType(
         "write_picked": "writing the picked times",
         "trace_rays": "tracing rays",
         "update_sart": "updating the image by SART",
+        "update_sart_slices": "updating slices by SART on a device",
         "update_gauss_newton": "updating the image by Gauss-Newton",
         "trace_attenuation_rays": "tracing rays for the attenuation",
         "solve_attenuation": "reconstructing the attenuation",

@@ -39,6 +39,9 @@ class FileScan(NamedTuple):
     def problem(self, index: int, stage: int = -1) -> Problem:
         return _problem(self, index, stage % len(self.stages()))
 
+    def problems(self, indices: tuple[int, ...], stage: int = -1) -> tuple[Problem, ...]:
+        return _problems(self, indices, stage % len(self.stages()))
+
 
 class FileWaveScan(NamedTuple):
     """See ``tomography.waveform.refinement_graph.WaveScan``; ``path`` is that of a file with traces.
@@ -88,6 +91,16 @@ def _stages(scan: FileScan) -> tuple[Settings, ...]:
 
 @lru_cache(maxsize=8)
 def _problem(scan: FileScan, index: int, stage: int) -> Problem:
+    return _new_problem(scan, index, stage)
+
+
+# Of one job: all slices that a device updates together.
+@lru_cache(maxsize=1)
+def _problems(scan: FileScan, indices: tuple[int, ...], stage: int) -> tuple[Problem, ...]:
+    return tuple(_new_problem(scan, index, stage) for index in indices)
+
+
+def _new_problem(scan: FileScan, index: int, stage: int) -> Problem:
     dataset = part_of(read_once(scan.path, scan.stamp, scan.settings.water_temperature_c), scan.part)
     return problem_of(dataset, scan.stages()[stage], index)
 

@@ -65,29 +65,61 @@ def advance(problem: Problem, settings: Settings, state: State, emitters: int, s
     """
     if state.done:
         return state
-    order = emitter_order(problem, settings.seed, slice_index, state.sweep)
-    first_batch = state.emitter == 0
+    batch = batch_of(problem, settings, state, emitters, slice_index)
     slowness = np.array(state.slowness, dtype=np.float64, order="C")
-    coverage = np.zeros_like(slowness) if first_batch else state.coverage.copy()
+    coverage = np.zeros_like(slowness) if state.emitter == 0 else state.coverage.copy()
     size = settings.numerics.subset
-    end = min(state.emitter + -(-emitters // size) * size, len(order))
     squares, residuals = state.squares, []
     update = update_for(problem, settings)
-    for first in range(state.emitter, end, size):
-        residual = update(slowness, coverage, order[first : min(first + size, end)], state.sweep)
+    for first in range(0, len(batch), size):
+        residual = update(slowness, coverage, batch[first : first + size], state.sweep)
         residuals.append(residual)
         squares += float((residual * residual).sum())
     counts = residual_counts(np.concatenate(residuals))
+    images = slowness, coverage
+    return advanced(problem, settings, state, len(batch), images, squares, counts, slice_index)
+
+
+def batch_of(problem: Problem, settings: Settings, state: State, emitters: int, slice_index: int = 0) -> Ints:
+    """The next emitters of the current iteration, in order; see ``advance``."""
+    order = emitter_order(problem, settings.seed, slice_index, state.sweep)
+    size = settings.numerics.subset
+    return order[state.emitter : state.emitter + -(-emitters // size) * size]
+
+
+def advanced(
+    problem: Problem,
+    settings: Settings,
+    state: State,
+    emitters: int,
+    images: tuple[Floats, Floats],
+    squares: float,
+    counts: Ints,
+    slice_index: int = 0,
+) -> State:
+    """The state after the updates by some emitters.
+
+    Args:
+        problem, settings, state: as ``advance``.
+        emitters: their number.
+        images: slowness and coverage after the updates.
+        squares: sum of squared residuals so far in this iteration, s².
+        counts: histogram of the residuals of these emitters.
+        slice_index: for the history.
+    """
+    slowness, coverage = images
+    first_batch, number = state.emitter == 0, len(problem.active_emitters)
     state = replace(
         state,
         slowness=slowness,
         coverage=coverage,
-        emitter=end,
+        emitter=state.emitter + emitters,
         squares=squares,
-        count=state.count + sum(part.size for part in residuals),
+        # Each residual is in one of the bins.
+        count=state.count + int(counts.sum()),
         residuals=counts if first_batch else state.residuals + counts,
     )
-    return state if end < len(order) else _finish_iteration(state, settings, slice_index, len(order))
+    return state if state.emitter < number else _finish_iteration(state, settings, slice_index, number)
 
 
 def emitter_order(problem: Problem, seed: int, slice_index: int, iteration: int) -> Ints:

@@ -79,9 +79,9 @@ def _compiled(problem: Problem, settings: Settings) -> Update:
             coverage,
             problem.region,
             problem.spacing,
-            _relaxation(settings, iteration),
+            relaxation_of(settings, iteration),
             settings.sart.smoothing_nodes,
-            _bounds(settings),
+            bounds_of(settings),
         )
         return np.concatenate(residuals)
 
@@ -113,8 +113,8 @@ def _traced(
     update[~problem.region] = 0.0
     if settings.sart.smoothing_nodes > 0.0:
         update = gaussian_filter(update, settings.sart.smoothing_nodes, mode="nearest")
-    updated = slowness + _relaxation(settings, iteration) * update
-    slowness[problem.region] = np.clip(updated, *_bounds(settings))[problem.region]
+    updated = slowness + relaxation_of(settings, iteration) * update
+    slowness[problem.region] = np.clip(updated, *bounds_of(settings))[problem.region]
     coverage += weights * problem.spacing
     return np.concatenate(residuals)
 
@@ -134,11 +134,11 @@ def _valid_receivers(problem: Problem, emitter: int) -> tuple[Floats, Floats, Fl
     return source, receivers, measured, slab
 
 
-def _relaxation(settings: Settings, iteration: int) -> float:
+def relaxation_of(settings: Settings, iteration: int) -> float:
     return settings.sart.relaxation * settings.numerics.relaxation_decay**iteration
 
 
-def _bounds(settings: Settings) -> tuple[float, float]:
+def bounds_of(settings: Settings) -> tuple[float, float]:
     """Lowest and highest slowness, s/m."""
     low, high = settings.speed_bounds_mps
     return 1.0 / high, 1.0 / low

@@ -10,8 +10,9 @@ import math
 from bentray_kernels.eikonal.diagonals import Diagonals
 from bentray_kernels.rays.vectorised import LONGEST
 from bentray_kernels.tomography.problem import MARGIN_NODES
+from bentray_kernels.tomography.sart.device_slices import PROCESSOR_SLICES, SliceSize
 from bentray_kernels.tomography.settings import Settings
-from bentray_kernels.tomography.solver_choice import solver_of
+from bentray_kernels.tomography.solver_choice import sart_engine, solver_of
 from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ...cluster.capacities import MIB, REAL
@@ -138,6 +139,8 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
     if settings.method == "gauss-newton":
         parts["trace_rays"] = tracing(rays)
         parts["update_gauss_newton"] = solving(rays)
+    elif sart_engine(settings, len(shape)) == "opencl":
+        parts["update_sart_slices"] = _parts_together(scan, settings, data)
     elif solver_of(settings, len(shape)).compiled:
         parts["update_sart"] = {
             "data": data,
@@ -153,6 +156,20 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
         parts["trace_final_rays"] = tracing(rays)
         parts["check_resolution"] = solving(rays)
     return parts
+
+
+def _parts_together(scan: Summary, settings: Settings, data: int) -> dict[str, int]:
+    """Memory of all slices updated in one task on a device, by what takes it, bytes."""
+    nodes, slices = settings.grid_nodes, scan.slices
+    emitters, receivers = scan.emitters, scan.receivers
+    size = SliceSize((nodes, nodes), emitters, receivers, 1, settings.numerics.subset)
+    # Of each slice the problem with its times and losses, the state before and after, and their copies for
+    # the device.
+    images = FLOOR_BYTES + slices * 3 * state_bytes((nodes, nodes), settings)
+    times = slices * 3 * REAL * emitters * receivers
+    # A processor as a device has its arrays in the memory of the worker; a GPU has its own.
+    in_flight = min(slices, PROCESSOR_SLICES) * size.bytes
+    return {"data": data + times, "images": images, "slices on the device": in_flight}
 
 
 def _field_of_task(scan: Summary, settings: Settings) -> int:

@@ -1,0 +1,322 @@
+"""SART of many slices on an OpenCL device: wave fronts, rays, back-projection and updates stay there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...arrays import Float32s, Floats, Ints
+from ...errors import InvalidInput
+from ...opencl.session import Session, set_arguments
+from ...rays.vectorised import LONGEST
+from ..result import RESIDUAL_EDGES_S
+
+SOURCES = ("tomography/fronts", "tomography/sart")
+
+# Work-items of a group that tracks a wave front, at most; of a group that takes rays of one emitter.
+GROUP, RAYS_GROUP = 256, 64
+
+# Part of a device's memory that slices in flight may fill, and slices in flight on a processor.
+MEMORY_SHARE = 0.5
+PROCESSOR_SLICES = 8
+
+# Columns beside a diagonal in local memory, diagonals there, and rows of crossing times: as ``fronts.cl``.
+BESIDE, SLOTS, CROSSINGS = 4, 6, 2
+
+
+class SliceSize(NamedTuple):
+    """Numbers that determine the memory of a slice on the device.
+
+    Attributes:
+        shape: of the image.
+        emitters: in one call.
+        receivers: of an emitter.
+        rings: of receivers.
+        members: emitters in one update.
+    """
+
+    shape: tuple[int, int]
+    emitters: int
+    receivers: int
+    rings: int
+    members: int
+
+    @property
+    def steps(self) -> int:
+        """Steps of a ray at most."""
+        return LONGEST * sum(self.shape)
+
+    def _buffers(self) -> tuple[int, ...]:
+        """Bytes of each array."""
+        nodes, passes = self.shape[0] * self.shape[1], self.members
+        rays = passes * self.receivers
+        images = (8 * nodes, 8 * nodes, nodes, 4 * nodes, 4 * nodes)
+        works = (8 * nodes * passes, 8 * nodes * passes, 16 * nodes * passes, 16 * nodes * passes)
+        geometry = (8 * self.emitters * self.receivers, 32 * self.emitters, 16 * self.rings * self.receivers)
+        return (*images, *works, 12 * self.steps * rays, 16 * rays, *geometry)
+
+    @property
+    def bytes(self) -> int:
+        """Of all arrays."""
+        return sum(self._buffers())
+
+    @property
+    def largest_bytes(self) -> int:
+        """Of the largest of them."""
+        return max(self._buffers())
+
+
+class Emissions(NamedTuple):
+    """The emitters of one slice in a call, in the order of the updates.
+
+    Attributes:
+        emitters: (n, 2), nodes.
+        receivers: (rings, nrx, 2), nodes.
+        ring: (n,), whose receivers an emitter has.
+        delta_tof: (n, nrx), s beyond water; NaN where there is none.
+    """
+
+    emitters: Floats
+    receivers: Floats
+    ring: Ints
+    delta_tof: Floats
+
+
+class Update(NamedTuple):
+    """How the slices are updated.
+
+    Attributes:
+        curved: whether rays are bent.
+        spacing: m.
+        crossing_s: time of a node in water, s.
+        members: emitters in one update.
+        weights: of the Gaussian, from its middle outwards.
+        bounds: lowest and highest slowness, s/m.
+    """
+
+    curved: bool
+    spacing: float
+    crossing_s: float
+    members: int
+    weights: Float32s
+    bounds: tuple[float, float]
+
+
+class Residuals(NamedTuple):
+    """Of one slice.
+
+    Attributes:
+        squares: (n,), sum of each emitter's squared residuals, s².
+        bins: histogram over ``RESIDUAL_EDGES_S``.
+    """
+
+    squares: Floats
+    bins: Ints
+
+
+def slices_in_flight(session: Session, size: SliceSize) -> int:
+    """Slices that the device holds together.
+
+    Raises:
+        InvalidInput: where it cannot hold one, naming the bytes or nodes of both.
+    """
+    device = session.device
+    limit = MEMORY_SHARE * device.memory_bytes if device.memory_bytes else float("inf")
+    largest = float(device.buffer_bytes or np.inf)
+    found = int(min(limit / size.bytes, largest / size.largest_bytes, 2**16))
+    if found < 1:
+        raise InvalidInput(
+            "nodes",
+            f"{size.shape[0]}, for which a slice takes {size.bytes} bytes, {size.largest_bytes} in one array",
+            f"at most {limit:.0f} bytes, {largest:.0f} in one array, on the device",
+        )
+    local = int(session.handle.local_mem_size)
+    if ring_bytes(size.shape[1]) > local - 16 * GROUP:
+        most = (local - 16 * GROUP) // 4 // (SLOTS + CROSSINGS) - BESIDE
+        raise InvalidInput("nodes", size.shape[1], f"at most {most}, for the local memory of the device")
+    return min(found, PROCESSOR_SLICES) if device.kind == "cpu" else found
+
+
+def ring_bytes(nodes: int) -> int:
+    """Local memory of a wave front on a grid of that side."""
+    return 4 * (SLOTS * (nodes + BESIDE) + CROSSINGS * nodes)
+
+
+class DeviceSlices:
+    """Slices on the device, and the work arrays of one update of each.
+
+    A slice's results have the same bits whichever slices are in flight with it, however its emitters are
+    distributed over calls, and on every run of one device.
+
+    Args:
+        session: the device.
+        slowness, coverage: (slices, nx, ny), s/m and m of ray.
+        region: as ``slowness``, nodes that may change.
+        emissions: of each slice; all with as many receivers.
+        update: what happens to all.
+        scales: (slices,), relaxation of each.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        slowness: Floats,
+        coverage: Floats,
+        region: Any,
+        emissions: Sequence[Emissions],
+        update: Update,
+        scales: Floats,
+    ) -> None:
+        self._session, self._update = session, update
+        slices, nx, ny = slowness.shape
+        self._shape, self._nodes, self._passes = (nx, ny), nx * ny, slices * update.members
+        self._emitters = max(len(one.emitters) for one in emissions)
+        self._rings, self._receivers = emissions[0].receivers.shape[:2]
+        self._most = LONGEST * (nx + ny)
+        group = GROUP
+        while group > session.handle.max_work_group_size:
+            group //= 2
+        self._group = group
+        self._numbers = np.array([len(one.emitters) for one in emissions], np.uint32)
+        up, reserve = session.upload, session.reserve
+        self._slowness = up(np.ascontiguousarray(slowness))
+        self._coverage = up(np.ascontiguousarray(coverage))
+        self._region = up(np.ascontiguousarray(region, np.uint8))
+        self._count_of = up(self._numbers)
+        self._sources = up(self._padded([one.emitters for one in emissions], 0.0))
+        self._times = up(self._padded([one.delta_tof for one in emissions], np.nan))
+        self._ring = up(self._padded([one.ring for one in emissions], 0).astype(np.int32))
+        self._places = up(np.stack([one.receivers for one in emissions]))
+        self._scales, self._weights = up(scales / update.spacing), up(update.weights)
+        self._edges = up(RESIDUAL_EDGES_S)
+        grids, rays = self._passes * self._nodes, self._passes * self._receivers
+        self._crossings, self._deviation = reserve(8 * grids), reserve(8 * grids)
+        self._fields, self._sums = reserve(16 * grids), session.zeros(2 * grids, np.int64)
+        self._tracks = reserve(12 * rays * self._most)
+        self._taken, self._residuals, self._correction = (
+            reserve(4 * rays),
+            reserve(8 * rays),
+            reserve(4 * rays),
+        )
+        self._exponents = reserve(4 * self._passes)
+        self._changes, self._blurred = reserve(4 * slices * self._nodes), reserve(4 * slices * self._nodes)
+        rows = slices * self._emitters
+        self._squares = session.zeros(rows, np.float64)
+        self._bins = session.zeros(slices * (RESIDUAL_EDGES_S.size - 1), np.uint32)
+
+    def run(self) -> None:
+        """Enqueue the updates by all emitters."""
+        kernels = self._kernels()
+        for step in range(-(-self._emitters // self._update.members)):
+            for kernel, place, size, group in kernels:
+                if place is not None:
+                    kernel.set_arg(place, np.uint32(step))
+                self._session.launch(kernel, size, group)
+
+    def images(self) -> tuple[Floats, Floats]:
+        """Slowness and coverage of all slices."""
+        slowness = np.empty((len(self._numbers), *self._shape))
+        coverage = np.empty_like(slowness)
+        self._session.download(slowness, self._slowness)
+        self._session.download(coverage, self._coverage)
+        return slowness, coverage
+
+    def residuals(self) -> list[Residuals]:
+        """Of each slice, before the updates."""
+        squares = np.empty((len(self._numbers), self._emitters))
+        bins = np.empty((len(self._numbers), RESIDUAL_EDGES_S.size - 1), np.uint32)
+        self._session.download(squares, self._squares)
+        self._session.download(bins, self._bins)
+        return [
+            Residuals(squares[k, :number], bins[k].astype(np.int64)) for k, number in enumerate(self._numbers)
+        ]
+
+    def _padded(self, rows: Sequence[Any], value: float) -> Any:
+        """(slices, emitters, …) from the rows of each slice."""
+        out = np.full((len(rows), self._emitters, *rows[0].shape[1:]), value, rows[0].dtype)
+        for into, row in zip(out, rows, strict=True):
+            into[: len(row)] = row
+        return out
+
+    def _kernels(self) -> list[tuple[Any, int | None, tuple[int, ...], tuple[int, ...] | None]]:
+        """The launches of one update, in order, each with the place of the number of the update."""
+        (nx, ny), update, session = self._shape, self._update, self._session
+        passes, nodes, slices, group = self._passes, self._nodes, len(self._numbers), self._group
+        uint, at, members = np.uint32, np.uint32(0), np.uint32(update.members)
+        sides, one = (np.int32(nx), np.int32(ny)), (self._count_of, members, at)
+        emitters, count = uint(self._emitters), uint(self._receivers)
+        over_nodes, over_images = (_filled(nodes), passes), (_filled(nodes), slices)
+        over_rays, rays_group = (_filled(self._receivers, RAYS_GROUP), passes), (RAYS_GROUP, 1)
+        reach, spacing = np.int32(update.weights.size - 1), np.float64(update.spacing)
+        traced = self._taken, self._residuals, self._correction
+
+        def kernel(name: str, *arguments: Any) -> Any:
+            made = session.own_kernel(SOURCES, name, f"GROUP={group}")
+            set_arguments(made, *arguments)
+            return made
+
+        begin = kernel(
+            "begin",
+            *(self._slowness, self._sources, *one, emitters, self._crossings, self._deviation),
+            *(*sides, np.int32(update.curved)),
+        )
+        interleave = kernel("interleave", *one, self._crossings, self._deviation, *sides, self._fields)
+        trace = kernel(
+            "trace",
+            *(self._slowness, self._sources, *one, emitters, self._places, self._ring, self._times),
+            *(uint(self._rings), count, *sides, spacing, np.float64(update.crossing_s)),
+            *(self._fields, uint(self._most), self._tracks, *traced),
+        )
+        summarise = kernel(
+            "summarise",
+            *(*one, emitters, count, *traced, self._exponents, self._squares),
+            *(self._edges, uint(RESIDUAL_EDGES_S.size), self._bins),
+        )
+        project = kernel(
+            "project",
+            *(count, *sides, uint(self._most), self._tracks, self._taken, self._correction),
+            *(self._exponents, self._sums),
+        )
+        change = kernel(
+            "change",
+            *(*one, np.int32(nodes), spacing, self._region, self._exponents, self._sums),
+            *(self._coverage, self._changes),
+        )
+        blur = kernel("blur", self._changes, self._blurred, self._weights, reach, *sides)
+        bounds = (np.float64(bound) for bound in update.bounds)
+        apply = kernel(
+            "apply",
+            *(*one, self._blurred, self._weights, reach, *sides, self._scales, *bounds),
+            *(self._region, self._slowness),
+        )
+        launches: list[tuple[Any, int | None, tuple[int, ...], tuple[int, ...] | None]] = [
+            (begin, 4, over_nodes, None),
+            (interleave, 2, over_nodes, None),
+            (trace, 4, over_rays, rays_group),
+            (summarise, 2, (passes * group,), (group,)),
+            (project, None, over_rays, rays_group),
+            (change, 2, over_images, None),
+            (blur, None, over_images, None),
+            (apply, 2, over_images, None),
+        ]
+        if update.curved:
+            front = kernel(
+                "front",
+                *(self._sources, *one, emitters, self._crossings, self._deviation, *sides),
+                local_memory(ring_bytes(ny)),
+            )
+            launches.insert(1, (front, 3, (passes * group,), (group,)))
+        return launches
+
+
+def local_memory(size_bytes: int) -> Any:
+    """An argument that reserves local memory."""
+    import pyopencl as cl
+
+    return cl.LocalMemory(size_bytes)
+
+
+def _filled(count: int, group: int = RAYS_GROUP) -> int:
+    return -(-count // group) * group

@@ -1,0 +1,138 @@
+"""Eikonal-SART of several slices in one call: together on an OpenCL device, or one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...errors import InvalidInput
+from ...opencl.choice import session_or_warning
+from ...opencl.lost_device import computing_on
+from ...opencl.session import Session
+from ..problem import Problem
+from ..settings import Settings
+from ..solver_choice import sart_engine
+from .device_slices import DeviceSlices, Emissions, SliceSize, Update, slices_in_flight
+from .emitter_pass import gaussian
+from .sart_step import State, advance, advanced, batch_of
+from .sart_update import bounds_of, relaxation_of
+
+
+class SliceCall(NamedTuple):
+    """The next emitters of one slice.
+
+    Attributes:
+        problem: the slice.
+        state: the state to continue from.
+        emitters: largest number, see ``sart_step.advance``.
+        slice_index: axial index.
+    """
+
+    problem: Problem
+    state: State
+    emitters: int
+    slice_index: int
+
+
+def advance_slices(calls: Sequence[SliceCall], settings: Settings) -> list[State]:
+    """As ``sart_step.advance`` for several slices of one shape.
+
+    On a device the slices are in flight together, and each has the same bits whichever the others are. Its
+    images differ from those of compiled code by rounding: rms below 0.05 m/s after three iterations in the
+    tests. Single nodes may differ by some m/s, where a ray at a shadow takes the other side.
+
+    Args:
+        calls: for each slice.
+        settings: the same of all.
+
+    Returns:
+        The new state of each.
+
+    Raises:
+        InvalidInput: for a device that cannot hold one slice, naming the bytes or nodes of both.
+        DeviceLostError: when the device fails.
+
+    Warns:
+        OpenCLFallbackWarning: once, where no device passes its self-test and compiled code computes instead.
+    """
+    session = None
+    if calls and sart_engine(settings, calls[0].problem.region.ndim) == "opencl":
+        session = session_or_warning(instead="compiled code")
+    if session is not None:
+        with computing_on(session):
+            return _on_device(session, calls, settings)
+    return [advance(one.problem, settings, one.state, one.emitters, one.slice_index) for one in calls]
+
+
+def _on_device(session: Session, calls: Sequence[SliceCall], settings: Settings) -> list[State]:
+    states = [one.state for one in calls]
+    left = [k for k, one in enumerate(calls) if not one.state.done]
+    while left:
+        size = slice_size([calls[k] for k in left], settings)
+        together = slices_in_flight(session, size)
+        some, left = left[:together], left[together:]
+        for k, state in zip(some, _advance(session, [calls[k] for k in some], settings), strict=True):
+            states[k] = state
+    return states
+
+
+def slice_size(calls: Sequence[SliceCall], settings: Settings) -> SliceSize:
+    """The memory of each of these slices."""
+    problem = calls[0].problem
+    nx, ny = problem.region.shape
+    emitters = max(min(one.emitters, len(one.problem.emitters)) for one in calls)
+    rings, receivers = problem.receivers.shape[:2]
+    return SliceSize((nx, ny), emitters, receivers, rings, settings.numerics.subset)
+
+
+def _advance(session: Session, calls: Sequence[SliceCall], settings: Settings) -> list[State]:
+    first, emissions, before = calls[0].problem, [], []
+    for call in calls:
+        problem, state = call.problem, call.state
+        if problem.region.shape != first.region.shape or problem.receivers.shape != first.receivers.shape:
+            raise InvalidInput("slices", problem.region.shape, "slices with as many nodes and receivers")
+        batch = batch_of(problem, settings, state, call.emitters, call.slice_index)
+        emissions.append(
+            Emissions(
+                problem.emitters[batch] / problem.spacing,
+                problem.receivers / problem.spacing,
+                problem.ring[batch],
+                problem.delta_tof[batch],
+            )
+        )
+        before.append(np.zeros_like(state.slowness) if state.emitter == 0 else state.coverage)
+    update = Update(
+        settings.rays == "curved",
+        first.spacing,
+        first.spacing / first.water_speed,
+        settings.numerics.subset,
+        gaussian(settings.sart.smoothing_nodes),
+        bounds_of(settings),
+    )
+    with session.lock:
+        slices = DeviceSlices(
+            session,
+            np.stack([call.state.slowness for call in calls]).astype(np.float64),
+            np.stack(before),
+            np.stack([call.problem.region for call in calls]),
+            emissions,
+            update,
+            np.array([relaxation_of(settings, call.state.sweep) for call in calls]),
+        )
+        slices.run()
+        slowness, coverage = slices.images()
+        residuals = slices.residuals()
+    states = []
+    for k, (call, found) in enumerate(zip(calls, residuals, strict=True)):
+        squares = call.state.squares
+        # One by one, so that the sum does not depend on how the emitters are distributed over calls.
+        for value in found.squares:
+            squares += float(value)
+        images, number = (slowness[k], coverage[k]), len(found.squares)
+        state = advanced(
+            call.problem, settings, call.state, number, images, squares, found.bins, call.slice_index
+        )
+        states.append(state)
+    return states
