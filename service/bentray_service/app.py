@@ -171,6 +171,7 @@ def _open(
     files = Files(settings.data_dir)
     files.prepare()
     stack.enter_context(lock(files.root))
+    files.check_restored()
     files.give_to_local()
     files.drop_leftovers()
     database = open_database(settings.database)

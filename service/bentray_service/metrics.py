@@ -18,6 +18,7 @@ from prometheus_client.registry import Collector
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from .backup.archive import newest_backup
 from .rows.checksums import Checksums
 from .rows.schema import STATES
 
@@ -135,6 +136,11 @@ class _ServiceCollector(Collector):
         lost = CounterMetricFamily("bentray_audit_lost_total", "Entries missing from the audit log.")
         lost.add_metric([], parts.audit.lost)
         yield lost
+        newest = newest_backup(parts.files.root)
+        if newest is not None:
+            yield _gauge(
+                "bentray_backup_timestamp_seconds", "End of the newest backup, since 1970 UTC.", newest
+            )
 
     def _from_database(self) -> Iterator[Metric]:
         """The metrics of stored jobs and files."""

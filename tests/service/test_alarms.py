@@ -10,6 +10,8 @@ import pytest
 import yaml
 from prometheus_client.parser import text_string_to_metric_families
 
+from bentray_service.backup.back_up import back_up
+
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"
 RULES = yaml.safe_load((DEPLOY / "prometheus/alerts.yml").read_text())["groups"][0]["rules"]
@@ -38,6 +40,7 @@ HEALTHY = {
     'bentray_http_request_duration_seconds_bucket{method="GET",route="/",le="10.0"}': "0+601x170",
     'bentray_http_request_duration_seconds_bucket{method="GET",route="/",le="+Inf"}': "0+601x170",
     "bentray_audit_lost_total": "0x170",
+    "bentray_backup_timestamp_seconds": "0x170",
     "bentray_process_open_fds": "90x170",
     "bentray_process_max_fds": "1024x170",
 }
@@ -65,6 +68,8 @@ ILL = {
     "BentrayServerErrors": {FAILED: "120+100x50"},
     "BentraySlow": {SLOW: "72000x50"},
     "BentrayAuditLost": {"bentray_audit_lost_total": "1x50"},
+    "BentrayBackupOld": {"bentray_backup_timestamp_seconds": "-129600x50"},
+    "BentrayNoBackup": {"bentray_backup_timestamp_seconds": "stale _x50"},
     "BentrayFilesOpen": {"bentray_process_open_fds": "900x50"},
 }
 
@@ -90,10 +95,11 @@ def selectors():
     ]
 
 
-def test_every_metric_and_label_of_alarms_and_dashboard_exists(start, work, uploaded):
+def test_every_metric_and_label_of_alarms_and_dashboard_exists(start, work, uploaded, tmp_path):
     http = start()
     uploaded(http)
     http.get("/health/live")
+    back_up(http.app.state.parts.settings, tmp_path / "backup")
     there = exported(http) | ITS_OWN
     assert len(selectors()) > 30
     for name, labels in selectors():

@@ -8,6 +8,7 @@ import typer
 
 from . import (
     audit,
+    backup,
     bench,
     compare,
     convert,
@@ -60,6 +61,8 @@ for command in (
     devices.devices,
     audit.audit,
     verify.verify,
+    backup.backup,
+    backup.restore,
 ):
     app.command()(command)
 app.command(cls=RepeatedSpacing)(render.render)

@@ -20,6 +20,9 @@ from .tenant_files import KINDS, TenantFiles
 
 log = logging.getLogger("bentray.storage")
 
+# Exists while a backup is restored into a data folder.
+RESTORING = "restoring.json"
+
 
 class Files:
     """The data folder of a service.
@@ -51,6 +54,14 @@ class Files:
                 folder.mkdir(mode=0o700, exist_ok=True)
         except OSError as error:
             raise InvalidInput("data_dir", f"{self.root} ({error.strerror})", "a writable folder") from error
+
+    def check_restored(self) -> None:
+        """Raises:
+        InvalidInput: when the restoration of a backup into this folder was interrupted.
+        """
+        if (self.root / RESTORING).exists():
+            found = f"{self.root}, into which a backup has been restored in part"
+            raise InvalidInput("data_dir", found, "a complete folder; the same `bentray restore` continues")
 
     def of(self, tenant: Tenant) -> TenantFiles:
         """The folders of a tenant; created if needed.

@@ -100,8 +100,7 @@ class Orphans:
         with self._database.write() as connection:
             begun = int(connection.execute(select(about.c.begun).with_for_update()).scalar_one()) + 1
             connection.execute(update(about).values(begun=begun))
-        content = {"database": mark_of(self._database), "begun": begun}
-        write_bytes(self._files.root / STAMP, json.dumps(content).encode())
+        stamp(self._files.root, mark_of(self._database), begun)
         self._agreed = True
 
     def _used_together(self) -> bool:
@@ -117,3 +116,8 @@ class Orphans:
         for folder in self._files.root.glob("tenants/*/*"):
             if folder.name in self._kinds and folder.is_dir():
                 yield from (path for path in folder.iterdir() if path.suffix != ".partial")
+
+
+def stamp(root: Path, mark: str, begun: int) -> None:
+    """Record in a data folder the id of its database, and the number of starts."""
+    write_bytes(root / STAMP, json.dumps({"database": mark, "begun": begun}).encode())

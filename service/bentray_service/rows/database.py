@@ -99,7 +99,7 @@ def open_database(address: str) -> Database:
     shown = address
     try:
         shown = make_url(address).render_as_string(hide_password=True)
-        engine = _engine(address, ("foreign_keys=ON",))
+        engine = engine_of(address, ("foreign_keys=ON",))
         with engine.begin() as connection:
             current = _make_or_check(connection, shown)
         if not current:
@@ -138,7 +138,7 @@ def _refusal(error: exc.SQLAlchemyError) -> DatabaseUnavailable | DatabaseFull |
     return DatabaseUnavailable("no answer")
 
 
-def _engine(address: str, pragmas: tuple[str, ...], *, patient: bool = True) -> Engine:
+def engine_of(address: str, pragmas: tuple[str, ...], *, patient: bool = True) -> Engine:
     """Create an engine.
 
     Args:
@@ -200,7 +200,7 @@ def _make_or_check(connection: Connection, shown: str) -> bool:
         schema.metadata.create_all(connection)
         connection.execute(insert(schema.about).values(version=schema.VERSION, probed=time.time()))
         return True
-    version = _version(connection)
+    version = version_of(connection)
     if version != schema.VERSION and version not in STEPS:
         raise InvalidInput(
             "database_url",
@@ -213,15 +213,15 @@ def _make_or_check(connection: Connection, shown: str) -> bool:
 def _update(address: str, shown: str) -> None:
     """Migrate over a separate connection: SQLite accepts the pragmas only outside of a transaction."""
     # Migration of a large table may take long.
-    engine = _engine(address, SQLITE_PRAGMAS, patient=False)
+    engine = engine_of(address, SQLITE_PRAGMAS, patient=False)
     try:
         with engine.begin() as connection:
-            version = _version(connection)
+            version = version_of(connection)
             log.warning("migrating %s from schema version %d to %d", shown, version, schema.VERSION)
             migrate(connection, version)
     finally:
         engine.dispose()
 
 
-def _version(connection: Connection) -> int:
+def version_of(connection: Connection) -> int:
     return int(connection.execute(select(schema.about.c.version)).scalar_one())

@@ -1,0 +1,119 @@
+"""Copies of all tables between databases, of one moment and of either kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sqlalchemy import Connection, exc, func, insert, inspect, select
+from sqlalchemy.engine import make_url
+
+from bentray_kernels.errors import InvalidInput
+
+from . import schema
+from .database import engine_of, version_of
+
+# Rows in memory at once.
+BATCH = 500
+
+ACCEPTED = "the database of a service"
+
+
+@contextmanager
+def snapshot(address: str) -> Iterator[Connection]:
+    """A view of a database at one moment; it blocks no writer and migrates nothing.
+
+    Raises:
+        InvalidInput: when it cannot be read, is empty, or has another schema version.
+    """
+    shown = make_url(address).render_as_string(hide_password=True)
+    try:
+        _check_file(address)
+        engine = engine_of(address, (), patient=False)
+        reading = engine.execution_options(bentray_read_only=True)
+        if engine.dialect.name != "sqlite":
+            # A read transaction of SQLite is of one moment anyway.
+            reading = reading.execution_options(isolation_level="REPEATABLE READ")
+        try:
+            with reading.begin() as connection:
+                if not inspect(connection).has_table(schema.about.name):
+                    raise InvalidInput("database_url", f"{shown}, without tables", ACCEPTED)
+                version = version_of(connection)
+                if version != schema.VERSION:
+                    accepted = f"schema version {schema.VERSION}; use the Bentray version of the service"
+                    raise InvalidInput("database_url", f"{shown} with schema version {version}", accepted)
+                yield connection
+        finally:
+            engine.dispose()
+    except (exc.SQLAlchemyError, ImportError) as error:
+        reason = str(getattr(error, "orig", None) or error).splitlines()[0]
+        raise InvalidInput("database_url", f"{shown} ({reason})", ACCEPTED) from error
+
+
+def copy_to_file(source: Connection, path: Path) -> None:
+    """Write all rows to a new SQLite file; one with this name is replaced."""
+    remove_database(path)
+    copy_to(source, f"sqlite:///{path}")
+
+
+def copy_to(source: Connection, address: str) -> None:
+    """Copy all rows into a database without tables, in one transaction.
+
+    Args:
+        source: of the present schema version.
+        address: of the other database.
+    """
+    engine = engine_of(address, ("foreign_keys=ON",), patient=False)
+    try:
+        with engine.begin() as target:
+            schema.metadata.create_all(target)
+            _copy_rows(source, target)
+    finally:
+        engine.dispose()
+
+
+def _copy_rows(source: Connection, target: Connection) -> None:
+    for table in schema.metadata.sorted_tables:
+        rows = source.execute(select(table).execution_options(yield_per=BATCH)).mappings()
+        for part in rows.partitions():
+            target.execute(insert(table), [dict(row) for row in part])
+        number = table.c.get("number")
+        if target.dialect.name == "postgresql" and number is not None:
+            # The next number that PostgreSQL gives follows those that were copied.
+            sequence = func.pg_get_serial_sequence(table.name, number.name)
+            last = func.coalesce(func.max(number), 1), func.count(number) > 0
+            target.execute(select(func.setval(sequence, *last)))
+
+
+def _check_file(address: str) -> None:
+    """Reject an SQLite database that does not exist, which opening would create."""
+    url = make_url(address)
+    if url.get_backend_name() == "sqlite" and not Path(url.database or "").is_file():
+        raise InvalidInput("database_url", f"{url.database}, which does not exist", ACCEPTED)
+
+
+def has_tables(address: str, besides: str = "") -> bool:
+    """Whether a database has tables of a service; one with the id ``besides`` does not count.
+
+    Raises:
+        InvalidInput: when it does not answer.
+    """
+    shown = make_url(address).render_as_string(hide_password=True)
+    engine = engine_of(address, ())
+    try:
+        with engine.begin() as connection:
+            if not inspect(connection).has_table(schema.about.name):
+                return False
+            return connection.execute(select(schema.bucket_mark.c.database)).scalar_one_or_none() != besides
+    except exc.SQLAlchemyError as error:
+        reason = str(getattr(error, "orig", None) or error).splitlines()[0]
+        raise InvalidInput("database_url", f"{shown} ({reason})", "a database that answers") from error
+    finally:
+        engine.dispose()
+
+
+def remove_database(path: Path) -> None:
+    """Remove an SQLite file and those beside it."""
+    for suffix in ("", "-wal", "-shm", "-journal"):
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
