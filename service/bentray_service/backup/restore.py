@@ -137,14 +137,18 @@ def _restore_database(root: Path, settings: ServiceSettings, mark: str) -> int:
 
 
 def _settle(connection: Connection, mark: str) -> None:
-    """Remove what was not in the backup: unfinished uploads, exports, leases, and marks of expired items."""
+    """Remove what belongs to the old place or is not in the backup.
+
+    These are unfinished uploads, exports, leases, sessions of browsers, and marks of expired items.
+    """
     connection.execute(delete(schema.bucket_mark))
     connection.execute(insert(schema.bucket_mark).values(database=mark))
     connection.execute(delete(schema.uploads).where(schema.uploads.c.state.in_(("receiving", "reading"))))
     connection.execute(update(schema.jobs).values(lease_owner=None, lease_until=None))
     connection.execute(delete(schema.storage).where(schema.storage.c.lease_owner.is_not(None)))
     connection.execute(delete(schema.storage).where(schema.storage.c.name.like("%.%")))
-    connection.execute(delete(schema.too_old))
+    for table in (schema.too_old, schema.sessions, schema.pending_sign_ins):
+        connection.execute(delete(table))
 
 
 def _publish(root: Path, settings: ServiceSettings, database: Database) -> None:
