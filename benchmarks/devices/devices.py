@@ -21,7 +21,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         yield Row("D1 engines on a device", None, WORTH_OTHER, ">=", "", choice.reason)
         return
     for number, found in enumerate(compare(context.quick)):
-        context.progress(number + 1, 7, found.engine.name)
+        context.progress(number + 1, 9, found.engine.name)
         yield from rows_of(found, choice.device)
 
 

@@ -40,6 +40,9 @@ from ..splines.sampling_opencl import OpenCLSpline
 from ..splines.sampling_opencl import on_the_device as spline_on_the_device
 from ..tomography import Problem, Settings
 from ..tomography.grid_schedule import initial_slowness
+from ..tomography.reflection.delay_and_sum import Pixels, Signals, Sums, sum_echoes
+from ..tomography.reflection.delay_and_sum_opencl import sum_echoes_opencl
+from ..tomography.reflection.element_times import solve_times
 from ..tomography.sart.sart_slices import SliceCall, advance_slices
 from ..tomography.sart.sart_step import begin
 from ..wave.emissions import Emissions, misfit_gradients, simulate_emissions
@@ -76,6 +79,7 @@ def engines(quick: bool) -> Iterator[Engine]:
     yield gradients(60 if quick else 212, 100 if quick else 800, 2 if quick else 8)
     yield sart(64 if quick else 128, 2 if quick else 8)
     yield spline(10_000 if quick else 1_000_000)
+    yield echoes(*((64, 16, 2) if quick else (256, 256, 16)))
     yield refraction(64 if quick else 512)
     yield field(64 if quick else 512)
 
@@ -216,6 +220,40 @@ def sart_scan(nodes: int, slices: int) -> tuple[list[SliceCall], Settings]:
     problem = Problem.of(scan, settings)
     state = begin(initial_slowness(problem, None))
     return [SliceCall(problem, state, SART_EMITTERS, k) for k in range(slices)], settings
+
+
+def echoes(pixels: int, elements: int, emissions: int) -> Engine:
+    """Delay and sum of some emissions of a ring in water, all elements of which receive; signals of noise."""
+    spacing, nodes, middle = 2e-3, 64, 0.063
+    turn = 2.0 * np.pi * np.arange(elements) / elements
+    ring = 0.05 * np.column_stack((np.cos(turn), np.sin(turn)))
+    times = solve_times(np.full((nodes, nodes), WATER_MPS), spacing, ring + middle, None)
+    step = 0.096 / pixels
+    line = step * (np.arange(pixels) - 0.5 * (pixels - 1))
+    inside = np.hypot(line[:, None], line[None, :]) < 0.048
+    grid = Pixels(np.full(2, (middle + line[0]) / spacing), step / spacing, inside)
+    parts = np.random.default_rng(2).standard_normal((emissions, elements, 2, 2000)).astype(np.float32)
+    parts[..., [0, -1]] = 0.0
+    signals = Signals(parts, np.ones((emissions, elements), bool), 0.0, 1e7)
+    receivers = np.arange(elements)
+    senders = receivers[np.linspace(0, elements, emissions, endpoint=False).astype(int)]
+    scan = signals, times, spacing, senders, receivers, grid, 90.0, False
+
+    def image(sums: Sums) -> Floats:
+        return np.stack((sums.echo.real, sums.echo.imag)).astype(float)
+
+    return Engine(
+        "reflection",
+        f"delay and sum, {emissions} x {elements} pairs x {pixels}²",
+        lambda: image(sum_echoes(*scan)),
+        lambda: image(sum_echoes_opencl(*scan)),
+        float(emissions * elements * inside.sum()),
+        "pairs",
+        None,
+        relative,
+        "of the largest",
+        1e-3,
+    )
 
 
 def spline(points: int) -> Engine:

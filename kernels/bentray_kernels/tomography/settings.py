@@ -315,8 +315,8 @@ class Settings:
     )
     device: Literal["auto", "cpu", "opencl"] = setting(
         "auto",
-        "Where SART of slices and full waveforms are computed. opencl: on an OpenCL device, many slices or "
-        "emitters at a time; cpu and auto: in compiled code. The images differ by rounding.",
+        "Where SART of slices, full waveforms and reflection are computed. opencl: on an OpenCL device, many "
+        "slices or emitters at a time; cpu and auto: in compiled code. The images differ by rounding.",
         label="Compute on",
         words={"auto": "Automatic", "cpu": "Processor", "opencl": "OpenCL device"},
     )

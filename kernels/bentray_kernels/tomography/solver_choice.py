@@ -49,12 +49,16 @@ def wave_engine(settings: Settings) -> Engine:
     return "opencl" if settings.device == "opencl" and settings.selects_model else "compiled"
 
 
+def echo_engine(settings: Settings) -> Engine:
+    """What sums the echoes of a reflection image."""
+    return "opencl" if settings.device == "opencl" and settings.reflection.enabled else "compiled"
+
+
 def needs_device(settings: Settings) -> bool:
     """Whether a call of the reconstruction computes on an OpenCL device."""
-    waves_or_fronts = tracks_on_device(settings) or wave_engine(settings) == "opencl"
-    return (
-        waves_or_fronts or sart_engine(settings, 3 if settings.decomposition == "volume" else 2) == "opencl"
-    )
+    dimensions = 3 if settings.decomposition == "volume" else 2
+    engines = wave_engine(settings), echo_engine(settings), sart_engine(settings, dimensions)
+    return tracks_on_device(settings) or "opencl" in engines
 
 
 def tracks_on_device(settings: Settings) -> bool:

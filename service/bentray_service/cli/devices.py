@@ -81,7 +81,7 @@ def _compared(*, quick: bool) -> list[Comparison]:
     with progress_bar("Measuring engines") as step:
         for one in compare(quick):
             found.append(one)
-            step(len(found), 7, one.engine.name)
+            step(len(found), 9, one.engine.name)
     return found
 
 

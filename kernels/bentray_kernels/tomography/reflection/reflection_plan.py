@@ -14,8 +14,10 @@ from ...acquisition import Dataset
 from ...acquisition.array_hull import inside_array
 from ...arrays import Flags, Floats, Ints
 from ...errors import InvalidInput
+from ...wave.emissions import Engine
 from ..directivity import within_opening
 from ..settings import ReflectionSettings, Settings
+from ..solver_choice import echo_engine
 from .delay_and_sum import Pixels
 
 # Pixels of a wavelength, and along a side at most, by default. Half the diagonal of a pixel of a quarter of a
@@ -61,6 +63,7 @@ class ReflectionPlan:
         pixel_m, origin_m: distance of pixels and position of the first in the dataset's coordinates, m.
         frequency_hz: centre frequency.
         water_mps: speed of the water, m/s.
+        engine: what sums the echoes.
     """
 
     settings: ReflectionSettings
@@ -76,6 +79,7 @@ class ReflectionPlan:
     origin_m: tuple[float, float]
     frequency_hz: float
     water_mps: float
+    engine: Engine = "compiled"
 
     @property
     def emissions(self) -> Ints:
@@ -155,6 +159,7 @@ def plan_reflection(
         origin_m=(float(first[0]), float(first[1])),
         frequency_hz=dataset.center_frequency_hz,
         water_mps=dataset.water_speed_mps,
+        engine=echo_engine(settings),
     )
 
 

@@ -69,6 +69,8 @@ def with_reflection(
         f"{nx} by {ny} pixels of {1e3 * plan.pixel_m:.3g} mm; delays in {medium}; pulse "
         f"{1e6 * pulse.delay_s:.3g} us after its travel time, muted for {1e6 * pulse.length_s:.3g} us"
     )
+    if plan.engine == "opencl":
+        summary += "; echoes summed on OpenCL devices"
     return replace(result, reflection=image, provenance={**result.provenance, "reflection": summary})
 
 

@@ -42,6 +42,17 @@ def scan(elements, samples):
     )
 
 
+def test_buffers_of_a_device_are_planned():
+    settings = Settings.of(method="sart", nodes=48, reflection=True)
+    dataset = scan(24, 500)
+    here, there = (
+        reflection_task_bytes(DatasetCounts.of(dataset).summary(one), one)
+        for one in (settings, settings.changed(device="opencl"))
+    )
+    assert there["sum_emissions"] > here["sum_emissions"] + dataset.waveform.object.nbytes
+    assert there["solve_element_times"] == here["solve_element_times"]
+
+
 @pytest.mark.parametrize(
     ("elements", "samples", "changes"),
     [(24, 1500, {}), (48, 300, {"gain": "attenuation", "nodes": 96}), (16, 200, {"pixel_m": 6e-5})],

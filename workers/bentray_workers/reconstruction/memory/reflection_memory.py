@@ -8,10 +8,12 @@ from __future__ import annotations
 import math
 
 from bentray_kernels.tomography.reflection.delay_and_sum import TILE
+from bentray_kernels.tomography.reflection.delay_and_sum_opencl import PIXELS, SUM_BYTES, VIEW_BYTES
 from bentray_kernels.tomography.reflection.echoes import upsampling
 from bentray_kernels.tomography.reflection.reflection_graph import ELEMENTS, PULSE_EMISSIONS
 from bentray_kernels.tomography.reflection.reflection_plan import emissions_per_task, pixel_size, side_pixels
 from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.tomography.solver_choice import echo_engine
 
 from ...cluster.capacities import MIB, REAL
 from ...files.dataset.counts import Summary, Traces
@@ -58,6 +60,11 @@ def reflection_task_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     times = 3 * elements * field
     image = 2 * REAL * nodes**2 + side**2
     reading = 2 * traces.read_bytes + traces.receivers * traces.samples * TRACE_BYTES
+    there = 0
+    if echo_engine(settings) == "opencl":
+        # A processor as a device has its buffers in the memory of the worker.
+        there = 8 * batch * signals + elements * field
+        there += (VIEW_BYTES * elements + SUM_BYTES * batch) * min(PIXELS, side**2)
     return {
         "solve_element_times": FLOOR_BYTES
         + field_bytes((nodes, nodes), "accurate")
@@ -76,7 +83,8 @@ def reflection_task_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         + reading
         + 8 * batch * signals
         + TRANSFORM_BYTES * signals
-        + views,
+        + views
+        + there,
     }
 
 

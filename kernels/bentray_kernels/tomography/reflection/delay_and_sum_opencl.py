@@ -1,0 +1,140 @@
+"""Delay and sum on an OpenCL device: the sums of ``delay_and_sum``, pixel by pixel."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Flags, Floats, Ints
+from ...opencl import Session, session_or_warning
+from ...opencl.lost_device import computing_on
+from ...opencl.session import set_arguments
+from .delay_and_sum import Pixels, Signals, Sums, empty_sums, sum_echoes
+from .element_times import ElementTimes
+
+SOURCES = ("reflection/delay_and_sum",)
+
+# Pixels of a work-group, and at once at most: the views of all elements at these lie on the device.
+GROUP, PIXELS = 64, 2**15
+
+# Of a view of a pixel from an element, and of a sum of a pixel, bytes.
+VIEW_BYTES = SUM_BYTES = 16
+
+
+def sum_echoes_opencl(
+    signals: Signals,
+    times: ElementTimes,
+    spacing: float,
+    emitters: Ints,
+    receivers: Ints,
+    pixels: Pixels,
+    pair_angle_deg: float,
+    spreading: bool,
+) -> Sums:
+    """As ``sum_echoes``, on the chosen OpenCL device; there if none passes its self-test.
+
+    The sums have the same order, and differ by rounding: within 1e-4 of the largest. The same bits on every
+    run of one device.
+
+    Raises:
+        DeviceLostError: when the device fails.
+
+    Warns:
+        OpenCLFallbackWarning: once, where no device passes its self-test.
+    """
+    session = session_or_warning(instead="compiled code")
+    if session is None:
+        return sum_echoes(signals, times, spacing, emitters, receivers, pixels, pair_angle_deg, spreading)
+    with computing_on(session), session.lock:
+        return _summed(
+            session, signals, times, spacing, (emitters, receivers), pixels, pair_angle_deg, spreading
+        )
+
+
+def _summed(
+    session: Session,
+    signals: Signals,
+    times: ElementTimes,
+    spacing: float,
+    pairs: tuple[Ints, Ints],
+    pixels: Pixels,
+    pair_angle_deg: float,
+    spreading: bool,
+) -> Sums:
+    column, row = np.nonzero(pixels.inside)
+    sums = empty_sums(pixels.inside.shape)
+    samples = signals.parts.shape[-1]
+    emissions, elements = len(pairs[0]), len(times.place)
+    parts, used = session.upload(signals.parts), session.upload(_bytes(signals.used))
+    sent, back = (session.upload(np.ascontiguousarray(one, np.int32)) for one in pairs)
+    places = session.upload(np.ascontiguousarray(times.place, np.float64))
+    slowness, lossy = session.upload(times.slowness), times.loss.size > 0
+    loss = session.upload(times.loss) if lossy else slowness
+    at_once = min(PIXELS, _pixels_at_once(session, elements, emissions))
+    least = math.cos(math.radians(pair_angle_deg))
+    views = session.reserve(VIEW_BYTES * elements * at_once)
+    found, total = session.reserve(SUM_BYTES * emissions * at_once), session.reserve(SUM_BYTES * at_once)
+    kernels = [session.kernel(SOURCES, name) for name in ("view_pixels", "sum_receivers", "sum_emissions")]
+    for start in range(0, len(column), at_once):
+        where = slice(start, start + at_once)
+        m, n = column[where], row[where]
+        px, py = (_positions(pixels, axis, index) for axis, index in enumerate((m, n)))
+        count, wide = np.int32(len(m)), -(-len(m) // GROUP) * GROUP
+        # Setting an argument does not keep its buffer alive: the names do.
+        there = session.upload(px), session.upload(py)
+        stored = (np.int32(n) for n in times.slowness.shape[1:])
+        set_arguments(
+            kernels[0],
+            places,
+            slowness,
+            loss,
+            np.int32(lossy),
+            *stored,
+            np.float64(spacing),
+            np.int32(spreading),
+            *there,
+            count,
+            views,
+        )
+        session.launch(kernels[0], (wide, elements), (GROUP, 1))
+        rate, first = np.float32(signals.rate_hz), np.float32(signals.first_s * signals.rate_hz)
+        set_arguments(
+            kernels[1],
+            parts,
+            used,
+            sent,
+            back,
+            np.int32(len(pairs[1])),
+            np.int32(samples),
+            views,
+            count,
+            rate,
+            first,
+            np.float32(least),
+            np.float32(1.0 / (1.0 - least)),
+            found,
+        )
+        session.launch(kernels[1], (wide, emissions), (GROUP, 1))
+        set_arguments(kernels[2], found, np.int32(emissions), count, total)
+        session.launch(kernels[2], (wide,), (GROUP,))
+        result = np.empty((len(m), 4), np.float32)
+        session.download(result, total)
+        sums.echo[m, n] = result[:, 0] + 1j * result[:, 1]
+        sums.power[m, n], sums.weight[m, n] = result[:, 2], result[:, 3]
+    return sums
+
+
+def _bytes(flags: Flags) -> Any:
+    return np.ascontiguousarray(flags, np.uint8)
+
+
+def _positions(pixels: Pixels, axis: int, index: Any) -> Floats:
+    return np.asarray(pixels.start[axis] + pixels.step * index)
+
+
+def _pixels_at_once(session: Session, elements: int, emissions: int) -> int:
+    """Pixels whose views and sums fill no more than a quarter of the device, a multiple of a work-group."""
+    largest = 8 * session.doubles_at_once() // max(VIEW_BYTES * elements, SUM_BYTES * emissions)
+    return max(GROUP, largest // GROUP * GROUP)
