@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from bentray_kernels.acquisition import Dataset, Truth, Waveform
+from bentray_kernels.acquisition import Dataset
 from bentray_kernels.phantoms import DETAILED_SIDE_M, DetailedBreast
 from bentray_kernels.tomography import Settings
-from bentray_kernels.wave.stencil import longest_step
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
@@ -20,6 +18,7 @@ from bentray_service.cli.output.terminal import Step
 from ..shared._baselines import Images
 from ..shared._image_error import object_error
 from ..shared._reconstruction_on_workers import reconstruct_on_workers
+from ..shared._ring_scan import RingScan
 from ..shared._trace_noise import with_trace_noise
 from ..waves._kwave_peer import Peer, installed
 from ._images_beside_truth import images_beside_truth
@@ -28,11 +27,8 @@ from ._planted_scan import planted, without_water_shot
 WATER_MPS, CENTRE_HZ, SIDE_M, RING = 1480.0, 3e5, 0.12, 0.45
 ELEMENTS, EMISSIONS, SNR = 128, 48, 30.0
 
-# Nodes in the shortest wave of the pulse, in the slowest tissue: its derivatives in space are exact for
-# waves of two. Its time step is that part of the longest of ours.
-NODES_A_WAVE, HIGHEST, STEP = 4.0, 1.54, 0.25
-SAMPLES_A_PERIOD = 8
-BEFORE, AFTER = 3.5, 12.0
+# Its time step, in the longest of ours.
+STEP = 0.25
 
 WAYS: dict[str, dict[str, Any]] = {
     "straight": {"method": "sart", "rays": "straight"},
@@ -81,42 +77,11 @@ def simulated(peer: Peer, progress: Step) -> Dataset:
         progress: of the emissions.
     """
     breast = DetailedBreast(WATER_MPS)
-    low, high = breast.speed_range()
-    nodes = math.ceil(SIDE_M * NODES_A_WAVE * HIGHEST * CENTRE_HZ / low) + 1
-    spacing = SIDE_M / (nodes - 1)
-    turn = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
-    place = RING * SIDE_M * np.column_stack((np.cos(turn), np.sin(turn)))
-    ring = np.rint((place + 0.5 * SIDE_M) / spacing).astype(int)
-    rate = SAMPLES_A_PERIOD * CENTRE_HZ
-    skip = math.ceil(1.0 / (rate * STEP * longest_step(high, spacing)))
-    step = 1.0 / (rate * skip)
-    samples = round((2.0 * RING * SIDE_M / low + (BEFORE + AFTER) / CENTRE_HZ) * rate)
-    late = (step * np.arange(samples * skip)) * CENTRE_HZ - BEFORE
-    pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
-    tx = np.arange(EMISSIONS) * ELEMENTS // EMISSIONS
-    media = {"object": breast.speed(nodes, DETAILED_SIDE_M), "water": np.full((nodes, nodes), WATER_MPS)}
-    recorded = {}
-    for name, speed in media.items():
-        shots = np.zeros((EMISSIONS, ELEMENTS, samples))
-        for number, element in enumerate(tx):
-            progress(number, EMISSIONS, f"k-Wave, {name}")
-            others = np.delete(np.arange(ELEMENTS), element)
-            traces = peer(speed, spacing, step, ring[element], ring[others], pulse)
-            shots[number, others] = traces[:, ::skip]
-        recorded[name] = shots
-    corner = -0.5 * SIDE_M
-    dataset = Dataset(
-        element_position_m=ring * spacing + corner,
-        tx=tx,
-        rx=np.arange(ELEMENTS),
-        water_speed_mps=WATER_MPS,
-        waveform=Waveform(recorded["object"], recorded["water"]),
-        roi=breast.inside(nodes, DETAILED_SIDE_M),
-        truth=Truth(media["object"], (spacing, spacing), (corner, corner)),
-        radius_m=RING * SIDE_M,
-        center_frequency_hz=CENTRE_HZ,
-        sampling_rate_hz=rate,
-        t0_s=-BEFORE / CENTRE_HZ,
-        source="made by k-Wave",
+    size = RingScan(
+        SIDE_M, RING * SIDE_M, CENTRE_HZ, ELEMENTS, EMISSIONS, breast.speed_range(), WATER_MPS, peer, STEP
     )
-    return with_trace_noise(dataset, SNR, seed=3)
+    speed = breast.speed(size.nodes, DETAILED_SIDE_M)
+    media = {"object": speed, "water": np.full_like(speed, WATER_MPS)}
+    shots = size.recorded(media, progress)
+    roi = breast.inside(size.nodes, DETAILED_SIDE_M)
+    return with_trace_noise(size.dataset(shots["object"], shots["water"], speed, roi), SNR, seed=3)

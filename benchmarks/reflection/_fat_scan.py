@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -12,10 +12,12 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.acquisition import Dataset, Truth, Waveform
-from bentray_kernels.arrays import Floats
+from bentray_kernels.arrays import Floats, Ints
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import longest_step
+
+from ..waves._kwave_peer import Peer
 
 # Water of 35 °C and a gland of nearly its speed in fat, m/s; radii of gland, fat and ring, m.
 WATER_MPS, FAT_MPS, GLAND_MPS = 1520.0, 1375.0, 1510.0
@@ -32,16 +34,19 @@ CONTRAST, SPECKLE, THIN, GRAIN = 0.06, 0.004, 0.2, 0.15
 
 # Nodes in the shortest wave, order in space and time step: not those of any inversion here (4.5, order 8).
 NODES_A_WAVE, HIGHEST, ORDER, STEP, EDGE_NODES = 5.0, 1.54, 6, 0.6, 40
+# Of k-Wave, whose derivatives in space are exact for waves of two nodes.
+PEER_NODES_A_WAVE, PEER_STEP = 4.0, 0.5
 SAMPLES_A_PERIOD, BEFORE, RECORD_S = 8, 2.5, 98e-6
 
 
 @dataclass(frozen=True)
 class FatScan:
-    """Size of a scan: centre frequency, Hz; elements of the ring; emitting elements."""
+    """Size of a scan: centre frequency, Hz; elements; emitting elements; k-Wave, or None: ours."""
 
     frequency_hz: float = 1e6
     elements: int = 192
     emissions: int = 24
+    peer: Peer | None = None
 
     @property
     def wavelength_m(self) -> float:
@@ -51,7 +56,8 @@ class FatScan:
     @property
     def nodes(self) -> int:
         """Along a side of the simulation."""
-        return math.ceil(SIDE_M * NODES_A_WAVE * HIGHEST * self.frequency_hz / FAT_MPS) + 1
+        a_wave = PEER_NODES_A_WAVE if self.peer else NODES_A_WAVE
+        return math.ceil(SIDE_M * a_wave * HIGHEST * self.frequency_hz / FAT_MPS) + 1
 
     @property
     def spacing_m(self) -> float:
@@ -91,12 +97,21 @@ class FatScan:
         return np.asarray(change)
 
     def ring_m(self) -> Floats:
-        """Elements, (elements, 2), m."""
+        """Elements, (elements, 2), m; those of k-Wave are on nodes."""
         turn = 2.0 * np.pi * (np.arange(self.elements) + 0.3) / self.elements
-        return RING_M * np.column_stack((np.cos(turn), np.sin(turn)))
+        ring = RING_M * np.column_stack((np.cos(turn), np.sin(turn)))
+        return ring if self.peer is None else self.spacing_m * self._ring_nodes(ring) - 0.5 * SIDE_M
 
-    def simulated(self, progress: Callable[[int, int, str], None], threads: int = 2) -> dict[str, Dataset]:
-        """The scans ``behind fat`` and ``in water``, each with its water shot."""
+    def _ring_nodes(self, ring: Floats) -> Ints:
+        return np.rint((ring + 0.5 * SIDE_M) / self.spacing_m).astype(int)
+
+    def simulated(
+        self,
+        progress: Callable[[int, int, str], None],
+        names: Sequence[str] = ("behind fat", "in water"),
+        threads: int = 2,
+    ) -> dict[str, Dataset]:
+        """The scans ``behind fat`` and ``in water``, or some of them, each with its water shot."""
         step, skip = self._clock()
         samples = int(RECORD_S * SAMPLES_A_PERIOD * self.frequency_hz)
         late = step * self.frequency_hz * np.arange(samples * skip) - BEFORE
@@ -109,15 +124,21 @@ class FatScan:
             "water shot": self.speed(fat=False, targets=False),
         }
         shots = {}
-        for name, speed in speeds.items():
-            medium = Medium.of(speed, self.spacing_m, step, edge_nodes=EDGE_NODES, order=ORDER)
-            shoot = partial(_shot, medium, ring, pulse, skip)
+        for name in (*names, "water shot"):
+            speed = speeds[name]
+            if self.peer is None:
+                medium = Medium.of(speed, self.spacing_m, step, edge_nodes=EDGE_NODES, order=ORDER)
+                shoot = partial(_shot, medium, ring, pulse, skip)
+            else:
+                nodes = self._ring_nodes(self.ring_m())
+                shoot = partial(_shot_of_peer, self.peer, speed, self.spacing_m, step, nodes, pulse, skip)
             with ThreadPoolExecutor(threads) as pool:
                 recorded = []
                 for number, traces in enumerate(pool.map(shoot, tx)):
                     progress(number + 1, len(tx), f"waves {name}")
                     recorded.append(traces)
             shots[name] = np.stack(recorded)
+        solver = f"order {ORDER} in space" if self.peer is None else "k-Wave"
         corner, truth = -0.5 * SIDE_M, self.speed(fat=True, targets=False)
         return {
             name: Dataset(
@@ -131,17 +152,27 @@ class FatScan:
                 center_frequency_hz=self.frequency_hz,
                 sampling_rate_hz=SAMPLES_A_PERIOD * self.frequency_hz,
                 t0_s=-BEFORE / self.frequency_hz,
-                source=f"order {ORDER} in space, {self.nodes} nodes of {1e3 * self.spacing_m:.3g} mm a side",
+                source=f"{solver}, {self.nodes} nodes of {1e3 * self.spacing_m:.3g} mm a side",
             )
-            for name in ("behind fat", "in water")
+            for name in names
         }
 
     def _clock(self) -> tuple[float, int]:
         """Time step, s, and steps from sample to sample."""
-        longest = STEP * longest_step(1.1 * WATER_MPS, self.spacing_m)
+        part = STEP if self.peer is None else PEER_STEP
+        longest = part * longest_step(1.1 * WATER_MPS, self.spacing_m)
         sample = 1.0 / (SAMPLES_A_PERIOD * self.frequency_hz)
         skip = math.ceil(sample / longest)
         return sample / skip, skip
+
+
+def _shot_of_peer(
+    peer: Peer, speed: Floats, spacing: float, step: float, ring: Ints, pulse: Floats, skip: int, emitter: int
+) -> np.ndarray:
+    others = np.delete(np.arange(len(ring)), emitter)
+    traces = np.zeros((len(ring), len(pulse[::skip])), np.float32)
+    traces[others] = peer(speed, spacing, step, ring[emitter], ring[others], pulse)[:, ::skip]
+    return traces
 
 
 def _shot(medium: Medium, ring: Floats, pulse: Floats, skip: int, emitter: int) -> np.ndarray:

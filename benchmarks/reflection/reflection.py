@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -17,11 +18,15 @@ from bentray_kernels.tomography.result import Reflection
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
+from ..waves._kwave_peer import installed
 from ._echo_measures import Echo, cyst_contrast, echo_near, line_offset
 from ._fat_scan import CYST, CYST_M, LINE, POINTS, FatScan
 from ._reflection_picture import picture
 
 SIZE, QUICK = FatScan(), FatScan(3e5, 64, 16)
+
+# The scan by k-Wave: half the frequency, so that it takes minutes; around a target, wavelengths.
+OTHER_HZ, OTHER_ELEMENTS, OTHER_EMISSIONS, OTHER_WINDOW = 5e5, 128, 16, 1.4
 
 # Around a target, wavelengths: water moves it by two, and the next one is farther away.
 WINDOW_WAVES = 3.2
@@ -41,6 +46,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     images, speed = reflections(scans, context)
     yield from compared(size, images, speed)
     context.save_picture("reflection.png", lambda: picture(size, images, speed))
+    yield from other_solver(context)
     yield from timed(context)
 
 
@@ -120,6 +126,40 @@ def compared(size: FatScan, images: dict[str, Reflection], speed: Reconstruction
     )
 
 
+def other_solver(context: BenchmarkContext) -> Iterator[Row]:
+    """Places of the targets in a scan by k-Wave, where it is installed."""
+    found, why = installed()
+    targets = (
+        "F1 k-Wave, points behind fat, largest error of place",
+        "F1 k-Wave, line behind fat, error of place",
+    )
+    if context.quick:
+        return
+    if not found:
+        for target in targets:
+            yield Row(target, None, 0.5, "<=", "wavelengths", why["k-Wave"])
+        return
+    size = FatScan(OTHER_HZ, OTHER_ELEMENTS, OTHER_EMISSIONS, found["k-Wave"])
+    scan = size.simulated(context.progress, ("behind fat",))["behind fat"]
+    picked = replace(pick(scan), waveform=scan.waveform)
+    wanted, wave = Settings.of(reflection=True, attenuation=False), size.wavelength_m
+    images = {
+        delays: reconstruct(picked, wanted.changed(delays=delays)).reflection
+        for delays in ("reconstructed", "water")
+    }
+    moved, lines = {}, {}
+    for delays, image in images.items():
+        assert image is not None
+        echoes = [echo_near(image, point, OTHER_WINDOW * wave) for point in POINTS]
+        moved[delays] = [one.away_m / wave for one in echoes]
+        lines[delays] = line_offset(image, LINE, OTHER_WINDOW * wave) / wave
+    made = f"{size.elements} elements, {size.emissions} emit, {1e-6 * size.frequency_hz:g} MHz; "
+    each = "; ".join(f"{name}: " + ", ".join(f"{one:.2f}" for one in away) for name, away in moved.items())
+    yield Row(targets[0], max(moved["reconstructed"]), 0.5, "<=", "wavelengths", made + each)
+    each = "; ".join(f"{name}: {one:.2f}" for name, one in lines.items())
+    yield Row(targets[1], lines["reconstructed"], 0.5, "<=", "wavelengths", made + each)
+
+
 def timed(context: BenchmarkContext) -> Iterator[Row]:
     """Delay and sum of 256 x 256 pairs at 512 x 512 pixels by two threads, travel times included."""
     turn = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
@@ -153,5 +193,6 @@ def timed(context: BenchmarkContext) -> Iterator[Row]:
         seconds, cpu = time.perf_counter() - begun, time.process_time() - cpu
     emitters = len(batches) * BATCH
     detail = f"{emitters} x {ELEMENTS} pairs, {int(inside.sum())} of {PIXELS}² pixels lie in the ring; "
-    detail += f"two threads, {cpu:.1f} s of processor time; signals of noise"
+    detail += f"two threads, {cpu:.1f} s of processor time; signals of noise; "
+    detail += f"load {os.getloadavg()[0]:.1f}"
     yield Row(f"F1 time, {emitters} x 256 pairs x 512²", seconds, 60.0, "<=", "s", detail)
