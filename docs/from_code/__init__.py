@@ -13,6 +13,7 @@ from .reconstruction_settings import reconstruction_settings
 from .rest import records, routes
 from .scan_limits import scan_limits
 from .scan_readers import scan_readers
+from .scoreboard import scoreboard
 from .service_settings import settings_table
 
 # A page includes one of these by a comment on its own line: <!-- from the code: commands -->
@@ -24,6 +25,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "dissertation": dissertation,
     "scan limits": scan_limits,
     "scan readers": scan_readers,
+    "scoreboard": scoreboard,
     "service settings": settings_table,
     "reconstruction settings": reconstruction_settings,
 }

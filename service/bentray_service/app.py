@@ -43,7 +43,6 @@ from .pictures import Pictures
 from .readiness import Readiness, Threaded
 from .routes import (
     access,
-    batches,
     cluster_health,
     datasets,
     events,
@@ -61,7 +60,6 @@ from .routes import (
     volumes,
 )
 from .rows.ages import ExpiryMarks
-from .rows.batches import Batches
 from .rows.checksums import Checksums
 from .rows.database import open_database
 from .rows.job_queue import Queue
@@ -147,7 +145,6 @@ def _routes() -> tuple[BaseRoute, ...]:
         tus,
         datasets,
         jobs,
-        batches,
         plans,
         names,
         previews,
@@ -257,7 +254,6 @@ def _open(
         files=files,
         datasets=Datasets(database),
         jobs=Jobs(database),
-        batches=Batches(database),
         queue=queue,
         volumes=Volumes(database),
         meshes=Meshes(database),

@@ -1,7 +1,7 @@
 """Analytic phantoms, sampled on any grid."""
 
 from .cube_fields import CubeField, eight_bit, in_nodes, sampled
-from .detailed_breast import DETAILED_SIDE_M, DetailedBreast
+from .detailed_breast import DENSITIES, DETAILED_SIDE_M, Anatomy, DetailedBreast
 from .ellipses import Ellipse, EllipsePhantom, HalfEllipse
 from .fringe_sphere import ONE_HOLE, TWO_HOLES, FringeSphere
 from .marschner_lobb import MarschnerLobb
@@ -11,6 +11,7 @@ from .table7 import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, ta
 from .volume import Part, PhantomSlice, VolumePhantom
 
 __all__ = [
+    "DENSITIES",
     "DETAILED_SIDE_M",
     "ONE_HOLE",
     "TABLE6_SIDE_M",
@@ -18,6 +19,7 @@ __all__ = [
     "TABLE7_GRIDS",
     "TABLE7_SIDE_M",
     "TWO_HOLES",
+    "Anatomy",
     "CubeField",
     "DetailedBreast",
     "Dome",

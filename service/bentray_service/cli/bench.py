@@ -44,6 +44,13 @@ def bench(
             help="Existing folder to write pictures to, e.g. benchmarks/results.", show_default="no pictures"
         ),
     ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            help="scoreboard: folder with the downloaded OpenBreastUS and NBPslices2D files.",
+            show_default="no public cases",
+        ),
+    ] = None,
     only: Annotated[
         list[str] | None,
         typer.Option(
@@ -98,9 +105,11 @@ def bench(
         )
     if pictures is not None and not pictures.is_dir():
         raise InvalidInput("--pictures", f"{pictures} (no such folder)", "an existing folder")
+    if data is not None and not data.is_dir():
+        raise InvalidInput("--data", f"{data} (no such folder)", "an existing folder")
     measure = load(name, benchmark_folder())
     with progress_bar(f"Measuring {name}") as step:
-        rows = list(measure(BenchmarkContext(quick, step, pictures, scheduler, tls)))
+        rows = list(measure(BenchmarkContext(quick, step, pictures, scheduler, tls, data=data)))
     measured = {"measured": date.today().isoformat()}
     text = json.dumps(without_nan([row.to_dict() | measured for row in rows]), indent=2, allow_nan=False)
     write_bytes(json_file, (text + "\n").encode())

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.phantoms import DETAILED_SIDE_M, DetailedBreast
+from bentray_kernels.phantoms import DENSITIES, DETAILED_SIDE_M, DetailedBreast
 
 BREAST = DetailedBreast(1480.0, 0.2)
 
@@ -36,6 +36,30 @@ def test_outside_is_water_and_inside_the_stated_range():
     attenuation = BREAST.attenuation(93, DETAILED_SIDE_M)
     assert (attenuation[0] == 0.2).all()
     assert attenuation.max() == pytest.approx(25.0)
+
+
+# Glandular parts of the classes a to d of ACR BI-RADS.
+CLASSES = {
+    "fatty": (0.0, 0.25),
+    "scattered": (0.25, 0.5),
+    "heterogeneous": (0.5, 0.75),
+    "dense": (0.75, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", DENSITIES)
+def test_each_density_has_its_share_of_gland_and_its_lesions(name):
+    anatomy = DENSITIES[name]
+    breast = DetailedBreast(1500.0, anatomy=anatomy)
+    low, high = CLASSES[name]
+    assert low < breast.glandular(93, DETAILED_SIDE_M) < high
+    speed, inside = breast.speed(93, DETAILED_SIDE_M), breast.inside(93, DETAILED_SIDE_M)
+    axis = np.linspace(-0.5, 0.5, 93) * DETAILED_SIDE_M
+    for lesion in anatomy.lesions:
+        i, j = (np.abs(axis - centre).argmin() for centre in lesion.centre_m)
+        assert inside[i, j]
+        assert abs(speed[i, j] - lesion.speed_mps) < 25.0
+    assert (speed[0] == 1500.0).all()
 
 
 def test_water_needs_a_speed():

@@ -31,6 +31,7 @@ class BenchmarkContext:
         scheduler: address of a Dask scheduler; None: workers are started on this machine.
         tls: folder of certificates for ``tls://`` addresses.
         scratch: folder for temporary files, with the same path on the workers; None: that of the system.
+        data: folder of public data that the user downloaded; None: rows that need it are left out.
     """
 
     quick: bool
@@ -39,6 +40,7 @@ class BenchmarkContext:
     scheduler: str | None = None
     tls: Path | None = None
     scratch: Path | None = None
+    data: Path | None = None
 
     def save_picture(self, name: str, draw: Callable[[], bytes]) -> None:
         """Write ``draw()`` to the file ``name`` in the folder for pictures, if there is one."""

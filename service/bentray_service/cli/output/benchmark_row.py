@@ -39,6 +39,7 @@ class Row:
             constant, water alone, straight rays by the same method, penalty and width, and the default
             settings; further ones may be added. Empty if the row is not about an image.
         tuned: whether a setting other than the default was chosen for the scan.
+        figures: further figures of the same image by name, such as its SSIM, for tables.
 
     Raises:
         InvalidInput: for an unknown ``op``, a missing value without a reason, or a tuned row without the
@@ -54,6 +55,7 @@ class Row:
     error: float | None = None
     baselines: Mapping[str, float] = field(default_factory=dict)
     tuned: bool = False
+    figures: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.op not in OPERATORS:
@@ -80,7 +82,7 @@ class Row:
         return error is not None and not all(error <= constant for constant in constants)
 
     def to_dict(self) -> dict[str, Any]:
-        """The row for JSON; error, baselines and tuned only if it is about an image."""
+        """The row for JSON; error, baselines and tuned only if it is about an image; figures if any."""
         row: dict[str, Any] = {
             "target": self.target,
             "value": None if self.value is None else float(self.value),
@@ -95,6 +97,8 @@ class Row:
             row["error"] = None if error is None else float(error)
             row["baselines"] = {name: float(one) for name, one in self.baselines.items()}
             row["tuned"] = self.tuned
+        if self.figures:
+            row["figures"] = {name: float(one) for name, one in self.figures.items()}
         return row
 
     @property
