@@ -43,6 +43,7 @@ from .pictures import Pictures
 from .readiness import Readiness, Threaded
 from .routes import (
     access,
+    batches,
     cluster_health,
     datasets,
     events,
@@ -60,6 +61,7 @@ from .routes import (
     volumes,
 )
 from .rows.ages import ExpiryMarks
+from .rows.batches import Batches
 from .rows.checksums import Checksums
 from .rows.database import open_database
 from .rows.job_queue import Queue
@@ -145,6 +147,7 @@ def _routes() -> tuple[BaseRoute, ...]:
         tus,
         datasets,
         jobs,
+        batches,
         plans,
         names,
         previews,
@@ -254,6 +257,7 @@ def _open(
         files=files,
         datasets=Datasets(database),
         jobs=Jobs(database),
+        batches=Batches(database),
         queue=queue,
         volumes=Volumes(database),
         meshes=Meshes(database),

@@ -9,7 +9,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 # Resources with irregular plurals.
-LISTED = {"mesh": "meshes", "field": "geometry-fields"}
+LISTED = {"mesh": "meshes", "field": "geometry-fields", "batch": "batches"}
 
 
 class Rejection(InvalidInput):

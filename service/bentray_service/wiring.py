@@ -25,6 +25,7 @@ from .jobs.feed import EventFeed
 from .jobs.runner import Runner
 from .pictures import Pictures
 from .readiness import Readiness, Threaded
+from .rows.batches import Batches
 from .rows.database import Database
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
@@ -43,6 +44,7 @@ class Parts:
     files: Files
     datasets: Datasets
     jobs: Jobs
+    batches: Batches
     queue: Queue
     volumes: Volumes
     meshes: Meshes

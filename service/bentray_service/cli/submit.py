@@ -53,14 +53,14 @@ def submit(
         typer.Option(
             metavar="DIR",
             show_default=False,
-            help="Reconstruct every scan in DIR on --scheduler, instead of FILE.",
+            help="Reconstruct every scan in DIR, instead of FILE.",
         ),
     ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
             show_default=False,
-            help="Dask cluster for a batch, e.g. tcp://head:8786; its workers must see DIR.",
+            help="Dask cluster for a batch, in place of a service, e.g. tcp://head:8786; it must see DIR.",
         ),
     ] = None,
     at_once: Annotated[
@@ -77,10 +77,10 @@ def submit(
     If the service or its database restarts in the meantime, requests are retried for up to five minutes; the
     job is started only once.
 
-    With --batch, reconstruct a folder of scans on a Dask cluster without the service. Scans with a valid
-    result for the same file and settings are skipped, so an interrupted batch can be repeated. Other scans
-    continue after a failure; then the exit code is 1. Example:
-    bentray submit --batch scans --scheduler tcp://head:8786 --out results
+    With --batch, reconstruct a folder of scans with one progress: on the service, or with --scheduler on a
+    Dask cluster without one. Scans with a valid result for the same file and settings are skipped, so an
+    interrupted batch can be repeated. Other scans continue after a failure; then the exit code is 1.
+    Example: bentray submit --batch scans --out results
 
     Example:  bentray submit scan.h5 --url http://127.0.0.1:8000 -o result
     """
@@ -92,11 +92,11 @@ def submit(
         raise InvalidInput(
             "scheduler", f"{scheduler} without --batch", "--url of a service, which has its own scheduler"
         )
-    if batch is not None and (scheduler is None or not wait):
-        found = "none" if scheduler is None else f"{scheduler} with --no-wait"
-        raise InvalidInput(
-            "scheduler", found, "the address of a Dask scheduler without --no-wait, for --batch"
-        )
+    if batch is not None and scheduler is not None and not wait:
+        raise InvalidInput("scheduler", f"{scheduler} with --no-wait", "one of the two")
+    if batch is not None and scheduler is None and at_once is not None:
+        accepted = "no --at-once without --scheduler: BENTRAY_JOBS_AT_ONCE of the service limits its jobs"
+        raise InvalidInput("at_once", at_once, accepted)
     if output is not None and not wait:
         raise InvalidInput(
             "output", f"{output} with --no-wait", "one of the two: there is no result to download yet"
@@ -108,7 +108,11 @@ def submit(
         folder = None if output is None else output_folder(output)
         with dataset_file(source, given, folder or Path(gettempdir())) as scan:
             _submit(source, scan, settings, url, folder, wait=wait, as_json=as_json)
-    if batch is not None and scheduler is not None:
+    if batch is not None and scheduler is None:
+        from .service_batch import submit_service_batch
+
+        submit_service_batch(batch, url, settings, given, output, wait=wait, as_json=as_json)
+    elif batch is not None and scheduler is not None:
         from .batch import submit_batch
 
         submit_batch(batch, scheduler, settings, given, output, at_once, tls, as_json=as_json)

@@ -9,6 +9,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar, Unpack
 
 import httpx
 
+from . import batches as batch_flows
 from . import flows, lists, pictures
 from .connection import Connection, ConnectionOptions, document
 from .errors import ClientError, from_response, no_answer
@@ -50,6 +51,11 @@ class Client(Connection):
     reconstruct = _method(flows.reconstruct)
     wait = _method(flows.wait)
     cancel = _method(flows.cancel)
+    submit_batch = _method(batch_flows.submit_batch)
+    wait_batch = _method(batch_flows.wait_batch)
+    cancel_batch = _method(batch_flows.cancel_batch)
+    batch = _method(batch_flows.batch)
+    batches = _method(batch_flows.batches)
     result = _method(flows.result)
     download = _method(flows.download)
     download_dataset = _method(flows.download_dataset)

@@ -82,12 +82,20 @@ def submit(
     Raises:
         InvalidInput: for an unknown name in ``values``, with the one that is spelt most like it.
     """
+    merged = merged_settings(settings, method, {**values})
+    return (yield from _start({"kind": "reconstruction", "dataset": id_of(dataset), "settings": merged}))
+
+
+def merged_settings(
+    settings: Mapping[str, Any] | None, method: Method | None, values: dict[str, Any]
+) -> dict[str, Any]:
+    """Settings as the REST interface has them, with those given by name in their place."""
     merged = dict(settings or {})
-    given = {**values} if method is None else {"method": method, **values}
+    given = values if method is None else {"method": method, **values}
     for name, value in nested(plain_numbers(given)).items():
         own = merged.get(name)
         merged[name] = {**own, **value} if isinstance(own, Mapping) and isinstance(value, dict) else value
-    return (yield from _start({"kind": "reconstruction", "dataset": id_of(dataset), "settings": merged}))
+    return merged
 
 
 def simulate(

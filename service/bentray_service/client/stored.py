@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
+from ..routes.models.batch_records import BatchRecord
 from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from ..routes.models.surface_records import MeshRecord
 from .errors import ClientError
@@ -11,10 +12,11 @@ from .errors import ClientError
 DatasetId: TypeAlias = str | DatasetRecord
 JobId: TypeAlias = str | JobRecord
 VolumeId: TypeAlias = str | VolumeRecord | JobRecord
+BatchId: TypeAlias = str | BatchRecord
 StoredId: TypeAlias = str | DatasetRecord | VolumeRecord | MeshRecord
 
 
-def id_of(stored: StoredId | JobId) -> str:
+def id_of(stored: StoredId | JobId | BatchId) -> str:
     """The id of a record, or the id itself."""
     return stored if isinstance(stored, str) else stored.id
 

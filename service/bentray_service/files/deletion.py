@@ -15,6 +15,7 @@ from ..rows.database import Database
 from ..rows.ids import checked
 from ..rows.schema import (
     ENDED,
+    batches,
     datasets,
     events,
     geometry_fields,
@@ -165,6 +166,8 @@ def _forget(
     connection.execute(delete(events).where(events.c.job_id.in_(gone)))
     connection.execute(delete(volumes).where(volumes.c.id.in_(names)))
     connection.execute(delete(jobs).where(jobs.c.id.in_(gone)))
+    left = select(jobs.c.id).where(jobs.c.batch_id == batches.c.id).exists()
+    connection.execute(delete(batches).where(batches.c.tenant == tenant, ~left))
     for table in (datasets, uploaded_volumes, meshes):
         connection.execute(delete(table).where(table.c.id.in_(names)))
     connection.execute(delete(uploads).where(uploads.c.result_id.in_(names), uploads.c.state == "done"))

@@ -89,6 +89,7 @@ def list_jobs(
     limit: Limit = 100,
     state: Annotated[State | None, Query(description="Only these.")] = None,
     kind: Annotated[JobKind | None, Query(description="Only these.")] = None,
+    batch: Annotated[str | None, Query(description="Only jobs of this batch.")] = None,
     before: Annotated[str | None, Query(description="Only jobs older than this job.")] = None,
     text: Annotated[
         str | None,
@@ -101,11 +102,18 @@ def list_jobs(
     ] = None,
 ) -> JobList:
     """List jobs, newest first; `next` is the address of the next page."""
-    rows = service.jobs.newest(tenant, limit + 1, state, kind, before, text)
+    rows = service.jobs.newest(tenant, limit + 1, state, kind, before, text, batch)
     shown = [job_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
         return JobList(jobs=shown, next=None)
-    filters = {"limit": limit, "state": state, "kind": kind, "text": text, "before": shown[-1].id}
+    filters = {
+        "limit": limit,
+        "state": state,
+        "kind": kind,
+        "text": text,
+        "batch": batch,
+        "before": shown[-1].id,
+    }
     query = urlencode({name: value for name, value in filters.items() if value is not None})
     return JobList(jobs=shown, next=f"/v1/jobs?{query}")
 

@@ -9,7 +9,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.rendering.refraction_view import check_even
 
 from ..jobs.kinds import KINDS, field_links
-from ..rows.typed_rows import DatasetRow, FieldRow, JobRow, MeshRow, UploadRow, VolumeRow
+from ..rows.ids import volume_of
+from ..rows.typed_rows import BatchRow, DatasetRow, FieldRow, JobRow, MeshRow, UploadRow, VolumeRow
+from .models.batch_records import BatchRecord
 from .models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from .models.surface_records import FieldRecord, FieldSeconds, MeshRecord
 from .models.upload_records import UploadRecord
@@ -43,8 +45,30 @@ def job_record(row: JobRow, ahead: int | None = None) -> JobRecord:
     started, progress = row["started"], {**row, "phase": row["phase"] or ""}
     seconds = None if started is None else (row["finished"] or time.time()) - started
     record = {**row, **reads, "field": None, **made, "progress": progress, "seconds": seconds, "links": links}
-    record["ahead"] = ahead
+    record |= {"ahead": ahead, "batch": row["batch_id"]}
+    if row["batch_id"] is not None:
+        links["batch"] = f"/v1/batches/{row['batch_id']}"
     return JobRecord.model_validate(record)
+
+
+def batch_record(row: BatchRow) -> BatchRecord:
+    here = f"/v1/batches/{row['id']}"
+    links = {"self": here, "jobs": f"/v1/jobs?batch={row['id']}"}
+    if any(row["counts"].get(state) for state in ("queued", "running")):
+        links["cancel"] = f"{here}/cancel"
+    jobs = [
+        {
+            "id": job["id"],
+            "dataset": job["dataset_id"],
+            "state": job["state"],
+            "volume": volume_of(job["id"]) if job["state"] == "succeeded" else None,
+        }
+        for job in row["jobs"]
+    ]
+    started = row["started"]
+    seconds = None if started is None else (row["finished"] or time.time()) - started
+    more = {"progress": row["fraction"], "jobs": jobs, "seconds": seconds, "links": links}
+    return BatchRecord.model_validate({**row, **more})
 
 
 def volume_record(row: VolumeRow) -> VolumeRecord:

@@ -7,7 +7,15 @@ import secrets
 
 from ..errors import UnknownId
 
-PREFIXES = {"dataset": "ds", "job": "job", "volume": "vol", "mesh": "mesh", "field": "field", "upload": "up"}
+PREFIXES = {
+    "dataset": "ds",
+    "job": "job",
+    "batch": "batch",
+    "volume": "vol",
+    "mesh": "mesh",
+    "field": "field",
+    "upload": "up",
+}
 _RANDOM = re.compile(r"[0-9a-f]{20}")
 
 

@@ -6,11 +6,12 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import cast
 
-from sqlalchemy import Connection, case, func, insert, or_, select
+from sqlalchemy import Connection, Table, case, func, insert, or_, select
 from sqlalchemy.exc import IntegrityError
 
 from ..errors import JobFinished, KeyReused, QueueFull, UnknownId
@@ -68,48 +69,18 @@ class Jobs(NamedTable[JobRow]):
             QueueFull: when ``most_queued`` jobs of this tenant are queued.
             UnknownId: when the dataset has been deleted in the meantime.
         """
-        job_id = new_id("job")
-        request = json.dumps([kind, settings, dataset_id, volume_id, mesh_id], sort_keys=True)
-        digest = hashlib.sha256(request.encode()).hexdigest()
-        with _dataset_exists(dataset_id), self._database.write() as connection:
-            if key is not None and connection.dialect.name != "sqlite":
-                # Write transactions of SQLite are serialised; this lock serialises those of PostgreSQL.
-                lock = int.from_bytes(hashlib.sha256(f"{tenant}/{key}".encode()).digest()[:8], signed=True)
-                connection.execute(select(func.pg_advisory_xact_lock(lock)))
-            before = _of_key(connection, tenant, key) if key is not None else None
-            if before is not None:
-                if before["request_sha256"] != digest:
-                    accepted = "a unique key for every request; this key was used with another request"
-                    raise KeyReused("Idempotency-Key", repr(key), accepted)
-                return before
-            if most_queued is not None:
-                mine = select(func.count()).where(jobs.c.tenant == tenant, jobs.c.state == "queued")
-                waiting = connection.execute(mine).scalar_one()
-                if waiting >= most_queued:
-                    raise QueueFull(
-                        "jobs", f"{waiting} queued", f"fewer than {most_queued} queued; try again later"
-                    )
-            if reserve is not None:
-                usage.reserve(connection, tenant, job_id, *reserve)
-            connection.execute(
-                insert(jobs).values(
-                    id=job_id,
-                    kind=kind,
-                    dataset_id=dataset_id,
-                    volume_id=volume_id,
-                    mesh_id=mesh_id,
-                    field_id=field_id,
-                    settings=settings,
-                    plan=plan,
-                    tenant=tenant,
-                    idempotency_key=key,
-                    request_sha256=digest,
-                    started_by=started_by[:200],
-                    state="queued",
-                    created=time.time(),
-                )
-            )
-            append_event(connection, job_id, "queued")
+        references = {"dataset_id": dataset_id, "volume_id": volume_id, "mesh_id": mesh_id}
+        new = NewJob(
+            kind, settings, **references, field_id=field_id, plan=plan, reserved=(reserve or (0, 0))[0]
+        )
+        how = Submission(None if reserve is None else reserve[1], most_queued, key, started_by)
+        digest = how.digest_of([kind, settings, dataset_id, volume_id, mesh_id])
+        with self._database.write() as connection:
+            before = how.earlier(connection, jobs, tenant, digest)
+            if before is None:
+                job_id = insert_jobs(connection, tenant, [new], how, key=key, digest=digest)[0]
+            else:
+                job_id = before["id"]
         return self.get(tenant, job_id)
 
     def newest(
@@ -120,6 +91,7 @@ class Jobs(NamedTable[JobRow]):
         kind: str | None = None,
         before: str | None = None,
         text: str | None = None,
+        batch: str | None = None,
     ) -> list[JobRow]:
         """Up to ``limit`` jobs of this tenant, newest first.
 
@@ -129,6 +101,7 @@ class Jobs(NamedTable[JobRow]):
             state, kind: only jobs with these values.
             before: only jobs older than the job with this id.
             text: only jobs that ``job_search.matches``.
+            batch: only jobs of this batch.
 
         Raises:
             UnknownId: when the tenant has no such job.
@@ -138,6 +111,8 @@ class Jobs(NamedTable[JobRow]):
             query = query.where(jobs.c.state == state)
         if kind is not None:
             query = query.where(jobs.c.kind == kind)
+        if batch is not None:
+            query = query.where(jobs.c.batch_id == checked("batch", batch))
         if text:
             query = query.where(job_search.matches(tenant, text))
         if before is not None:
@@ -292,17 +267,134 @@ class Jobs(NamedTable[JobRow]):
         return self.get(tenant, job_id)
 
 
+@dataclass(frozen=True)
+class NewJob:
+    """A job to insert.
+
+    Attributes:
+        kind: a key of ``jobs.kinds.KINDS``.
+        settings: of the job, as JSON.
+        dataset_id, volume_id, mesh_id: inputs.
+        field_id: output, if its id is known in advance.
+        plan: decomposition into tasks.
+        reserved: maximum bytes that it stores while it runs.
+    """
+
+    kind: str
+    settings: Plain
+    dataset_id: str | None = None
+    volume_id: str | None = None
+    mesh_id: str | None = None
+    field_id: str | None = None
+    plan: Plain | None = None
+    reserved: int = 0
+
+
+@dataclass(frozen=True)
+class Submission:
+    """What holds for all jobs of a request.
+
+    Attributes:
+        most_bytes: quota of the tenant; None: nothing is reserved.
+        most_queued: maximum number of queued jobs.
+        key: idempotency key.
+        started_by: id of the key, or the user.
+    """
+
+    most_bytes: int | None = None
+    most_queued: int | None = None
+    key: str | None = None
+    started_by: str = ""
+
+    @staticmethod
+    def digest_of(request: object) -> str:
+        """SHA-256 of a request, which an idempotency key belongs to."""
+        return hashlib.sha256(json.dumps(request, sort_keys=True).encode()).hexdigest()
+
+    def earlier(self, connection: Connection, table: Table, tenant: Tenant, digest: str) -> Plain | None:
+        """The row that an earlier request with this key inserted; concurrent requests with it wait.
+
+        Raises:
+            KeyReused: when it was another request.
+        """
+        if self.key is None:
+            return None
+        if connection.dialect.name != "sqlite":
+            # Write transactions of SQLite are serialised; this lock serialises those of PostgreSQL.
+            words = f"{tenant}/{self.key}".encode()
+            lock = int.from_bytes(hashlib.sha256(words).digest()[:8], signed=True)
+            connection.execute(select(func.pg_advisory_xact_lock(lock)))
+        mine = select(table).where(table.c.tenant == tenant, table.c.idempotency_key == self.key)
+        row = connection.execute(mine).mappings().one_or_none()
+        if row is not None and row["request_sha256"] != digest:
+            accepted = "a unique key for every request; this key was used with another request"
+            raise KeyReused("Idempotency-Key", repr(self.key), accepted)
+        return None if row is None else dict(row)
+
+
+def insert_jobs(
+    connection: Connection,
+    tenant: Tenant,
+    new: Sequence[NewJob],
+    how: Submission,
+    batch_id: str | None = None,
+    key: str | None = None,
+    digest: str | None = None,
+) -> list[str]:
+    """Insert queued jobs; returns their ids.
+
+    Args:
+        connection: in a write transaction.
+        tenant: owner.
+        new: the jobs.
+        how: limits and user.
+        batch_id: of the batch that they belong to.
+        key, digest: idempotency key of the request, and its digest, if it is for one job.
+
+    Raises:
+        QuotaExceeded, QueueFull, UnknownId: as for ``Jobs.add``; the transaction must be rolled back.
+    """
+    if how.most_queued is not None:
+        mine = select(func.count()).where(jobs.c.tenant == tenant, jobs.c.state == "queued")
+        waiting = connection.execute(mine).scalar_one()
+        if waiting + len(new) > how.most_queued:
+            more = f" and {len(new)} more" if len(new) > 1 else ""
+            accepted = f"fewer than {how.most_queued} queued; try again later"
+            raise QueueFull("jobs", f"{waiting} queued{more}", accepted)
+    ids = []
+    for one in new:
+        job_id = new_id("job")
+        if how.most_bytes is not None:
+            usage.reserve(connection, tenant, job_id, one.reserved, how.most_bytes)
+        with _dataset_exists(one.dataset_id):
+            connection.execute(
+                insert(jobs).values(
+                    id=job_id,
+                    kind=one.kind,
+                    dataset_id=one.dataset_id,
+                    volume_id=one.volume_id,
+                    mesh_id=one.mesh_id,
+                    field_id=one.field_id,
+                    batch_id=batch_id,
+                    settings=one.settings,
+                    plan=one.plan,
+                    tenant=tenant,
+                    idempotency_key=key,
+                    request_sha256=digest,
+                    started_by=how.started_by[:200],
+                    state="queued",
+                    created=time.time(),
+                )
+            )
+        append_event(connection, job_id, "queued")
+        ids.append(job_id)
+    return ids
+
+
 def _batches(ids: list[str]) -> Iterator[list[str]]:
     """Batches small enough for one query of any database."""
     for begin in range(0, len(ids), BATCH):
         yield ids[begin : begin + BATCH]
-
-
-def _of_key(connection: Connection, tenant: Tenant, key: str) -> JobRow | None:
-    """The job that was submitted with an idempotency key."""
-    mine = select(jobs).where(jobs.c.tenant == tenant, jobs.c.idempotency_key == key)
-    row = connection.execute(mine).mappings().one_or_none()
-    return None if row is None else cast(JobRow, dict(row))
 
 
 @contextmanager

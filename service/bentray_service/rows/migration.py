@@ -137,6 +137,13 @@ def _to_7(connection: Connection) -> None:
         new.create(connection)
 
 
+def _to_8(connection: Connection) -> None:
+    """Version 8: batches of jobs."""
+    connection.execute(text("ALTER TABLE jobs ADD COLUMN batch_id VARCHAR(32)"))
+    connection.execute(text("CREATE INDEX jobs_by_batch ON jobs (batch_id)"))
+    schema.batches.create(connection)
+
+
 def _count_stored_bytes(connection: Connection) -> None:
     """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
@@ -148,5 +155,5 @@ def _count_stored_bytes(connection: Connection) -> None:
 
 
 STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType(
-    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6, 6: _to_7}
+    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6, 6: _to_7, 7: _to_8}
 )

@@ -20,7 +20,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 7
+VERSION = 8
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -123,6 +123,8 @@ jobs = Table(
     Column("created", Float, nullable=False),
     Column("started", Float),
     Column("finished", Float),
+    # Not a foreign key: a batch is deleted with the last of its jobs.
+    Column("batch_id", String(32)),
     # Owner, and who of them started it: the id of a key, or the user of a proxy.
     _tenant(),
     *named_columns(),
@@ -138,6 +140,26 @@ jobs = Table(
     Index("jobs_by_tenant", "tenant", "state"),
     Index("jobs_by_key", "tenant", "idempotency_key", unique=True),
     Index("jobs_by_age", "tenant", "number"),
+    Index("jobs_by_batch", "batch_id"),
+)
+
+# Reconstructions of many scans that were started together. State and progress are those of their jobs.
+batches = Table(
+    "batches",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    _tenant(),
+    Column("name", String(200), nullable=False),
+    Column("settings", JSON, nullable=False),
+    # Number of jobs at first.
+    Column("size", Integer, nullable=False),
+    Column("created", Float, nullable=False),
+    Column("started_by", String(200), nullable=False),
+    Column("idempotency_key", String(200)),
+    Column("request_sha256", String(64)),
+    Index("batches_by_tenant", "tenant", "number"),
+    Index("batches_by_key", "tenant", "idempotency_key", unique=True),
 )
 
 # Append-only; the number of a row is the id of a server-sent event. The tenant is that of the job.

@@ -111,6 +111,7 @@ class JobRow(JobProgress):
     volume_id: str | None
     mesh_id: str | None
     field_id: str | None
+    batch_id: str | None
     settings: Plain
     attempts: int
     history: list[Plain]
@@ -124,6 +125,39 @@ class JobRow(JobProgress):
     request_sha256: str | None
     lease_owner: str | None
     lease_until: float | None
+
+
+class BatchJob(TypedDict):
+    """A job of a batch."""
+
+    id: str
+    batch_id: str
+    dataset_id: str | None
+    state: str
+    done: int
+    total: int
+    phase: str | None
+    started: float | None
+    finished: float | None
+
+
+class BatchRow(TypedDict):
+    """A batch, with state, progress (``fraction``, 0 to 1) and times from its jobs; ``size`` at first."""
+
+    number: int
+    id: str
+    tenant: Tenant
+    name: str
+    settings: Plain
+    size: int
+    created: float
+    started_by: str
+    state: str
+    fraction: float
+    counts: dict[str, int]
+    jobs: list[BatchJob]
+    started: float | None
+    finished: float | None
 
 
 class EventRow(TypedDict):

@@ -29,6 +29,7 @@ from bentray_service.routes.models.surface_records import FieldErrors, FieldSeco
 from bentray_service.rows import schema
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.ids import new_id, volume_of
+from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
@@ -99,6 +100,8 @@ def _stored(app: FastAPI, http: TestClient, auth: dict[str, str]) -> dict[str, s
     cube |= {"speed_range_mps": [1.0, 2.0], "water_speed_mps": 1.0, "provenance": {}, "bytes": 1}
     # At its end, so that its events have one too.
     parts.jobs.request_cancel(ACME, job)
+    batch = parts.batches.add(ACME, "", {}, [NewJob("reconstruction", {}, dataset)], Submission())["id"]
+    parts.batches.request_cancel(ACME, batch)
     figures = dict.fromkeys((*FieldSizes.model_fields, *FieldErrors.model_fields), 1)
     figures |= {f"{name}_seconds": 1.0 for name in FieldSeconds.model_fields}
     with parts.database.write() as connection:
@@ -121,6 +124,7 @@ def _stored(app: FastAPI, http: TestClient, auth: dict[str, str]) -> dict[str, s
         "dataset_id": dataset,
         "mesh_id": mesh,
         "job_id": job,
+        "batch_id": batch,
         "volume_id": volume_of(job),
         "field_id": field,
         "upload_id": begun.headers["location"].rpartition("/")[2],

@@ -134,7 +134,6 @@ def test_without_json_it_ends_with_a_table_and_the_reasons(
             ("--batch", "nowhere", "--scheduler", "tcp://h:1"),
             "bentray: --batch: found nowhere (no such folder)",
         ),
-        (("--batch", "."), "bentray: scheduler: found none"),
         (("x.h5", "--batch", "."), "bentray: file: found x.h5 with --batch"),
         ((), "bentray: file: found nothing"),
         (("x.h5", "--scheduler", "tcp://h:1"), "bentray: scheduler: found tcp://h:1 without --batch"),

@@ -51,7 +51,7 @@ INSERT INTO about VALUES (1, 0.0);
 DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
 
 
-@pytest.fixture(params=[1, 2, 3, 4, 5, 6])
+@pytest.fixture(params=[1, 2, 3, 4, 5, 6, 7])
 def old(request, tmp_path):
     """A database as an older version left it, with a finished and a waiting job."""
     path = tmp_path / "old.sqlite"
@@ -117,7 +117,7 @@ def test_the_old_tables_were_those_of_version_1(old, tmp_path):
         names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     connection.close()
     later = {"uploaded_volumes", "meshes", "geometry_fields", "keys", "uploads", "bucket_mark"}
-    later |= {"checksums", "too_old", "storage", "sessions", "pending_sign_ins"}
+    later |= {"checksums", "too_old", "storage", "sessions", "pending_sign_ins", "batches"}
     assert names == set(expected) - later
 
 
@@ -174,10 +174,10 @@ def test_keys_hold_afterwards(old):
 
 def test_failed_migration_keeps_the_old_database(old, monkeypatch):
     def broken(connection):
-        migration._to_7(connection)
+        migration._to_8(connection)
         raise RuntimeError("the power went")
 
-    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 6: broken})
+    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 7: broken})
     with pytest.raises(RuntimeError, match="power"):
         open_database(old)
     monkeypatch.undo()
@@ -261,6 +261,9 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "ALTER TABLE datasets ADD COLUMN water_temperature_c FLOAT",
         "sessions",
         "pending_sign_ins",
+        "ALTER TABLE jobs ADD COLUMN batch_id VARCHAR(32)",
+        "CREATE INDEX jobs_by_batch ON jobs (batch_id)",
+        "batches",
     ]
     assert told.said[-1].startswith("UPDATE about SET version")
 

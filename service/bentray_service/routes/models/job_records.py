@@ -150,6 +150,7 @@ class JobRecord(ShownRecord):
     ahead: int | None = Field(
         description="Queued jobs that start before this queued job if jobs run one at a time; null in lists."
     )
+    batch: str | None = Field(description="Id of the batch that it belongs to.")
     dataset: str | None = Field(
         description="Id of the input of a reconstruction, or of the result of a simulation."
     )

@@ -80,7 +80,7 @@ function when(job) {
 
 // Show the table in root with the filters and the page of query. Returns { refresh, close }.
 export async function jobTable(root, query) {
-  let asked = new URLSearchParams([...query].filter(([name]) => ["text", "state", "kind", "before"].includes(name)));
+  let asked = new URLSearchParams([...query].filter(([name]) => ["batch", "text", "state", "kind", "before"].includes(name)));
   const rows = new Map();
   const error = make("p", "error");
   error.setAttribute("role", "alert");
@@ -98,8 +98,11 @@ export async function jobTable(root, query) {
   table.append(head, body);
   const pages = make("nav", "pages");
   pages.setAttribute("aria-label", "Pages of the list");
+  const batch = asked.get("batch");
   const filters = await jobFilters(asked, (changed) => {
     asked = changed;
+    // The page of a batch stays that of the batch.
+    if (batch) asked.set("batch", batch);
     keepQuery(asked);
     followed.refresh();
   });
@@ -196,7 +199,7 @@ export async function jobTable(root, query) {
   function onJobs(jobs) {
     draw(jobs);
     table.hidden = !jobs.length;
-    const filtered = [...asked.keys()].some((name) => name !== "before");
+    const filtered = [...asked.keys()].some((name) => name !== "before" && name !== "batch");
     const none = filtered ? "No job matches these filters." : "Nothing has run yet. Upload a scan and press Fast or Best.";
     const many = `${jobs.length === 1 ? "1 job" : `${jobs.length} jobs`}${older ? " on this page, and older ones" : ""}`;
     told.textContent = jobs.length ? many : none;

@@ -1,0 +1,117 @@
+"""/v1/batches: reconstruct many scans, with one progress; cancel and delete them together."""
+
+from __future__ import annotations
+
+import logging
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Body, Depends, Header, Response, status
+from fastapi.openapi.models import Example
+
+from bentray_kernels.errors import InvalidInput
+
+from ..errors import InUse
+from ..files.deletion import StoredItem
+from ..jobs.kinds import KINDS, ReconstructionRequest
+from ..rows.jobs import NewJob, Submission
+from ..rows.schema import ENDED
+from ..web.errors import problems
+from ..wiring import CallerTenant, CurrentCaller, Service
+from .bodies import Limit, SmallBody, accept_media_types
+from .models.batch_records import BatchList, BatchRecord, BatchRequest
+from .record_conversion import batch_record
+
+log = logging.getLogger("bentray.jobs")
+
+KIND: Literal["reconstruction"] = "reconstruction"
+EXAMPLES: dict[str, Example] = {
+    "batch": {
+        "summary": "Two scans with the same settings",
+        "value": {
+            "datasets": ["ds-0123456789abcdef0123", "ds-abcdef01234567890123"],
+            "name": "Ward 3",
+            "settings": {"nodes": 128, "rays": "curved"},
+        },
+    }
+}
+
+router = APIRouter(prefix="/v1/batches", tags=["batches"], route_class=SmallBody)
+
+
+@router.post(
+    "",
+    status_code=status.HTTP_202_ACCEPTED,
+    dependencies=[Depends(accept_media_types("application/json"))],
+    responses=problems(400, 404, 409, 413, 415, 422, 429, 503, 507),
+)
+def start_batch(
+    batch_request: Annotated[BatchRequest, Body(openapi_examples=EXAMPLES)],
+    response: Response,
+    service: Service,
+    caller: CurrentCaller,
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            min_length=1,
+            max_length=200,
+            description="Idempotency key: a repeated request with the same key starts no second batch.",
+        ),
+    ] = None,
+) -> BatchRecord:
+    """Queue one reconstruction for each dataset. All are stored before the response, or none."""
+    datasets, settings = batch_request.datasets, batch_request.settings
+    if len(set(datasets)) < len(datasets):
+        twice = next(one for one in datasets if datasets.count(one) > 1)
+        raise InvalidInput("datasets", f"{twice[:80]} twice", "each dataset once")
+    new = []
+    for dataset in datasets:
+        one = ReconstructionRequest(kind=KIND, dataset=dataset, settings=settings)
+        order = KINDS[KIND].plan(one, caller.tenant, service)
+        new.append(
+            NewJob(
+                KIND,
+                order.settings,
+                order.references["dataset_id"],
+                plan=order.plan,
+                reserved=order.largest_bytes,
+            )
+        )
+    how = Submission(service.quota.most_bytes, service.settings.max_queued_jobs, idempotency_key, caller.who)
+    row = service.batches.add(caller.tenant, batch_request.name, settings.to_dict(), new, how)
+    log.info("%s queued, %d jobs", row["id"], row["size"], extra={"figures": {"batch": row["id"]}})
+    service.runner.notify()
+    batch = batch_record(row)
+    response.headers["Location"] = batch.links["self"]
+    return batch
+
+
+@router.get("", responses=problems(422))
+def list_batches(service: Service, tenant: CallerTenant, limit: Limit = 100) -> BatchList:
+    """List batches, newest first."""
+    return BatchList(batches=[batch_record(row) for row in service.batches.newest(tenant, limit)])
+
+
+@router.get("/{batch_id}", responses=problems(404))
+def show_batch(batch_id: str, service: Service, tenant: CallerTenant) -> BatchRecord:
+    """Show one batch: state, progress and jobs."""
+    return batch_record(service.batches.get(tenant, batch_id))
+
+
+@router.post("/{batch_id}/cancel", status_code=status.HTTP_202_ACCEPTED, responses=problems(404, 409))
+def cancel_batch(batch_id: str, service: Service, tenant: CallerTenant) -> BatchRecord:
+    """Cancel the jobs that have not ended; results of the others stay."""
+    return batch_record(service.batches.request_cancel(tenant, batch_id))
+
+
+@router.delete("/{batch_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
+def delete_batch(batch_id: str, service: Service, tenant: CallerTenant) -> None:
+    """Delete a batch that has ended, with its jobs and their volumes; the scans stay.
+
+    If the service dies in between, the remaining jobs keep the batch, and it can be deleted again.
+    """
+    batch = service.batches.get(tenant, batch_id)
+    busy = next((job for job in batch["jobs"] if job["state"] not in ENDED), None)
+    if busy is not None:
+        raise InUse("batch", f"{batch['id']} with {busy['id']} ({busy['state']})", "a batch that has ended")
+    for job in batch["jobs"]:
+        service.deletion.delete(StoredItem(tenant, "job", job["id"]))
