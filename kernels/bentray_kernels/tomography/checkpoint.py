@@ -15,6 +15,7 @@ from .gauss_newton import gauss_newton_step
 from .reconstruction_graph import ReconstructionCheckpoint
 from .result import Iteration
 from .sart import sart_step
+from .uncertainty.ray_uncertainty import Uncertainty
 
 # Records in checkpoints of a reconstruction, by name; ``waveform`` adds its own.
 TYPES: Mapping[str, type] = MappingProxyType(
@@ -26,6 +27,7 @@ TYPES: Mapping[str, type] = MappingProxyType(
             gauss_newton_step.Iterate,
             gauss_newton_step.Measured,
             Iteration,
+            Uncertainty,
         )
     }
 )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..acquisition import Dataset
+from ..acquisition.noise import robust_deviation
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
 from .decomposition import distinct_heights, with_decomposition
@@ -24,6 +26,7 @@ class Pairs:
         ring: (ntx,), index of the ring that receives an emitter.
         delta_tof: (ntx, nrx), s; NaN where there is none.
         log_ratio: as ``delta_tof``, Np, or None.
+        noise_s: standard deviation of a time, s, from pairs measured both ways; 0: there are none.
     """
 
     emitters: Floats
@@ -31,6 +34,7 @@ class Pairs:
     ring: Ints
     delta_tof: Floats
     log_ratio: Floats | None
+    noise_s: float = 0.0
 
     @property
     def elements(self) -> Floats:
@@ -106,7 +110,12 @@ def _ring(dataset: Dataset, settings: Settings, index: int) -> Pairs:
     ring = np.searchsorted(np.asarray(z), height, side="right") - 1
     whole = _between(dataset, settings, dataset.tx, dataset.rx, np.flatnonzero(ring == index))
     return Pairs(
-        whole.emitters[:, :2], whole.receivers[..., :2], whole.ring, whole.delta_tof, whole.log_ratio
+        whole.emitters[:, :2],
+        whole.receivers[..., :2],
+        whole.ring,
+        whole.delta_tof,
+        whole.log_ratio,
+        whole.noise_s,
     )
 
 
@@ -126,6 +135,7 @@ def _moved_ring(dataset: Dataset, settings: Settings) -> Pairs:
         np.repeat(np.arange(len(z)), [len(ring.emitters) for ring in rings]),
         np.concatenate([ring.delta_tof for ring in rings]),
         np.concatenate(known) if len(known) == len(ratios) else None,
+        max(ring.noise_s for ring in rings),
     )
 
 
@@ -144,15 +154,29 @@ def _between(dataset: Dataset, settings: Settings, tx: Ints, rx: Ints, members: 
         tx, rx = tx[sent], rx[received]
         delta = delta[np.ix_(sent, received)]
         ratio = None if ratio is None else ratio[np.ix_(sent, received)]
-    emitters, receivers = tx, rx
+    emitters, receivers, noise = tx, rx, reciprocal_noise(tx, rx, delta)
     if settings.numerics.reciprocity and tx.size and rx.size:
         if ratio is not None:
             _, _, ratio = _with_reverses(tx, rx, ratio)
         emitters, receivers, delta = _with_reverses(tx, rx, delta)
     position = dataset.element_position_m
     return Pairs(
-        position[emitters], position[receivers][None], np.zeros(len(emitters), np.int64), delta, ratio
+        position[emitters], position[receivers][None], np.zeros(len(emitters), np.int64), delta, ratio, noise
     )
+
+
+def reciprocal_noise(tx: Ints, rx: Ints, delta: Floats) -> float:
+    """Standard deviation of a time, s, from the differences of pairs measured both ways; 0 without any.
+
+    Both times of a pair are equal by reciprocity, so their difference has twice the variance of one.
+
+    Args:
+        tx, rx: elements of the rows and columns; delta: (ntx, nrx), s, NaN where there is none.
+    """
+    elements, full = _by_element(tx, rx, delta)
+    differences = (full - full.T)[np.triu_indices(len(elements), 1)]
+    known = differences[np.isfinite(differences)]
+    return robust_deviation(known) / math.sqrt(2.0) if known.size else 0.0
 
 
 def _with_reverses(tx: Ints, rx: Ints, delta: Floats) -> tuple[Ints, Ints, Floats]:
@@ -161,8 +185,14 @@ def _with_reverses(tx: Ints, rx: Ints, delta: Floats) -> tuple[Ints, Ints, Float
     Travel times are reciprocal, so half of the matrix determines the other half, and every emitter then has
     receivers on all sides of the object.
     """
+    elements, full = _by_element(tx, rx, delta)
+    return elements, elements, np.where(np.isfinite(full), full, full.T)
+
+
+def _by_element(tx: Ints, rx: Ints, delta: Floats) -> tuple[Ints, Floats]:
+    """All elements, and the data as a square matrix between them, NaN where there is none."""
     elements = np.union1d(tx, rx)
     full = np.full((len(elements), len(elements)), np.nan)
     # Duplicate entries of tx or rx keep their last value, as a dictionary would.
     full[np.searchsorted(elements, tx)[:, None], np.searchsorted(elements, rx)[None, :]] = delta
-    return elements, elements, np.where(np.isfinite(full), full, full.T)
+    return elements, full

@@ -39,6 +39,7 @@ class Problem:
         water_attenuation: Np/m.
         wavelength_m: in water, of the amplitudes; None if their frequency is unknown.
         axial_margin: nodes that a ray may go above and below its emitter and receivers; None: any number.
+        noise_s: standard deviation of a time, s, from pairs measured both ways; 0: there are none.
     """
 
     emitters: Floats
@@ -53,6 +54,7 @@ class Problem:
     water_attenuation: float = 0.0
     wavelength_m: float | None = None
     axial_margin: int | None = None
+    noise_s: float = 0.0
 
     @classmethod
     def of(cls, dataset: Dataset, settings: Settings, index: int = 0) -> Problem:
@@ -123,6 +125,7 @@ class Problem:
             water_attenuation=dataset.water_attenuation_np_m or 0.0,
             wavelength_m=None if frequency is None else dataset.water_speed_mps / frequency,
             axial_margin=settings.numerics.axial_margin_nodes,
+            noise_s=data.noise_s,
         )
 
     @property
@@ -174,7 +177,10 @@ class Problem:
             return halves
 
         ratio = None if self.log_ratio is None else once(self.log_ratio)
-        return replace(self, delta_tof=once(self.delta_tof), log_ratio=ratio)
+        twice = any(_measured_twice(self.delta_tof[of_ring]) for of_ring in members)
+        # The mean of two times has half the variance.
+        noise = self.noise_s / math.sqrt(2.0) if twice else self.noise_s
+        return replace(self, delta_tof=once(self.delta_tof), log_ratio=ratio, noise_s=noise)
 
 
 def image_side(dataset: Dataset, nodes: int) -> float:
@@ -182,6 +188,11 @@ def image_side(dataset: Dataset, nodes: int) -> float:
     flat = dataset.element_position_m[:, :2]
     reach = float(np.abs(flat - 0.5 * (flat.min(axis=0) + flat.max(axis=0))).max())
     return 2.0 * reach * (nodes - 1) / (nodes - 1 - 2 * MARGIN_NODES)
+
+
+def _measured_twice(data: Floats) -> bool:
+    """Whether a square matrix has a pair in both places."""
+    return bool(np.triu(np.isfinite(data) & np.isfinite(data.T), 1).any())
 
 
 def _once(data: Floats) -> Floats:

@@ -31,6 +31,7 @@ from .reconstruction_graph import (
     Run,
     TomographyGraph,
     check_resolution,
+    estimate_uncertainty,
     progress_of,
     solve_attenuation,
 )
@@ -251,6 +252,8 @@ def _assembled(
         return None if any(part is None for part in parts) else image(parts)
 
     losses = evaluated(solve_attenuation)
+    spread = [graph.value_of(estimate_uncertainty) for graph in graphs]
+    known = all(one is not None for one in spread)
     caution = {} if losses is None else {"attenuation": EXPERIMENTAL}
     return Reconstruction(
         speed=image([1.0 / graph.state.slowness for graph in graphs]),
@@ -262,6 +265,8 @@ def _assembled(
         history=progress_of(graphs).history,
         attenuation=losses,
         recovery=evaluated(check_resolution),
+        uncertainty=image([one.deviation for one in spread]) if known else None,
+        resolution_width_m=tuple(one.width_m for one in spread) if known else (),
         residuals=np.sum([graph.state.residuals for graph in graphs], axis=0),
         trials=trials,
         provenance={**provenance(), **recorded(settings.numerics), **caution},

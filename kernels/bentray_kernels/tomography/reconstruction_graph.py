@@ -16,6 +16,7 @@ from .grid_schedule import initial_slowness
 from .result import Iteration, Progress
 from .sart.sart_step import State
 from .stage_graphs import GaussNewtonStage, SartStage, Scan, Stage, batches_of, trace_rays
+from .uncertainty.ray_uncertainty import Uncertainty, ray_uncertainty, trace_probed_rays
 
 
 class TomographyGraph(ResumableGraph, Protocol):
@@ -48,7 +49,7 @@ class ReconstructionCheckpoint:
     passes_before: int
     history: tuple[Iteration, ...]
     state: State | Iterate
-    values: tuple[Floats | None, ...]
+    values: tuple[Floats | Uncertainty | None, ...]
     spacing: float
     origin: tuple[float, ...]
 
@@ -59,7 +60,7 @@ class ReconstructionCheckpoint:
 
 
 class ReconstructionGraph:
-    """All stages of one slice, then its attenuation and resolution check where requested."""
+    """All stages of one slice, then its attenuation, resolution check and uncertainty where requested."""
 
     def __init__(self, scan: Scan, index: int) -> None:
         self._scan, self._index = scan, index
@@ -83,6 +84,9 @@ class ReconstructionGraph:
             evaluations.append(Evaluation(at, trace_attenuation_rays, solve_attenuation, emitters))
         if settings.resolution_check:
             evaluations.append(Evaluation(at, trace_final_rays, check_resolution, problem.active_emitters))
+        if settings.uncertainty:
+            emitters = problem.each_pair_once().active_emitters
+            evaluations.append(Evaluation(at, trace_uncertainty_rays, estimate_uncertainty, emitters))
         return evaluations
 
     @property
@@ -176,6 +180,7 @@ class Evaluation:
         self._at, self.trace, self.evaluate = at, trace, evaluate
         self.sizes = [len(batch) for batch in batches_of(emitters)]
         self.value: Any = None
+        self._image: Floats | None = None
         self._rows: dict[int, Any] = {}
 
     @property
@@ -185,8 +190,9 @@ class Evaluation:
 
     def first(self, image: Floats) -> list[Task]:
         """Tasks to start with; without emitters the evaluation of no rows."""
+        self._image = image
         if not self.sizes:
-            return [Task(self.evaluate, (*self._at, []))]
+            return [Task(self.evaluate, (*self._at, image, []))]
         return [
             Task(self.trace, (*self._at, image, batch), keep_on_worker=True)
             for batch in range(len(self.sizes))
@@ -200,7 +206,8 @@ class Evaluation:
         self._rows[task.arguments[-1]] = result
         if len(self._rows) < len(self.sizes):
             return []
-        return [Task(self.evaluate, (*self._at, [rows for _, rows in sorted(self._rows.items())]))]
+        rows = [rows for _, rows in sorted(self._rows.items())]
+        return [Task(self.evaluate, (*self._at, self._image, rows))]
 
 
 def trace_attenuation_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
@@ -210,7 +217,7 @@ def trace_attenuation_rays(scan: Scan, index: int, slowness: Floats, batch: int)
     return attenuation.trace_rays(problem, scan.stages()[-1], slowness, emitters)
 
 
-def solve_attenuation(scan: Scan, index: int, rows: list[Rows]) -> Floats:
+def solve_attenuation(scan: Scan, index: int, _slowness: Floats, rows: list[Rows]) -> Floats:
     """Task: the attenuation image."""
     return attenuation.solve(scan.problem(index), scan.stages()[-1], rows)
 
@@ -220,10 +227,22 @@ def trace_final_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Ro
     return trace_rays(scan, index, -1, slowness, batch)
 
 
-def check_resolution(scan: Scan, index: int, rows: list[Rows]) -> Floats:
+def check_resolution(scan: Scan, index: int, _slowness: Floats, rows: list[Rows]) -> Floats:
     """Task: how much of a checkerboard the rays recover."""
     problem = scan.problem(index)
     return resolution.recovery(problem, rows, width_in_nodes(problem, scan.stages()[-1]))
+
+
+def trace_uncertainty_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
+    """Task: bent rays of one batch of emitters through the finished image, each pair once."""
+    problem = scan.problem(index).each_pair_once()
+    return trace_probed_rays(problem, scan.stages()[-1], slowness, batches_of(problem.active_emitters)[batch])
+
+
+def estimate_uncertainty(scan: Scan, index: int, slowness: Floats, rows: list[Rows]) -> Uncertainty:
+    """Task: standard deviation and resolution width of the finished image."""
+    problem = scan.problem(index).each_pair_once()
+    return ray_uncertainty(problem, scan.stages()[-1], slowness, rows, index)
 
 
 def progress_of(graphs: Sequence[TomographyGraph], before: int = 0, after: int = 0) -> Progress:

@@ -118,6 +118,10 @@ class Reconstruction:
         coverage: as ``speed``: metres of ray through each node in the last iteration that changed the image.
         attenuation: as ``speed``, Np/m, or None.
         recovery: as ``speed``: recovered fraction of a checkerboard's contrast, or None.
+        uncertainty: as ``speed``, standard deviation, m/s, of the speed from the truth smoothed by the
+            resolution width; 0 at nodes that are kept as water. None if not requested.
+        resolution_width_m: standard deviation, m, of the Gaussian that smooths the truth like the image: one
+            for each slice, or one for a slice or volume; empty without uncertainty.
         reflection: image of echoes on a grid of its own, or None.
         spacing_m: node spacing (x, y[, z]), m; z is NaN when the slices are not evenly spaced.
         origin_m: position of node 0 (x, y[, z]), m.
@@ -138,6 +142,8 @@ class Reconstruction:
     history: tuple[Iteration, ...] = ()
     attenuation: NDArray[np.float64] | None = None
     recovery: NDArray[np.float64] | None = None
+    uncertainty: NDArray[np.float64] | None = None
+    resolution_width_m: tuple[float, ...] = ()
     reflection: Reflection | None = None
     residuals: NDArray[np.int64] | None = None
     trials: tuple[Trial, ...] = ()
@@ -147,7 +153,8 @@ class Reconstruction:
         """A quantity on its grid; None if the result does not have it.
 
         Args:
-            quantity: ``speed``, ``coverage``, ``attenuation``, ``recovery`` or ``reflection``.
+            quantity: ``speed``, ``coverage``, ``attenuation``, ``recovery``, ``uncertainty`` or
+                ``reflection``.
         """
         held = getattr(self, quantity)
         if held is None:

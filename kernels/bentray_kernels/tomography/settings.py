@@ -326,6 +326,12 @@ class Settings:
         "Also reconstruct a checkerboard along the same rays, and report its recovery at each node.",
         label="Resolution check",
     )
+    uncertainty: bool = setting(
+        False,
+        "Also estimate the standard deviation of the speed at each node, and the resolution width of the "
+        "image, from the misfit along bent rays and the differences of pairs measured both ways.",
+        label="Uncertainty",
+    )
     minutes: float | None = setting(
         None,
         "Time budget of full-waveform refinement, minutes of one processor core: it sets how many bands of "

@@ -39,7 +39,14 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 # Units of the arrays of a reconstruction.
-UNITS = {"speed": "m/s", "coverage": "m", "attenuation": "Np/m", "recovery": "1", "reflection": "dB"}
+UNITS = {
+    "speed": "m/s",
+    "coverage": "m",
+    "attenuation": "Np/m",
+    "recovery": "1",
+    "uncertainty": "m/s",
+    "reflection": "dB",
+}
 # Axes of the reflection, before that of heights: it has a grid of its own.
 REFLECTION_AXES = ("reflection_x", "reflection_y")
 # Name of the only array of an uploaded volume.
@@ -53,7 +60,7 @@ class Result:
     Attributes:
         axes: names of the axes in order: ``x``, ``y`` and, in 3-D, ``z``.
         values: arrays by name, each (nx, ny[, nz]): for a reconstruction ``speed``, ``coverage`` and, if
-            present, ``attenuation``, ``recovery`` and ``reflection``; for an upload ``value``.
+            present, ``attenuation``, ``recovery``, ``uncertainty`` and ``reflection``; for an upload ``value``.
         coordinates: node positions along each axis, m; ``z`` is missing for slices with non-uniform heights.
             The reflection has a grid of its own, along ``reflection_x`` and ``reflection_y``.
         units: unit of each array.
@@ -91,6 +98,19 @@ class Result:
     def recovery(self) -> Floats:
         """Recovered fraction of a checkerboard, as ``speed``; raises InvalidInput without a check."""
         return self._of("recovery")
+
+    @property
+    def uncertainty(self) -> Floats:
+        """Standard deviation, as ``speed``, m/s; raises InvalidInput without ``uncertainty``.
+
+        Of the speed from the truth smoothed by a Gaussian of ``resolution_width_m``.
+        """
+        return self._of("uncertainty")
+
+    @property
+    def resolution_width_m(self) -> tuple[float, ...]:
+        """Resolution width of each slice, or one of a slice or volume, m; empty without ``uncertainty``."""
+        return self._reconstruction().resolution_width_m
 
     @property
     def reflection(self) -> Floats:

@@ -37,6 +37,7 @@ class ReconstructionSettings(TypedDict, total=False):
     device: Literal["auto", "cpu", "opencl"]
     seed: int
     resolution_check: bool
+    uncertainty: bool
     minutes: float | None
     relaxation: float
     smoothing_nodes: float

@@ -30,10 +30,11 @@ async def show_histogram(
     service: Service,
     tenant: CallerTenant,
     quantity: Annotated[
-        Literal["speed", "coverage", "attenuation", "recovery", "reflection", "value"] | None,
+        Literal["speed", "coverage", "attenuation", "recovery", "uncertainty", "reflection", "value"] | None,
         Query(
             description="Reconstructions: speed (default), coverage, attenuation if the scan has amplitudes, "
-            "recovery if resolution_check was set, reflection (dB) if it was requested. Uploads: value."
+            "recovery if resolution_check was set, uncertainty (m/s) and reflection (dB) if requested. "
+            "Uploads: value."
         ),
     ] = None,
     bins: Annotated[
@@ -51,7 +52,7 @@ async def show_histogram(
         accepted = (
             "value: this is an uploaded volume"
             if uploaded
-            else "speed, coverage, attenuation, recovery or reflection"
+            else "speed, coverage, attenuation, recovery, uncertainty or reflection"
         )
         raise InvalidInput("quantity", repr(quantity), accepted)
     path = service.files.of(tenant).volume(volume["id"])

@@ -70,11 +70,11 @@ async def slice_png(
         int | None, Query(ge=0, description="Index along this axis; default: the middle.")
     ] = None,
     quantity: Annotated[
-        Literal["speed", "coverage", "attenuation", "recovery", "reflection", "value"] | None,
+        Literal["speed", "coverage", "attenuation", "recovery", "uncertainty", "reflection", "value"] | None,
         Query(
             description="Quantity to show. Reconstructions: speed (default), coverage, "
             "attenuation if the scan has amplitudes, recovery if resolution_check was set, "
-            "reflection (dB) if it was requested. upload: value."
+            "uncertainty (m/s) and reflection (dB) if requested. upload: value."
         ),
     ] = None,
     low: Annotated[
@@ -97,7 +97,8 @@ async def slice_png(
     how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(style)}
     if "job_id" in volume:
         if quantity == "value":
-            raise InvalidInput("quantity", "'value'", "speed, coverage, attenuation, recovery or reflection")
+            accepted = "speed, coverage, attenuation, recovery, uncertainty or reflection"
+            raise InvalidInput("quantity", "'value'", accepted)
         how["quantity"] = quantity or "speed"
     elif quantity not in (None, "value"):
         raise InvalidInput("quantity", repr(quantity), "value: this is an uploaded volume")

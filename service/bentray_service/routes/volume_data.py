@@ -49,10 +49,11 @@ async def volume_data(
         ),
     ] = "hdf5",
     quantity: Annotated[
-        Literal["speed", "attenuation", "coverage", "recovery", "reflection", "truth"],
+        Literal["speed", "attenuation", "coverage", "recovery", "uncertainty", "reflection", "truth"],
         Query(
             description="Quantity of npy, nifti, metaimage and nrrd of a reconstruction; truth: the true "
-            "speed at its nodes, NaN outside, of a scan that has it. reflection, in dB, has a grid of its "
+            "speed at its nodes, NaN outside, of a scan that has it. uncertainty: standard deviation of the "
+            "speed, m/s. reflection, in dB, has a grid of its "
             "own: mat, vti, ome-zarr and dicom then hold this image alone, otherwise all others."
         ),
     ] = "speed",

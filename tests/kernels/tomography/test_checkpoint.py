@@ -17,6 +17,7 @@ from bentray_kernels.tomography.reconstruction import MemoryScan
 from bentray_kernels.tomography.reconstruction_graph import (
     ReconstructionGraph,
     check_resolution,
+    estimate_uncertainty,
     solve_attenuation,
 )
 
@@ -82,6 +83,22 @@ def test_a_graph_interrupted_anywhere_gives_the_same_bits(dataset, name, cuts):
     assert np.array_equal(resumed.state.slowness, whole.state.slowness)
     assert np.array_equal(resumed.state.coverage, whole.state.coverage)
     assert np.array_equal(resumed.state.residuals, whole.state.residuals)
+
+
+def test_the_uncertainty_is_kept_and_computed_again_to_the_same_bits(dataset):
+    plan = PLANS["sart"].changed(iterations=1, attenuation=False, resolution_check=False, uncertainty=True)
+
+    def make():
+        return ReconstructionGraph(MemoryScan(dataset, plan, "all"), 0)
+
+    whole, tasks = run(make)
+    kept = stored(whole).values[0]
+    one = whole.value_of(estimate_uncertainty)
+    assert np.array_equal(kept.deviation, one.deviation)
+    resumed, _ = run(make, {tasks - 1})
+    other = resumed.value_of(estimate_uncertainty)
+    assert np.array_equal(other.deviation, one.deviation)
+    assert other.width_m == one.width_m == kept.width_m > 0.0
 
 
 def test_the_graph_of_a_candidate_keeps_its_misfit(dataset):

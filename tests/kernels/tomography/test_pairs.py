@@ -10,6 +10,7 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.pairs import count, heights, of
+from bentray_kernels.tomography.problem import Problem
 
 RING, Z, WATER = Ring(6, 0.05), np.array([-0.004, 0.0, 0.004]), 1500.0
 SLICES, VOLUME = (Settings(method="sart", decomposition=way) for way in ("slices", "volume"))
@@ -29,6 +30,21 @@ def rings():
         delta[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] = within
     position = np.concatenate([np.column_stack((RING.positions(), np.full(6, z))) for z in Z])
     return Dataset(position, everyone, everyone, WATER, delta_tof_s=delta, array_type="rings")
+
+
+def test_noise_is_measured_where_pairs_were_measured_both_ways():
+    ring, random = Ring(64, 0.05), np.random.default_rng(2)
+    everyone = np.arange(64)
+    one_way = random.normal(0.0, 1e-6, (64, 64))
+    delta = one_way + one_way.T + random.normal(0.0, 1e-8, (64, 64))
+    both = Dataset(ring.positions(), everyone, everyone, WATER, delta_tof_s=delta)
+    assert of(both, SLICES, 0).noise_s == pytest.approx(1e-8, rel=0.05)
+    once = replace(both, delta_tof_s=np.where(everyone[:, None] < everyone, delta, np.nan))
+    assert of(once, SLICES, 0).noise_s == 0.0
+    # Two times have a mean of half the variance; one that is filled in from its reverse has not.
+    problem = Problem.of(both, SLICES.changed(nodes=32), 0)
+    assert problem.each_pair_once().noise_s == pytest.approx(problem.noise_s / np.sqrt(2.0))
+    assert problem.each_pair_once().each_pair_once().noise_s == problem.each_pair_once().noise_s
 
 
 def test_heights_are_those_of_slices_and_rings():

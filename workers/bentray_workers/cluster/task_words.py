@@ -22,6 +22,8 @@ TASK_WORDS = MappingProxyType(
         "solve_attenuation": "reconstructing the attenuation",
         "trace_final_rays": "tracing rays for the resolution",
         "check_resolution": "checking the resolution",
+        "trace_uncertainty_rays": "tracing rays for the uncertainty",
+        "estimate_uncertainty": "estimating the uncertainty",
         "start_band": "preparing a frequency band",
         "evaluate_emitter": "simulating the waves of an emitter",
         "update_image": "updating the image by full waveforms",

@@ -63,7 +63,7 @@ WAVES_IN_SPACE = VolumeWaveSettings(frequency_hz=1e5, side_m=0.03, elements=8, e
 
 def time_settings() -> Iterator[dict[str, Any]]:
     """The settings of reconstructions from travel times and amplitudes."""
-    yield {"resolution_check": True}
+    yield {"resolution_check": True, "uncertainty": True}
     yield {"rays": "straight", "reciprocity": False}
     yield {"eikonal": "accurate", "speed_range_mps": (1300.0, 1600.0)}
     yield {"method": "auto"}

@@ -37,6 +37,7 @@ IMAGES = {
     "coverage": "coverage_m",
     "attenuation": "attenuation_np_m",
     "recovery": "recovery",
+    "uncertainty": "uncertainty_mps",
 }
 # The reflection image has attributes spacing_m and origin_m of its own.
 REFLECTION = "reflection_db"
@@ -46,11 +47,12 @@ QUANTITIES = (*IMAGES, "reflection")
 def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
     """Write a reconstruction; ``path`` is replaced atomically.
 
-    The file holds ``speed_mps``, ``coverage_m`` and, if present, ``attenuation_np_m`` and ``recovery``,
-    each (nx, ny) or (nx, ny, nz); ``reflection_db``, if present, with attributes ``spacing_m`` and
-    ``origin_m`` of its own; ``history`` with a column for each field of ``Iteration``; ``residuals``
-    with ``count`` and the ``edge_s`` of its bins; and root attributes ``spacing_m``, ``origin_m``, ``axes``,
-    ``water_speed_mps``, ``settings``, ``trials`` and ``provenance``, the last three JSON.
+    The file holds ``speed_mps``, ``coverage_m`` and, if present, ``attenuation_np_m``, ``recovery`` and
+    ``uncertainty_mps`` with attribute ``resolution_width_m``, each (nx, ny) or (nx, ny, nz);
+    ``reflection_db``, if present, with attributes ``spacing_m`` and ``origin_m`` of its own; ``history``
+    with a column for each field of ``Iteration``; ``residuals`` with ``count`` and the ``edge_s`` of its
+    bins; and root attributes ``spacing_m``, ``origin_m``, ``axes``, ``water_speed_mps``, ``settings``,
+    ``trials`` and ``provenance``, the last three JSON.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
@@ -68,6 +70,8 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
         for name, place in IMAGES.items():
             if getattr(reconstruction, name) is not None:
                 write_array(file, place, getattr(reconstruction, name))
+        if reconstruction.uncertainty is not None:
+            file[IMAGES["uncertainty"]].attrs["resolution_width_m"] = reconstruction.resolution_width_m
         if reconstruction.reflection is not None:
             write_array(file, REFLECTION, reconstruction.reflection.db)
             file[REFLECTION].attrs["spacing_m"] = reconstruction.reflection.spacing_m
@@ -99,7 +103,7 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
         coverage = _image(reader, "coverage_m", speed.shape)
         extra = {
             name: _image(reader, IMAGES[name], speed.shape) if reader.has(IMAGES[name]) else None
-            for name in ("attenuation", "recovery")
+            for name in ("attenuation", "recovery", "uncertainty")
         }
         water = reader.number("", "water_speed_mps", "m/s")
         if water is None:
@@ -109,6 +113,7 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
             speed=speed,
             coverage=coverage,
             **extra,
+            resolution_width_m=_widths(reader),
             reflection=_reflection(reader, speed.shape[2:]),
             spacing_m=_per_axis(reader, "spacing_m", speed.ndim),
             origin_m=_per_axis(reader, "origin_m", speed.ndim),
@@ -158,6 +163,17 @@ def _reflection(reader: Reader, heights: tuple[int, ...]) -> Reflection | None:
         raise InvalidInput(REFLECTION, f"shape {db.shape}", "the slices of the speed")
     grid = (_per_axis(reader, name, db.ndim, REFLECTION) for name in ("spacing_m", "origin_m"))
     return Reflection(db, *grid)
+
+
+def _widths(reader: Reader) -> tuple[float, ...]:
+    """Resolution widths, m; none without uncertainty."""
+    place, name = IMAGES["uncertainty"], "resolution_width_m"
+    if not reader.has(place):
+        return ()
+    values = reader.numbers(place, name, "m")
+    if not values or min(values) < 0.0:
+        raise InvalidInput(f"{place}@{name}", values or "nothing", "a number >= 0 m for each slice")
+    return values
 
 
 def _per_axis(reader: Reader, name: str, ndim: int, path: str = "") -> tuple[float, ...]:

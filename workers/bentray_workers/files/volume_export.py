@@ -36,6 +36,7 @@ UNITS = {
     ATTENUATION: "Np/m",
     ATTENUATION_DB: "dB/(cm.MHz)",
     "recovery": "1",
+    "uncertainty_mps": "m/s",
     REFLECTION: "dB",
 }
 TITLES = {
@@ -44,6 +45,7 @@ TITLES = {
     ATTENUATION_DB: "Attenuation, dB/(cm MHz)",
     "coverage_m": "Ray length per node, m",
     "recovery": "Recovered fraction of a checkerboard",
+    "uncertainty_mps": "Standard deviation of the speed of sound, m/s",
     REFLECTION: "Reflection, dB",
 }
 # Formats with one image.

@@ -12,6 +12,7 @@ LABELS = {
     "coverage": "ray length per node (m)",
     "attenuation": "attenuation (Np/m)",
     "recovery": "recovered fraction of a checkerboard",
+    "uncertainty": "standard deviation of the speed (m/s)",
     "reflection": "reflection (dB)",
 }
 NAMES = {
@@ -19,6 +20,7 @@ NAMES = {
     "coverage": "Coverage",
     "attenuation": "Attenuation (experimental)",
     "recovery": "Resolution check",
+    "uncertainty": "Uncertainty",
     "reflection": "Reflection",
 }
 

@@ -22,12 +22,16 @@ DIFFERENCE = "RdBu_r"
 COVERAGE = "magma"
 ATTENUATION = "cividis"
 RECOVERY = "bone"
+UNCERTAINTY = "inferno"
 MISSING = "#e4e4e4"
 
 REFLECTION = "gray"
 
 # Of the recovered fraction, and of the reflection, dB.
 FIXED_LIMITS = {"recovery": (0.0, 1.0), "reflection": (-50.0, 0.0)}
+
+# Quantities whose colours begin at 0.
+FROM_ZERO = ("coverage", "uncertainty")
 
 # Nodes outside robust limits at each end, per cent.
 OUTSIDE_PERCENT = 0.1

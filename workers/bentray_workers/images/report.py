@@ -23,9 +23,11 @@ from .maps import (
     COVERAGE,
     DIFFERENCE,
     FIXED_LIMITS,
+    FROM_ZERO,
     RECOVERY,
     REFLECTION,
     SPEED,
+    UNCERTAINTY,
     Limits,
     draw_bar,
     draw_map,
@@ -41,7 +43,7 @@ Bools = NDArray[np.bool_]
 PANEL_IN = (4.4, 3.5)
 
 # Rows and columns by the largest number of panels.
-GRIDS = {3: (1, 3), 4: (2, 2), 6: (2, 3), 8: (2, 4), 9: (3, 3)}
+GRIDS = {3: (1, 3), 4: (2, 2), 6: (2, 3), 8: (2, 4), 9: (3, 3), 12: (3, 4)}
 
 # Characters per inch of the line under the panels.
 CHARACTERS_AN_INCH = 15
@@ -50,6 +52,7 @@ COLORMAPS = {
     "coverage": COVERAGE,
     "attenuation": ATTENUATION,
     "recovery": RECOVERY,
+    "uncertainty": UNCERTAINTY,
     "reflection": REFLECTION,
 }
 
@@ -193,7 +196,7 @@ def _maps(panels: Iterator[Axes], result: Reconstruction, k: int) -> None:
         image, grid = cut(whole.values, k), (whole.spacing_m, whole.origin_m)
         if name in FIXED_LIMITS:
             limits = FIXED_LIMITS[name]
-        elif name == "coverage":
+        elif name in FROM_ZERO:
             limits = (0.0, robust_limits([image])[1])
         else:
             limits = _limits(image, cut(result.coverage, k))

@@ -19,6 +19,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
 
     Returns:
         ``quantities``: those in the file, and ``truth`` if the scan has one on comparable axes;
+        ``resolution_width_m``: of each slice, or one, m; empty without uncertainty;
         ``grids``: shape, spacing and origin of quantities whose grid is not that of the speed;
         ``candidates``: the models that were compared, the chosen one first, each with ``label``,
         ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s`` and
@@ -59,6 +60,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
             }
     return {
         "quantities": quantities,
+        "resolution_width_m": list(own.resolution_width_m),
         "grids": {
             name: {
                 "shape": list(image.values.shape),

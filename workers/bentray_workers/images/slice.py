@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from ..files.reconstruction import read_reconstruction
 from ..files.volume import read_volume
 from .captions import LABELS, NAMES, facts
-from .maps import FIXED_LIMITS, Limits, robust_limits
+from .maps import FIXED_LIMITS, FROM_ZERO, Limits, robust_limits
 from .plane import UPRIGHT, plane_of
 from .plane_picture import plane_png
 from .slice_style import COLOUR_VALUE, SliceStyle
@@ -35,7 +35,8 @@ def slice_png(
 
     Args:
         path: of ``reconstruction.h5``.
-        quantity: ``speed``, ``coverage``, or ``attenuation``, ``recovery`` or ``reflection`` if present.
+        quantity: ``speed``, ``coverage``, or ``attenuation``, ``recovery``, ``uncertainty`` or
+            ``reflection`` if present.
         axis: across the slice: x, y or z.
         index: along the axis; None: the middle.
         low, high: values of the first and the last colour, in the unit of the quantity; None: the range
@@ -84,7 +85,7 @@ def volume_slice_png(
 
 
 def usual_limits(quantity: str, image: Floats, coverage: Floats | None) -> Limits:
-    """The range of nodes with rays, without outliers; from 0 for the coverage; or fixed limits.
+    """The range of nodes with rays, without outliers; from 0 for ``FROM_ZERO``; or fixed limits.
 
     Args:
         quantity: as for ``slice_png``, or any name of other values.
@@ -95,7 +96,7 @@ def usual_limits(quantity: str, image: Floats, coverage: Floats | None) -> Limit
         return FIXED_LIMITS[quantity]
     passed = None if coverage is None else coverage > 0.0
     limits = robust_limits([image], passed if passed is not None and passed.any() else None)
-    return (0.0, limits[1]) if quantity == "coverage" else limits
+    return (0.0, limits[1]) if quantity in FROM_ZERO else limits
 
 
 def requested_limits(limits: Limits, low: float | None, high: float | None) -> Limits:

@@ -207,7 +207,8 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     else:
         batch = max(1.0, NODES_IN_A_TASK / (math.prod(shape) * 2.0 + scan.receivers * settings.grid_nodes))
         each = passes * math.ceil(emitters / batch)
-    each += (parts + 1) * (bool(settings.attenuation.enabled and scan.amplitudes) + settings.resolution_check)
+    further = bool(settings.attenuation.enabled and scan.amplitudes) + settings.resolution_check
+    each += (parts + 1) * (further + settings.uncertainty)
     return problems * each + 1
 
 

@@ -125,6 +125,8 @@ def _problem_seconds(scan: Summary, settings: Settings) -> float:
         visits += numerics.straight_iterations * _visits(scan, straight, grids[-1])
     seconds = visits / VISITS_PER_S[settings.method]
     further = int(settings.attenuation.enabled and scan.amplitudes) + int(settings.resolution_check)
+    # Rays are traced once more, and sixteen probes cost about as much as that.
+    further += 2 * int(settings.uncertainty)
     return seconds + further * _visits(scan, settings, settings.grid_nodes) / VISITS_PER_S["gauss-newton"]
 
 

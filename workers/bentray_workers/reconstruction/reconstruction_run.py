@@ -165,6 +165,7 @@ def _pick_with_guides(
         method="auto" if settings.method == "waveform" else settings.method,
         attenuation=False,
         resolution_check=False,
+        uncertainty=False,
         reflection=False,
         minutes=None,
     )
@@ -177,7 +178,7 @@ def _pick_with_guides(
         progress.next()
         if settings.method == "auto" and not trials:
             rays, trials = result.settings, result.trials
-            names = ("attenuation", "resolution_check", "reflection", "minutes")
+            names = ("attenuation", "resolution_check", "uncertainty", "reflection", "minutes")
             requested = {name: getattr(settings, name) for name in names}
             settings = rays.changed(**requested)
         guide = PickingGuide(image, PickingFiles.of(job.folder).findings)

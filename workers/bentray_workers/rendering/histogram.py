@@ -25,6 +25,7 @@ UNITS = {
     "coverage": "m",
     "attenuation": "Np/m",
     "recovery": "",
+    "uncertainty": "m/s",
     "reflection": "dB",
     "value": "",
 }
@@ -37,8 +38,8 @@ def volume_histogram(path: Path, quantity: str, bins: int) -> dict[str, Any]:
 
     Args:
         path: of a volume or reconstruction file.
-        quantity: ``value`` of a volume; ``speed``, ``coverage``, ``attenuation``, ``recovery`` or
-            ``reflection`` of a reconstruction.
+        quantity: ``value`` of a volume; ``speed``, ``coverage``, ``attenuation``, ``recovery``,
+            ``uncertainty`` or ``reflection`` of a reconstruction.
         bins: of equal width between least and greatest value.
 
     Returns:

@@ -41,7 +41,7 @@ class CandidateGraph(ReconstructionGraph):
         return float(self.value_of(misfit)[1])
 
 
-def misfit(_scan: Scan, _index: int, rows: Sequence[Rows]) -> Floats:
+def misfit(_scan: Scan, _index: int, _slowness: Floats, rows: Sequence[Rows]) -> Floats:
     """Task: root mean square and mean absolute residual, s."""
     residual = np.concatenate([part.residual for part in rows])
     return np.array([math.sqrt(float((residual**2).mean())), float(np.abs(residual).mean())])

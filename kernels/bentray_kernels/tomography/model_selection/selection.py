@@ -70,7 +70,7 @@ def candidate_settings(
     coarser = nodes / settings.grid_nodes
     plans = []
     for changes in candidates:
-        plan = settings.changed(**changes, attenuation=False, resolution_check=False)
+        plan = settings.changed(**changes, attenuation=False, resolution_check=False, uncertainty=False)
         front = plan.numerics.front_smoothing_nodes * coarser
         # An image of half the nodes has half the edge nodes for the same rays.
         strength = plan.gauss_newton.penalty_strength * (coarser if plan.numerics.ray_width_m > 0.0 else 1.0)
@@ -194,7 +194,7 @@ def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     plans = [stages(dataset, final_settings(settings, changes)) for changes in every]
     each = max(sum(plan.iterations for plan in grids) for grids in plans)
     each += settings.attenuation.enabled and dataset.log_ratio_np is not None
-    each += settings.resolution_check
+    each += settings.resolution_check + settings.uncertainty
     problems = range(pairs.count(dataset, settings))
     return each * sum(len(pairs.of(dataset, settings, index).emitters) for index in problems)
 

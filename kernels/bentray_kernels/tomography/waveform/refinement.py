@@ -130,11 +130,13 @@ class Refinement:
             coverage=stacked(_slices(rays, rays.coverage)),
             attenuation=attenuation,
             recovery=of_rays(rays.recovery),
+            # Those of the rays do not belong to this image.
+            uncertainty=None,
+            resolution_width_m=(),
             spacing_m=(finest.spacing, finest.spacing, *rays.spacing_m[2:]),
             origin_m=(*finest.origin, *rays.origin_m[2:]),
             settings=replace(self._settings, method="waveform"),
             history=progress_of(graphs[-1:]).history,
-            # Those of the rays do not belong to this image.
             residuals=None,
             provenance={
                 **rays.provenance,

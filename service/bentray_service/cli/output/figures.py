@@ -31,7 +31,8 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
     Returns:
         settings, residual history, speed range, time and provenance; ``residual_within_s``: quantiles of the
         absolute residuals of the last iteration by percentage; ``recovery_mean``: mean of the resolution
-        check inside the array; ``trials`` and ``reason``: candidate models and choice of ``auto``;
+        check inside the array; ``uncertainty_rms_mps``: of the standard deviations inside the array;
+        ``resolution_width_m``: of each slice, or one; empty without uncertainty; ``trials`` and ``reason``: candidate models and choice of ``auto``;
         ``candidates``: rows of their table. Missing values are None, missing trials and reasons are empty.
     """
     return {
@@ -50,6 +51,8 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         ),
         "history": [asdict(sweep) for sweep in result.history],
         "recovery_mean": _recovery_mean(result),
+        "uncertainty_rms_mps": _uncertainty_rms(result),
+        "resolution_width_m": list(result.resolution_width_m),
         "reason": advice_of(result),
         "candidates": trial_table(result.trials),
         "trials": [asdict(trial) for trial in result.trials],
@@ -91,6 +94,14 @@ def _recovery_mean(result: Reconstruction) -> float | None:
     return float(result.recovery[inside].mean()) if inside.any() else 0.0
 
 
+def _uncertainty_rms(result: Reconstruction) -> float | None:
+    if result.uncertainty is None:
+        return None
+    # Exactly 0 at nodes that are kept as water.
+    inside = result.uncertainty[result.uncertainty != 0.0]
+    return float(np.sqrt((inside**2).mean())) if inside.size else 0.0
+
+
 def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
     """Rows (name, value) of the summary table, from the result of ``figures``."""
     low, high = found["speed_range_mps"]
@@ -105,6 +116,10 @@ def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
         rows.insert(4, ("residual", f"{found['residual_rms_s'] * 1e9:.0f} ns rms"))
     if found["recovery_mean"] is not None:
         rows.append(("resolution check", f"{100 * found['recovery_mean']:.0f} % of a checkerboard recovered"))
+    if found["uncertainty_rms_mps"] is not None:
+        width = 1e3 * float(np.median(found["resolution_width_m"]))
+        text = f"{found['uncertainty_rms_mps']:.1f} m/s rms, at a resolution width of {width:.1f} mm"
+        rows.append(("uncertainty", text))
     if "pulse" in found["provenance"]:
         rows.append(("pulse", found["provenance"]["pulse"]))
     if found["provenance"].get("quality", NOTHING_FOUND) != NOTHING_FOUND:

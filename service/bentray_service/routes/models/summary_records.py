@@ -48,8 +48,12 @@ class GridRecord(BaseModel):
 class SummaryRecord(BaseModel):
     """What a reconstruction holds, and how its model was chosen."""
 
-    quantities: list[Literal["speed", "coverage", "attenuation", "recovery", "reflection", "truth"]] = Field(
-        description="Those that can be shown and downloaded."
+    quantities: list[
+        Literal["speed", "coverage", "attenuation", "recovery", "uncertainty", "reflection", "truth"]
+    ] = Field(description="Those that can be shown and downloaded.")
+    resolution_width_m: list[float] = Field(
+        description="Standard deviation, m, of the Gaussian that smooths the truth like the image: one for "
+        "each slice, or one of a slice or volume; the uncertainty refers to it. Empty without uncertainty."
     )
     grids: dict[str, GridRecord] = Field(
         description="Grids of quantities that are not on the grid of the volume, such as reflection."

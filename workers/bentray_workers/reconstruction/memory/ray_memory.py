@@ -14,6 +14,8 @@ from bentray_kernels.tomography.sart.device_slices import PROCESSOR_SLICES, Slic
 from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.solver_choice import sart_engine, solver_of
 from bentray_kernels.tomography.stage_graphs import BATCH
+from bentray_kernels.tomography.uncertainty.probe_product import LANES
+from bentray_kernels.tomography.uncertainty.ray_uncertainty import BATCHES
 
 from ...cluster.capacities import MIB, REAL
 from ...files.dataset.counts import Summary
@@ -28,6 +30,9 @@ FIELD_BYTES_PER_NODE = 80
 # Matrix entries of a ray per node of a side: chords are 0.64 of the ring's width on average, and each step
 # between nodes touches the corners of its cells. In 3-D a level ray stays in its plane.
 ENTRIES_LEVEL, ENTRIES_IN_SPACE = 1.55, 3.1
+
+# Arrays of the size of all probes of one solve: its iterates, transforms and products, with copies.
+PROBE_ARRAYS = 15
 
 # An entry is a column of 4 bytes and a length of 4.
 ENTRY_BYTES = 8
@@ -155,6 +160,16 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
     if settings.resolution_check:
         parts["trace_final_rays"] = tracing(rays)
         parts["check_resolution"] = solving(rays)
+    if settings.uncertainty:
+        bent, once = settings.changed(rays="curved"), rays
+        if settings.numerics.reciprocity and settings.method != "gauss-newton":
+            once = -(-rays // 2)
+        probes = (PROBE_ARRAYS + BATCHES) * LANES
+        # For each row its errors in all probes, weighted too.
+        errors = {"probes": probes * image, "errors": (2 * LANES + 4) * REAL * once}
+        entries = math.ceil(once * _entries(bent, scan.in_space) * ENTRY_BYTES)
+        parts["trace_uncertainty_rays"] = {**tracing(once), "a travel time": _field_of_task(scan, bent)}
+        parts["estimate_uncertainty"] = {"data": data, "images": state, "rays": entries, **errors}
     return parts
 
 

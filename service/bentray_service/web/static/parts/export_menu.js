@@ -8,7 +8,7 @@ const WHOLE = [["hdf5", "HDF5"], ["mat", "MATLAB"], ["vti", "VTK (ParaView)"], [
 const SINGLE = [["npy", "NumPy"], ["nifti", "NIfTI"], ["nrrd", "NRRD"], ["metaimage", "MetaImage"]];
 const NAMES = {
   speed: "speed (m/s)", attenuation: "attenuation (Np/m)", coverage: "coverage (m)", recovery: "resolution",
-  reflection: "reflection (dB)", truth: "truth (m/s)",
+  uncertainty: "uncertainty (m/s)", reflection: "reflection (dB)", truth: "truth (m/s)",
 };
 const DECIBEL = "attenuation-db";
 

@@ -17,6 +17,10 @@ export const QUANTITIES = {
     title: "Resolution", words: "recovered fraction of a checkerboard", unit: "", map: "bone", digits: 3, reads: ["recovery"],
     limits: [0, 1],
   },
+  uncertainty: {
+    title: "Uncertainty", words: "standard deviation of the speed", unit: "m/s", map: "inferno", digits: 2, reads: ["uncertainty"],
+    least: 0,
+  },
   reflection: {
     title: "Reflection", words: "reflection, envelope relative to its maximum", unit: "dB", map: "gray", digits: 1,
     reads: ["reflection"], limits: [-50, 0],

@@ -1,0 +1,108 @@
+"""Standard deviations of nodes cover the error, and grow with noise, missing rays and straight rays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.phantoms import EllipsePhantom
+from bentray_kernels.phantoms.ellipses import Ellipse
+from bentray_kernels.tomography import Settings, reconstruct
+
+WATER, SIDE, NODES, RING = 1500.0, 0.16, 48, Ring(48, 0.07)
+PLAN = Settings.of(method="gauss-newton", nodes=NODES, side_m=SIDE, iterations=3, uncertainty=True)
+PHANTOM = EllipsePhantom(
+    WATER,
+    (
+        Ellipse((0.0, 0.0), (0.045, 0.040), 1475.0, 5.0, "fat"),
+        Ellipse((0.008, 0.004), (0.022, 0.018), 1520.0, 10.0, "gland"),
+        Ellipse((-0.020, -0.010), (0.006, 0.006), 1540.0, 25.0, "lesion"),
+    ),
+)
+EVERYONE = np.arange(RING.elements)
+
+
+@pytest.fixture(scope="module")
+def times():
+    return TravelTimeScan(PHANTOM, RING, SIDE, nodes=NODES).delta_tof(EVERYONE)
+
+
+def scan(times, noise_s=1e-8, keep=None):
+    noisy = times + np.random.default_rng(5).normal(0.0, noise_s, times.shape)
+    np.fill_diagonal(noisy, np.nan)
+    delta = noisy if keep is None else np.where(keep, noisy, np.nan)
+    return Dataset(RING.positions(), EVERYONE, EVERYONE, WATER, delta_tof_s=delta)
+
+
+@pytest.fixture(scope="module")
+def image(times):
+    return reconstruct(scan(times), PLAN)
+
+
+def inside():
+    return PHANTOM.inside(NODES, SIDE)
+
+
+def mean_square(result):
+    return float((result.uncertainty[inside()] ** 2).mean())
+
+
+@pytest.mark.parametrize("noise_s", [1e-8, 6e-8])
+def test_most_nodes_lie_within_two_deviations_of_the_smoothed_truth(times, image, noise_s):
+    result = image if noise_s == 1e-8 else reconstruct(scan(times, noise_s), PLAN)
+    (width,) = result.resolution_width_m
+    assert 0.0 < width < 4 * result.spacing_m[0]
+    truth = gaussian_filter(PHANTOM.speed(NODES, SIDE), width / result.spacing_m[0], mode="nearest")
+    error = np.abs(result.speed - truth)[inside()]
+    assert (error < 2.0 * result.uncertainty[inside()]).mean() >= 0.85
+    # Not by being useless: the deviations are of the size of the error, and larger where it is.
+    assert mean_square(result) < 9.0 * (error**2).mean()
+    assert np.corrcoef(error, result.uncertainty[inside()])[0, 1] > 0.2
+
+
+def test_the_uncertainty_changes_nothing_else(times, image):
+    plain = reconstruct(scan(times), PLAN.changed(uncertainty=False))
+    assert plain.uncertainty is None
+    assert plain.resolution_width_m == ()
+    assert np.array_equal(plain.speed, image.speed)
+    assert image.image("uncertainty").values.shape == image.speed.shape
+
+
+def test_nodes_outside_the_array_are_not_estimated(image):
+    assert image.uncertainty[0, 0] == 0.0
+    assert np.isfinite(image.uncertainty).all()
+    assert image.uncertainty[inside()].min() > 0.0
+
+
+def test_noise_and_missing_rays_make_it_larger(times, image):
+    noisy = reconstruct(scan(times, 2e-7), PLAN)
+    assert mean_square(noisy) > 1.3 * mean_square(image)
+    assert noisy.resolution_width_m[0] > image.resolution_width_m[0]
+    few = np.zeros(times.shape, bool)
+    few[::4, ::4] = True
+    sparse = reconstruct(scan(times, keep=few), PLAN)
+    assert mean_square(sparse) > 1.5 * mean_square(image)
+
+
+def test_straight_rays_are_less_certain_than_bent_ones(times, image):
+    """The misfit along bent rays shows what straight rays neglect."""
+    straight = reconstruct(scan(times), replace(PLAN, rays="straight"))
+    assert mean_square(straight) > 1.5 * mean_square(image)
+
+
+def test_sart_has_an_uncertainty_too_and_slices_have_their_own(times):
+    plan = replace(PLAN, method="sart", iterations=2)
+    one = scan(times)
+    alone = reconstruct(one, plan)
+    stacked = replace(
+        one, delta_tof_s=np.stack([one.delta_tof_s, one.delta_tof_s]), slice_z_m=np.array([0.0, 0.002])
+    )
+    both = reconstruct(stacked, plan)
+    assert np.array_equal(both.uncertainty[..., 0], alone.uncertainty)
+    assert both.resolution_width_m[0] == alone.resolution_width_m[0]
+    # The image differs by the order of its emitters, the samples by the slice.
+    assert not np.array_equal(both.uncertainty[..., 1], alone.uncertainty)
+    assert len(both.resolution_width_m) == 2
