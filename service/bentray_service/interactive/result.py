@@ -60,7 +60,8 @@ class Result:
     Attributes:
         axes: names of the axes in order: ``x``, ``y`` and, in 3-D, ``z``.
         values: arrays by name, each (nx, ny[, nz]): for a reconstruction ``speed``, ``coverage`` and, if
-            present, ``attenuation``, ``recovery``, ``uncertainty`` and ``reflection``; for an upload ``value``.
+            present, ``attenuation``, ``recovery``, ``uncertainty`` and ``reflection``; for an upload
+            ``value``.
         coordinates: node positions along each axis, m; ``z`` is missing for slices with non-uniform heights.
             The reflection has a grid of its own, along ``reflection_x`` and ``reflection_y``.
         units: unit of each array.

@@ -24,7 +24,7 @@ from bentray_workers.rendering.turntable import Turntable, draw_turntable
 from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
-PLAN = Settings(nodes=32, iterations=6, method="gauss-newton", resolution_check=True)
+PLAN = Settings(nodes=32, iterations=6, method="gauss-newton", resolution_check=True, uncertainty=True)
 SCAN = PhantomScan(waveform=True, nodes=32, elements=16, frequency_hz=2e5, side_m=0.03, emissions=8, snr=20.0)
 TURNTABLE = Turntable(iso=(0.5,), width=32, height=24, frames=8)
 FIELD = FieldSettings(samples=6, inner_samples=4, divisions=4, image_size=33)
@@ -32,7 +32,7 @@ FIELD = FieldSettings(samples=6, inner_samples=4, divisions=4, image_size=33)
 
 def reconstruction(client, folder, work, on_progress):
     result = reconstruct(client, folder / "scan.h5", PLAN, on_progress, work_dir=work)
-    return result.speed.tobytes(), result.recovery.tobytes(), result.history
+    return result.speed.tobytes(), result.recovery.tobytes(), result.uncertainty.tobytes(), result.history
 
 
 def simulation(client, folder, work, on_progress):

@@ -26,7 +26,9 @@ def plans():
     shots = None, TRACES, TRACES.__class__(**{**vars(TRACES), "water_shot": False})
     for traces, method in product(shots, ("sart", "gauss-newton", "auto", "waveform")):
         if traces is not None or method != "waveform":
-            settings = Settings.of(method=method, nodes=64, resolution_check=True, minutes=10.0)
+            settings = Settings.of(
+                method=method, nodes=64, resolution_check=True, uncertainty=True, minutes=10.0
+            )
             if method in ("sart", "gauss-newton"):
                 settings = settings.changed(minutes=None)
             yield plan(summary(traces), settings, ())

@@ -31,6 +31,27 @@ def test_written_file_round_trips_bit_for_bit(tmp_path, slices, with_attenuation
     assert_same(replace(found, spacing_m=()), replace(result, spacing_m=()))
 
 
+@pytest.mark.parametrize("slices", [None, 3])
+def test_the_uncertainty_comes_back_with_its_resolution_widths(tmp_path, slices):
+    widths = (1.5e-3, 2e-3, 0.0)[: slices or 1]
+    spread = np.random.default_rng(1).uniform(0.0, 9.0, made(slices=slices).speed.shape)
+    result = replace(made(slices=slices), uncertainty=spread, resolution_width_m=widths)
+    write_reconstruction(tmp_path / "r.h5", result)
+    found = read_reconstruction(tmp_path / "r.h5")
+    assert np.array_equal(found.uncertainty, spread)
+    assert found.resolution_width_m == widths
+    assert found.image("uncertainty").spacing_m == found.spacing_m
+    for wrong in (-1e-3, np.nan):
+        with h5py.File(tmp_path / "r.h5", "r+") as file:
+            file["uncertainty_mps"].attrs["resolution_width_m"] = [wrong]
+        with pytest.raises(InvalidInput, match="uncertainty_mps@resolution_width_m"):
+            read_reconstruction(tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        del file["uncertainty_mps"].attrs["resolution_width_m"]
+    with pytest.raises(InvalidInput, match="uncertainty_mps@resolution_width_m"):
+        read_reconstruction(tmp_path / "r.h5")
+
+
 def test_bands_of_a_refinement_come_back(tmp_path):
     waves = (
         Iteration(0, 1, 3e-8, 36, 1, given=False, band_hz=(1e5, 2e5), misfit=0.3, held_out_misfit=0.4),

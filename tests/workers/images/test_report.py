@@ -70,6 +70,17 @@ def test_each_image_has_its_own_limits_and_the_resolution_check_those_from_0_to_
     assert len(set(limits.values())) == 4
 
 
+def test_the_uncertainty_is_a_panel_with_colours_from_zero(undrawn):
+    result = replace(made(), uncertainty=np.random.default_rng(2).uniform(3.0, 9.0, made().speed.shape))
+    report_png(result)
+    shown = {axes.get_title(loc="left"): axes.images[0] for axes in undrawn[-1].axes if axes.images}
+    low, high = shown["Uncertainty"].get_clim()
+    assert low == 0.0
+    assert high == pytest.approx(9.0, abs=0.1)
+    # With a truth and a section there are eleven panels.
+    report_png(result, truth())
+
+
 def test_report_names_stages_and_automatic_choices(undrawn):
     history = (*(Iteration(0, n, 1e-7, 4, 0) for n in (1, 2)), Iteration(0, 1, 9e-8, 4, 1))
     plan = made().settings.changed(nodes=64, coarser_grids=1)

@@ -40,10 +40,10 @@ def ring(elements, heights):
 @pytest.mark.parametrize(
     ("asked", "elements", "heights"),
     [
-        ({"nodes": 64, "resolution_check": True}, 128, 0),
+        ({"nodes": 64, "resolution_check": True, "uncertainty": True}, 128, 0),
         pytest.param({"nodes": 96}, 192, 0, marks=pytest.mark.nightly),
         pytest.param(
-            {"nodes": 64, "method": "gauss-newton", "resolution_check": True},
+            {"nodes": 64, "method": "gauss-newton", "resolution_check": True, "uncertainty": True},
             128,
             0,
             marks=pytest.mark.nightly,

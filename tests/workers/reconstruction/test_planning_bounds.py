@@ -35,7 +35,7 @@ from ..files.datasets import datasets
 
 WAYS = [
     {},
-    {"method": "gauss-newton", "resolution_check": True},
+    {"method": "gauss-newton", "resolution_check": True, "uncertainty": True},
     {"method": "auto", "minutes": 100.0},
     {"method": "waveform"},
     {"decomposition": "volume"},

@@ -171,7 +171,7 @@ def _widths(reader: Reader) -> tuple[float, ...]:
     if not reader.has(place):
         return ()
     values = reader.numbers(place, name, "m")
-    if not values or min(values) < 0.0:
+    if not values or not min(values) >= 0.0:
         raise InvalidInput(f"{place}@{name}", values or "nothing", "a number >= 0 m for each slice")
     return values
 

@@ -31,9 +31,10 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
     Returns:
         settings, residual history, speed range, time and provenance; ``residual_within_s``: quantiles of the
         absolute residuals of the last iteration by percentage; ``recovery_mean``: mean of the resolution
-        check inside the array; ``uncertainty_rms_mps``: of the standard deviations inside the array;
-        ``resolution_width_m``: of each slice, or one; empty without uncertainty; ``trials`` and ``reason``: candidate models and choice of ``auto``;
-        ``candidates``: rows of their table. Missing values are None, missing trials and reasons are empty.
+        check inside the array; ``uncertainty_rms_mps``: root mean square of the standard deviations inside
+        the array; ``resolution_width_m``: of each slice, or one; ``trials`` and ``reason``: candidate models
+        and choice of ``auto``; ``candidates``: rows of their table. Missing values are None, missing widths,
+        trials and reasons are empty.
     """
     return {
         "seconds": round(seconds, 3),

@@ -32,6 +32,7 @@ CHOICES = [
     (["--device", "opencl"], "device", "opencl"),
     (["--seed", "5"], "seed", 5),
     (["--resolution-check"], "resolution_check", True),
+    (["--uncertainty"], "uncertainty", True),
     (["--minutes", "2.5"], "minutes", 2.5),
     (["--relaxation", "0.9"], "relaxation", 0.9),
     (["--smoothing", "1.5"], "smoothing_nodes", 1.5),

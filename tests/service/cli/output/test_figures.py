@@ -123,6 +123,17 @@ def test_summary_shows_findings() -> None:
     assert row(words([])) is None
 
 
+def test_summary_shows_the_uncertainty_inside_the_array() -> None:
+    speed = disc()
+    spread = np.where(np.arange(speed.shape[1]) < 5, 6.0, 0.0) * np.ones_like(speed)
+    result = replace(image(speed), uncertainty=spread, resolution_width_m=(0.0016, 0.002, 0.0031))
+    found = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
+    assert found["uncertainty_rms_mps"] == pytest.approx(6.0)
+    assert found["resolution_width_m"] == [0.0016, 0.002, 0.0031]
+    assert dict(summary(found))["uncertainty"] == "6.0 m/s rms, at a resolution width of 2.0 mm"
+    assert "uncertainty" not in dict(summary(figures(image(speed), dataset(None), 1.0)))
+
+
 def test_summary_shows_residuals_resolution_and_candidates() -> None:
     speed = disc()
     recovery = np.zeros_like(speed)

@@ -32,7 +32,7 @@ FIELD_BYTES_PER_NODE = 80
 ENTRIES_LEVEL, ENTRIES_IN_SPACE = 1.55, 3.1
 
 # Arrays of the size of all probes of one solve: its iterates, transforms and products, with copies.
-PROBE_ARRAYS = 15
+PROBE_ARRAYS = 22
 
 # An entry is a column of 4 bytes and a length of 4.
 ENTRY_BYTES = 8
@@ -166,7 +166,7 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
             once = -(-rays // 2)
         probes = (PROBE_ARRAYS + BATCHES) * LANES
         # For each row its errors in all probes, weighted too.
-        errors = {"probes": probes * image, "errors": (2 * LANES + 4) * REAL * once}
+        errors = {"probes": probes * image, "errors": (3 * LANES + 8) * REAL * once}
         entries = math.ceil(once * _entries(bent, scan.in_space) * ENTRY_BYTES)
         parts["trace_uncertainty_rays"] = {**tracing(once), "a travel time": _field_of_task(scan, bent)}
         parts["estimate_uncertainty"] = {"data": data, "images": state, "rays": entries, **errors}
