@@ -84,6 +84,10 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
         link.click()
     assert download.value.suggested_filename.endswith(".apng")
     assert download.value.path().read_bytes() == b"pictures"
+    page.once("dialog", lambda dialog: dialog.accept())
+    page.get_by_role("button", name="Delete the volume").click()
+    expect(page.locator("#volume")).to_have_text("No 3-D volume yet")
+    expect(page.get_by_role("button", name="Delete the volume")).to_be_hidden()
 
 
 def test_the_filter_is_chosen(ball):

@@ -1,5 +1,7 @@
 """The start page: upload a scan, error messages, and the list of scans."""
 
+import base64
+
 import pytest
 from playwright.sync_api import expect
 from scipy.io import savemat
@@ -25,6 +27,27 @@ def test_an_uploaded_scan_is_opened_and_listed(page, serve, scan):
     page.get_by_role("link", name="Scans", exact=True).click()
     page.get_by_role("link", name="Sixteen elements").click()
     page.get_by_text("16 emitters").wait_for()
+
+
+def test_several_files_are_dropped_beside_the_zone(page, serve, scan, tmp_path):
+    page.goto(serve())
+    page.get_by_text("No scan yet").wait_for()
+    content = scan().read_bytes()
+    files = [["first.h5", content], ["notes.h5", b"only text"], ["second.h5", content]]
+    page.evaluate(
+        """(files) => {
+          const dataTransfer = new DataTransfer();
+          for (const [name, text] of files) {
+            dataTransfer.items.add(new File([Uint8Array.from(atob(text), (one) => one.charCodeAt(0))], name));
+          }
+          const drop = new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true });
+          document.querySelector("h1").dispatchEvent(drop);
+        }""",
+        [[name, base64.b64encode(one).decode()] for name, one in files],
+    )
+    page.get_by_text("3 of 3: second.h5 is stored").wait_for()
+    expect(page.locator("#scan-error")).to_contain_text("notes.h5 is not a scan that can be read. ")
+    expect(page.locator("#scans li")).to_have_count(2)
 
 
 def test_errors_are_shown_as_text(page, serve, tmp_path):

@@ -98,6 +98,58 @@ def test_from_a_dropped_file_over_a_killed_service_to_an_export(page, service, b
     )
 
 
+def tab_to(page, goal):
+    """Press Tab until an element has the focus."""
+    goal.first.wait_for(state="attached")
+    for _ in range(120):
+        page.keyboard.press("Tab")
+        if goal.first.evaluate("it => it === document.activeElement"):
+            return
+    raise AssertionError(f"{goal} has not been reached")
+
+
+def test_the_whole_story_by_keyboard_alone(page, service, breast, tmp_path):
+    def press(goal, key="Enter"):
+        tab_to(page, goal)
+        page.keyboard.press(key)
+
+    page.on("dialog", lambda dialog: dialog.accept())
+    write_dataset(tmp_path / "ring.h5", breast)
+    page.goto(service.url)
+    tab_to(page, page.get_by_label("API key"))
+    page.keyboard.type(service.keys["south"])
+    page.keyboard.press("Enter")
+    with page.expect_file_chooser() as chooser:
+        press(page.locator("#scan-file"))
+    chooser.value.set_files(tmp_path / "ring.h5")
+    page.wait_for_url("**/#/scans/*")
+    press(page.get_by_text("All settings"))
+    for name, text in (("Method", "SART"), ("Nodes per side", "32"), ("Iterations", "1")):
+        tab_to(page, page.get_by_label(name, exact=True))
+        page.keyboard.type(text)
+    press(page.get_by_role("button", name="Start"))
+    press(page.locator(".job h2 a"))
+    page.locator(".readout").filter(has_text="mm").wait_for()
+    http = httpx.Client(headers={"Authorization": f"Bearer {service.keys['south']}"}, timeout=60.0)
+    job = http.get(f"{service.url}/v1/jobs/{page.url.partition('?')[0].rpartition('/')[2]}").json()
+    assert (job["settings"]["method"], job["settings"]["nodes"]) == ("sart", 32)
+    press(page.locator(".export summary"))
+    with page.expect_download() as download:
+        press(page.locator(".export").get_by_role("link", name="NumPy"))
+    values = np.load(download.value.path())
+    page.keyboard.press("Escape")
+    expect(page.locator(".export summary")).to_be_focused()
+    expect(page.locator(".export .sheet")).to_be_hidden()
+    press(page.locator("canvas.plane"), "ArrowRight")
+    expect(page.locator(".readout")).to_contain_text("node 17, 16")
+    assert float(page.locator(".readout").get_attribute("data-value")) == values[17, 16]
+    page.locator("#page").focus()
+    press(page.get_by_role("main").get_by_role("link", name="Scan", exact=True))
+    press(page.get_by_role("button", name="Delete"))
+    page.get_by_text("No scan yet").wait_for()
+    assert http.get(f"{service.url}{job['links']['self']}").status_code == 404
+
+
 def test_two_tenants_see_nothing_of_each_other(page, browser, service, breast, tmp_path):
     enter(page, service, "north")
     dropped(page, breast, tmp_path)

@@ -77,8 +77,9 @@ document.addEventListener("connection", ({ detail: answered }) => {
   if (line.hidden !== answered) {
     line.hidden = answered;
     line.textContent = answered ? "" : "The service does not answer. The page tries again every two seconds.";
+    if (!answered) showSign("not reached", false);
     if (answered) again?.();
-    else checkHealthIn(LOST_MS);
+    checkHealthIn(answered ? 0 : LOST_MS);
   }
 });
 
@@ -89,19 +90,25 @@ function checkHealthIn(milliseconds) {
   checking = setTimeout(showHealth, milliseconds);
 }
 
+function showSign(words, good) {
+  at("health").textContent = words;
+  at("health").className = `health ${good ? "good" : "bad"}`;
+}
+
 async function showHealth() {
-  const sign = at("health");
   try {
     const { workers } = await request("/health/ready");
-    sign.textContent = workers === 1 ? "ready, 1 worker" : `ready, ${workers} workers`;
-    sign.className = "health good";
+    showSign(workers === 1 ? "ready, 1 worker" : `ready, ${workers} workers`, true);
   } catch (error) {
-    sign.textContent = error.message;
-    sign.className = "health bad";
+    if (at("offline").hidden) showSign(error.message, false);
   }
   checkHealthIn(at("offline").hidden ? HEALTH_MS : LOST_MS);
 }
 
+// A file that misses the drop zone must not take the place of the page.
+for (const name of ["dragover", "drop"]) {
+  addEventListener(name, (event) => event.dataTransfer?.types.includes("Files") && event.preventDefault());
+}
 at("skip").addEventListener("click", (event) => {
   event.preventDefault();
   at("page").focus();
@@ -111,6 +118,7 @@ if (await admitted(request)) {
   addEventListener("hashchange", () => openPage(false));
   openPage(true);
 } else if (at("key").hidden) {
-  again = () => location.reload();
   showFailure(at("page"), at("access").textContent);
+  const enter = () => request("/v1/access").then(() => location.reload(), () => setTimeout(enter, LOST_MS));
+  setTimeout(enter, LOST_MS);
 }

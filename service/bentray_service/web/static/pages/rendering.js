@@ -7,7 +7,7 @@ import { drawHistogram } from "../parts/histogram.js";
 import { jobList } from "../parts/job_list.js";
 import { withKey } from "../parts/key.js";
 import { orbit } from "../parts/orbit.js";
-import { fillSelect, startJob } from "../parts/panel.js";
+import { deleteStored, fillSelect, startJob } from "../parts/panel.js";
 import { pictureStream, rateOf } from "../parts/picture_stream.js";
 import { planOf, queueInWords, timeInWords } from "../parts/plan_estimate.js";
 import { load, titleOf } from "../parts/titles.js";
@@ -85,6 +85,7 @@ const PAGE = `
         <div class="actions">
           <button id="turn" type="submit" disabled>Render a turntable</button>
           <button id="reset-view" type="button" class="quiet">Reset the view</button>
+          <button id="delete-volume" type="button" class="quiet" hidden>Delete the volume</button>
           <a id="picture-link" hidden>Open the picture</a>
         </div>
         <p id="turn-plan" class="facts" role="status"></p>
@@ -275,6 +276,8 @@ export async function open(root, { id, query }) {
     const [lowest, highest] = volume.value_range.map(rounded);
     const size = volume.shape.join(" × ");
     at("volume-facts").textContent = `${size} nodes · values ${lowest} to ${highest} ${volume.unit}`;
+    // Results are deleted on their own pages.
+    at("delete-volume").hidden = volume.source !== "upload";
     field("index").placeholder = volume.water_speed_mps === null ? String(UPLOAD_INDEX) : "automatic: of sound";
     show();
   }
@@ -323,6 +326,11 @@ export async function open(root, { id, query }) {
   });
   orbit(at("stage"), { turn, zoom, reset });
   at("reset-view").addEventListener("click", reset);
+  at("delete-volume").addEventListener("click", async () => {
+    const { links, ...volume } = chosen();
+    if (!(await deleteStored(links.self, `${titleOf(volume)} and its turntables`, "look-error"))) return;
+    go("/rendering");
+  });
   withKey(at("picture-link"));
   let ended = null;
   const jobs = jobList(at("turntables"), {

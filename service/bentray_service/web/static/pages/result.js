@@ -6,6 +6,8 @@ import { curlOf, pythonOf } from "../parts/code_snippets.js";
 import { copyButton } from "../parts/copying.js";
 import { make, showError } from "../parts/dom.js";
 import { exportMenu } from "../parts/export_menu.js";
+import { menuOf } from "../parts/menu.js";
+import { deleteStored } from "../parts/panel.js";
 import { provenanceTable } from "../parts/provenance.js";
 import { choiceTable, facts, planTable, truthTable } from "../parts/result_tables.js";
 import { loadResult, methodOf, nameOf } from "../parts/results.js";
@@ -40,16 +42,15 @@ async function compareMenu(job) {
   const { jobs } = await request("/v1/jobs?kind=reconstruction&state=succeeded&limit=100");
   const others = jobs.filter((one) => one.id !== job.id).sort((a, b) => (b.dataset === job.dataset) - (a.dataset === job.dataset));
   if (!others.length) return null;
-  const menu = make("details", "menu");
-  menu.append(make("summary", "", "Compare with"));
-  const form = make("form", "sheet");
-  for (const one of others.slice(0, 12)) {
+  const form = make("form");
+  const list = make("div", "others");
+  for (const one of others) {
     const label = make("label");
     const box = make("input");
     Object.assign(box, { type: "checkbox", name: "other", value: one.id });
     const same = one.dataset === job.dataset ? "this scan" : "another scan";
     label.append(box, ` ${one.name || methodOf(one)}, ${same}, ${inTime(one.created)}`);
-    form.append(label);
+    list.append(label);
   }
   const start = make("button", "", "Compare");
   start.type = "submit";
@@ -59,13 +60,12 @@ async function compareMenu(job) {
   };
   form.addEventListener("change", sync);
   sync();
-  form.append(make("p", "facts", "One to three others"), start);
+  form.append(list, make("p", "facts", "One to three others"), start);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     go(`/compare/${[job.id, ...new FormData(form).getAll("other")].join(",")}`);
   });
-  menu.append(form);
-  return menu;
+  return menuOf("Compare with", form);
 }
 
 export async function open(root, { id, query }) {
@@ -98,13 +98,7 @@ export async function open(root, { id, query }) {
     }
   });
   const remove = button("Delete", async () => {
-    if (!confirm(`Delete the result ${nameOf(result)} for good?`)) return;
-    try {
-      await request(volume.links.self, { method: "DELETE" });
-      go("/jobs");
-    } catch (error) {
-      showError("result-error", error);
-    }
+    if (await deleteStored(volume.links.self, `the result ${nameOf(result)}`, "result-error")) go("/jobs");
   });
   const again = make("a", "button quiet", "Run again with changes");
   again.href = `#/scans/${job.dataset}?from=${job.id}`;

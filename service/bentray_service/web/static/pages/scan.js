@@ -24,7 +24,7 @@ const PAGE = `
           <small>rays and method chosen automatically</small>
           <small class="time" id="fast-time">…</small></button>
         <button id="best" type="submit" value="best">Best
-          <small>then full waveform, where it predicts unused traces better</small>
+          <small id="best-words">then full waveform, where it predicts unused traces better</small>
           <small class="time" id="best-time">…</small></button>
       </div>
       <details id="run-own">
@@ -194,6 +194,7 @@ export async function open(root, { id, query }) {
     at("dataset-facts").textContent = factsOf(shown);
   };
   entitle(scan);
+  if (!scan.has_traces) at("best-words").textContent = "the same here: full waveforms need traces, and the file has none";
   const showTimes = presetTimes(scan);
   showTimes();
   let states = null;

@@ -71,19 +71,24 @@ function entry(scan) {
 export function open(root) {
   root.innerHTML = PAGE;
   let closed = false;
-  const sendAgain = uploads("scan", metadata, (scan) => closed || go(`/scans/${scan.id}`));
+  const sendAgain = uploads("scan", metadata, (scan, several) => closed || (several ? showScans() : go(`/scans/${scan.id}`)));
   at("sample").addEventListener("click", () => startJob(SAMPLE, "sample-error", (job) => closed || go(`/jobs/${job.id}?then=scan`)));
   at("own").addEventListener("submit", (event) => {
     event.preventDefault();
     sendAgain();
   });
-  load("datasets")
-    .then((scans) => {
-      if (closed) return;
-      at("scans").replaceChildren(...scans.map(entry));
-      at("empty").hidden = scans.length > 0;
-    })
-    .catch((error) => showError("scans-error", error));
+
+  function showScans() {
+    load("datasets")
+      .then((scans) => {
+        if (closed) return;
+        at("scans").replaceChildren(...scans.map(entry));
+        at("empty").hidden = scans.length > 0;
+      })
+      .catch((error) => showError("scans-error", error));
+  }
+
+  showScans();
   return () => {
     closed = true;
   };

@@ -6,7 +6,7 @@ import { at, make, showError } from "../parts/dom.js";
 import { objectAt, objectsOf, placeAt } from "../parts/ground.js";
 import { jobList } from "../parts/job_list.js";
 import { orbit } from "../parts/orbit.js";
-import { fillSelect, startJob } from "../parts/panel.js";
+import { deleteStored, fillSelect, startJob } from "../parts/panel.js";
 import { pictureStream, rateOf } from "../parts/picture_stream.js";
 import { load, titleOf } from "../parts/titles.js";
 import { uploads } from "../parts/uploads.js";
@@ -72,6 +72,7 @@ const PAGE = `
         <div class="actions">
           <button id="make" type="submit" disabled>Build the geometry field</button>
           <button id="reset-view" type="button" class="quiet">Reset the view</button>
+          <button id="delete-mesh" type="button" class="quiet" disabled>Delete the mesh</button>
         </div>
       </form>
     </div>
@@ -192,7 +193,7 @@ export async function open(root, { id, query }) {
 
   function show(moving = false) {
     const mesh = meshes.get(at("mesh").value);
-    at("make").disabled = !mesh;
+    at("make").disabled = at("delete-mesh").disabled = !mesh;
     if (!mesh) return;
     at("mesh-facts").textContent = factsOf(mesh);
     showObjects();
@@ -291,6 +292,10 @@ export async function open(root, { id, query }) {
   form.addEventListener("change", () => show());
   orbit(at("stage"), { turn, zoom, reset, dragged: drag });
   at("reset-view").addEventListener("click", reset);
+  at("delete-mesh").addEventListener("click", async () => {
+    const mesh = meshes.get(at("mesh").value);
+    if (await deleteStored(`/v1/meshes/${mesh.id}`, `${titleOf(mesh)} and its geometry fields`, "field-error")) go("/surfaces");
+  });
   const jobs = jobList(at("of-fields"), {
     empty: "No geometry field yet",
     filters: { kind: "geometry-field" },

@@ -7,7 +7,8 @@ export function parse(hash) {
 
 // Open a page, such as "/jobs".
 export function go(path) {
-  location.hash = `#${path}`;
+  if (location.hash === `#${path}`) dispatchEvent(new Event("hashchange"));
+  else location.hash = `#${path}`;
 }
 
 // State the view in the address, without a step in the history and without opening the page again.

@@ -1,6 +1,7 @@
 // The menu of downloads of a result: every format, and the picture of the view.
 import { make } from "./dom.js";
 import { withKey } from "./key.js";
+import { menuOf } from "./menu.js";
 import { queryOf } from "./views.js";
 import { QUANTITIES } from "../viewer/quantities.js";
 
@@ -33,9 +34,8 @@ function pictureOf({ volume }, state) {
 
 export function exportMenu(result, state) {
   const { volume, summary } = result;
-  const menu = make("details", "menu export");
-  menu.append(make("summary", "", "Export"));
-  const sheet = make("div", "sheet");
+  const sheet = make("div");
+  const menu = menuOf("Export", sheet, "export");
   const data = volume.links.data;
   const group = (title, nodes) => sheet.append(make("h3", "", title), ...nodes);
   group(summary.quantities.includes("reflection") ? "All quantities (reflection: HDF5)" : "All quantities", WHOLE.map(([format, title]) => withKey(link(title, `${data}?format=${format}`), `${data}?format=${format}`)));
@@ -62,6 +62,5 @@ export function exportMenu(result, state) {
     place.replaceChildren(...(found ? [withKey(link("PNG of this quantity", found), found)] : [make("p", "facts", "No picture of this quantity")]));
   });
   group("Picture", [place]);
-  menu.append(sheet);
   return menu;
 }

@@ -20,7 +20,7 @@ const PHASES = { examining: "Examining the scan", picking: "Picking first arriva
 const COMPILING = "The workers compile their kernels for this processor. That happens once and takes up to some minutes.";
 
 const PAGE = `
-  <p class="crumb"><a href="#/jobs">Jobs</a></p>
+  <p class="crumb"><a href="#/jobs">Jobs</a><span class="live-scan" hidden> · <a>Scan</a></span></p>
   <h1></h1>
   <p class="facts live-facts"></p>
   <section class="panel" aria-label="State">
@@ -177,6 +177,10 @@ export function liveJob(root, first, onSuccess) {
     const [summary, settings] = summaryOf(job);
     const what = job.kind === "reconstruction" ? methodOf(job) : summary;
     say("h1", job.name || what);
+    if (job.dataset && job.kind === "reconstruction") {
+      part(".live-scan").hidden = false;
+      part(".live-scan a").href = `#/scans/${job.dataset}`;
+    }
     say(".live-facts", [titleOfJob(job), job.name ? `${what}: ${settings}` : settings].join(" · "));
     const now = performance.now();
     estimate.add(now / 1e3, job.progress, (job.seconds ?? 0) + (now - received) / 1e3);

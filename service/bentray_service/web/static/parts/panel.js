@@ -1,8 +1,7 @@
-// Parts that the panels of datasets, volumes and meshes share: a list to choose from, an image, and a job to start.
+// Parts that the pages of scans, volumes and meshes share: a list to choose from, a job to start, a record to delete.
 import { inTime } from "./amounts.js";
 import { request } from "./api.js";
 import { at, showError } from "./dom.js";
-import { show } from "./key.js";
 
 // Offer stored records, newest first; the chosen one, else the present one, is selected.
 export function fillSelect(id, records, titleOf, chosen) {
@@ -14,37 +13,16 @@ export function fillSelect(id, records, titleOf, chosen) {
   if (records.some((one) => one.id === before)) select.value = before;
 }
 
-// A frame for one image at a time; an address that is drawn already is not drawn again.
-export function imageFrame(id, errorId) {
-  let shown = "";
-  const finish = (content) => {
-    if (!at(id)) return;
-    at(id).replaceChildren(content);
-    at(id).className = "picture";
-  };
-  return {
-    clear(text) {
-      shown = "";
-      finish(text);
-    },
-    draw(address, alt) {
-      if (address === shown) return;
-      shown = address;
-      showError(errorId, null);
-      const image = new Image();
-      image.alt = alt;
-      at(id).className = "picture drawing";
-      image.onload = () => address === shown && finish(image);
-      image.onerror = () => {
-        if (address !== shown) return;
-        shown = "";
-        finish("No image");
-        // The reason is in the body of the response, which an image does not give access to.
-        request(address).catch((error) => showError(errorId, error));
-      };
-      show(image, address);
-    },
-  };
+// Delete a stored record after a question; words: what goes with it. Returns whether it was deleted.
+export async function deleteStored(address, words, errorId) {
+  if (!confirm(`Delete ${words} for good?`)) return false;
+  try {
+    await request(address, { method: "DELETE" });
+    return true;
+  } catch (error) {
+    showError(errorId, error);
+    return false;
+  }
 }
 
 // refused(error) may show an error elsewhere; it returns whether it did.

@@ -1,9 +1,14 @@
 // Name, notes and water of a scan: shown, and changed in a form. The file of the scan stays as it is.
+import { go } from "./address.js";
 import { request } from "./api.js";
 import { at, make, showError } from "./dom.js";
+import { deleteStored } from "./panel.js";
+import { titleOf } from "./titles.js";
 
 const FORM = `
-  <div class="links"><button id="edit" type="button" class="quiet" aria-expanded="false" aria-controls="edit-form">Edit name, notes and water</button></div>
+  <div class="links"><button id="edit" type="button" class="quiet" aria-expanded="false" aria-controls="edit-form">Edit name, notes and water</button>
+    <button id="delete-scan" type="button" class="quiet">Delete</button></div>
+  <p id="delete-error" class="error" role="alert" hidden></p>
   <p id="scan-notes" class="notes" hidden></p>
   <form id="edit-form" class="panel edit" hidden>
     <label><span class="caption">Name</span>
@@ -48,6 +53,9 @@ export function scanEditor(place, scan, onChange) {
   }
 
   button.addEventListener("click", () => toggle(form.hidden));
+  at("delete-scan").addEventListener("click", async () => {
+    if (await deleteStored(`/v1/datasets/${scan.id}`, `${titleOf(shown)} and its reconstructions`, "delete-error")) go("/");
+  });
   at("edit-cancel").addEventListener("click", () => {
     toggle(false);
     button.focus();
