@@ -44,8 +44,8 @@ lint: install-dev ## check style, types and the import rules
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
-docs: install-docs ## build the documentation into build/docs; warnings are errors
-	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+docs: install-docs ## build the documentation into build/docs, with the gallery; warnings are errors
+	@$(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs
 	@echo "Documentation: build/docs/index.html"
 
 bench: install ## run the benchmark NAME; NAME=reconstruction ARGS=--quick
@@ -59,9 +59,9 @@ bench-device: install ## compare each engine on the OpenCL device of this machin
 mutants: install-tests ## plant faults in the numerics one at a time and run the nearest tests (hours); ARGS="--count 20" narrows it
 	@PYTHONPATH=tests $(BIN)/python -m mutation $(ARGS)
 
-release: install ## build wheel, sdist, bill of materials and checksums into dist/
+release: docs ## build wheel, sdist, bill of materials and checksums into dist/
 	@rm -rf dist
-	@set -e; export SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct); \
+	@set -e; export SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) BENTRAY_DOCUMENTATION=build/docs; \
 	  $(BIN)/python -m hatchling build -d dist -t sdist -t wheel; \
 	  $(BIN)/python deploy/sbom.py > dist/bentray.cdx.json
 	@cd dist && sha256sum -- * > SHA256SUMS && cat SHA256SUMS

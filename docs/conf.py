@@ -2,30 +2,43 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+# The gallery draws without a screen.
+os.environ["MPLBACKEND"] = "agg"
 
 project = "Bentray"
 author = "The Bentray founders"
+copyright = f"{author}, BSD-3-Clause"  # noqa: A001 - the name of Sphinx
 release = version = version_of("bentray")
 
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
     "from_code",
+    "mathml",
+    "offline",
 ]
-source_suffix = {".md": "markdown"}
-myst_enable_extensions = ["dollarmath", "deflist"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+exclude_patterns = ["recipes"]
+myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
+myst_dmath_double_inline = True
+math_number_all = False
+html_math_renderer = "mathml"
 
 html_theme = "furo"
 html_title = f"Bentray {release}"
 html_favicon = "../service/bentray_service/web/static/icon.svg"
+html_static_path = ["static"]
+html_css_files = ["pages.css"]
 html_copy_source = False
 html_show_sphinx = False
 
@@ -36,3 +49,28 @@ autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_class_signature = "separated"
 python_use_unqualified_type_names = True
+
+# The gallery: each file of recipes/ is executed, and becomes a page and a notebook. Recipes write files
+# beside themselves, so copies of them are executed.
+RECIPES = Path(__file__).parents[1] / "build" / "recipes"
+shutil.rmtree(RECIPES, ignore_errors=True)
+shutil.copytree(Path(__file__).parent / "recipes", RECIPES)
+sphinx_gallery_conf = {
+    "examples_dirs": str(RECIPES),
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "plot_gallery": "True",
+    "abort_on_example_error": True,
+    "only_warn_on_example_error": False,
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "show_memory": False,
+    "show_signature": False,
+    "min_reported_time": 1e9,
+    "write_computation_times": False,
+    "within_subsection_order": "FileNameSortKey",
+    "copyfile_regex": "",
+    "image_scrapers": ("matplotlib",),
+    "matplotlib_animations": False,
+    "thumbnail_size": (400, 280),
+}

@@ -25,6 +25,9 @@ from bentray_workers.simulation.simulation_run import simulate
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
+RECIPES = sorted((DOCS / "recipes").glob("*.py"))
+# Of the gallery, which is made from the recipes when the documentation is built.
+GALLERY = {"gallery/index", *(f"gallery/{recipe.stem}" for recipe in RECIPES)}
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 BLOCK = re.compile(r"(?:<!-- not run: (.*?) -->\n)?```(sh|python)\n(.*?)```", re.DOTALL)
 SAID = "http://127.0.0.1:8000"
@@ -194,8 +197,10 @@ def test_links_of_every_page_resolve() -> None:
     for page in PAGES:
         text = page.read_text()
         for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text):
+            place = (page.parent / target).resolve()
+            built = place.is_relative_to(DOCS) and str(place.relative_to(DOCS).with_suffix("")) in GALLERY
             if "://" not in target:
-                assert (page.parent / target).exists(), f"{page.name}: {target}"
+                assert built or place.exists(), f"{page.name}: {target}"
         for path in re.findall(r"`((?:deploy|benchmarks)/[\w./-]+)`", text):
             assert (ROOT / path).exists(), f"{page.name}: {path}"
 
@@ -203,7 +208,19 @@ def test_links_of_every_page_resolve() -> None:
 def test_every_page_is_in_the_contents() -> None:
     listed = re.findall(r"^((?:[\w-]+/)?[\w-]+)$", (DOCS / "index.md").read_text(), re.MULTILINE)
     pages = {str(page.relative_to(DOCS).with_suffix("")) for page in PAGES} - {"index"}
-    assert pages == set(listed)
+    assert pages | {"gallery/index"} == set(listed)
+
+
+def test_recipes_have_a_title_and_link_to_pages() -> None:
+    assert len(RECIPES) >= 12
+    for recipe in RECIPES:
+        text = recipe.read_text()
+        title = re.match(r'"""(.+)\n(=+)\n\n.+\n', text)
+        assert title, recipe.name
+        assert len(title[1]) <= len(title[2]), recipe.name
+        compile(text, recipe.name, "exec")
+        for target in re.findall(r":doc:`/([^`]+)`", text):
+            assert target in GALLERY or (DOCS / f"{target}.md").exists(), f"{recipe.name}: {target}"
 
 
 def test_pictures_are_shown_and_small() -> None:

@@ -26,6 +26,7 @@ PUBLIC = frozenset(
         "/",
         "/docs",
         "/docs/formats",
+        "/documentation",
         "/openapi.json",
         "/health/live",
         "/health/ready",
@@ -35,7 +36,7 @@ PUBLIC = frozenset(
         "/sign-out",
     }
 )
-PUBLIC_FOLDERS = ("/static/", "/problems/")
+PUBLIC_FOLDERS = ("/static/", "/problems/", "/documentation/")
 
 UNMATCHED = "unmatched"
 

@@ -20,9 +20,11 @@ ROOT = Path(__file__).resolve().parents[2]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PROJECT = PYPROJECT["project"]
 RELEASED = {"SOURCE_DATE_EPOCH": "1767225600"}
+# In the wheel.
+DOCUMENTATION = "bentray_service/web/built_documentation/"
 PACKAGES = PYPROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
 # Of the service; what they answer is in the wheel.
-ADDRESSES = ("/", "/docs", "/static/app.js", "/openapi.json")
+ADDRESSES = ("/", "/docs", "/documentation/", "/static/app.js", "/openapi.json")
 
 
 def run(*command: str, folder: Path) -> str:
@@ -40,9 +42,14 @@ def run(*command: str, folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Wheel and sdist of this tree."""
-    folder = tmp_path_factory.mktemp("dist")
-    run("-m", "hatchling", "build", "-d", str(folder), "-t", "sdist", "-t", "wheel", folder=ROOT)
+    """Wheel and sdist of this tree, with a documentation of two files."""
+    folder, pages = tmp_path_factory.mktemp("dist"), tmp_path_factory.mktemp("pages")
+    (pages / "_static").mkdir()
+    (pages / "_static" / "pages.css").write_text("p { color: black; }")
+    (pages / "index.html").write_text(f"<!doctype html><title>Bentray</title><p>{'text ' * 300}</p>")
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("BENTRAY_DOCUMENTATION", str(pages))
+        run("-m", "hatchling", "build", "-d", str(folder), "-t", "sdist", "-t", "wheel", folder=ROOT)
     return folder
 
 
@@ -57,7 +64,8 @@ def test_the_wheel_holds_the_packages_and_nothing_else(dist: Path) -> None:
     )
     committed = {name.partition("/")[2] for name in listed.stdout.split("\0") if (ROOT / name).is_file()}
     packed = set(zipfile.ZipFile(only(dist, "*.whl")).namelist())
-    assert {name for name in packed if ".dist-info/" not in name} == committed
+    pages = {DOCUMENTATION + name for name in ("index.html", "_static/pages.css")}
+    assert {name for name in packed if ".dist-info/" not in name} == committed | pages
     assert any(name.endswith(".dist-info/licenses/LICENSE") for name in packed)
 
 
@@ -69,6 +77,14 @@ def test_the_source_distribution_gives_the_same_wheel(dist: Path, tmp_path: Path
         assert (source / name).exists(), name
     run("-m", "hatchling", "build", "-d", str(tmp_path / "again"), "-t", "wheel", folder=source)
     assert only(tmp_path / "again", "*.whl").read_bytes() == only(dist, "*.whl").read_bytes()
+
+
+def test_a_documentation_that_is_not_built_is_no_release(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "hatchling", "build", "-d", str(tmp_path / "dist"), "-t", "wheel"]
+    named = os.environ | {"BENTRAY_DOCUMENTATION": str(tmp_path)}
+    done = subprocess.run(command, cwd=ROOT, env=named, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "make docs" in done.stderr
 
 
 @pytest.mark.nightly

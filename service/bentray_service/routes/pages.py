@@ -1,12 +1,13 @@
-"""The web pages: viewer at /, REST reference at /docs, file formats at /docs/formats."""
+"""The web pages: viewer at /, documentation, REST reference at /docs, file formats at /docs/formats."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from fastapi import APIRouter, Request
-from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse
+from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 
+from ..web.documentation import documentation_files, missing_page
 from ..web.reference import reference_page
 
 WEB = Path(__file__).parent.parent / "web"
@@ -18,6 +19,21 @@ router = APIRouter(include_in_schema=False)
 def viewer() -> FileResponse:
     """The viewer."""
     return FileResponse(WEB / "index.html", headers={"Cache-Control": "no-cache"})
+
+
+@router.get("/documentation")
+def documentation_start() -> RedirectResponse:
+    """Redirect to the start page, so that its relative links lead into the folder."""
+    return RedirectResponse("/documentation/")
+
+
+@router.get("/documentation/{path:path}")
+async def documentation(path: str, request: Request) -> Response:
+    """A file of the built documentation."""
+    files = documentation_files()
+    if files is None:
+        return HTMLResponse(missing_page(request.app.version), status_code=404)
+    return await files.get_response(path or ".", request.scope)
 
 
 @router.get("/docs")

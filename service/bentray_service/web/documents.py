@@ -29,8 +29,8 @@ def document(title: str, version: str, content: str) -> str:
 <header class="top">
 <div class="brand"><img src="/static/icon.svg" alt="" width="32" height="32">
 <div><h1>Bentray {escape(version)}</h1><small>{escape(title)}</small></div></div>
-<nav><a href="/">Viewer</a><a href="/docs">REST reference</a><a href="/docs/formats">File formats</a>
-<a href="/openapi.json">openapi.json</a></nav>
+<nav><a href="/">Viewer</a><a href="/documentation/">Documentation</a><a href="/docs">REST reference</a>
+<a href="/docs/formats">File formats</a><a href="/openapi.json">openapi.json</a></nav>
 <button id="theme" type="button" class="quiet">Dark</button>
 </header>
 <main class="reference">

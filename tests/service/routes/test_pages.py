@@ -5,6 +5,7 @@ import re
 import pytest
 
 from bentray_service.routes.pages import WEB
+from bentray_service.web import documentation
 
 ASSETS = sorted(
     f"/static/{path.relative_to(WEB / 'static')}" for path in (WEB / "static").rglob("*") if path.is_file()
@@ -35,3 +36,39 @@ def test_problem_types_lead_to_their_list(start):
 
 def test_static_files_end_at_their_folder(start):
     assert start().get("/static/..%2f..%2fapp.py").status_code == 404
+
+
+@pytest.fixture
+def built(tmp_path, monkeypatch):
+    """A built documentation of two pages beside a file that is not part of it."""
+    folder = tmp_path / "documentation"
+    (folder / "how-to").mkdir(parents=True)
+    (folder / "index.html").write_text("<title>start</title>")
+    (folder / "how-to" / "deploy.html").write_text("<title>deploy</title>")
+    (tmp_path / "secret.html").write_text("secret")
+    monkeypatch.setattr(documentation, "PACKAGED", folder)
+    documentation.documentation_files.cache_clear()
+    yield folder
+    documentation.documentation_files.cache_clear()
+
+
+def test_the_documentation_is_served_under_the_same_policy(start, built):
+    app = start()
+    assert app.get("/documentation", follow_redirects=False).headers["location"] == "/documentation/"
+    for path, title in {"": "start", "how-to/deploy.html": "deploy"}.items():
+        answer = app.get(f"/documentation/{path}")
+        assert (answer.status_code, answer.text) == (200, f"<title>{title}</title>")
+        assert "default-src 'self'" in answer.headers["content-security-policy"]
+    for path in ("nowhere.html", "..%2fsecret.html", "%2e%2e/secret.html"):
+        assert app.get(f"/documentation/{path}").status_code == 404
+
+
+def test_a_documentation_that_is_not_built_says_how_to_get_it(start, monkeypatch, tmp_path):
+    monkeypatch.setattr(documentation, "PACKAGED", tmp_path)
+    monkeypatch.setattr(documentation, "CHECKOUT", tmp_path)
+    documentation.documentation_files.cache_clear()
+    answer = start().get("/documentation/")
+    documentation.documentation_files.cache_clear()
+    assert answer.status_code == 404
+    assert "make docs" in answer.text
+    assert not re.search(r"<script(?![^>]*\bsrc=)|<style|\bstyle=|\bon\w+=", answer.text)
