@@ -1,28 +1,52 @@
-"""Each engine on the OpenCL device beside compiled code: time, throughput and difference."""
+"""Each engine on the OpenCL device beside compiled code, and whole reconstructions on it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bentray_kernels.device_engines import Comparison, compare
+from bentray_kernels.device_engines import ENGINES_COMPARED, Comparison, compare
 from bentray_kernels.opencl import Device, choose
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
+
+from ._whole_runs import whole_runs
 
 # Times the speed of compiled code, where the device is another one than the processor. Where it is the
 # processor itself, its vectors are hardly used.
 WORTH_OTHER, WORTH_SAME = 1.0, 0.5
 
+# Time of one projection of 256² by the dissertation's Tesla, ms; frames of 512² asked for.
+ONE_PROJECTION = "fast iterative method, 1 of"
+THEIR_PROJECTION_MS, FRAMES_PER_S = 2.2, 60.0
+
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
-    """Two rows for each engine: the speed over compiled code, and the difference of the results."""
+    """Rows for each engine: the speed over compiled code, the difference, a rate; and for whole runs."""
     choice = choose()
     if choice.device is None:
         yield Row("D1 engines on a device", None, WORTH_OTHER, ">=", "", choice.reason)
         return
     for number, found in enumerate(compare(context.quick)):
-        context.progress(number + 1, 9, found.engine.name)
+        context.progress(number + 1, ENGINES_COMPARED, found.engine.name)
         yield from rows_of(found, choice.device)
+        yield from rates_of(found, choice.device)
+    yield from whole_runs(context, choice.device)
+
+
+def rates_of(found: Comparison, device: Device) -> Iterable[Row]:
+    """Times and rates that have a goal of their own on a graphics card."""
+    engine, seconds = found.engine, found.device_s
+    if seconds is None:
+        return
+    where = f"{device.label}, driver {device.driver}"
+    if engine.engine == "eikonal" and engine.name.startswith(ONE_PROJECTION):
+        label = f"D1 {engine.name}, time"
+        yield Row(
+            label, 1e3 * seconds, THEIR_PROJECTION_MS, "<=", "ms", f"{where}; goal: their Tesla at 256²"
+        )
+    elif engine.engine == "refraction":
+        label = f"D1 {engine.name}, frames per second"
+        yield Row(label, 1.0 / seconds, FRAMES_PER_S, ">=", "1/s", where)
 
 
 def rows_of(found: Comparison, device: Device) -> Iterable[Row]:

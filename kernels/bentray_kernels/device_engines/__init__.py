@@ -2,6 +2,6 @@
 
 from .comparison import Comparison, compare
 from .engine import Engine
-from .problems import engines
+from .problems import ENGINES_COMPARED, engines
 
-__all__ = ["Comparison", "Engine", "compare", "engines"]
+__all__ = ["ENGINES_COMPARED", "Comparison", "Engine", "compare", "engines"]

@@ -52,6 +52,9 @@ from .engine import Engine, odd_pixels, relative, rms_difference
 
 WATER_MPS = 1500.0
 
+# Rows of the table, see ``engines``.
+ENGINES_COMPARED = 10
+
 # Of a node in a step in float32: two fields are read and one is written; the three factors of the medium are
 # the same for all emitters and remain in a cache.
 STEP_BYTES = 12.0
@@ -77,6 +80,7 @@ def engines(quick: bool) -> Iterator[Engine]:
     yield projection(64 if quick else 256, 4 if quick else 64)
     yield traces(60 if quick else 212, 100 if quick else 800, 2 if quick else 8)
     yield gradients(60 if quick else 212, 100 if quick else 800, 2 if quick else 8)
+    yield traces_in_space(20 if quick else 210, 32)
     yield sart(64 if quick else 128, 2 if quick else 8)
     yield spline(10_000 if quick else 1_000_000)
     yield echoes(*((64, 16, 2) if quick else (256, 256, 16)))
@@ -133,6 +137,35 @@ def traces(nodes: int, steps: int, emitters: int) -> Engine:
         work,
         "node updates",
         STEP_BYTES * work,
+        relative,
+        "of the largest",
+        1e-5,
+    )
+
+
+def traces_in_space(nodes: int, steps: int) -> Engine:
+    """Traces of one emitter in 3-D, float32; 256³ nodes with the absorbing edges of 210³."""
+    spacing, step = 5e-4, 1e-7
+    speed = np.random.default_rng(0).uniform(1400.0, 1600.0, (nodes,) * 3)
+    medium = Medium.of(speed, spacing, step, dtype=np.float32)
+    middle = 0.5 * spacing * (nodes - 1)
+    places = np.array([[middle, middle, middle], [middle, middle, middle + 4.0 * spacing]])
+    pulse = np.exp(-(((np.arange(steps) - 0.5 * steps) * 6.0 / steps) ** 2))
+    emissions = Emissions(places[:1], places, [np.arange(2)], pulse)
+    work = float(steps * medium.keep.size)
+
+    def simulated(engine: WaveEngine) -> Floats:
+        return np.stack(list(simulate_emissions(medium, emissions, engine=engine)))
+
+    return Engine(
+        "traces",
+        f"3-D waves forwards, {medium.keep.shape[0]}³ with edges, {steps} steps",
+        lambda: simulated("compiled"),
+        lambda: simulated("opencl"),
+        work,
+        "node updates",
+        # With one emitter the factors of the medium are read from memory, too.
+        2.0 * STEP_BYTES * work,
         relative,
         "of the largest",
         1e-5,
@@ -314,7 +347,7 @@ def field(pixels: int) -> Engine:
         lambda: trace(world, eye, settings).astype(float),
         (lambda: tracer.follow(eye, settings).astype(float)) if tracer is not None and good else None,
         float(pixels**2),
-        "rays",
+        "rays with lookups",
         None,
         odd_pixels,
         "of the pixels",

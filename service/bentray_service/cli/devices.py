@@ -75,13 +75,13 @@ def devices(
 
 
 def _compared(*, quick: bool) -> list[Comparison]:
-    from bentray_kernels.device_engines import compare
+    from bentray_kernels.device_engines import ENGINES_COMPARED, compare
 
     found: list[Comparison] = []
     with progress_bar("Measuring engines") as step:
         for one in compare(quick):
             found.append(one)
-            step(len(found), 9, one.engine.name)
+            step(len(found), ENGINES_COMPARED, one.engine.name)
     return found
 
 

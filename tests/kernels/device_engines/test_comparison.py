@@ -6,12 +6,15 @@ import pytest
 
 from bentray_kernels.device_engines.comparison import compare, copy_bytes_per_s, measured
 from bentray_kernels.device_engines.problems import (
+    ENGINES_COMPARED,
+    engines,
     field,
     gradients,
     projection,
     refraction,
     sart,
     traces,
+    traces_in_space,
     trial_problems,
 )
 from bentray_kernels.opencl import choice
@@ -25,12 +28,13 @@ pytestmark = pytest.mark.opencl
     [
         lambda: projection(12, 2),
         lambda: traces(40, 60, 2),
+        lambda: traces_in_space(12, 32),
         lambda: gradients(40, 60, 2),
         lambda: sart(32, 2),
         pytest.param(lambda: refraction(32), marks=pytest.mark.slow),
         pytest.param(lambda: field(32), marks=pytest.mark.slow),
     ],
-    ids=["eikonal", "traces", "wave", "sart", "refraction", "field"],
+    ids=["eikonal", "traces", "space", "wave", "sart", "refraction", "field"],
 )
 def test_the_device_agrees_with_compiled_code_within_the_bound(engine):
     found = measured(engine(), 1e9, 1)
@@ -73,3 +77,7 @@ def test_without_a_device_there_is_nothing_to_compare(monkeypatch):
     with pytest.warns(choice.OpenCLFallbackWarning):
         assert list(compare(True)) == []
     choice._warn_once.cache_clear()
+
+
+def test_the_number_of_engines_is_known_before_they_are_built():
+    assert sum(1 for _ in engines(quick=True)) == ENGINES_COMPARED
