@@ -43,6 +43,7 @@ from ..tomography.grid_schedule import initial_slowness
 from ..tomography.reflection.delay_and_sum import Pixels, Signals, Sums, sum_echoes
 from ..tomography.reflection.delay_and_sum_opencl import sum_echoes_opencl
 from ..tomography.reflection.element_times import solve_times
+from ..tomography.sart.device_slices import TRIAL_EMITTERS
 from ..tomography.sart.sart_slices import SliceCall, advance_slices
 from ..tomography.sart.sart_step import begin
 from ..wave.emissions import Emissions, misfit_gradients, simulate_emissions
@@ -60,7 +61,7 @@ ENGINES_COMPARED = 10
 STEP_BYTES = 12.0
 
 # Of a scan for SART.
-SART_EMITTERS, SART_RECEIVERS = 8, 128
+SART_RECEIVERS = 128
 
 # Threads of compiled code that draw a picture, as many as the service uses.
 DRAWING_THREADS = min(4, len(os.sched_getaffinity(0)))
@@ -94,6 +95,7 @@ def trial_problems(engine: str) -> Iterator[Engine]:
         "eikonal": lambda size: projection((32, 256)[size], 1),
         "wave": lambda size: gradients(*((60, 60, 2), (212, 200, 8))[size]),
         "sart": lambda size: sart(*((64, 1), (128, 8))[size]),
+        "reflection": lambda size: echoes(*((64, 16, 2), (256, 128, 4))[size]),
         "refraction": lambda size: refraction((32, 256)[size]),
         "field": lambda size: field((32, 256)[size]),
     }
@@ -213,7 +215,7 @@ def wave_scan(nodes: int, steps: int, emitters: int) -> tuple[Medium, Emissions]
 
 
 def sart(nodes: int, slices: int) -> Engine:
-    """Slices of a ring scan of a phantom, updated by ``SART_EMITTERS`` emitters each."""
+    """Slices of a ring scan of a phantom, updated by ``TRIAL_EMITTERS`` emitters each."""
     calls, settings = sart_scan(nodes, slices)
 
     def speeds(device: str) -> Floats:
@@ -222,10 +224,10 @@ def sart(nodes: int, slices: int) -> Engine:
 
     return Engine(
         "sart",
-        f"Eikonal-SART, {slices} of {nodes}², {SART_EMITTERS} emitters each",
+        f"Eikonal-SART, {slices} of {nodes}², {TRIAL_EMITTERS} emitters each",
         lambda: speeds("cpu"),
         lambda: speeds("opencl"),
-        float(SART_EMITTERS * slices * nodes**2),
+        float(TRIAL_EMITTERS * slices * nodes**2),
         "nodes",
         None,
         rms_difference,
@@ -236,13 +238,13 @@ def sart(nodes: int, slices: int) -> Engine:
 
 def sart_scan(nodes: int, slices: int) -> tuple[list[SliceCall], Settings]:
     """The begin of a reconstruction of slices that are all the same."""
-    ring, sending = Ring(SART_RECEIVERS, 0.45 * TABLE6_SIDE_M), np.arange(SART_EMITTERS)
+    ring, sending = Ring(SART_RECEIVERS, 0.45 * TABLE6_SIDE_M), np.arange(TRIAL_EMITTERS)
     positions = ring.positions()
     speed, spacing = table6(WATER_MPS).speed(nodes, TABLE6_SIDE_M), TABLE6_SIDE_M / (nodes - 1)
-    senders = np.linspace(0, ring.elements, SART_EMITTERS, endpoint=False).astype(int)
+    senders = np.linspace(0, ring.elements, TRIAL_EMITTERS, endpoint=False).astype(int)
     places = positions / spacing + 0.5 * (nodes - 1)
     times = eikonal.solve_many(
-        np.broadcast_to(speed, (SART_EMITTERS, *speed.shape)), spacing, spacing * places[senders], "fsm"
+        np.broadcast_to(speed, (TRIAL_EMITTERS, *speed.shape)), spacing, spacing * places[senders], "fsm"
     )
     measured = np.stack([map_coordinates(time, places.T, order=1) for time in times])
     offset = positions[senders, None] - positions
@@ -252,7 +254,7 @@ def sart_scan(nodes: int, slices: int) -> tuple[list[SliceCall], Settings]:
     settings = Settings.of(method="sart", nodes=nodes, side_m=TABLE6_SIDE_M, iterations=2)
     problem = Problem.of(scan, settings)
     state = begin(initial_slowness(problem, None))
-    return [SliceCall(problem, state, SART_EMITTERS, k) for k in range(slices)], settings
+    return [SliceCall(problem, state, TRIAL_EMITTERS, k) for k in range(slices)], settings
 
 
 def echoes(pixels: int, elements: int, emissions: int) -> Engine:

@@ -89,6 +89,12 @@ def place(work: Work, device: str = "auto") -> Session | None:
     return session
 
 
+def may_place() -> bool:
+    """Whether ``auto`` may find a device on this machine: False without one that it may use."""
+    request = requested()
+    return request == "opencl" or (request == "auto" and not cpu_only() and _tested_device() is not None)
+
+
 def check_available(device: str) -> None:
     """Check, before any work, that a device that is requested exists and passes its self-test.
 

@@ -17,7 +17,7 @@ from .records import read_record, record_file, write_record
 
 # The engines that are tried, and the module that tries them. It imports every engine, so it is started as a
 # process and never imported here.
-ENGINES = ("eikonal", "wave", "sart", "refraction", "field")
+ENGINES = ("eikonal", "wave", "sart", "reflection", "refraction", "field")
 MODULE = "bentray_kernels.device_engines.trial_process"
 
 # Of all engines; the first run of an installation compiles kernels too.

@@ -19,6 +19,7 @@ from ..task_graph import ThreadPool, run
 from . import pairs
 from .attenuation import EXPERIMENTAL
 from .decomposition import with_decomposition
+from .device_choice import ScanSize, needs_decision, with_device
 from .geometry_summary import geometry_summary
 from .grid_schedule import stages
 from .image_grid import automatic_nodes
@@ -80,6 +81,7 @@ def reconstruct(
         return MemoryWaveScan(dataset, plan, index=index)
 
     recorded = dataset.waveform
+    settings = on_this_machine(dataset, settings, 0 if recorded is None else recorded.object.shape[-1])
     echoes = None
     if recorded is not None:
         echoes = Echoes(recorded.object.shape[-1], lambda index: MemoryEchoScan(dataset, index))
@@ -92,6 +94,19 @@ def reconstruct(
         0 if recorded is None or recorded.water is None else recorded.object.shape[-1],
         echoes,
     )
+
+
+def on_this_machine(dataset: Dataset, settings: Settings, samples: int) -> Settings:
+    """The settings with the device that this machine computes on, see ``device_choice.with_device``."""
+    if not needs_decision(settings):
+        return settings
+    return settings.changed(device=with_device(*device_request(dataset, settings, samples)).device)
+
+
+def device_request(dataset: Dataset, settings: Settings, samples: int) -> tuple[ScanSize, Settings]:
+    """The arguments of ``device_choice.with_device`` for a dataset with so many samples in a trace."""
+    known = with_nodes(dataset, with_decomposition(dataset.element_position_m, settings))
+    return ScanSize(dataset.slices, len(dataset.tx), len(dataset.rx), samples), known
 
 
 def run_reconstruction(

@@ -315,8 +315,9 @@ class Settings:
     )
     device: Literal["auto", "cpu", "opencl"] = setting(
         "auto",
-        "Where SART of slices, full waveforms and reflection are computed. opencl: on an OpenCL device, many "
-        "slices or emitters at a time; cpu and auto: in compiled code. The images differ by rounding.",
+        "Where SART of slices, full waveforms and reflection are computed. auto: on an OpenCL device where a "
+        "trial on this machine was faster; cpu: in compiled code; opencl: on a device, many slices or "
+        "emitters at a time. The images differ by rounding, and the result states which it was.",
         label="Compute on",
         words={"auto": "Automatic", "cpu": "Processor", "opencl": "OpenCL device"},
     )

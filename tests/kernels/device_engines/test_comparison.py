@@ -68,7 +68,7 @@ def test_every_engine_of_the_trial_has_a_small_and_a_large_problem():
         small, large = trial_problems(name)
         assert small.engine == large.engine == name
         assert small.size < large.size
-    assert set(ENGINES) == {"eikonal", "wave", "sart", "refraction", "field"}
+    assert set(ENGINES) == {"eikonal", "wave", "sart", "reflection", "refraction", "field"}
 
 
 def test_without_a_device_there_is_nothing_to_compare(monkeypatch):

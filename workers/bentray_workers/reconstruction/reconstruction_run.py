@@ -34,6 +34,7 @@ from ..files.findings import ScanFindings, read_findings
 from ..files.reconstruction import write_reconstruction
 from ..files.reference import read_reference, reference_path
 from ..files.volume_export import FREQUENCY
+from .device_of_job import settled
 from .file_scan import FileEchoScan, FileScan, FileWaveScan
 from .picking_graph import PickingFiles, PickingGraph, PickingGuide, PickingSource
 
@@ -78,6 +79,7 @@ def reconstruct(
         InvalidInput: from the file or the settings, and for a device that no worker offers.
     """
     with _folder(work_dir) as folder:
+        settings = settled(client, folder, dataset_path, settings)
         resources = RECONSTRUCTION if client is None else resources_for(client, settings)
         pool = open_pool(client, folder, share, placement=lambda: {"resources": resources}, threads=threads)
         checkpoints = Checkpoints(folder / CHECKPOINTS, on_saved or (lambda: None))

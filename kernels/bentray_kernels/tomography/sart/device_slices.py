@@ -22,6 +22,9 @@ GROUP, RAYS_GROUP = 256, 64
 MEMORY_SHARE = 0.5
 PROCESSOR_SLICES = 8
 
+# Emitters of each slice in the trial of a device.
+TRIAL_EMITTERS = 8
+
 # Columns beside a diagonal in local memory, diagonals there, and rows of crossing times: as ``fronts.cl``.
 BESIDE, SLOTS, CROSSINGS = 4, 6, 2
 

@@ -1,0 +1,111 @@
+"""The device of a job: decided once by the trial, kept on a resume, and none where nothing exists for one."""
+
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.opencl import choice, placement
+from bentray_kernels.tomography import Settings, device_choice
+from bentray_kernels.tomography.device_choice import ScanSize, device_work, with_device
+from bentray_workers.cluster import capacities
+from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.reconstruction.device_of_job import DECISION, settled
+
+SIZE = ScanSize(40, 256, 256, 0)
+SART = Settings(method="sart", nodes=32, decomposition="slices")
+
+
+@pytest.fixture
+def path(scan, tmp_path):
+    file = tmp_path / "scan.h5"
+    write_dataset(file, scan)
+    return file
+
+
+@pytest.fixture
+def trial(monkeypatch):
+    """What the trial decides, and how often it is asked."""
+    asked, answer = [], [object()]
+
+    def place(work, device="auto"):
+        asked.append(work)
+        return answer[0]
+
+    monkeypatch.setattr(device_choice, "place", place)
+    monkeypatch.setattr(device_choice, "may_place", lambda: True)
+    return asked, answer
+
+
+def test_auto_takes_the_device_where_the_trial_was_faster(trial):
+    asked, answer = trial
+    assert with_device(SIZE, SART).device == "opencl"
+    answer[0] = None
+    assert with_device(SIZE, SART) == SART
+    assert {work.engine for work in asked} == {"sart"}
+    assert asked[0].size == 8 * 40 * 32**2
+    assert asked[0].memory_bytes > asked[0].buffer_bytes > 0
+    assert with_device(SIZE, SART.changed(device="cpu")).device == "cpu"
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "samples", "engine"),
+    [
+        ({}, 0, "sart"),
+        ({"rays": "straight"}, 0, "sart"),
+        ({"method": "gauss-newton"}, 0, None),
+        ({"method": "auto"}, 0, "sart"),
+        ({"method": "auto"}, 100, "sart"),
+        ({"method": "auto", "minutes": 5.0}, 100, "wave"),
+        ({"method": "waveform"}, 100, "wave"),
+        ({"method": "waveform", "reflection": True}, 100, "wave"),
+        ({"method": "gauss-newton", "reflection": True}, 100, "reflection"),
+        ({"decomposition": "volume"}, 0, None),
+        ({"eikonal": "fmm"}, 0, None),
+        ({"speed_range_mps": (1400.0, 1600.0)}, 0, None),
+    ],
+)
+def test_the_part_that_takes_longest_decides(changes, samples, engine):
+    work = device_work(SIZE._replace(samples=samples), SART.changed(**changes))
+    assert (work.engine if work else None) == engine
+
+
+def test_a_resumed_job_keeps_its_device(trial, path, tmp_path):
+    asked, answer = trial
+    assert settled(None, tmp_path, path, SART).device == "opencl"
+    answer[0] = None
+    assert settled(None, tmp_path, path, SART).device == "opencl"
+    assert len(asked) == 1
+    (tmp_path / DECISION).write_text("damaged")
+    assert settled(None, tmp_path, path, SART).device == "auto"
+
+
+def test_embedded_workers_offer_the_device_that_is_chosen(trial, path, tmp_path, monkeypatch):
+    monkeypatch.setattr(capacities, "_has_device", lambda: True)
+    with open_cluster(workers=1, local_directory=tmp_path / "local", processes=False) as cluster:
+        chosen = settled(cluster.client, tmp_path, path, SART)
+        assert chosen.device == "opencl"
+        assert "opencl" in capacities.capacities_of(cluster.client)[0].resources
+        # A device that has gone since is not waited for.
+        monkeypatch.setattr(capacities, "_has_device", lambda: False)
+    with open_cluster(workers=1, local_directory=tmp_path / "other", processes=False) as cluster:
+        assert settled(cluster.client, tmp_path, path, SART).device == "auto"
+
+
+def test_without_a_device_nothing_is_read_or_written(path, tmp_path, monkeypatch):
+    monkeypatch.setenv("BENTRAY_DEVICE", "cpu")
+    path.unlink()
+    assert settled(None, tmp_path, path, SART) == SART
+    assert not (tmp_path / DECISION).exists()
+
+
+def test_a_requested_device_that_is_missing_is_an_error(path, tmp_path, monkeypatch):
+    monkeypatch.delenv("BENTRAY_DEVICE", raising=False)
+    monkeypatch.setenv("BENTRAY_OPENCL_DEVICE", "none")
+    with pytest.raises(InvalidInput, match="device: found 'opencl', but BENTRAY_OPENCL_DEVICE=none"):
+        settled(None, tmp_path, path, SART.changed(device="opencl"))
+    monkeypatch.setenv("BENTRAY_DEVICE", "cpu")
+    with pytest.raises(InvalidInput, match="because this machine has BENTRAY_DEVICE=cpu"):
+        settled(None, tmp_path, path, SART.changed(device="opencl"))
+    assert choice.hidden()
+    assert not placement.may_place()
