@@ -55,6 +55,7 @@ from .routes import (
     pages,
     plans,
     previews,
+    projects,
     refraction,
     sign_in,
     tus,
@@ -68,6 +69,7 @@ from .rows.job_queue import Queue
 from .rows.jobs import Jobs
 from .rows.keys import Keys
 from .rows.observed_time import ObservedTime
+from .rows.projects import Projects
 from .rows.sessions import Sessions
 from .rows.stored_tables import Datasets, GeometryFields, Meshes, UploadedTable, Volumes
 from .rows.uploads import Uploads
@@ -157,6 +159,7 @@ def _routes() -> tuple[BaseRoute, ...]:
         meshes,
         geometry_fields,
         access,
+        projects,
         cluster_health,
     ):
         router.include_router(part.router, **CLOSED)
@@ -189,7 +192,8 @@ def _open(
     orphans.begin()
     quota = Quota(database, settings.max_tenant_bytes)
     quota.begin(files, alone=settings.database_url is None)
-    access_control = SignIn(settings, Keys(database), Sessions(database))
+    tenant_projects = Projects(database)
+    access_control = SignIn(settings, Keys(database), Sessions(database), tenant_projects)
     stack.callback(access_control.close)
     if cluster is None:
         cluster = stack.enter_context(
@@ -258,6 +262,7 @@ def _open(
         datasets=Datasets(database),
         jobs=Jobs(database),
         batches=Batches(database),
+        projects=tenant_projects,
         queue=queue,
         volumes=Volumes(database),
         meshes=Meshes(database),
@@ -274,7 +279,7 @@ def _open(
         pictures=pictures,
         runner=runner,
         sign_in=access_control,
-        key_watch=KeyWatch(Keys(database), Sessions(database)),
+        key_watch=KeyWatch(Keys(database), Sessions(database), tenant_projects),
         feed=EventFeed(Jobs(database), leaving.is_set),
         audit=Audit(files.audit),
         readiness=readiness,

@@ -73,6 +73,7 @@ def _authenticate(scope: Scope, seen: _RequestLog) -> Caller:
     sign_in = _parts(scope).sign_in
     headers, peer = Headers(scope=scope), scope.get("client")
     seen.caller = sign_in.caller(headers, peer[0] if peer else "", scope["method"])
+    seen.caller = sign_in.in_project(seen.caller, headers)
     sign_in.check(seen.caller, scope["method"], scope["path"])
     return seen.caller
 
@@ -127,8 +128,8 @@ class _RequestLog:
         # Of a request that signs in or out.
         self.caller = self.caller or self._scope.get("state", {}).get("caller")
         if self.caller is not None:
-            who = {"tenant": self.caller.tenant, "how": self.caller.how, "who": self.caller.who}
-            figures |= who
+            who = {"tenant": self.caller.home, "how": self.caller.how, "who": self.caller.who}
+            figures |= who | ({"project": self.caller.project} if self.caller.project else {})
             number = self._scope["state"]["request_id"]
             _parts(self._scope).audit.append({"request": number, **figures, "ids": self._ids()})
         seconds = round(time.perf_counter() - self._begun, 4)

@@ -29,6 +29,7 @@ from .rows.batches import Batches
 from .rows.database import Database
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
+from .rows.projects import Projects
 from .rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
 from .rows.tenants import Tenant
 from .rows.uploads import Uploads
@@ -45,6 +46,7 @@ class Parts:
     datasets: Datasets
     jobs: Jobs
     batches: Batches
+    projects: Projects
     queue: Queue
     volumes: Volumes
     meshes: Meshes

@@ -9,6 +9,7 @@ from bentray_service.openapi import description
 from bentray_service.routes.jobs import JobRequest
 from bentray_service.routes.models.batch_records import BatchRequest
 from bentray_service.routes.models.name_changes import DatasetChanges, JobChanges
+from bentray_service.routes.models.project_records import MemberRequest, ProjectRequest
 
 COMMITTED = Path(__file__).parents[2] / "openapi.json"
 
@@ -81,9 +82,8 @@ def test_every_error_response_is_described():
 
 
 def test_every_json_body_has_examples_that_are_taken():
-    changes = {
-        f"#/components/schemas/{one.__name__}": one for one in (BatchRequest, DatasetChanges, JobChanges)
-    }
+    models = (BatchRequest, DatasetChanges, JobChanges, MemberRequest, ProjectRequest)
+    changes = {f"#/components/schemas/{one.__name__}": one for one in models}
     found = 0
     for _, operation in operations():
         content = operation.get("requestBody", {}).get("content", {}).get("application/json")

@@ -126,7 +126,7 @@ class BrowserSessions:
         # A session of before ends, so that nobody finds themselves in that of another.
         self._end(headers)
         secret, row = self._sessions.start(user.tenant, user.who, user.scopes, self._seconds)
-        caller = Caller(row["tenant"], "session", row["who"], frozenset(row["scopes"]), row["id"])
+        caller = Caller(row["tenant"], "session", row["who"], frozenset(row["scopes"]), (row["id"],))
         cookies = [
             Cookie(self._pending, "", 0.0, self._secure, "Lax"),
             Cookie(self._session, secret, self._seconds, self._secure, "Strict"),
@@ -145,7 +145,7 @@ class BrowserSessions:
             return None
         if method not in SAFE_METHODS:
             self._check_origin(headers)
-        return Caller(row["tenant"], "session", row["who"], frozenset(row["scopes"]), row["id"])
+        return Caller(row["tenant"], "session", row["who"], frozenset(row["scopes"]), (row["id"],))
 
     def sign_out(self, headers: Headers) -> tuple[Caller | None, str | None, Cookie]:
         """End the session of a request: who it was, where to sign out at the provider, the cookie to delete.

@@ -28,18 +28,36 @@ class Caller:
     """The authenticated caller.
 
     Attributes:
-        tenant: whose data it accesses.
+        tenant: whose data it accesses; in a project, its id.
         how: method of authentication: ``open`` (not required), ``key``, ``proxy`` or ``session``.
         who: id of the key, or user name from the proxy or the OpenID provider.
         scopes: permissions.
-        ends: id of the key or session whose end ends its requests; empty if there is none.
+        ends: ids of the key or session and of the membership whose end ends its requests.
+        project: id of the project in which it acts; empty outside of projects.
+        role: in this project.
+        owner: tenant of this project.
     """
 
     tenant: Tenant
     how: Literal["open", "key", "proxy", "session"]
     who: str
     scopes: frozenset[str]
-    ends: str = ""
+    ends: tuple[str, ...] = ()
+    project: str = ""
+    role: str = ""
+    owner: Tenant | None = None
+
+    @property
+    def home(self) -> Tenant:
+        """The tenant, also in one of its projects."""
+        return self.tenant if self.owner is None else self.owner
+
+    @property
+    def member(self) -> str | None:
+        """What members of projects are called; None without authentication, when everything is allowed."""
+        if self.how == "open":
+            return None
+        return f"{'key' if self.how == 'key' else 'user'}:{self.who}"
 
 
 ANYONE = Caller(LOCAL, "open", "", frozenset(SCOPES))

@@ -1,11 +1,11 @@
-"""Ends requests in progress when their key or session ends, polling the database once a second."""
+"""Ends requests in progress when their key, session or membership ends, polling the database."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 
 import anyio
 from sqlalchemy.exc import SQLAlchemyError
@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ..errors import DatabaseUnavailable, NotAuthenticated
 from ..rows.keys import Keys
+from ..rows.projects import Projects
 from ..rows.sessions import Sessions
 from ..web.errors import problem_response
 
@@ -24,20 +25,21 @@ EVENTS = b"text/event-stream"
 
 
 class KeyWatch:
-    """The requests in progress of each key and session.
+    """The requests in progress of each key, session and membership of a project.
 
     Another process may end them, therefore the database is polled. Most requests end before the first poll.
     """
 
-    def __init__(self, keys: Keys, sessions: Sessions) -> None:
+    def __init__(self, keys: Keys, sessions: Sessions, projects: Projects) -> None:
         self._keys = keys
         self._sessions = sessions
+        self._projects = projects
         self._under_way: dict[str, set[Callable[[], None]]] = {}
         self._polling: asyncio.Task[None] | None = None
 
     @contextmanager
     def during(self, key_id: str, end: Callable[[], None]) -> Iterator[None]:
-        """Within the block, call ``end`` once if the key or session ends."""
+        """Within the block, call ``end`` once if the key, session or membership ends."""
         self._under_way.setdefault(key_id, set()).add(end)
         if self._polling is None:
             self._polling = asyncio.create_task(self._poll())
@@ -50,7 +52,7 @@ class KeyWatch:
                 self._under_way.pop(key_id, None)
 
     def _ended(self, ids: list[str]) -> list[str]:
-        return [*self._keys.ended(ids), *self._sessions.ended(ids)]
+        return [*self._keys.ended(ids), *self._sessions.ended(ids), *self._projects.ended(ids)]
 
     async def _poll(self) -> None:
         # A thread of its own, so that polling does not wait for other work.
@@ -75,9 +77,9 @@ class KeyWatch:
 
 
 async def answer_while_valid(
-    app: ASGIApp, scope: Scope, receive: Receive, send: Send, watch: KeyWatch, key_id: str
+    app: ASGIApp, scope: Scope, receive: Receive, send: Send, watch: KeyWatch, ids: Sequence[str]
 ) -> None:
-    """Answer a request until its key or session ends.
+    """Answer a request until its key, session or membership of a project ends; ``ids`` are theirs.
 
     Before the response has started, it becomes 401. An event stream ends; the connection of any other
     response is aborted, so that the client does not take a part of a file for the whole.
@@ -85,7 +87,7 @@ async def answer_while_valid(
     cancelling = anyio.CancelScope()
     ended = begun = events = replaced = complete = False
     refusal = NotAuthenticated(
-        "Authorization", "a key or session that ended during the request", "a valid key or session"
+        "Authorization", "a key, session or membership that ended during the request", "a valid one"
     )
 
     def end() -> None:
@@ -116,7 +118,10 @@ async def answer_while_valid(
         if not replaced:
             await send(message)
 
-    with watch.during(key_id, end), cancelling:
+    with ExitStack() as watched:
+        for one in ids:
+            watched.enter_context(watch.during(one, end))
+        watched.enter_context(cancelling)
         await app(scope, receive_while_valid, send_while_valid)
     if begun and events and not complete:
         await send({"type": "http.response.body", "body": b"", "more_body": False})

@@ -13,6 +13,8 @@ from ..rows.tenants import LOCAL, Tenant, checked_tenant, tenant_of_user
 from ..settings import ServiceSettings
 from .caller import USUAL, checked_scopes
 
+LONGEST_USER = 200
+
 Checked = TypeVar("Checked")
 
 
@@ -66,6 +68,9 @@ class ClaimMapping:
         users = values_of(claims, self._user)
         if len(users) != 1:
             raise Forbidden(self._user, _shown(users), "one name of the user, as text")
+        # Longer ones are cut where they are stored, and could then be those of another user.
+        if len(users[0]) > LONGEST_USER:
+            raise Forbidden(self._user, f"{len(users[0])} characters", f"at most {LONGEST_USER}")
         if self._user == "email" and claims.get("email_verified") is False:
             raise Forbidden("email_verified", "false", "true: an address that the provider has verified")
         return Identity(self._tenant_of(users[0], claims), users[0], self._scopes(claims))

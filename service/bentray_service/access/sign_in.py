@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
+from dataclasses import replace
 
 from starlette.datastructures import Headers
 
@@ -13,8 +14,9 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import Forbidden, NotAuthenticated, RateLimited
 from ..rows.api_key import PREFIX, ApiKey
 from ..rows.keys import Keys
+from ..rows.projects import ROLES, Projects, membership
 from ..rows.sessions import Sessions
-from ..rows.tenants import LOCAL, tenant_of_user
+from ..rows.tenants import LOCAL, Tenant, tenant_of_user
 from ..settings import ServiceSettings
 from ..web.addresses import is_loopback, names_loopback, networks, within
 from .browser_sessions import BrowserSessions
@@ -22,6 +24,9 @@ from .caller import ANYONE, SCOPES, USUAL, Caller, scope_of
 from .rate_limits import RateLimits
 
 log = logging.getLogger("bentray.access")
+
+# Names the project in which a request acts.
+PROJECT_HEADER = "Bentray-Project"
 
 # Sign-ins that an address may begin per minute.
 SIGN_INS_PER_MINUTE = 60
@@ -46,11 +51,12 @@ class SignIn:
         browsers: sessions of users who signed in at the OpenID provider; None without one.
     """
 
-    def __init__(self, settings: ServiceSettings, keys: Keys, sessions: Sessions) -> None:
+    def __init__(self, settings: ServiceSettings, keys: Keys, sessions: Sessions, projects: Projects) -> None:
         """Raises:
         InvalidInput: if the service would be open to other machines, or for an invalid setting.
         """
         self._keys = keys
+        self._projects = projects
         self._trusted = networks(settings.trusted_proxies or "")
         self._user_header = settings.proxy_user_header
         self.browsers = None if settings.oidc_issuer is None else BrowserSessions(settings, sessions)
@@ -109,6 +115,27 @@ class SignIn:
             accepted += f"; or a session: sign in at {self.browsers.name}"
         raise NotAuthenticated("Authorization", found, accepted)
 
+    def in_project(self, caller: Caller, headers: Headers) -> Caller:
+        """The caller in the project that a request names, with the permissions of its role there.
+
+        Raises:
+            UnknownId: when the caller is no member of it.
+        """
+        name = headers.get(PROJECT_HEADER)
+        if name is None:
+            return caller
+        project = self._projects.get(caller.tenant, name, caller.member)
+        ends = () if caller.member is None else (membership(project["id"], caller.member),)
+        return replace(
+            caller,
+            tenant=Tenant(project["id"]),
+            scopes=caller.scopes.intersection(ROLES[project["role"]]),
+            ends=(*caller.ends, *ends),
+            project=project["id"],
+            role=project["role"],
+            owner=caller.tenant,
+        )
+
     def check(self, caller: Caller, method: str, path: str) -> None:
         """Check the scopes and the rate limit of a caller.
 
@@ -145,7 +172,7 @@ class SignIn:
             raise RateLimited("sign-ins", found, "a lower rate; see Retry-After", wait_s)
 
     def _take(self, rates: RateLimits, what: str, caller: Caller, share: float = 1.0) -> None:
-        wait_s = rates.take(caller.tenant, share) if caller.how != "open" else 0.0
+        wait_s = rates.take(caller.home, share) if caller.how != "open" else 0.0
         if wait_s > 0.0:
             raise RateLimited(
                 what, f"more than {rates.per_minute} per minute", "a lower rate; see Retry-After", wait_s
@@ -168,7 +195,7 @@ class SignIn:
             raise NotAuthenticated(
                 "Authorization", "a key that is unknown, revoked or expired", "a valid key"
             )
-        return Caller(row["tenant"], "key", row["id"], frozenset(row["scopes"]), row["id"])
+        return Caller(row["tenant"], "key", row["id"], frozenset(row["scopes"]), (row["id"],))
 
     def _create_first_key(self, settings: ServiceSettings) -> None:
         path = settings.first_key_file

@@ -18,6 +18,7 @@ from . import (
     export,
     geometry_field,
     keys,
+    projects,
     quality,
     reconstruct,
     render,
@@ -67,6 +68,7 @@ for command in (
     app.command()(command)
 app.command(cls=RepeatedSpacing)(render.render)
 app.add_typer(keys.keys, name="keys")
+app.add_typer(projects.projects, name="projects")
 
 
 def _version(requested: bool) -> None:

@@ -17,6 +17,7 @@ from bentray_kernels.errors import InvalidInput
 from .output.terminal import AsJson, print_json, print_lines, print_table, remark
 
 if TYPE_CHECKING:
+    from ..rows.database import Database
     from ..rows.keys import Keys
     from ..rows.typed_rows import KeyRow
 
@@ -116,10 +117,18 @@ def revoke(
 
 @contextmanager
 def _opened(data: Path | None) -> Iterator[Keys]:
+    from ..rows.keys import Keys
+
+    with opened_database(data) as database:
+        yield Keys(database)
+
+
+@contextmanager
+def opened_database(data: Path | None) -> Iterator[Database]:
+    """The database of the service with this data folder, which may be running."""
     from ..files.data_folder import Files
     from ..files.private import private_files
     from ..rows.database import open_database
-    from ..rows.keys import Keys
     from ..settings import ServiceSettings
 
     settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
@@ -127,7 +136,7 @@ def _opened(data: Path | None) -> Iterator[Keys]:
         Files(settings.data_dir).prepare()
         database = open_database(settings.database)
         try:
-            yield Keys(database)
+            yield database
         finally:
             database.close()
 
@@ -140,14 +149,15 @@ def _seconds(text: str) -> float:
 
 
 def _shown(row: KeyRow) -> dict[str, Any]:
-    times = {name: _time(row[name]) for name in ("created", "expires", "revoked", "used")}
+    times = {name: shown_time(row[name]) for name in ("created", "expires", "revoked", "used")}
     same = {name: row[name] for name in ("id", "tenant", "name", "scopes")}
     expired = row["expires"] is not None and row["expires"] <= time.time()
     state = "revoked" if row["revoked"] is not None else "expired" if expired else "valid"
     return {**same, "state": state, **times}
 
 
-def _time(seconds: float | None) -> str | None:
+def shown_time(seconds: float | None) -> str | None:
+    """A time, s since 1970, as text."""
     return None if seconds is None else datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")
 
 

@@ -11,6 +11,7 @@ import httpx
 
 from . import batches as batch_flows
 from . import flows, lists, pictures
+from . import projects as project_flows
 from .connection import Connection, ConnectionOptions, document
 from .errors import ClientError, from_response, no_answer
 from .saving import saving
@@ -62,6 +63,11 @@ class AsyncClient(Connection):
     download = _method(flows.download)
     download_dataset = _method(flows.download_dataset)
     delete = _method(flows.delete)
+    create_project = _method(project_flows.create_project)
+    set_member = _method(project_flows.set_member)
+    delete_project = _method(project_flows.delete_project)
+    project = _method(project_flows.project)
+    projects = _method(project_flows.projects)
     datasets = _method(lists.datasets)
     jobs = _method(lists.jobs)
     volumes = _method(lists.volumes)

@@ -24,6 +24,7 @@ class ConnectionOptions(TypedDict, total=False):
     poll_s: float
     patience_s: float
     on_wait: Callable[[str], None] | None
+    project: str | None
 
 
 class Connection:
@@ -34,6 +35,7 @@ class Connection:
     Args:
         url: of the service.
         key: API key, if required; default: the variable ``BENTRAY_KEY``.
+        project: id of the project in which to work; default: the variable ``BENTRAY_PROJECT``.
         timeout_s: time limit for a response.
         poll_s: interval between polls of a job without event stream.
         patience_s: time for which requests are retried while the service is unavailable, e.g. during a
@@ -51,6 +53,7 @@ class Connection:
         url: str,
         key: str | None = None,
         *,
+        project: str | None = None,
         timeout_s: float = 300.0,
         poll_s: float = 0.3,
         patience_s: float = PATIENCE_S,
@@ -66,9 +69,13 @@ class Connection:
         self.poll_s = poll_s
         self._retries = Retries(patience_s, on_wait)
         key = key or os.environ.get("BENTRAY_KEY")
+        headers = {
+            "Authorization": f"Bearer {key}" if key else None,
+            "Bentray-Project": project or os.environ.get("BENTRAY_PROJECT"),
+        }
         self._options: dict[str, Any] = {
             "base_url": self.url,
-            "headers": {"Authorization": f"Bearer {key}"} if key else {},
+            "headers": {name: value for name, value in headers.items() if value},
             # An upload is answered after the service has read the file.
             "timeout": httpx.Timeout(timeout_s, connect=CONNECT_S),
         }
@@ -83,6 +90,7 @@ def document(method: Callable[..., Any], flow: Callable[..., Any]) -> None:
     signature = inspect.signature(flow)
     first, *others = signature.parameters.values()
     result = str(signature.return_annotation).removeprefix("Flow[").removesuffix("]")
-    parameters = [first.replace(name="self", annotation=first.empty, kind=others[0].kind), *others]
+    kind = others[0].kind if others else first.kind
+    parameters = [first.replace(name="self", annotation=first.empty, kind=kind), *others]
     documented = signature.replace(parameters=parameters, return_annotation=result)
     method.__signature__ = documented  # type: ignore[attr-defined]

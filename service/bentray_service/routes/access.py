@@ -25,8 +25,10 @@ class AccessRecord(BaseModel):
         "OpenID provider."
     )
     who: str = Field(description="Id of the key, or user name from the proxy or provider.")
-    scopes: list[str]
-    bytes_stored: int = Field(description="Bytes stored by the tenant.")
+    project: str | None = Field(description="Id of the project in which the request acts.")
+    role: str | None = Field(description="Role in this project.")
+    scopes: list[str] = Field(description="Permissions, in a project those of the role.")
+    bytes_stored: int = Field(description="Bytes stored by the tenant, its projects included.")
     bytes_reserved: int = Field(description="Bytes reserved for uploads and unfinished jobs.")
     bytes_most: int = Field(description="Storage quota of the tenant, bytes.")
     requests_per_minute: int = Field(description="Rate limit of the tenant; 0: unlimited.")
@@ -82,7 +84,9 @@ def show_access(service: Service, caller: CurrentCaller) -> AccessRecord:
     settings, limited = service.settings, caller.how != "open"
     used = service.quota.of(caller.tenant)
     return AccessRecord(
-        tenant=caller.tenant,
+        tenant=caller.home,
+        project=caller.project or None,
+        role=caller.role or None,
         how=caller.how,
         who=caller.who,
         scopes=sorted(caller.scopes),
@@ -107,5 +111,5 @@ def show_storage(service: Service, caller: CurrentCaller) -> StorageList:
 @router.get("/keys", responses=problems(503))
 def list_keys(service: Service, caller: CurrentCaller) -> OwnKeyList:
     """List the API keys of the tenant; `bentray keys` creates and revokes them."""
-    rows = Keys(service.database).all(caller.tenant)
+    rows = Keys(service.database).all(caller.home)
     return OwnKeyList(keys=[OwnKey.model_validate(row) for row in rows])

@@ -11,6 +11,7 @@ PREFIXES = {
     "dataset": "ds",
     "job": "job",
     "batch": "batch",
+    "project": "project",
     "volume": "vol",
     "mesh": "mesh",
     "field": "field",

@@ -18,6 +18,7 @@ from ..errors import JobFinished, KeyReused, QueueFull, UnknownId
 from . import job_search, schema, usage
 from .ids import checked, new_id
 from .job_states import RUNNING, append_event, change
+from .projects import family_of
 from .schema import ENDED, UNFINISHED, jobs
 from .stored_tables import NamedTable
 from .tenants import Tenant
@@ -355,7 +356,8 @@ def insert_jobs(
         QuotaExceeded, QueueFull, UnknownId: as for ``Jobs.add``; the transaction must be rolled back.
     """
     if how.most_queued is not None:
-        mine = select(func.count()).where(jobs.c.tenant == tenant, jobs.c.state == "queued")
+        family = family_of(connection, tenant)
+        mine = select(func.count()).where(jobs.c.tenant.in_(family), jobs.c.state == "queued")
         waiting = connection.execute(mine).scalar_one()
         if waiting + len(new) > how.most_queued:
             more = f" and {len(new)} more" if len(new) > 1 else ""

@@ -20,7 +20,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 8
+VERSION = 9
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -160,6 +160,30 @@ batches = Table(
     Column("request_sha256", String(64)),
     Index("batches_by_tenant", "tenant", "number"),
     Index("batches_by_key", "tenant", "idempotency_key", unique=True),
+)
+
+# Projects inside a tenant. Their items have the id of the project as tenant.
+projects = Table(
+    "projects",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    _tenant(),
+    Column("name", String(200), nullable=False),
+    Column("created", Float, nullable=False),
+    UniqueConstraint("tenant", "name"),
+)
+
+project_members = Table(
+    "project_members",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("project_id", String(32), ForeignKey("projects.id"), nullable=False),
+    # "key:" and the id of a key, or "user:" and the name of a user.
+    Column("member", String(210), nullable=False),
+    Column("role", String(16), nullable=False),
+    Column("created", Float, nullable=False),
+    UniqueConstraint("project_id", "member"),
 )
 
 # Append-only; the number of a row is the id of a server-sent event. The tenant is that of the job.

@@ -160,6 +160,27 @@ class BatchRow(TypedDict):
     finished: float | None
 
 
+class ProjectRow(TypedDict):
+    """A project, with the role of the caller."""
+
+    number: int
+    id: str
+    tenant: Tenant
+    name: str
+    created: float
+    role: str
+
+
+class MemberRow(TypedDict):
+    """A member of a project."""
+
+    number: int
+    project_id: str
+    member: str
+    role: str
+    created: float
+
+
 class EventRow(TypedDict):
     """A change of state of a job; ``number`` is the id of the server-sent event."""
 

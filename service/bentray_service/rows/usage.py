@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from sqlalchemy import ColumnElement, Connection, delete, func, insert, not_, or_, select, update
 
 from ..errors import QuotaExceeded
+from .projects import family_of
 from .schema import storage
 from .tenants import Tenant
 
@@ -31,14 +32,17 @@ class Lease:
 
 
 def usage_of(connection: Connection, tenant: Tenant, besides: str = "") -> Usage:
-    """The usage of a tenant without reservations of dead processes.
+    """The usage of a tenant and its projects, or of all of those of a project; without dead processes.
 
     Args:
         connection: in a transaction.
         tenant: owner.
         besides: name of an item to leave out.
     """
-    mine = storage.c.tenant == tenant, storage.c.name != besides, _counted()
+    family = storage.c.tenant.in_(family_of(connection, tenant))
+    # The name alone would leave out an equal one of another project, as of a geometry field.
+    other = or_(storage.c.tenant != tenant, storage.c.name != besides)
+    mine = family, other, _counted()
     query = select(storage.c.reserved, func.sum(storage.c.bytes)).where(*mine).group_by(storage.c.reserved)
     sizes = {bool(reserved): int(size) for reserved, size in connection.execute(query)}
     return Usage(sizes.get(False, 0), sizes.get(True, 0))
@@ -152,5 +156,5 @@ def _counted() -> ColumnElement[bool]:
 def _take_turn(connection: Connection, tenant: Tenant) -> None:
     """Serialise write transactions of one tenant; those of SQLite are serialised anyway."""
     if connection.dialect.name != "sqlite":
-        digest = hashlib.sha256(f"storage/{tenant}".encode()).digest()
+        digest = hashlib.sha256(f"storage/{family_of(connection, tenant)[0]}".encode()).digest()
         connection.execute(select(func.pg_advisory_xact_lock(int.from_bytes(digest[:8], signed=True))))

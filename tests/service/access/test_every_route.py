@@ -79,33 +79,34 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
             token = ApiKey.new()
             keys.add(token, tenant, name, scopes)
             auth[name] = {"Authorization": f"Bearer {token.shown()}"}
-        yield Place(http, folder, _stored(app, http, auth["acme"]), auth)
+        project = http.post("/v1/projects", json={"name": "One"}, headers=auth["acme"]).json()["id"]
+        yield Place(http, folder, {**one_of_each(app, http, ACME, auth["acme"]), "project_id": project}, auth)
 
 
-def _stored(app: FastAPI, http: TestClient, auth: dict[str, str]) -> dict[str, str]:
-    """One of everything of acme, by the name that paths give its id."""
+def one_of_each(app: FastAPI, http: TestClient, owner: Tenant, auth: dict[str, str]) -> dict[str, str]:
+    """One of everything of a tenant or a project, by the name that paths give its id."""
     parts = app.state.parts
-    files = parts.files.of(ACME)
+    files = parts.files.of(owner)
     dataset, mesh, field = new_id("dataset"), new_id("mesh"), new_id("field")
     scan = dict.fromkeys(("dimension", "elements", "ntx", "nrx", "slices", "water_speed_mps"), 0)
     scan |= dict.fromkeys(("title", "source", "license"), "")
     scan |= dict.fromkeys(("has_traces", "has_travel_times", "has_truth"), False)
-    parts.datasets.add(ACME, dataset, size=1, sha256="0" * 64, summary=scan)
+    parts.datasets.add(owner, dataset, size=1, sha256="0" * 64, summary=scan)
     surface = {"vertices": 4, "faces": 4, "genus": 0, "holes": 0, "coloured": False}
     surface["repairs"] = dict.fromkeys(Repairs.model_fields, 0)
     surface |= {"title": "", "format": "ply", "content": "0" * 64}
-    parts.meshes.add(ACME, mesh, size=1, sha256="0" * 64, summary=surface)
-    job = parts.jobs.add(ACME, "reconstruction", {}, dataset)["id"]
+    parts.meshes.add(owner, mesh, size=1, sha256="0" * 64, summary=surface)
+    job = parts.jobs.add(owner, "reconstruction", {}, dataset)["id"]
     cube = {"axes": "x,y,z", "shape": [4, 4, 4], "spacing_m": [1.0] * 3, "origin_m": [0.0] * 3}
     cube |= {"speed_range_mps": [1.0, 2.0], "water_speed_mps": 1.0, "provenance": {}, "bytes": 1}
     # At its end, so that its events have one too.
-    parts.jobs.request_cancel(ACME, job)
-    batch = parts.batches.add(ACME, "", {}, [NewJob("reconstruction", {}, dataset)], Submission())["id"]
-    parts.batches.request_cancel(ACME, batch)
+    parts.jobs.request_cancel(owner, job)
+    batch = parts.batches.add(owner, "", {}, [NewJob("reconstruction", {}, dataset)], Submission())["id"]
+    parts.batches.request_cancel(owner, batch)
     figures = dict.fromkeys((*FieldSizes.model_fields, *FieldErrors.model_fields), 1)
     figures |= {f"{name}_seconds": 1.0 for name in FieldSeconds.model_fields}
     with parts.database.write() as connection:
-        made = {"tenant": ACME, "job_id": job, "created": 1.0}
+        made = {"tenant": owner, "job_id": job, "created": 1.0}
         connection.execute(insert(schema.volumes).values(id=volume_of(job), **made, **cube))
         made |= {"mesh_id": mesh, "bytes": 1, "settings": {}, "figures": figures}
         connection.execute(insert(schema.geometry_fields).values(id=field, **made))

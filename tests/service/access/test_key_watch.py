@@ -11,6 +11,7 @@ from bentray_service.access import key_watch
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
 from bentray_service.rows.keys import Keys
+from bentray_service.rows.projects import Projects
 from bentray_service.rows.sessions import Sessions
 from bentray_service.rows.tenants import LOCAL
 
@@ -114,7 +115,7 @@ def test_a_download_is_broken_off(serve, keys, held, monkeypatch):
 
 
 def test_a_request_that_ended_is_not_watched(keys, held, tmp_path):
-    watch = key_watch.KeyWatch(keys, Sessions(keys._database))
+    watch = key_watch.KeyWatch(keys, Sessions(keys._database), Projects(keys._database))
 
     async def go():
         with watch.during(held[0].id, lambda: pytest.fail("it had ended")):

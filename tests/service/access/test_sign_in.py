@@ -9,6 +9,7 @@ from bentray_service.errors import Forbidden, NotAuthenticated, RateLimited
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
 from bentray_service.rows.keys import Keys
+from bentray_service.rows.projects import Projects
 from bentray_service.rows.sessions import Sessions
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.settings import ServiceSettings
@@ -27,7 +28,10 @@ def keys(tmp_path):
 @pytest.fixture
 def sign_in(keys, tmp_path):
     return lambda **settings: SignIn(
-        ServiceSettings(data_dir=tmp_path, **settings), keys, Sessions(keys._database)
+        ServiceSettings(data_dir=tmp_path, **settings),
+        keys,
+        Sessions(keys._database),
+        Projects(keys._database),
     )
 
 

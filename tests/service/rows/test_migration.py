@@ -51,7 +51,7 @@ INSERT INTO about VALUES (1, 0.0);
 DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
 
 
-@pytest.fixture(params=[1, 2, 3, 4, 5, 6, 7])
+@pytest.fixture(params=[1, 2, 3, 4, 5, 6, 7, 8])
 def old(request, tmp_path):
     """A database as an older version left it, with a finished and a waiting job."""
     path = tmp_path / "old.sqlite"
@@ -117,7 +117,8 @@ def test_the_old_tables_were_those_of_version_1(old, tmp_path):
         names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     connection.close()
     later = {"uploaded_volumes", "meshes", "geometry_fields", "keys", "uploads", "bucket_mark"}
-    later |= {"checksums", "too_old", "storage", "sessions", "pending_sign_ins", "batches"}
+    later |= {"checksums", "too_old", "storage", "sessions", "pending_sign_ins", "batches", "projects"}
+    later |= {"project_members"}
     assert names == set(expected) - later
 
 
@@ -174,10 +175,10 @@ def test_keys_hold_afterwards(old):
 
 def test_failed_migration_keeps_the_old_database(old, monkeypatch):
     def broken(connection):
-        migration._to_8(connection)
+        migration._to_9(connection)
         raise RuntimeError("the power went")
 
-    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 7: broken})
+    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 8: broken})
     with pytest.raises(RuntimeError, match="power"):
         open_database(old)
     monkeypatch.undo()
@@ -264,6 +265,8 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "ALTER TABLE jobs ADD COLUMN batch_id VARCHAR(32)",
         "CREATE INDEX jobs_by_batch ON jobs (batch_id)",
         "batches",
+        "projects",
+        "project_members",
     ]
     assert told.said[-1].startswith("UPDATE about SET version")
 

@@ -2,10 +2,18 @@
 import { at } from "./dom.js";
 
 const STORED = "bentray-key";
+const PROJECT = "bentray-project";
 
+// The headers of every request: the key, and the project in which this tab works.
 export function authorization() {
   const key = sessionStorage.getItem(STORED);
-  return key ? { Authorization: `Bearer ${key}` } : {};
+  const project = sessionStorage.getItem(PROJECT);
+  return { ...(key && { Authorization: `Bearer ${key}` }), ...(project && { "Bentray-Project": project }) };
+}
+
+// Whether requests need headers, which elements and links cannot send.
+function hasHeaders() {
+  return Object.keys(authorization()).length > 0;
 }
 
 function hasKey() {
@@ -20,7 +28,7 @@ async function blobOf(address) {
 
 // An element that shows a picture cannot send a key, so that the picture is fetched for it.
 export function show(image, address) {
-  if (!hasKey()) {
+  if (!hasHeaders()) {
     image.src = address;
     return;
   }
@@ -47,7 +55,7 @@ const near = new IntersectionObserver(
 // The same once the reader comes near it.
 export function showOnceNear(image, address) {
   image.loading = "lazy";
-  if (!hasKey()) {
+  if (!hasHeaders()) {
     image.src = address;
     return;
   }
@@ -58,7 +66,7 @@ export function showOnceNear(image, address) {
 // A link cannot send a key either: what it leads to is fetched, and saved. Without an address it is that of the link.
 export function withKey(anchor, fixed) {
   anchor.addEventListener("click", async (event) => {
-    if (!hasKey()) return;
+    if (!hasHeaders()) return;
     event.preventDefault();
     const address = fixed ?? anchor.getAttribute("href");
     const saving = document.createElement("a");
@@ -103,6 +111,25 @@ function requestKey(why) {
   at("key-error").hidden = !hasKey();
 }
 
+// The projects of the user, if there are any; choosing one opens the page again in it.
+async function offerProjects(request) {
+  const { projects } = await request("/v1/projects");
+  const chosen = sessionStorage.getItem(PROJECT) ?? "";
+  const select = at("project");
+  select.replaceChildren(new Option("No project", ""), ...projects.map(({ id, name }) => new Option(name, id)));
+  select.value = chosen;
+  select.hidden = !projects.length;
+  select.addEventListener("change", () => openIn(select.value));
+}
+
+function openIn(project) {
+  if (project) sessionStorage.setItem(PROJECT, project);
+  else sessionStorage.removeItem(PROJECT);
+  // What the address names belongs to the project before.
+  location.hash = "#/";
+  location.reload();
+}
+
 // Show the identity of the user; returns whether the service accepts the key.
 export async function admitted(request) {
   document.addEventListener("locked", (event) => requestKey(event.detail));
@@ -128,8 +155,11 @@ export async function admitted(request) {
       at("forget").textContent = "Sign out";
       at("forget").hidden = false;
     }
+    await offerProjects(request);
     return true;
   } catch (error) {
+    // Removed from the project, or it was deleted.
+    if (error.problem?.field === "project" && sessionStorage.getItem(PROJECT)) openIn("");
     // Other errors than a missing key are shown with their reason.
     at("access").textContent = at("key").hidden ? error.message : "Authentication required";
     return false;

@@ -1,0 +1,122 @@
+"""/v1/projects: projects inside a tenant, and their members."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Depends, Response, status
+from fastapi.openapi.models import Example
+
+from ..access.caller import Caller
+from ..errors import Forbidden
+from ..rows.projects import OWNER
+from ..rows.typed_rows import ProjectRow
+from ..web.errors import problems
+from ..wiring import CurrentCaller, Service
+from .bodies import SmallBody, accept_media_types
+from .models.project_records import (
+    MemberList,
+    MemberRecord,
+    MemberRequest,
+    ProjectDetails,
+    ProjectList,
+    ProjectRecord,
+    ProjectRequest,
+)
+
+NAMES: dict[str, Example] = {"name": {"summary": "A name", "value": {"name": "Trial 7"}}}
+MEMBERS: dict[str, Example] = {
+    "user": {"summary": "A user", "value": {"member": "user:alice", "role": "contributor"}},
+    "key": {"summary": "A key", "value": {"member": "key:0123456789ab", "role": "reader"}},
+}
+JSON = [Depends(accept_media_types("application/json"))]
+
+router = APIRouter(prefix="/v1/projects", tags=["projects"], route_class=SmallBody)
+
+
+@router.post(
+    "", status_code=status.HTTP_201_CREATED, dependencies=JSON, responses=problems(400, 413, 415, 422, 503)
+)
+def create_project(
+    project: Annotated[ProjectRequest, Body(openapi_examples=NAMES)],
+    response: Response,
+    service: Service,
+    caller: CurrentCaller,
+) -> ProjectDetails:
+    """Create a project; the caller becomes its owner."""
+    made = _details(service, service.projects.add(caller.home, project.name, caller.member))
+    response.headers["Location"] = made.links["self"]
+    return made
+
+
+@router.get("", responses=problems(503))
+def list_projects(service: Service, caller: CurrentCaller) -> ProjectList:
+    """List the projects that the caller is a member of."""
+    found = service.projects.all(caller.home, caller.member)
+    return ProjectList(projects=[ProjectRecord.model_validate(_with_links(row)) for row in found])
+
+
+@router.get("/{project_id}", responses=problems(404))
+def show_project(project_id: str, service: Service, caller: CurrentCaller) -> ProjectDetails:
+    """Show a project with its members, to its members."""
+    return _details(service, service.projects.get(caller.home, project_id, caller.member))
+
+
+@router.patch("/{project_id}", dependencies=JSON, responses=problems(400, 404, 413, 415, 422))
+def rename_project(
+    project_id: str,
+    project: Annotated[ProjectRequest, Body(openapi_examples=NAMES)],
+    service: Service,
+    caller: CurrentCaller,
+) -> ProjectDetails:
+    """Rename a project; owners only."""
+    service.projects.rename(_owned(service, caller, project_id), project.name)
+    return show_project(project_id, service, caller)
+
+
+@router.delete("/{project_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409))
+def delete_project(project_id: str, service: Service, caller: CurrentCaller) -> None:
+    """Delete an empty project; owners only."""
+    service.projects.delete(_owned(service, caller, project_id))
+
+
+@router.put("/{project_id}/members", dependencies=JSON, responses=problems(400, 404, 413, 415, 422))
+def put_member(
+    project_id: str,
+    member: Annotated[MemberRequest, Body(openapi_examples=MEMBERS)],
+    service: Service,
+    caller: CurrentCaller,
+) -> MemberList:
+    """Add a member, change their role or remove them; owners only, but all members may remove themselves."""
+    project = service.projects.get(caller.home, project_id, caller.member)
+    if member.role is None:
+        if member.member != caller.member:
+            _check_owner(project)
+        service.projects.remove_member(project, member.member)
+    else:
+        _check_owner(project)
+        service.projects.put_member(project, member.member, member.role)
+    found = service.projects.members(project)
+    return MemberList(members=[MemberRecord.model_validate(one) for one in found])
+
+
+def _owned(service: Service, caller: Caller, project_id: str) -> ProjectRow:
+    project = service.projects.get(caller.home, project_id, caller.member)
+    _check_owner(project)
+    return project
+
+
+def _check_owner(project: ProjectRow) -> None:
+    if project["role"] != OWNER:
+        raise Forbidden("role", project["role"], f"{OWNER} of the project")
+
+
+def _details(service: Service, project: ProjectRow) -> ProjectDetails:
+    return ProjectDetails.model_validate(
+        {**_with_links(project), "members": service.projects.members(project)}
+    )
+
+
+def _with_links(project: ProjectRow) -> dict[str, object]:
+    here = f"/v1/projects/{project['id']}"
+    return {**project, "links": {"self": here, "members": f"{here}/members"}}
