@@ -27,10 +27,16 @@ from PIL import Image, ImageDraw
 from bentray_kernels import eikonal, rays
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
-from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
 from bentray_workers.files.dataset import write_dataset
+from bentray_workers.files.reconstruction import read_reconstruction
+from bentray_workers.images.canvas import drawing, new_figure, to_png
+from bentray_workers.images.captions import LABELS, NAMES
+from bentray_workers.images.maps import SPEED, draw_bar, draw_map
+from bentray_workers.images.report import COLORMAPS
+from bentray_workers.images.slice import usual_limits
 from bentray_workers.images.truth_comparison import compare
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
@@ -40,6 +46,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.shared._small_png import in_full_colour
 
 FOLDER = Path(__file__).parent / "pictures"
+# Beside the checkout, where the tests with real scans look for it.
+OTHERS = FOLDER.parents[2] / "shared" / "data" / "ring_wave_a.h5"
 CHROMIUM = Path("/usr/bin/chromium")
 BENTRAY = [sys.executable, "-m", "bentray_service.cli"]
 MM = 1e3
@@ -156,6 +164,34 @@ def mesh() -> Image.Image:
             pictures[title] = _opened(made / "image.png")
         positions = _opened(made / "geometry-image.png").resize((320, 320))
         return _titled({**pictures, "Geometry image: (x, y, z) as RGB": positions})
+
+
+def quantities() -> Image.Image:
+    """Speed, attenuation, reflection and uncertainty of a scan that another team simulated."""
+    with tempfile.TemporaryDirectory() as folder:
+        extras = ("--amplitudes", "ratio", "--reflection", "--uncertainty")
+        _run("reconstruct", OTHERS, "-o", folder, "--workers", 1, *extras)
+        made = read_reconstruction(Path(folder) / "reconstruction.h5")
+    with drawing():
+        figure = new_figure(17.2, 4.2)
+        draw_quantities(figure, made)
+        return Image.open(io.BytesIO(to_png(figure)))
+
+
+def draw_quantities(figure: Figure, made: Reconstruction) -> None:
+    """The quantities of a result side by side, each with its colours and unit."""
+    shown = {
+        "speed": SPEED,
+        **{name: COLORMAPS[name] for name in ("attenuation", "reflection", "uncertainty")},
+    }
+    for axes, (name, colormap) in zip(figure.subplots(1, len(shown)), shown.items(), strict=True):
+        one = made.image(name)
+        assert one is not None
+        limits = usual_limits(name, one.values, None if name == "reflection" else made.coverage)
+        drawn = draw_map(
+            axes, one.values, one.spacing_m, one.origin_m, limits, colormap=colormap, title=NAMES[name]
+        )
+        draw_bar([drawn], LABELS[name])
 
 
 def overview() -> Image.Image:
@@ -347,6 +383,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
         fresnel,
         glass,
         mesh,
+        quantities,
         viewer,
         comparison,
         scan_page,

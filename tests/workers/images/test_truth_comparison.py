@@ -24,6 +24,18 @@ def test_a_constant_error_is_read_as_it_is(offset: float) -> None:
     assert found.region.sum() == 81
 
 
+def test_statistics_have_the_uncertainty_of_the_nodes_in_the_region() -> None:
+    known = np.where(disc() == WATER, 90.0, 4.0)
+    found = compare(
+        replace(image(disc() + 2.0), uncertainty=known, resolution_width_m=(3e-3,)), truth(disc())
+    )
+    assert found.image_statistics.uncertainty == pytest.approx(4.0)
+    assert found.true_statistics.uncertainty is None
+    assert found.image_statistics.mean - found.true_statistics.mean == pytest.approx(2.0)
+    assert found.mean_absolute_error_mps == pytest.approx(2.0)
+    assert found.correlation == pytest.approx(1.0)
+
+
 def test_errors_in_the_water_do_not_count() -> None:
     speed = disc()
     speed[0, 0] += 500.0

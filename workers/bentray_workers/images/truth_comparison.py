@@ -108,7 +108,9 @@ def compare(result: Reconstruction, truth: Truth, roi: Bools | None = None) -> C
         mean_absolute_error_mps=mean_absolute_error(result.speed, true_speed, region),
         ssim=structural_similarity(result.speed, true_speed, region, whole) if whole > 0.0 else math.nan,
         correlation=correlation(result.speed, true_speed, region),
-        image_statistics=region_statistics(result.speed, region, result.spacing_m),
+        image_statistics=region_statistics(
+            result.speed, region, result.spacing_m, uncertainty=result.uncertainty
+        ),
         true_statistics=region_statistics(true_speed, region, result.spacing_m),
     )
 
