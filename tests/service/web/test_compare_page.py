@@ -59,6 +59,19 @@ def test_the_difference_and_the_border_to_swipe(page, both):
     page.wait_for_url(re.compile("mode=swipe"))
 
 
+def test_a_way_that_is_chosen_before_the_values_are_read_is_shown(page, both):
+    held = []
+    page.route("**/data?*", lambda route: held.append(route))
+    page.goto(both)
+    page.get_by_role("button", name="Difference", exact=True).click()
+    while len(held) < 2:
+        page.wait_for_timeout(20)
+    for one in held:
+        one.continue_()
+    expect(page.locator("canvas.plane")).to_have_count(1)
+    page.locator(".readout").filter(has_text="mm").wait_for()
+
+
 def test_a_comparison_is_chosen_on_the_page_of_a_result(page, both):
     first, second = both.rsplit("/", 1)[1].split(",")
     ready(page, f"{both.partition('#')[0]}#/jobs/{first}")

@@ -65,3 +65,10 @@ def test_keys_of_the_tenant_alone(page, serve, tmp_path):
     expect(page.locator("#keys")).to_contain_text("bentray keys create --tenant local")
     shown = page.content()
     assert not [one for one in (mine.shown(), mine.digest(), theirs.id, "scanner of another") if one in shown]
+    # A key that ends while the page is open: the page asks for another one.
+    database = open_database(f"sqlite:///{tmp_path / 'served' / 'bentray.sqlite'}")
+    Keys(database).revoke(mine.id)
+    database.close()
+    page.get_by_role("link", name="Jobs", exact=True).click()
+    page.locator("#key-error").get_by_text("unknown, revoked or expired").wait_for()
+    expect(page.get_by_label("API key")).to_be_visible()

@@ -37,7 +37,7 @@ export function exportMenu(result, state) {
   const sheet = make("div");
   const menu = menuOf("Export", sheet, "export");
   const data = volume.links.data;
-  const group = (title, nodes) => sheet.append(make("h3", "", title), ...nodes);
+  const group = (title, nodes) => sheet.append(make("h2", "", title), ...nodes);
   group(summary.quantities.includes("reflection") ? "All quantities (reflection: HDF5)" : "All quantities", WHOLE.map(([format, title]) => withKey(link(title, `${data}?format=${format}`), `${data}?format=${format}`)));
   const label = make("label", "", "Quantity ");
   const choice = make("select");

@@ -78,6 +78,8 @@ export function viewer(root, panes, state, keep) {
   }
 
   function rebuild() {
+    // Pressed before the values are here: they are shown in the chosen way.
+    if (!fields.length) return;
     for (const tile of tiles) tile.image.close();
     if (!main().axes.includes(state.axis)) state.axis = "z";
     tiles = layout().map((tile) => {
