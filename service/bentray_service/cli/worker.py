@@ -75,8 +75,9 @@ def worker(
     """
     from dask.utils import parse_bytes
 
+    from bentray_workers.cluster.capacities import device_resources
     from bentray_workers.cluster.local_workers import JoinRequest, join
-    from bentray_workers.cluster.resources import OFFERED, OPENCL
+    from bentray_workers.cluster.resources import OFFERED
     from bentray_workers.cluster.tls import security_of
 
     if memory_limit is not None:
@@ -90,7 +91,7 @@ def worker(
     request = JoinRequest(
         scheduler=scheduler,
         workers=count,
-        resources={**OFFERED, **(OPENCL if opencl and _has_device() else {})},
+        resources={**OFFERED, **(device_resources() if opencl and _has_device() else {})},
         memory_limit=memory_limit,
         local_directory=None if local_directory is None else output_folder(local_directory),
         host=host,

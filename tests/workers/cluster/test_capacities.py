@@ -6,6 +6,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.cluster import capacities
+from bentray_workers.cluster.capacities import MIB
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.cluster.resources import OPENCL
 from bentray_workers.files.dataset import write_dataset
@@ -65,6 +66,14 @@ def test_external_cluster_is_not_queried(fresh, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: pytest.fail("tried"))
     with open_cluster(fresh.scheduler.address) as joined, pytest.raises(InvalidInput, match="eikonal"):
         capacities.resources_for(joined.client, WITH_DEVICE)
+
+
+@pytest.mark.opencl
+def test_the_memory_of_a_device_is_known_to_plans(fresh, opencl_session):
+    capacities.resources_for(fresh, WITH_DEVICE)
+    (found,) = capacities.capacities_of(fresh)
+    assert set(found.resources) == {*OPENCL, "recon", "render"}
+    assert found.device_bytes == opencl_session.device.memory_bytes // MIB * MIB > 0
 
 
 @pytest.mark.opencl

@@ -17,6 +17,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.array_shapes import bowl
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.sart.device_slices import SliceSize
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.cluster.task_words import task_in_words
 from bentray_workers.files.dataset.counts import DatasetCounts, Summary, Traces
@@ -230,3 +231,29 @@ def test_more_nodes_and_more_slices_never_take_less(nodes, method, volume, check
     finer = plan(scan, replace(asked, nodes=nodes + 64), [])
     assert all(finer.call_bytes[name] > size for name, size in found.call_bytes.items())
     assert plan(replace(scan, slices=8), asked, []).tasks > found.tasks
+
+
+def test_a_device_that_cannot_hold_one_slice_or_emitter_is_refused_by_number():
+    asked = Settings.of(method="sart", nodes=256, device="opencl")
+    needed = SliceSize((256, 256), 256, 256, 1, 1).bytes
+
+    def offer(device_bytes):
+        return [WorkerCapacity(0, (*BOTH, "opencl"), device_bytes)]
+
+    assert plan(RING, asked, offer(2 * needed)).lane == "opencl"
+    assert plan(RING, asked, offer(0)).workers == 1, "its memory is not known"
+    with pytest.raises(
+        InvalidInput, match=f"nodes: found 256, for which a slice takes {needed} bytes on the device"
+    ):
+        plan(RING, asked, offer(2 * needed - 2))
+    with pytest.raises(InvalidInput, match=f"at most {needed // 4} bytes"):
+        plan(RING, asked, offer(needed // 2))
+    # Compiled code needs no device.
+    assert plan(RING, asked.changed(device="cpu"), offer(1)).lane == "recon"
+    waves = replace(RING, traces=Traces(128, 256, 1000, 2, 1e7, 4e5, 1500.0))
+    waveform = Settings(method="waveform", device="opencl", nodes=64)
+    assert plan(waves, waveform, offer(2**33)).lane == "opencl"
+    with pytest.raises(
+        InvalidInput, match=r"method: found 'waveform', for which an emitter takes \d+ bytes on"
+    ):
+        plan(waves, waveform, offer(2**23))

@@ -15,7 +15,7 @@ from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.solver_choice import needs_device, tracks_on_device
 
 from .connected import connected_workers
-from .resources import OPENCL, RECONSTRUCTION
+from .resources import OPENCL, OPENCL_MIB, RECONSTRUCTION
 
 REAL = 8
 MIB = 2**20
@@ -36,10 +36,12 @@ class WorkerCapacity:
     Attributes:
         memory_bytes: its limit; 0: none.
         resources: by the names in ``cluster.resources``.
+        device_bytes: memory of its OpenCL device; 0: unknown, or no device.
     """
 
     memory_bytes: int
     resources: tuple[str, ...]
+    device_bytes: int = 0
 
     @property
     def task_bytes(self) -> float:
@@ -70,7 +72,12 @@ def capacities_by_address(client: Client) -> dict[str, WorkerCapacity]:
     return {
         address: WorkerCapacity(
             int(worker.get("memory_limit") or 0),
-            tuple(name for name, amount in worker.get("resources", {}).items() if amount > 0),
+            tuple(
+                name
+                for name, amount in worker.get("resources", {}).items()
+                if amount > 0 and name != OPENCL_MIB
+            ),
+            int(worker.get("resources", {}).get(OPENCL_MIB, 0)) * MIB,
         )
         for address, worker in connected_workers(client).items()
     }
@@ -109,8 +116,14 @@ async def probe_device(dask_worker: Any) -> bool:
     # Not in the event loop, which sends heartbeats to the scheduler.
     passed = await asyncio.get_running_loop().run_in_executor(None, _has_device)
     if passed:
-        await dask_worker.set_resources(**OPENCL)
+        await dask_worker.set_resources(**device_resources())
     return passed
+
+
+def device_resources() -> dict[str, float]:
+    """The resources of a worker with the chosen device."""
+    device = choose().device
+    return {**OPENCL, **({} if device is None else {OPENCL_MIB: device.memory_bytes // MIB})}
 
 
 def _has_device() -> bool:

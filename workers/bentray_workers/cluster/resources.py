@@ -7,6 +7,8 @@ RECONSTRUCTION = {"recon": 1}
 RENDER = {"render": 1}
 # Only where a device passed its self-test; OpenCL runs one task per process.
 OPENCL = {"opencl": 1}
+# Memory of that device, MiB; no task requests it, plans read it.
+OPENCL_MIB = "opencl_mib"
 OFFERED = {**RECONSTRUCTION, **RENDER}
 
 THREADS = 2

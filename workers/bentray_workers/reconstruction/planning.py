@@ -13,7 +13,9 @@ from bentray_kernels.tomography.directivity import check_normals
 from bentray_kernels.tomography.model_selection.selection import CANDIDATES, final_settings, label
 from bentray_kernels.tomography.reflection.reflection_plan import check_reflection
 from bentray_kernels.tomography.requirements import check_waveform
+from bentray_kernels.tomography.sart.device_slices import MEMORY_SHARE
 from bentray_kernels.tomography.settings import MIN_NODES, Settings
+from bentray_kernels.tomography.solver_choice import sart_engine
 from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of, without_device
@@ -31,10 +33,11 @@ from .memory.ray_memory import (
     rays_of,
     rows_bytes,
     shape_of,
+    slice_bytes,
     state_bytes,
 )
 from .memory.reflection_memory import reflection_bytes, reflection_task_bytes, reflection_tasks
-from .memory.waveform_memory import budgeted, wave_task_bytes, wave_tasks
+from .memory.waveform_memory import budgeted, least_flight_bytes, wave_task_bytes, wave_tasks
 from .reconstruction_cost import reconstruction_cost
 
 Decomposition = Literal["slices", "emitters", "volume"]
@@ -134,6 +137,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     check_reflection(settings, traces=scan.echoes is not None, in_space=scan.in_space)
     echoes = reflection_task_bytes(scan, settings)
     calls |= echoes
+    _check_device(scan, methods, least_flight_bytes(traces, scan.width_m, refining), fitting)
     limit = max((one.task_bytes for one in fitting), default=math.inf)
     name, size = max(calls.items(), key=lambda item: item[1])
     if size > limit:
@@ -179,6 +183,30 @@ def _check_extent(scan: Summary) -> None:
     WIDTH_M.check("geometry/element_position_m", scan.width_m)
     if not scan.height_m <= WIDTH_M.most:
         raise InvalidInput("slice/z_m", f"slices over {scan.height_m:.4g} m", f"at most {WIDTH_M.most:g} m")
+
+
+def _check_device(
+    scan: Summary, methods: Sequence[Settings], waves: int, workers: Sequence[WorkerCapacity]
+) -> None:
+    """Check that a device can hold one slice, or one emitter of ``waves`` bytes; more of them are tiled.
+
+    Raises:
+        InvalidInput: with the bytes of both.
+    """
+    able = [one for one in methods if sart_engine(one, 3 if one.decomposition == "volume" else 2) == "opencl"]
+    slices = max((slice_bytes(scan, one) for one in able), default=0)
+    needed = max(slices, waves)
+    # Of a device whose memory is unknown nothing is expected.
+    limits = [MEMORY_SHARE * one.device_bytes if one.device_bytes else math.inf for one in workers]
+    if not needed or not limits or needed <= max(limits):
+        return
+    what, field = ("a slice", "nodes") if slices >= waves else ("an emitter", "method")
+    found = methods[0].grid_nodes if field == "nodes" else "'waveform'"
+    raise InvalidInput(
+        field,
+        f"{found}, for which {what} takes {needed} bytes on the device",
+        f"at most {max(limits):.0f} bytes, half of the memory of the largest device; or device cpu",
+    )
 
 
 def _decomposition(settings: Settings) -> Decomposition:

@@ -173,17 +173,22 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
     return parts
 
 
+def slice_bytes(scan: Summary, settings: Settings) -> int:
+    """Device memory of one slice that is updated by SART."""
+    nodes = settings.grid_nodes
+    return SliceSize((nodes, nodes), scan.emitters, scan.receivers, 1, settings.numerics.subset).bytes
+
+
 def _parts_together(scan: Summary, settings: Settings, data: int) -> dict[str, int]:
     """Memory of all slices updated in one task on a device, by what takes it, bytes."""
     nodes, slices = settings.grid_nodes, scan.slices
     emitters, receivers = scan.emitters, scan.receivers
-    size = SliceSize((nodes, nodes), emitters, receivers, 1, settings.numerics.subset)
     # Of each slice the problem with its times and losses, the state before and after, and their copies for
     # the device.
     images = FLOOR_BYTES + slices * 3 * state_bytes((nodes, nodes), settings)
     times = slices * 3 * REAL * emitters * receivers
     # A processor as a device has its arrays in the memory of the worker; a GPU has its own.
-    in_flight = min(slices, PROCESSOR_SLICES) * size.bytes
+    in_flight = min(slices, PROCESSOR_SLICES) * slice_bytes(scan, settings)
     return {"data": data + times, "images": images, "slices on the device": in_flight}
 
 

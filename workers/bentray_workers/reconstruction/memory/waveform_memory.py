@@ -95,6 +95,27 @@ def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -
     return sizes
 
 
+def least_flight_bytes(traces: Traces | None, width_m: float, settings: Settings) -> int:
+    """Device memory of one emitter over all bands, with checkpoints where these help; 0: none."""
+    if traces is None or wave_engine(settings) != "opencl":
+        return 0
+    plan = _scale(traces, width_m).bands(settings)
+    bands = plan if refines(settings) else validation_settings(WaveSettings(plan)).bands
+    record_s = (traces.samples - 1) / traces.rate_hz
+    least = 0
+    for band in bands:
+        extent = Extent.of(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
+        flight = _flight(traces, extent)
+        least = max(least, min(flight.bytes(segments) for segments in range(1, max(1, flight.slots) + 1)))
+    return least
+
+
+def _flight(traces: Traces, extent: Extent) -> FlightSize:
+    """An emitter on a device."""
+    stored, samples = -(-extent.steps // extent.every), traces.receivers * extent.steps
+    return FlightSize(int(FILLED * extent.padded), extent.nodes**2, stored, samples, 4)
+
+
 def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) -> dict[str, int]:
     record_s = (traces.samples - 1) / traces.rate_hz
     extent = Extent.of(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
@@ -109,8 +130,7 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
     in_flight = 4 * extent.nodes**2 * stored
     if wave_engine(settings) == "opencl":
         base += OBSERVED_BYTES * samples * looks
-        field = int(FILLED * padded)
-        flight = FlightSize(field, extent.nodes**2, stored, samples, 4).bytes(1)
+        flight = _flight(traces, extent).bytes(1)
         # A processor as a device has its arrays in the memory of the worker; a GPU holds more emitters.
         in_flight = (
             PROCESSOR_EMITTERS * flight + (OBSERVED_BYTES * samples + FOUND_BYTES * extent.nodes**2) * looks
