@@ -194,8 +194,12 @@ def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result,
     assert float(said["area_mm2"]) == pytest.approx(values.size * DX * DY)
     assert float(said["mean"]) == pytest.approx(values.mean(), rel=1e-12)
     assert float(said["standard_deviation"]) == pytest.approx(values.std(), rel=1e-9)
+    away = np.hypot(u, v) if shape == "Ellipse" else np.maximum(abs(u), abs(v))
+    contrast = values.mean() - SPEED[(away > 1.25) & (away <= 2)].mean()
+    assert float(said["contrast"]) == pytest.approx(contrast, rel=1e-9)
     cells = page.locator(".statistics td").all_text_contents()
     assert cells[0] == f"{values.mean():.2f}"
+    assert cells[2] == f"{contrast:.2f}"
 
 
 def test_the_image_is_used_by_keys_alone(page, result):

@@ -12,25 +12,35 @@ export function profileOf(plane, [x0, y0, x1, y1]) {
   };
 }
 
-// Nodes in a rectangle, or the ellipse in it: count, area (mm²), mean, standard deviation, minimum, maximum.
+// Multiples of the size of a region between which its surroundings lie, as in kernels/…/tomography/regions.py.
+const INNER = 1.25;
+const OUTER = 2;
+
+const meanOf = (values) => values.reduce((sum, one) => sum + one, 0) / values.length;
+
+// Nodes in a rectangle, or the ellipse in it: count, area (mm²), mean, standard deviation, minimum, maximum, and
+// contrast: mean minus that of the surroundings, NaN without any.
 export function regionOf(plane, shape, [x0, y0, x1, y1]) {
   const [cx, cy, rx, ry] = [(x0 + x1) / 2, (y0 + y1) / 2, Math.abs(x1 - x0) / 2, Math.abs(y1 - y0) / 2];
   const inside = [];
+  const beside = [];
   for (let a = 0; a < plane.na; a += 1) {
     const u = (plane.origin[0] + a * plane.spacing[0] - cx) / rx;
-    if (!(Math.abs(u) <= 1)) continue;
+    if (!(Math.abs(u) <= OUTER)) continue;
     for (let b = 0; b < plane.nb; b += 1) {
       const v = (plane.origin[1] + b * plane.spacing[1] - cy) / ry;
-      const within = shape === "ellipse" ? u * u + v * v <= 1 : Math.abs(v) <= 1;
+      const away = shape === "ellipse" ? Math.hypot(u, v) : Math.max(Math.abs(u), Math.abs(v));
       const value = plane.values[a * plane.nb + b];
-      if (within && Number.isFinite(value)) inside.push(value);
+      if (!Number.isFinite(value)) continue;
+      if (away <= 1) inside.push(value);
+      else if (away > INNER && away <= OUTER) beside.push(value);
     }
   }
   const nodes = inside.length;
-  const mean = inside.reduce((sum, one) => sum + one, 0) / nodes;
+  const mean = meanOf(inside);
   const deviation = Math.sqrt(inside.reduce((sum, one) => sum + (one - mean) ** 2, 0) / nodes);
   return {
-    nodes, area: nodes * plane.spacing[0] * plane.spacing[1], mean, deviation,
+    nodes, area: nodes * plane.spacing[0] * plane.spacing[1], mean, deviation, contrast: mean - meanOf(beside),
     minimum: inside.reduce((least, one) => Math.min(least, one), Infinity),
     maximum: inside.reduce((most, one) => Math.max(most, one), -Infinity),
   };

@@ -24,9 +24,9 @@ export function profileCsv(curves, { unit }) {
 }
 
 export function regionCsv(found, { unit }, region) {
-  const head = ["image", "quantity_unit", "shape", "x0_mm", "y0_mm", "x1_mm", "y1_mm", "nodes", "area_mm2", "mean", "standard_deviation", "minimum", "maximum"];
+  const head = ["image", "quantity_unit", "shape", "x0_mm", "y0_mm", "x1_mm", "y1_mm", "nodes", "area_mm2", "mean", "standard_deviation", "minimum", "maximum", "contrast"];
   const rows = found.map(({ title, statistics: s }) => [
-    quoted(title), quoted(unit), region.shape, ...region.place, s.nodes, s.area, s.mean, s.deviation, s.minimum, s.maximum,
+    quoted(title), quoted(unit), region.shape, ...region.place, s.nodes, s.area, s.mean, s.deviation, s.minimum, s.maximum, s.contrast,
   ]);
   return lines([head, ...rows]);
 }
@@ -99,6 +99,7 @@ export function measuresPanel(root, set) {
           ["", found.map((one) => one.title)],
           [`Mean${unit}`, found.map((one) => shown(one.statistics.mean, quantity))],
           [`Standard deviation${unit}`, found.map((one) => shown(one.statistics.deviation, quantity))],
+          [`Contrast to surroundings${unit}`, found.map((one) => shown(one.statistics.contrast, quantity))],
           ["Area (mm²)", found.map((one) => one.statistics.area.toFixed(2))],
           ["Nodes", found.map((one) => one.statistics.nodes)],
         ].slice(found.length > 1 ? 0 : 1);
