@@ -32,8 +32,7 @@ from ..rows.ids import dataset_of, field_of, volume_of
 from ..rows.tenants import Tenant
 from ..rows.typed_rows import DatasetRow, JobRow, Plain
 from .kind import JobRequest, JobRun, Kind, Order, Sources
-
-DEFAULTS = "Omitted settings take their defaults."
+from .request_words import DEFAULTS
 
 
 class ReconstructionRequest(JobRequest):

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from bentray_kernels.tomography.settings import Settings
 
 from ...html_tables import ShownRecord
-from ...jobs.kinds import DEFAULTS
+from ...jobs.request_words import DEFAULTS
 from ...settings_request import check_setting_names
 from .job_records import State
 
