@@ -36,7 +36,9 @@ def finished(
 
     def made(self: FakeWork, *given: Any, **named: Any) -> Any:
         grid = {"spacing_m": SPACING_M[: speed.ndim], "origin_m": ORIGIN_M[: speed.ndim]}
-        own = {"coverage": np.ones(speed.shape), **images}
+        own: dict[str, Any] = {"coverage": np.ones(speed.shape), **images}
+        if "uncertainty" in images:
+            own["resolution_width_m"] = (0.0025,)
         return replace(plain(self, *given, **named), speed=speed, **own, **grid)
 
     monkeypatch.setattr(type(work), "__call__", made)

@@ -115,6 +115,37 @@ def test_the_attenuation_is_in_decibels_per_centimetre(page, result):
     )
 
 
+def test_the_uncertainty_fades_what_is_not_known(page, shared_service):
+    """Opaque without uncertainty, clear where two deviations reach half the range of the colours."""
+    address, scan, work, monkeypatch, _ = shared_service
+    spread = np.zeros(SPEED.shape)
+    spread[8:], spread[16:] = 14.0, 35.0
+    job = finished(address, scan, work, monkeypatch, SPEED, uncertainty=spread)
+    ready(page, f"{address}/#/jobs/{job}?window=1430,1570")
+    expect(page.locator("#result-facts")).to_contain_text("resolution width 2.5 mm")
+    canvas = page.locator("canvas.plane")
+
+    def alpha(share_x):
+        return canvas.evaluate(
+            """(one, x) => one.getContext("2d").getImageData(
+                Math.round(x * one.width), Math.round(0.5 * one.height), 1, 1).data[3]""",
+            share_x,
+        )
+
+    places = {share: node_below(page, share, 0.52)[0] for share in (0.3, 0.5, 0.7)}
+    assert [alpha(share) for share in places] == [255, 255, 255]
+    page.get_by_label("Fade what is not known").check()
+    page.wait_for_url(re.compile("fade=1"))
+    for share, node in places.items():
+        faded = 255.0 * max(0.0, 1.0 - 4.0 * spread[node] / 140.0)
+        assert alpha(share) == pytest.approx(faded, abs=1)
+    assert sorted({spread[node] for node in places.values()}) == [0.0, 14.0, 35.0]
+    page.get_by_role("button", name="Uncertainty").click()
+    page.locator(".colour-bar").get_by_text("standard deviation of the speed (m/s)").wait_for()
+    expect(page.get_by_label("Fade what is not known")).to_be_hidden()
+    assert window_of(page)[0] == 0.0
+
+
 def test_a_link_restores_the_view(page, result, browser):
     ready(page, result)
     page.get_by_role("button", name="Coverage").click()

@@ -12,6 +12,8 @@ export function facts({ job, volume, summary }) {
   const residual = job.history.at(-1)?.residual_rms_s;
   if (residual) parts.push(`residual ${inNanoseconds(residual)}`);
   if (summary.truth?.rmse_mps != null) parts.push(`error ${summary.truth.rmse_mps.toFixed(2)} m/s rms (${summary.truth.region})`);
+  const widths = summary.resolution_width_m;
+  if (widths.length) parts.push(`resolution width ${(1e3 * widths[Math.floor(widths.length / 2)]).toFixed(1)} mm`);
   if (job.seconds !== null) parts.push(`took ${duration(job.seconds)}`);
   return parts.join(" · ");
 }

@@ -7,7 +7,13 @@ const MISSING = 0xffe4e4e4;
 const BAR_SHARE = 0.3;
 const FILL = 0.97;
 
-function coloured(plane, low, high, map) {
+// Opacity of a node: 1 where it is known, 0 where two standard deviations reach half the range of the colours.
+export function opacity(deviation, low, high) {
+  return Math.min(1, Math.max(0, 1 - (4 * deviation) / (high - low)));
+}
+
+// deviations: a plane of the same nodes that fades what is not known, or null.
+function coloured(plane, low, high, map, deviations) {
   const { na, nb, values } = plane;
   const image = new ImageData(na, nb);
   const pixels = new Uint32Array(image.data.buffer);
@@ -17,7 +23,9 @@ function coloured(plane, low, high, map) {
     for (let b = 0; b < nb; b += 1) {
       const value = values[a * nb + b];
       const step = Math.floor((value - low) * scale);
-      pixels[(nb - 1 - b) * na + a] = Number.isFinite(value) ? colours[Math.min(255, Math.max(0, step))] : MISSING;
+      const place = (nb - 1 - b) * na + a;
+      pixels[place] = Number.isFinite(value) ? colours[Math.min(255, Math.max(0, step))] : MISSING;
+      if (deviations) image.data[4 * place + 3] = Math.round(255 * opacity(deviations.values[a * nb + b], low, high));
     }
   }
   return image;
@@ -43,18 +51,19 @@ export class ImageView {
     this.watcher.disconnect();
   }
 
-  // Show a plane; other: one shown right of the share `swipe` of the width. look: centre ([x, y] mm or null), zoom, marks.
-  show(plane, { low, high, map, other = null, swipe = 0.5, ...look }) {
+  // Show a plane; other: one shown right of the share `swipe` of the width; deviations: those that fade the plane.
+  // look: centre ([x, y] mm or null), zoom, marks.
+  show(plane, { low, high, map, other = null, swipe = 0.5, deviations = null, ...look }) {
     const key = [low, high, map].join(" ");
-    if (plane !== this.plane || other !== this.other || key !== this.key) {
+    if (plane !== this.plane || other !== this.other || deviations !== this.deviations || key !== this.key) {
       this.bitmaps = [plane, other].filter(Boolean).map((one) => {
         const bitmap = document.createElement("canvas");
         [bitmap.width, bitmap.height] = [one.na, one.nb];
-        bitmap.getContext("2d").putImageData(coloured(one, low, high, map), 0, 0);
+        bitmap.getContext("2d").putImageData(coloured(one, low, high, map, one === plane ? deviations : null), 0, 0);
         return bitmap;
       });
     }
-    Object.assign(this, { plane, other, key, swipe, look });
+    Object.assign(this, { plane, other, deviations, key, swipe, look });
     this.draw();
   }
 

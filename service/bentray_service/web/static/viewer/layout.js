@@ -38,6 +38,7 @@ export const PAGE = `
         <button type="button" class="quiet automatic">Automatic</button>
         <label>Colours <select name="map"></select></label>
         <button type="button" class="quiet whole">Whole image</button>
+        <label class="fade" hidden><input type="checkbox" name="fade"> Fade what is not known</label>
         <label class="planes" hidden><input type="checkbox" name="planes"> Three planes</label>
       </fieldset>
       <div class="measures"></div>

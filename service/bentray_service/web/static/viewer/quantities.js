@@ -6,6 +6,9 @@ import { parseNpy } from "./npy.js";
 // Decibels per centimetre of one neper per metre.
 export const DB_CM_OF_NP_M = 20 / Math.LN10 / 100;
 
+// Quantities of which the uncertainty is known.
+export const FADED = ["speed", "error"];
+
 export const QUANTITIES = {
   speed: { title: "Speed", words: "sound speed", unit: "m/s", map: "viridis", digits: 2, reads: ["speed"] },
   attenuation: {

@@ -17,7 +17,7 @@ export const clampZoom = (zoom) => Math.min(MOST_ZOOM, Math.max(0.25, zoom));
 
 export function freshState() {
   return {
-    quantity: "speed", map: null, window: null, axis: "z", planes: false, cursor: null, views: {},
+    quantity: "speed", map: null, window: null, axis: "z", planes: false, fade: false, cursor: null, views: {},
     tool: "pan", profile: null, region: null, mode: "side", other: 1, swipe: 0.5,
   };
 }
@@ -32,6 +32,7 @@ export function stateOf(query) {
   if (window && window[0] < window[1]) state.window = window;
   if (["x", "y", "z"].includes(get("axis"))) state.axis = get("axis");
   state.planes = get("planes") === "3";
+  state.fade = get("fade") === "1";
   state.cursor = numbers(get("at"), 3);
   for (const axis of ["x", "y", "z"]) {
     const view = numbers(get(`view-${axis}`), 3);
@@ -60,6 +61,7 @@ export function queryOfState(state) {
   if (state.window) put("window", state.window);
   if (state.axis !== usual.axis) put("axis", state.axis);
   if (state.planes) put("planes", "3");
+  if (state.fade) put("fade", "1");
   if (state.cursor) put("at", state.cursor);
   for (const [axis, { centre, zoom }] of Object.entries(state.views)) put(`view-${axis}`, [...centre, zoom]);
   if (state.tool !== usual.tool) put("tool", state.tool);

@@ -8,7 +8,7 @@ import { choices, PAGE } from "./layout.js";
 import { measuresPanel } from "./measures_panel.js";
 import { robustLimits } from "./measures.js";
 import { watch } from "./pointing.js";
-import { QUANTITIES, shown, shownOf } from "./quantities.js";
+import { FADED, QUANTITIES, shown, shownOf } from "./quantities.js";
 import { MODES, queryOfState, TOOLS } from "./state.js";
 
 const SAVE_MS = 250;
@@ -22,6 +22,8 @@ export function viewer(root, panes, state, keep) {
   if (!names.includes(state.quantity)) [state.quantity] = names;
   state.other = Math.max(1, Math.min(state.other, panes.length - 1));
   let fields = [];
+  // Of the uncertainty of the only pane, while it fades the image.
+  let spread = null;
   let tiles = [];
   let automatic = [0, 1];
   let hover = null;
@@ -60,6 +62,20 @@ export function viewer(root, panes, state, keep) {
     planes.set(key, { one, first, plane });
     return plane;
   }
+
+  // The deviations of the nodes of a plane; the same object for the same plane.
+  function deviationsOf(axis) {
+    if (!spread) return null;
+    const index = spread.nearest(axis, state.cursor[AXES.indexOf(axis)]);
+    const key = `deviations ${axis}`;
+    const before = planes.get(key);
+    if (before?.index === index) return before.plane;
+    const plane = spread.plane(axis, index);
+    planes.set(key, { index, plane });
+    return plane;
+  }
+
+  const fades = () => panes.length === 1 && panes[0].stored.includes("uncertainty") && FADED.includes(state.quantity);
 
   const shownPlane = ({ number, axis, minus }) => (minus ? differenceOf(number, axis) : planeOf(number, axis));
 
@@ -160,7 +176,7 @@ export function viewer(root, panes, state, keep) {
         ...(tile.axis === state.axis && { profile: state.profile, region: state.region }),
       };
       const other = tile.other ? planeOf(tile.other, tile.axis) : null;
-      tile.image.show(shownPlane(tile), { low, high, map: map(), other, swipe: state.swipe, ...viewOf(tile.axis), marks });
+      tile.image.show(shownPlane(tile), { low, high, map: map(), other, swipe: state.swipe, deviations: deviationsOf(tile.axis), ...viewOf(tile.axis), marks });
       tile.canvas.classList.toggle("grip", state.tool !== "pan" || viewOf(tile.axis).zoom > 1);
     }
     for (const slider of root.querySelectorAll(".slices input")) {
@@ -300,11 +316,14 @@ export function viewer(root, panes, state, keep) {
         shares[k] = share;
         status.textContent = `Reading the values, ${Math.floor((100 * shares.reduce((a, b) => a + b)) / shares.length)} %`;
       })));
+      const deviations = state.fade && fades() ? await panes[0].values.field("uncertainty") : null;
       if (closed || mine !== asked) return;
       fields = read;
+      spread = deviations;
       planes.clear();
       const middle = [0, 1, 2].map((k) => (k < main().dimension ? main().position(AXES[k], Math.floor(main().shape[k] / 2)) : 0));
       state.cursor ??= middle;
+      find(".fade").hidden = !fades();
       find(".planes").hidden = panes.length > 1 || main().axes.length === 1;
       if (find(".planes").hidden) state.planes = false;
       rebuild();
@@ -360,6 +379,11 @@ export function viewer(root, panes, state, keep) {
   }
   find(".automatic").addEventListener("click", () => change({ window: null }));
   find(".whole").addEventListener("click", () => change({ views: {} }));
+  find("input[name=fade]").checked = state.fade;
+  find("input[name=fade]").addEventListener("change", (event) => {
+    state.fade = event.target.checked;
+    load();
+  });
   find("input[name=planes]").checked = state.planes;
   find("input[name=planes]").addEventListener("change", (event) => {
     state.planes = event.target.checked;

@@ -1,0 +1,70 @@
+"""Picture of the uncertainty: calibration curve, parts of each scan, and one image with its deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import erf
+
+from bentray_workers.images.canvas import drawing, new_figure
+from bentray_workers.images.captions import LABELS
+from bentray_workers.images.maps import SPEED, UNCERTAINTY, draw_bar, draw_map, robust_limits
+
+from ..shared._small_png import figure_png
+
+if TYPE_CHECKING:
+    from .uncertainty import Judged
+
+SHADOW, OTHER, CHOSEN = "#c1272d", "#1f5fa8", "#9aa7b5"
+
+
+def calibration_picture(judged: Sequence[Judged], others: Sequence[Judged]) -> bytes:
+    """PNG of four panels.
+
+    Args:
+        judged: all scans.
+        others: those that chose nothing.
+    """
+    with drawing():
+        figure = new_figure(15.0, 3.9)
+        curve, bars, image, spread = figure.subplots(1, 4)
+        deviations = np.linspace(0.0, 4.0, 81)
+        curve.plot(deviations, erf(deviations / np.sqrt(2.0)), color="#555555", dashes=(4, 2), label="normal")
+        worst = min(judged, key=lambda one: one.within)
+        for label, group, colour in (
+            ("scans that chose nothing", others, OTHER),
+            ("scan with the fewest", [worst], SHADOW),
+        ):
+            sizes = np.concatenate([np.abs(one.error) / one.deviation for one in group])
+            curve.plot(deviations, [(sizes <= k).mean() for k in deviations], color=colour, label=label)
+        curve.plot([2.0], [0.85], "o", color="#e08a00", label="goal")
+        curve.set_xlabel("deviations")
+        curve.set_ylabel("part of the nodes within")
+        curve.set_xlim(0.0, 4.0)
+        curve.set_ylim(0.0, 1.0)
+        curve.set_title("Calibration")
+        curve.legend(loc="lower right", fontsize=8)
+        chosen = [one not in others for one in judged]
+        colours = [
+            SHADOW if one is worst else CHOSEN if c else OTHER for one, c in zip(judged, chosen, strict=True)
+        ]
+        bars.bar(range(len(judged)), [100.0 * one.within for one in judged], color=colours)
+        bars.axhline(85.0, color="#e08a00", linewidth=1.0)
+        bars.set_xlabel("scan (grey: chose the factor)")
+        bars.set_ylabel("nodes within two deviations (%)")
+        bars.set_title("Each scan")
+        result = others[-1].result
+        assert result.uncertainty is not None
+        grid = result.spacing_m, result.origin_m
+        title = f"Speed of scan {others[-1].name.split(':')[0]}"
+        limits = robust_limits([result.speed])
+        shown = draw_map(image, result.speed, *grid, limits, colormap=SPEED, title=title)
+        draw_bar([shown], LABELS["speed"])
+        limits = 0.0, robust_limits([result.uncertainty])[1]
+        width = 1e3 * result.resolution_width_m[0]
+        title = f"Deviation, width {width:.1f} mm"
+        shown = draw_map(spread, result.uncertainty, *grid, limits, colormap=UNCERTAINTY, title=title)
+        draw_bar([shown], LABELS["uncertainty"])
+        return figure_png(figure)

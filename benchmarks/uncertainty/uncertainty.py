@@ -1,0 +1,182 @@
+"""U1: the standard deviations of nodes hold on simulated scans, and their time."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
+from bentray_kernels.tomography.problem import Problem
+from bentray_kernels.tomography.stage_graphs import batches_of
+from bentray_kernels.tomography.uncertainty.ray_uncertainty import (
+    INFLATION,
+    ray_uncertainty,
+    trace_probed_rays,
+)
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
+from bentray_service.cli.output.benchmark_row import Row
+
+from ._breast_scans import BreastScan, breast_scans
+from ._calibration_picture import calibration_picture
+
+Floats = NDArray[np.float64]
+
+# The factor of the deviations was chosen with the first half of the scans, and is judged on the others.
+SCANS, QUICK_SCANS = 20, 2
+DEVIATIONS, PART = 2.0, 0.85
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An image with its uncertainty, compared with the truth.
+
+    Attributes:
+        name: of the scan, with the chosen model.
+        result: the image.
+        error: (nodes,), m/s, of the nodes in the breast from the truth smoothed by the resolution width.
+        deviation: (nodes,), m/s, their standard deviations.
+        image_s, uncertainty_s: CPU time, s.
+    """
+
+    name: str
+    result: Reconstruction
+    error: Floats
+    deviation: Floats
+    image_s: float
+    uncertainty_s: float
+
+    @property
+    def within(self) -> float:
+        """Part of the nodes within ``DEVIATIONS``."""
+        return part_within([self], DEVIATIONS)
+
+
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """Rows of the calibration, then of the time."""
+    count = QUICK_SCANS if context.quick else SCANS
+    judged = []
+    for number, scan in enumerate(breast_scans(count)):
+        context.progress(number, count, scan.name)
+        judged.append(judge(scan))
+    chosen_with, others = judged[: count // 2], judged[count // 2 :]
+    factor = INFLATION * quantile(chosen_with, PART) / DEVIATIONS
+    constant = constant_deviation(chosen_with)
+    flat = float(np.mean(np.concatenate([np.abs(one.error) for one in others]) <= DEVIATIONS * constant))
+    each = "; ".join(f"{one.name}: {100.0 * one.within:.0f} %" for one in judged)
+    first = chosen_with[0].name.split(":")[0], chosen_with[-1].name.split(":")[0]
+    yield Row(
+        "U1 nodes within two deviations, scans that chose nothing",
+        part_within(others, DEVIATIONS),
+        PART,
+        ">=",
+        "",
+        f"{len(others)} scans, nodes in the breast; one deviation for all nodes, chosen alike: "
+        f"{100.0 * flat:.0f} %; scans {first[0]} to {first[1]} would choose the factor {factor:.2f}, in use is {INFLATION:g}",
+    )
+    yield Row(
+        "U1 nodes within two deviations, all scans",
+        part_within(judged, DEVIATIONS),
+        PART,
+        ">=",
+        "",
+        f"{len(judged)} scans, {100.0 * part_within(judged, 1.0):.0f} % within one deviation; {each}",
+    )
+    least = min(judged, key=lambda one: one.within)
+    yield Row(
+        "U1 nodes within two deviations, the scan with the fewest",
+        least.within,
+        PART,
+        ">=",
+        "",
+        f"{least.name}; error {rms(least.error):.1f} m/s, deviations {rms(least.deviation):.1f} m/s",
+    )
+    correlations = [correlation(one) for one in judged]
+    yield Row(
+        "U1 rank correlation of deviation and error, least of all scans",
+        min(correlations),
+        0.2,
+        ">=",
+        "",
+        f"median {float(np.median(correlations)):.2f}; a deviation that is the same at all nodes has 0",
+    )
+    image, own = (sum(getattr(one, name) for one in judged) for name in ("image_s", "uncertainty_s"))
+    yield Row(
+        "U1 time of image and uncertainty over that of the image",
+        (image + own) / image,
+        2.0,
+        "<",
+        "",
+        f"CPU time of {len(judged)} scans, {image:.0f} s for the images; load {os.getloadavg()[0]:.1f}",
+    )
+    context.save_picture("uncertainty.png", lambda: calibration_picture(judged, others))
+
+
+def judge(scan: BreastScan) -> Judged:
+    """Reconstruct a scan by the default settings, and compare with the truth."""
+    begun = time.process_time()
+    result = reconstruct(scan.dataset, Settings.of(uncertainty=True, attenuation=False))
+    whole = time.process_time() - begun
+    assert result.uncertainty is not None
+    spacing, nodes = result.spacing_m[0], result.speed.shape[0]
+    side = spacing * (nodes - 1)
+    (width,) = result.resolution_width_m
+    truth = scan.breast.speed(nodes, side)
+    smooth = gaussian_filter(truth, width / spacing, mode="nearest") if width > 0.0 else truth
+    inside = scan.breast.inside(nodes, side) & (result.uncertainty > 0.0)
+    own = seconds_of_uncertainty(scan.dataset, result)
+    settings = result.settings
+    name = f"{scan.name}, {'bent' if settings.rays == 'curved' else 'straight'} {settings.method}"
+    return Judged(name, result, (result.speed - smooth)[inside], result.uncertainty[inside], whole - own, own)
+
+
+def seconds_of_uncertainty(dataset: Dataset, result: Reconstruction) -> float:
+    """CPU time of the uncertainty of a result, s."""
+    begun = time.process_time()
+    problem = Problem.of(dataset, result.settings, 0).each_pair_once()
+    slowness = 1.0 / result.speed
+    parts = [
+        trace_probed_rays(problem, result.settings, slowness, batch)
+        for batch in batches_of(problem.active_emitters)
+    ]
+    ray_uncertainty(problem, result.settings, slowness, parts)
+    return time.process_time() - begun
+
+
+def part_within(judged: Sequence[Judged], deviations: float) -> float:
+    """Part of all nodes whose error is at most so many deviations."""
+    return float(np.mean(np.concatenate([relative(one) for one in judged]) <= deviations))
+
+
+def quantile(judged: Sequence[Judged], part: float) -> float:
+    """The number of deviations within which that part of the nodes lies."""
+    return float(np.quantile(np.concatenate([relative(one) for one in judged]), part))
+
+
+def relative(judged: Judged) -> Floats:
+    """Absolute errors in deviations."""
+    return np.asarray(np.abs(judged.error) / judged.deviation)
+
+
+def constant_deviation(judged: Sequence[Judged]) -> float:
+    """One deviation for all nodes with ``PART`` of them within ``DEVIATIONS``, m/s."""
+    errors = np.concatenate([np.abs(one.error) for one in judged])
+    return float(np.quantile(errors, PART)) / DEVIATIONS
+
+
+def correlation(judged: Judged) -> float:
+    """Spearman's rank correlation of absolute error and deviation."""
+    ranks = [np.argsort(np.argsort(values)) for values in (np.abs(judged.error), judged.deviation)]
+    return float(np.corrcoef(ranks)[0, 1])
+
+
+def rms(values: Floats) -> float:
+    """Root mean square."""
+    return math.sqrt(float((values**2).mean()))
