@@ -1,4 +1,4 @@
-"""Travel time scans of breasts of which no two are alike: anatomy, water, elements and noise are drawn."""
+"""Scans of breasts of which no two are alike: anatomy, water, elements and noise are drawn."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def breast_scans(count: int) -> Iterator[BreastScan]:
     for number in range(count):
         random = np.random.default_rng((71, number))
         water = float(random.choice(WATERS_MPS))
-        breast = _detailed(random, water) if number % 2 else _of_ellipses(random, water)
+        breast = detailed(random, water) if number % 2 else _of_ellipses(random, water)
         ring = Ring(ELEMENTS[number % len(ELEMENTS)], RADIUS_M)
         everyone = np.arange(ring.elements)
         times = TravelTimeScan(breast, ring, DETAILED_SIDE_M, nodes=NODES).delta_tof(everyone)
@@ -53,7 +53,7 @@ def breast_scans(count: int) -> Iterator[BreastScan]:
         yield BreastScan(name, dataset, breast)
 
 
-def _detailed(random: np.random.Generator, water_mps: float) -> DetailedBreast:
+def detailed(random: np.random.Generator, water_mps: float) -> DetailedBreast:
     """A breast of any density with a tumour and a cyst."""
     places = [_place(random, 0.045) for _ in range(2)]
     sizes = random.uniform(0.0025, 0.007, 2)

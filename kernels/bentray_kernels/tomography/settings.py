@@ -330,7 +330,8 @@ class Settings:
     uncertainty: bool = setting(
         False,
         "Also estimate the standard deviation of the speed at each node, and the resolution width of the "
-        "image, from the misfit along bent rays and the differences of pairs measured both ways.",
+        "image: from the misfit along bent rays and the differences of pairs measured both ways; of full "
+        "waveforms from two more inversions, each with half of the emitters, in about as much time again.",
         label="Uncertainty",
     )
     minutes: float | None = setting(

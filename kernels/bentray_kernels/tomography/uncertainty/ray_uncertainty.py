@@ -29,8 +29,8 @@ AVERAGED_NODES = 1.5
 # deviations by less than a fifth.
 CORRELATION, PRIOR, PRIOR_FLOOR, PRIOR_FLOOR_MPS = 0.026, 1.5, 0.15, 2.0
 
-# For errors of the model and of the linearisation, which are not noise: with this factor 85 % of the nodes of
-# ten simulated scans lay within two deviations. ``bentray bench uncertainty`` judges it on ten others.
+# For errors of the model and of the linearisation, which are not noise: with this factor nine tenths of the
+# nodes of ten simulated scans lay within two deviations; ``bentray bench uncertainty`` judges it on others.
 INFLATION = 1.6
 
 # Widths that the truth may be smoothed by, nodes.

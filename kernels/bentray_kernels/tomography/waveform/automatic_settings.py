@@ -13,6 +13,7 @@ from ..numerics import BANDS
 from ..requirements import check_waveform
 from ..settings import Settings
 from ..solver_choice import wave_engine
+from .half_runs import half_plans
 from .waveform_cost import core_seconds
 from .waveform_settings import Band, WaveSettings, bands, loss_band
 
@@ -61,6 +62,8 @@ class WaveScale(NamedTuple):
 
     def _minutes(self, settings: Settings, count: int | None, emitters: int | None) -> float:
         plan = self._bands(settings, count, emitters)
+        if settings.uncertainty:
+            plan = (*plan, *(band for half in half_plans(WaveSettings(plan)) for band in half.bands))
         fastest = settings.speed_bounds_mps[1]
         return self.slices * core_seconds(plan, self.width_m, self.record_s, fastest) / 60.0
 

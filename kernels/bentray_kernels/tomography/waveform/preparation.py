@@ -128,8 +128,11 @@ def _draw_emitters(candidates: Ints, settings: WaveSettings, number: int) -> tup
     rest = np.setdiff1d(candidates, held)
     if rest.size == 0:
         raise InvalidInput("held_out", settings.held_out, f"fewer than the {candidates.size} emitters")
-    count = min(settings.bands[number].emitters, rest.size)
+    # Both halves draw the same emitters, and each takes every other one.
+    requested = settings.bands[number].emitters * (1 if settings.half is None else 2)
+    count = min(requested, rest.size)
     edges = np.linspace(0, rest.size, count + 1)
     chance = np.random.default_rng((settings.seed, number)).random(count)
     drawn = (edges[:-1] + chance * np.diff(edges)).astype(np.int64)
-    return rest[np.unique(np.minimum(drawn, rest.size - 1))], held
+    drawn = np.unique(np.minimum(drawn, rest.size - 1))
+    return rest[drawn if settings.half is None else drawn[settings.half :: 2]], held

@@ -17,6 +17,7 @@ from ..numerics import recorded
 from ..reconstruction_graph import Run, progress_of
 from ..result import Reconstruction
 from ..settings import Settings
+from . import half_runs
 from .automatic_settings import scale_of, wave_settings
 from .inversion_state import BandEnd, Image
 from .refinement_graph import RefinementGraph, WaveScan, resampled
@@ -56,7 +57,10 @@ class Refinement:
         self._whole_minutes = scale.minutes(settings)
         budget = -1.0 if settings.minutes is None else settings.minutes
         self.within_budget = scale.minutes(self._settings) <= budget
-        self.total = slices * sum(band.evaluations(self._plan.held_out) for band in self._plan.bands)
+        self._of_halves = half_runs.passes(self._plan) if settings.uncertainty else 0
+        self._of_image = sum(band.evaluations(self._plan.held_out) for band in self._plan.bands)
+        self._water_mps = dataset.water_speed_mps
+        self.total = slices * (self._of_image + self._of_halves)
 
     def refined(self, rays: Reconstruction, run_graphs: Run, before: int) -> Reconstruction:
         """The refined reconstruction, slice after slice: the emitters of one slice occupy many workers.
@@ -67,21 +71,52 @@ class Refinement:
             before: emitter passes already made.
         """
         images = _slices(rays, rays.speed)
-        passes = self.total // len(images)
-        made = before
+        made, after = before, len(images) * self._of_halves
         stage = 1 + max(record.stage for record in rays.history)
         history, graphs = rays.history, []
         for index, image in enumerate(images):
             scan = self._scan_of(self._plan, index)
             graphs.append(RefinementGraph(scan, image, index, history, stage))
-            run_graphs(graphs[-1:], made, self.total - passes * (index + 1))
+            run_graphs(graphs[-1:], made, self._of_image * (len(images) - 1 - index) + after)
             made += graphs[-1].total
             history = graphs[-1].history
         if self._settings.method == "auto" and not predicts_better(graphs):
             summary = _summary(rays, self._plan, graphs)
             summary += "; not clearly better, so the image of the rays is given"
             return replace(rays, history=history, provenance={**rays.provenance, "waveform": summary})
-        return self._result(rays, graphs)
+        result = self._result(rays, graphs)
+        return self._with_uncertainty(result, images, graphs, run_graphs, made) if after else result
+
+    def _with_uncertainty(
+        self,
+        result: Reconstruction,
+        images: Sequence[Image],
+        graphs: Sequence[RefinementGraph],
+        run_graphs: Run,
+        made: int,
+    ) -> Reconstruction:
+        """The result with the standard deviations from both halves of the emitters; see ``half_runs``."""
+        spread, widths = [], []
+        for index, (start, graph) in enumerate(zip(images, graphs, strict=True)):
+            plans, before = half_runs.half_plans_after(self._plan, graph.ends, start)
+            if not plans:
+                return result
+            runs = [
+                half_runs.HalfRun(self._scan_of(plan, index), before, earlier=graph.history) for plan in plans
+            ]
+            for number, run in enumerate(runs):
+                run_graphs([run], made, self._of_halves // 2 * (2 * (len(images) - index) - 1 - number))
+                made += run.total
+            band = half_runs.last_band(self._plan, graph.ends)
+            widths.append(half_runs.WIDTH_WAVES * self._water_mps / band.high_hz)
+            deviation = half_runs.deviation(graph.image, [run.image for run in runs], widths[-1])
+            spread.append(
+                replace(graph.image, speed=np.where(graph.image.speed != self._water_mps, deviation, 0.0))
+            )
+        grid = result.spacing_m[0], (result.origin_m[0], result.origin_m[1]), result.speed.shape[:2]
+        parts = [one.speed if _grid(one) == grid else resampled(one, *grid) for one in spread]
+        stacked = np.ascontiguousarray(np.stack(parts, axis=-1)) if result.speed.ndim == 3 else parts[0]
+        return replace(result, uncertainty=stacked, resolution_width_m=tuple(widths))
 
     @property
     def passes(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from ...errors import InvalidInput
 from ...limits import SPACING_M, SPEED_MPS
@@ -119,6 +119,7 @@ class WaveSettings:
         opening_angle_deg: pairs outside this angle are left out, see ``directivity``; None: no pair is.
         estimates_source: whether the source is estimated anew in each band from the traces of the object.
         engine: that simulates the waves.
+        half: 0 or 1, that half of the emitters of each band alone; None: all of them.
     """
 
     bands: tuple[Band, ...]
@@ -134,6 +135,7 @@ class WaveSettings:
     opening_angle_deg: float | None = None
     estimates_source: bool = False
     engine: Engine = "compiled"
+    half: Literal[0, 1] | None = None
 
     def __post_init__(self) -> None:
         if not self.bands:

@@ -1,0 +1,105 @@
+"""U1: standard deviations of full-waveform images hold on breasts that chose no parameter, and their time."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from bentray_kernels.acquisition import Dataset, pick
+from bentray_kernels.arrays import Floats
+from bentray_kernels.phantoms import DETAILED_SIDE_M
+from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
+from bentray_service.cli.output.benchmark_context import BenchmarkContext
+from bentray_service.cli.output.benchmark_row import Row
+
+from ..shared._ring_scan import RingScan
+from ..shared._trace_noise import with_trace_noise
+from ._breast_scans import detailed
+
+# Half the size of a breast; the ratio of breast and wavelength is that of 75 kHz at full size.
+SIDE_M, RADIUS_M, CENTRE_HZ, ELEMENTS, EMISSIONS, WATER_MPS = 0.12, 0.054, 1.5e5, 64, 32, 1500.0
+SCANS, QUICK_SCANS, SNRS = 4, 1, (10.0, 30.0)
+PLAN = Settings.of(method="waveform", attenuation=False, uncertainty=True)
+
+
+def rows(context: BenchmarkContext) -> Iterable[Row]:
+    """Rows of the calibration and of the time."""
+    errors, deviations, parts, seconds = [], [], [], np.zeros(2)
+    for number, scan in enumerate(wave_scans(QUICK_SCANS if context.quick else SCANS, context)):
+        begun = time.process_time()
+        result = reconstruct(scan, PLAN)
+        both = time.process_time() - begun
+        begun = time.process_time()
+        reconstruct(scan, result.settings.changed(uncertainty=False))
+        seconds += both, time.process_time() - begun
+        error, deviation = beside_truth(scan, result)
+        errors.append(error)
+        deviations.append(deviation)
+        parts.append(f"{number}: {100.0 * np.mean(error <= 2.0 * deviation):.0f} %")
+    error, deviation = np.concatenate(errors), np.concatenate(deviations)
+    each = "; ".join(parts)
+    yield Row(
+        "U1 full waveform, nodes within two deviations",
+        float(np.mean(error <= 2.0 * deviation)),
+        0.85,
+        ">=",
+        "",
+        f"{len(parts)} scans of {EMISSIONS} emitters at {1e-3 * CENTRE_HZ:.0f} kHz, nodes in the breast; "
+        f"{each}; "
+        f"{100.0 * np.mean(error <= deviation):.0f} % within one; error {rms(error):.1f} m/s, deviations "
+        f"{rms(deviation):.1f} m/s",
+    )
+    yield Row(
+        "U1 full waveform, time of image and uncertainty over that of the image",
+        float(seconds[0] / seconds[1]),
+        2.0,
+        "<",
+        "",
+        f"CPU time, {seconds[1]:.0f} s for the images; load {os.getloadavg()[0]:.1f}",
+    )
+
+
+def wave_scans(count: int, context: BenchmarkContext) -> Iterator[Dataset]:
+    """Breasts in water by a finer simulator of another order, with noise."""
+    for number in range(count):
+        breast = detailed(np.random.default_rng((73, number)), WATER_MPS)
+        size = RingScan(
+            SIDE_M, RADIUS_M, CENTRE_HZ, ELEMENTS, EMISSIONS, breast.speed_range(), WATER_MPS, None
+        )
+        speed = breast.speed(size.nodes, DETAILED_SIDE_M)
+        shots = size.recorded({"object": speed, "water": np.full_like(speed, WATER_MPS)}, context.progress)
+        inside = breast.inside(size.nodes, DETAILED_SIDE_M)
+        scan = size.dataset(shots["object"], shots["water"], speed, inside)
+        noisy = with_trace_noise(scan, SNRS[number % len(SNRS)], seed=number)
+        yield replace(pick(noisy), waveform=noisy.waveform)
+
+
+def beside_truth(scan: Dataset, result: Reconstruction) -> tuple[Floats, Floats]:
+    """Absolute errors from the smoothed truth, m/s, and deviations, m/s, of the nodes in the breast."""
+    truth, spread = scan.truth, result.uncertainty
+    assert truth is not None
+    assert spread is not None
+    assert scan.roi is not None
+    nodes = result.resolution_width_m[0] / truth.spacing_m[0]
+    smooth = gaussian_filter(truth.sound_speed_mps, nodes, mode="nearest")
+    lines = [
+        (result.origin_m[axis] + result.spacing_m[axis] * np.arange(count) - truth.origin_m[axis])
+        / truth.spacing_m[axis]
+        for axis, count in enumerate(result.speed.shape)
+    ]
+    places = np.meshgrid(*lines, indexing="ij")
+    inside = map_coordinates(scan.roi.astype(float), places, order=0, mode="constant") > 0.5
+    inside &= spread > 0.0
+    true = map_coordinates(smooth, places, order=1, mode="nearest")
+    return np.abs(result.speed - true)[inside], spread[inside]
+
+
+def rms(values: Floats) -> float:
+    """Root mean square."""
+    return math.sqrt(float((values**2).mean()))
