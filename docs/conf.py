@@ -20,6 +20,7 @@ release = version = version_of("bentray")
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx_gallery.gen_gallery",
     "from_code",
@@ -27,7 +28,8 @@ extensions = [
     "offline",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["recipes"]
+exclude_patterns = ["recipes", "templates"]
+templates_path = ["templates"]
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
 myst_dmath_double_inline = True
@@ -44,6 +46,9 @@ html_show_sphinx = False
 
 # A name in single backticks is code, as in the docstrings.
 default_role = "code"
+# A page for each object of the Python reference, in reference/api.
+autosummary_generate = True
+autosummary_imported_members = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
