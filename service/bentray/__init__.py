@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from bentray_service.interactive.result import Result, load
     from bentray_service.interactive.scan import Scan, read
     from bentray_service.interactive.simulation import simulate
+    from bentray_service.webhooks.signature import verify_webhook
 else:
     # Where each name is defined.
     PLACES = {
@@ -29,6 +30,7 @@ else:
         "read": "bentray_service.interactive.scan",
         "reconstruct": "bentray_service.interactive.reconstruction",
         "simulate": "bentray_service.interactive.simulation",
+        "verify_webhook": "bentray_service.webhooks.signature",
     }
 
     def __getattr__(name: str) -> object:
@@ -58,4 +60,5 @@ __all__ = [
     "read",
     "reconstruct",
     "simulate",
+    "verify_webhook",
 ]

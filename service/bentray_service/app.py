@@ -65,6 +65,7 @@ from .rows.ages import ExpiryMarks
 from .rows.batches import Batches
 from .rows.checksums import Checksums
 from .rows.database import open_database
+from .rows.deliveries import Deliveries
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
 from .rows.keys import Keys
@@ -80,6 +81,7 @@ from .web.headers import SecurityHeaders
 from .web.request_id import RequestIds
 from .web.slow_bodies import SlowBodies
 from .web.tus_headers import TusHeaders
+from .webhooks.sender import Webhooks
 from .wiring import Parts
 
 DESCRIPTION = (
@@ -248,10 +250,14 @@ def _open(
     stack.callback(housekeeper.stop)
     pictures = Pictures(cluster, store.fetch)
     stack.callback(pictures.stop)
+    webhooks = Webhooks(database, settings, alone=settings.database_url is None)
+    webhooks.start()
+    stack.callback(webhooks.stop)
     threads: dict[str, Threaded] = {
         "runner": runner,
         "ingest": upload_ingest,
         "housekeeping": housekeeper,
+        "webhooks": webhooks,
     }
     readiness = Readiness(database, files, compute, threads, settings.min_free_bytes)
     stack.callback(readiness.stop)
@@ -284,4 +290,6 @@ def _open(
         audit=Audit(files.audit),
         readiness=readiness,
         threads=threads,
+        webhooks=webhooks,
+        deliveries=Deliveries(database),
     )

@@ -148,6 +148,7 @@ class _ServiceCollector(Collector):
         try:
             counts, oldest = parts.queue.load()
             damaged = Checksums(parts.database).count_damaged()
+            sent = parts.deliveries.counts()
         except SQLAlchemyError:
             return
         waiting = GaugeMetricFamily("bentray_jobs", "Jobs by state.", labels=["state"])
@@ -157,6 +158,10 @@ class _ServiceCollector(Collector):
         age = 0.0 if oldest is None else max(0.0, time.time() - oldest)
         yield _gauge("bentray_jobs_oldest_queued_seconds", "Age of the oldest queued job.", age)
         yield _gauge("bentray_files_damaged", "Stored items known to be damaged.", damaged)
+        messages = GaugeMetricFamily("bentray_webhooks", "Messages to webhooks by state.", labels=["state"])
+        for state, count in sent.items():
+            messages.add_metric([state], count)
+        yield messages
 
 
 class _Sentences(Collector):

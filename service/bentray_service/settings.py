@@ -170,6 +170,12 @@ class ServiceSettings(BaseSettings):
         description="Rate limit for rendered images; those of few rays count less; 0: unlimited.",
     )
     max_tenant_bytes: int = Field(100 * GIB, gt=0, description="Storage quota per tenant, in bytes.")
+    webhooks: bool = Field(True, description="Whether jobs may have webhooks, and messages to them are sent.")
+    webhook_networks: str | None = Field(
+        None,
+        description="Networks that webhooks may reach beside public addresses, separated by commas; "
+        "http without TLS is accepted there only.",
+    )
     log_format: Literal["text", "json"] = Field(
         "text", description="Log format: warnings as text, or all requests as lines of JSON."
     )

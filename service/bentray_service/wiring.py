@@ -27,6 +27,7 @@ from .pictures import Pictures
 from .readiness import Readiness, Threaded
 from .rows.batches import Batches
 from .rows.database import Database
+from .rows.deliveries import Deliveries
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
 from .rows.projects import Projects
@@ -34,6 +35,7 @@ from .rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
 from .rows.tenants import Tenant
 from .rows.uploads import Uploads
 from .settings import ServiceSettings
+from .webhooks.sender import Webhooks
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,8 @@ class Parts:
     audit: Audit
     readiness: Readiness
     threads: Mapping[str, Threaded]
+    webhooks: Webhooks
+    deliveries: Deliveries
 
 
 def parts_of(request: Request) -> Parts:

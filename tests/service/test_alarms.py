@@ -41,6 +41,7 @@ HEALTHY = {
     'bentray_http_request_duration_seconds_bucket{method="GET",route="/",le="+Inf"}': "0+601x170",
     "bentray_audit_lost_total": "0x170",
     "bentray_backup_timestamp_seconds": "0x170",
+    'bentray_webhooks{state="failed"}': "3x170",
     "bentray_process_open_fds": "90x170",
     "bentray_process_max_fds": "1024x170",
 }
@@ -70,6 +71,7 @@ ILL = {
     "BentrayAuditLost": {"bentray_audit_lost_total": "1x50"},
     "BentrayBackupOld": {"bentray_backup_timestamp_seconds": "-129600x50"},
     "BentrayNoBackup": {"bentray_backup_timestamp_seconds": "stale _x50"},
+    "BentrayWebhooksFail": {'bentray_webhooks{state="failed"}': "4x50"},
     "BentrayFilesOpen": {"bentray_process_open_fds": "900x50"},
 }
 

@@ -27,6 +27,7 @@ from . import (
     simulate,
     submit,
     verify,
+    webhooks,
     worker,
 )
 from .options.repeated_words import RepeatedSpacing
@@ -69,6 +70,7 @@ for command in (
 app.command(cls=RepeatedSpacing)(render.render)
 app.add_typer(keys.keys, name="keys")
 app.add_typer(projects.projects, name="projects")
+app.add_typer(webhooks.webhooks, name="webhooks")
 
 
 def _version(requested: bool) -> None:

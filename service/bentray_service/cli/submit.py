@@ -45,6 +45,13 @@ def submit(
             show_default="no download; with --batch, DIR/results",
         ),
     ] = None,
+    webhook: Annotated[
+        str | None,
+        typer.Option(
+            show_default=False,
+            help="https address that the service calls when the job ends; needs --no-wait.",
+        ),
+    ] = None,
     wait: Annotated[
         bool, typer.Option("--wait/--no-wait", help="Wait for the job, or return at once.")
     ] = True,
@@ -101,13 +108,16 @@ def submit(
         raise InvalidInput(
             "output", f"{output} with --no-wait", "one of the two: there is no result to download yet"
         )
+    if webhook is not None and (batch is not None or wait):
+        found = "an address with --batch" if batch is not None else "an address without --no-wait"
+        raise InvalidInput("webhook", found, "FILE with --no-wait")
     settings = settings_from(options)
     given = scan_options.metadata()
     if file is not None:
         source = input_scan(file)
         folder = None if output is None else output_folder(output)
         with dataset_file(source, given, folder or Path(gettempdir())) as scan:
-            _submit(source, scan, settings, url, folder, wait=wait, as_json=as_json)
+            _submit(source, scan, settings, url, folder, wait=wait, webhook=webhook, as_json=as_json)
     if batch is not None and scheduler is None:
         from .service_batch import submit_service_batch
 
@@ -119,7 +129,15 @@ def submit(
 
 
 def _submit(
-    source: Path, scan: Path, settings: Settings, url: str, folder: Path | None, *, wait: bool, as_json: bool
+    source: Path,
+    scan: Path,
+    settings: Settings,
+    url: str,
+    folder: Path | None,
+    *,
+    wait: bool,
+    webhook: str | None,
+    as_json: bool,
 ) -> None:
     """Submit ``scan``, the dataset file made of ``source``."""
     from bentray_kernels.tomography.requirements import check_scan
@@ -133,7 +151,7 @@ def _submit(
     with client_errors(), Client(url, on_wait=remark) as client:
         with progress_bar("Uploading") as step:
             dataset = client.upload(scan, step)
-        job = client.submit(dataset.id, settings.to_dict())
+        job = client.submit(dataset.id, settings.to_dict(), webhook=webhook)
         if job.plan is not None:
             remark(job.plan.why)
         if wait:

@@ -69,6 +69,7 @@ def submit(
     settings: Mapping[str, Any] | None = None,
     *,
     method: Method | None = None,
+    webhook: str | None = None,
     **values: Unpack[ReconstructionSettings],
 ) -> Flow[JobRecord]:
     """Start a reconstruction; omitted settings take their defaults.
@@ -77,13 +78,16 @@ def submit(
         dataset: id or record of the scan.
         settings: nested, as the REST interface has them.
         method: as for ``bentray.reconstruct``.
+        webhook: address that the service calls when the job ends; see ``bentray.verify_webhook``.
         values: single settings as for ``bentray.reconstruct``, in place of those of ``settings``.
 
     Raises:
         InvalidInput: for an unknown name in ``values``, with the one that is spelt most like it.
     """
     merged = merged_settings(settings, method, {**values})
-    return (yield from _start({"kind": "reconstruction", "dataset": id_of(dataset), "settings": merged}))
+    called = {} if webhook is None else {"webhook": webhook}
+    request = {"kind": "reconstruction", "dataset": id_of(dataset), "settings": merged, **called}
+    return (yield from _start(request))
 
 
 def merged_settings(

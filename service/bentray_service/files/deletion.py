@@ -17,6 +17,7 @@ from ..rows.schema import (
     ENDED,
     batches,
     datasets,
+    deliveries,
     events,
     geometry_fields,
     jobs,
@@ -163,7 +164,8 @@ def _forget(
     connection.execute(delete(geometry_fields).where(*mine))
     delete_checksums(connection, tenant, {*names, *fields, *gone})
     connection.execute(delete(too_old).where(too_old.c.tenant == tenant, too_old.c.id.in_(names)))
-    connection.execute(delete(events).where(events.c.job_id.in_(gone)))
+    for table in (events, deliveries):
+        connection.execute(delete(table).where(table.c.job_id.in_(gone)))
     connection.execute(delete(volumes).where(volumes.c.id.in_(names)))
     connection.execute(delete(jobs).where(jobs.c.id.in_(gone)))
     left = select(jobs.c.id).where(jobs.c.batch_id == batches.c.id).exists()

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from fastapi.openapi.models import Example
-from pydantic import BaseModel, ConfigDict, TypeAdapter, field_validator
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 
 from bentray_workers.cluster.task_pool import JobControl
 
@@ -27,6 +27,11 @@ class JobRequest(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     kind: str
+    webhook: str | None = Field(
+        default=None,
+        max_length=2000,
+        description="https address to which a signed message is sent when the job ends.",
+    )
 
     @field_validator("settings", mode="before", check_fields=False)
     @classmethod

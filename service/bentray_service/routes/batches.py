@@ -76,7 +76,10 @@ def start_batch(
                 reserved=order.largest_bytes,
             )
         )
-    how = Submission(service.quota.most_bytes, service.settings.max_queued_jobs, idempotency_key, caller.who)
+    webhook = batch_request.webhook
+    service.webhooks.check(caller.tenant, webhook)
+    limits = service.quota.most_bytes, service.settings.max_queued_jobs
+    how = Submission(*limits, idempotency_key, caller.who, webhook)
     row = service.batches.add(caller.tenant, batch_request.name, settings.to_dict(), new, how)
     log.info("%s queued, %d jobs", row["id"], row["size"], extra={"figures": {"batch": row["id"]}})
     service.runner.notify()

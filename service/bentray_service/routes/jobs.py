@@ -10,9 +10,12 @@ from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, 
 
 from ..errors import NoAnimation
 from ..files.deletion import StoredItem
+from ..jobs.estimate import READ, estimate
 from ..jobs.kinds import KINDS
+from ..rows.schema import ENDED
+from ..rows.typed_rows import JobRow
 from ..web.errors import problems
-from ..wiring import CallerTenant, CurrentCaller, Service
+from ..wiring import CallerTenant, CurrentCaller, Parts, Service
 from .bodies import Limit, SmallBody, accept_media_types
 from .downloads import download, download_of
 from .models.job_records import JobList, JobRecord, State
@@ -63,6 +66,7 @@ def start_job(
     """Queue a job. It is stored before the response and survives a restart of the service."""
     kind: str = job_request.kind
     tenant = caller.tenant
+    service.webhooks.check(tenant, job_request.webhook)
     order = KINDS[kind].plan(job_request, tenant, service)
     row = service.jobs.add(
         tenant,
@@ -74,8 +78,9 @@ def start_job(
         most_queued=service.settings.max_queued_jobs,
         key=idempotency_key,
         started_by=caller.who,
+        webhook=job_request.webhook,
     )
-    job = job_record(row, service.jobs.place(row))
+    job = _shown(service, row)
     log.info("%s queued, kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
     service.runner.notify()
     response.headers["Location"] = job.links["self"]
@@ -121,8 +126,18 @@ def list_jobs(
 @router.get("/{job_id}", responses=problems(404))
 def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
     """Show one job: state, progress, and the residual after every iteration."""
-    row = service.jobs.get(tenant, job_id)
-    return job_record(row, service.jobs.place(row))
+    return _shown(service, service.jobs.get(tenant, job_id))
+
+
+def _shown(service: Parts, row: JobRow) -> JobRecord:
+    """The record of one job, with its place in the queue, its estimate and its webhook."""
+    minutes = None
+    if row["state"] == "queued":
+        minutes = estimate(row["plan"], service.jobs.durations(row["tenant"], row["kind"], READ)).minutes
+    delivery = None
+    if row["webhook"] is not None and row["state"] in ENDED:
+        delivery = service.deliveries.of_job(row["tenant"], row["id"])
+    return job_record(row, service.jobs.place(row), minutes, delivery)
 
 
 @router.post(

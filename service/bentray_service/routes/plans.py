@@ -26,6 +26,7 @@ def plan_job(job_request: JobRequest, service: Service, tenant: CallerTenant) ->
     A job that would be rejected is rejected here with the same error.
     """
     kind: str = job_request.kind
+    service.webhooks.check(tenant, job_request.webhook)
     plan = KINDS[kind].plan(job_request, tenant, service).plan
     found = estimate(plan, service.jobs.durations(tenant, kind, READ))
     return EstimateRecord(

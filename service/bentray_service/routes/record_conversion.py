@@ -10,9 +10,18 @@ from bentray_workers.rendering.refraction_view import check_even
 
 from ..jobs.kinds import KINDS, field_links
 from ..rows.ids import volume_of
-from ..rows.typed_rows import BatchRow, DatasetRow, FieldRow, JobRow, MeshRow, UploadRow, VolumeRow
+from ..rows.typed_rows import (
+    BatchRow,
+    DatasetRow,
+    DeliveryRow,
+    FieldRow,
+    JobRow,
+    MeshRow,
+    UploadRow,
+    VolumeRow,
+)
 from .models.batch_records import BatchRecord
-from .models.job_records import DatasetRecord, JobRecord, VolumeRecord
+from .models.job_records import DatasetRecord, JobRecord, VolumeRecord, WebhookRecord
 from .models.surface_records import FieldRecord, FieldSeconds, MeshRecord
 from .models.upload_records import UploadRecord
 
@@ -30,7 +39,19 @@ def dataset_record(row: DatasetRow) -> DatasetRecord:
     return DatasetRecord.model_validate({**row, "title": title, "job": job, "links": links})
 
 
-def job_record(row: JobRow, ahead: int | None = None) -> JobRecord:
+def job_record(
+    row: JobRow,
+    ahead: int | None = None,
+    minutes: float | None = None,
+    delivery: DeliveryRow | None = None,
+) -> JobRecord:
+    """The record of a job.
+
+    Args:
+        row: the job.
+        ahead, minutes: place in the queue and estimate, of a queued job.
+        delivery: the message to its webhook, of a job that has ended.
+    """
     here = f"/v1/jobs/{row['id']}"
     reads = {what: row[f"{what}_id"] for what in READ}  # type: ignore[literal-required]
     links = {"self": here} | {what: f"/v1/{LISTED[what]}/{name}" for what, name in reads.items() if name}
@@ -45,7 +66,8 @@ def job_record(row: JobRow, ahead: int | None = None) -> JobRecord:
     started, progress = row["started"], {**row, "phase": row["phase"] or ""}
     seconds = None if started is None else (row["finished"] or time.time()) - started
     record = {**row, **reads, "field": None, **made, "progress": progress, "seconds": seconds, "links": links}
-    record |= {"ahead": ahead, "batch": row["batch_id"]}
+    record |= {"ahead": ahead, "minutes": minutes, "batch": row["batch_id"]}
+    record["webhook"] = _webhook_record(row["webhook"], delivery)
     if row["batch_id"] is not None:
         links["batch"] = f"/v1/batches/{row['batch_id']}"
     return JobRecord.model_validate(record)
@@ -69,6 +91,22 @@ def batch_record(row: BatchRow) -> BatchRecord:
     seconds = None if started is None else (row["finished"] or time.time()) - started
     more = {"progress": row["fraction"], "jobs": jobs, "seconds": seconds, "links": links}
     return BatchRecord.model_validate({**row, **more})
+
+
+def _webhook_record(url: str | None, delivery: DeliveryRow | None) -> WebhookRecord | None:
+    if url is None:
+        return None
+    if delivery is None:
+        return WebhookRecord(url=url, state="pending", message=None, attempts=[], due=None)
+    return WebhookRecord.model_validate(
+        {
+            "url": url,
+            "state": delivery["state"],
+            "message": delivery["id"],
+            "attempts": delivery["log"],
+            "due": delivery["due"] if delivery["state"] == "waiting" else None,
+        }
+    )
 
 
 def volume_record(row: VolumeRow) -> VolumeRecord:

@@ -45,7 +45,8 @@ class Batches:
         Raises:
             KeyReused, QuotaExceeded, QueueFull, UnknownId: as for ``Jobs.add``.
         """
-        digest = how.digest_of([name, settings, [one.dataset_id for one in new]])
+        called = [] if how.webhook is None else [how.webhook]
+        digest = how.digest_of([name, settings, [one.dataset_id for one in new], *called])
         with self._database.write() as connection:
             before = how.earlier(connection, batches, tenant, digest)
             if before is None:

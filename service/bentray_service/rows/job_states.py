@@ -1,6 +1,6 @@
 """Changes of the state of a job: an update and an appended event in the transaction of the caller.
 
-When a job ends, its reserved storage is released.
+When a job ends, its reserved storage is released, and a message to its webhook is stored.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, delete, insert, select, update
 
 from . import schema
+from .deliveries import announce
 from .schema import ENDED, jobs, storage
 
 RUNNING = ("running", "cancelling")
@@ -33,6 +34,7 @@ def change(
     if changed.rowcount:
         append_event(connection, job_id, after, note)
         if after in ENDED:
+            announce(connection, job_id, after)
             mine = select(jobs.c.tenant).where(jobs.c.id == job_id).scalar_subquery()
             reserved = storage.c.tenant == mine, storage.c.name == job_id, storage.c.reserved
             connection.execute(delete(storage).where(*reserved))

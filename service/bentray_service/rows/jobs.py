@@ -47,6 +47,7 @@ class Jobs(NamedTable[JobRow]):
         most_queued: int | None = None,
         key: str | None = None,
         started_by: str = "",
+        webhook: str | None = None,
     ) -> JobRow:
         """Insert a queued job; it survives a crash once this method returns.
 
@@ -63,6 +64,7 @@ class Jobs(NamedTable[JobRow]):
             most_queued: maximum number of queued jobs.
             key: idempotency key of the request.
             started_by: id of the key, or user of the proxy.
+            webhook: address to call when it ends.
 
         Raises:
             KeyReused: when the key was used with another request.
@@ -74,8 +76,9 @@ class Jobs(NamedTable[JobRow]):
         new = NewJob(
             kind, settings, **references, field_id=field_id, plan=plan, reserved=(reserve or (0, 0))[0]
         )
-        how = Submission(None if reserve is None else reserve[1], most_queued, key, started_by)
-        digest = how.digest_of([kind, settings, dataset_id, volume_id, mesh_id])
+        how = Submission(None if reserve is None else reserve[1], most_queued, key, started_by, webhook)
+        called = [] if webhook is None else [webhook]
+        digest = how.digest_of([kind, settings, dataset_id, volume_id, mesh_id, *called])
         with self._database.write() as connection:
             before = how.earlier(connection, jobs, tenant, digest)
             if before is None:
@@ -300,12 +303,14 @@ class Submission:
         most_queued: maximum number of queued jobs.
         key: idempotency key.
         started_by: id of the key, or the user.
+        webhook: address to call when each job ends.
     """
 
     most_bytes: int | None = None
     most_queued: int | None = None
     key: str | None = None
     started_by: str = ""
+    webhook: str | None = None
 
     @staticmethod
     def digest_of(request: object) -> str:
@@ -384,6 +389,7 @@ def insert_jobs(
                     idempotency_key=key,
                     request_sha256=digest,
                     started_by=how.started_by[:200],
+                    webhook=how.webhook,
                     state="queued",
                     created=time.time(),
                 )

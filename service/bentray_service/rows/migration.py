@@ -150,6 +150,13 @@ def _to_9(connection: Connection) -> None:
         new.create(connection)
 
 
+def _to_10(connection: Connection) -> None:
+    """Version 10: webhooks of jobs, messages to them, and the secrets that sign these."""
+    connection.execute(text("ALTER TABLE jobs ADD COLUMN webhook VARCHAR(2000)"))
+    for new in (schema.deliveries, schema.webhook_secrets):
+        new.create(connection)
+
+
 def _count_stored_bytes(connection: Connection) -> None:
     """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
@@ -161,5 +168,5 @@ def _count_stored_bytes(connection: Connection) -> None:
 
 
 STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType(
-    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6, 6: _to_7, 7: _to_8, 8: _to_9}
+    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6, 6: _to_7, 7: _to_8, 8: _to_9, 9: _to_10}
 )

@@ -20,7 +20,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 9
+VERSION = 10
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -129,6 +129,8 @@ jobs = Table(
     _tenant(),
     *named_columns(),
     Column("started_by", String(200), nullable=False, server_default=""),
+    # Address that is called when it ends.
+    Column("webhook", String(2000)),
     # Idempotency key of the request, and a digest of the request.
     Column("idempotency_key", String(200)),
     Column("request_sha256", String(64)),
@@ -195,6 +197,42 @@ events = Table(
     Column("time", Float, nullable=False),
     Column("state", String(16), nullable=False),
     Column("note", String(500), nullable=False, default=""),
+)
+
+# Messages to the webhooks of jobs that have ended. A message is sent until its receiver accepts it or its
+# attempts are used up; ``log`` has the outcome of each attempt.
+deliveries = Table(
+    "deliveries",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    _tenant(),
+    Column("job_id", String(32), ForeignKey("jobs.id"), nullable=False, unique=True),
+    Column("url", String(2000), nullable=False),
+    # As it is sent, byte for byte in UTF-8.
+    Column("body", String(2000), nullable=False),
+    # waiting, delivered or failed.
+    Column("state", String(16), nullable=False),
+    Column("attempts", Integer, nullable=False, default=0),
+    Column("log", JSON, nullable=False, default=list),
+    Column("created", Float, nullable=False),
+    # Time of the next attempt, and the end of the attempt under way.
+    Column("due", Float, nullable=False),
+    Column("lease_until", Float),
+    Index("deliveries_by_due", "state", "due"),
+)
+
+# Secrets that sign messages to webhooks. They are stored as such, since signing needs them.
+webhook_secrets = Table(
+    "webhook_secrets",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    _tenant(),
+    Column("secret", String(100), nullable=False),
+    Column("created", Float, nullable=False),
+    # Of a secret that was replaced.
+    Column("expires", Float),
+    Index("webhook_secrets_by_tenant", "tenant"),
 )
 
 # Results of reconstructions; uploaded volumes have their own table.

@@ -121,6 +121,7 @@ class JobRow(JobProgress):
     created: float
     started: float | None
     finished: float | None
+    webhook: str | None
     idempotency_key: str | None
     request_sha256: str | None
     lease_owner: str | None
@@ -189,6 +190,23 @@ class EventRow(TypedDict):
     time: float
     state: str
     note: str
+
+
+class DeliveryRow(TypedDict):
+    """A message to a webhook."""
+
+    number: int
+    id: str
+    tenant: Tenant
+    job_id: str
+    url: str
+    body: str
+    state: Literal["waiting", "delivered", "failed"]
+    attempts: int
+    log: list[Plain]
+    created: float
+    due: float
+    lease_until: float | None
 
 
 class UploadRow(TypedDict):

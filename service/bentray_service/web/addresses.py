@@ -1,4 +1,4 @@
-"""Loopback addresses and networks of trusted proxies."""
+"""Loopback addresses and networks: of trusted proxies, and those that webhooks may reach."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def names_loopback(host: str) -> bool:
         return bare.lower() == "localhost"
 
 
-def networks(words: str) -> tuple[Network, ...]:
+def networks(words: str, setting: str = "BENTRAY_TRUSTED_PROXIES") -> tuple[Network, ...]:
     """Parse networks or addresses separated by commas.
 
     Raises:
-        InvalidInput: naming ``BENTRAY_TRUSTED_PROXIES``.
+        InvalidInput: naming the setting.
     """
     found = []
     for word in filter(None, (part.strip() for part in words.split(","))):
@@ -46,7 +46,7 @@ def networks(words: str) -> tuple[Network, ...]:
             found.append(ipaddress.ip_network(word))
         except ValueError:
             accepted = "addresses or networks, as 10.0.0.7,10.1.0.0/16"
-            raise InvalidInput("BENTRAY_TRUSTED_PROXIES", repr(word[:80]), accepted) from None
+            raise InvalidInput(setting, repr(word[:80]), accepted) from None
     return tuple(found)
 
 

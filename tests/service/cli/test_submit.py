@@ -43,8 +43,9 @@ class StandIn:
         StandIn.scan = path
         return SimpleNamespace(id="dataset-1")
 
-    def submit(self, dataset: str, settings: dict[str, Any]) -> JobRecord:
+    def submit(self, dataset: str, settings: dict[str, Any], webhook: str | None = None) -> JobRecord:
         self.asked.append((dataset, settings))
+        self.asked.append(webhook)
         return self.record("queued")
 
     def wait(self, job: str, on_progress: Callable[[JobRecord], None]) -> JobRecord:
@@ -133,6 +134,16 @@ def test_without_a_folder_it_prints_the_job_and_its_address(
     assert result.exit_code == 0
     assert result.stdout == f"job-1 {state}\nhttp://lab:8000/v1/jobs/job-1\n"
     assert json.loads(bentray("submit", scan_file, *words, "--json").stdout)["state"] == state
+
+
+def test_a_webhook_goes_along_without_waiting(
+    bentray: Callable[..., Result], client: type[StandIn], scan_file: Path
+) -> None:
+    words = ("--webhook", "https://hooks.example.org/x")
+    assert bentray("submit", scan_file, "--no-wait", *words).exit_code == 0
+    assert words[1] in client.asked
+    waiting = bentray("submit", scan_file, *words)
+    assert (waiting.exit_code, "--no-wait" in waiting.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,11 @@ class BatchRequest(BaseModel):
     )
     name: str = Field("", max_length=200, description="Name of the batch.")
     settings: Settings = Field(default_factory=Settings, description=DEFAULTS)
+    webhook: str | None = Field(
+        None,
+        max_length=2000,
+        description="https address to which a signed message is sent when each job ends.",
+    )
 
     @field_validator("settings", mode="before")
     @classmethod

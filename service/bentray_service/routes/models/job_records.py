@@ -136,6 +136,28 @@ class EstimateRecord(BaseModel):
     ahead: int = Field(description="Queued jobs that would start before it if jobs run one at a time.")
 
 
+class AttemptRecord(BaseModel):
+    """One attempt to send a message to a webhook."""
+
+    time: datetime
+    status: int | None = Field(description="Status of the response; null without a response.")
+    error: str = Field(description="Why it was not accepted; empty if it was.")
+    seconds: float
+
+
+class WebhookRecord(BaseModel):
+    """The webhook of a job, and the message that the job has ended."""
+
+    url: str
+    state: Literal["pending", "waiting", "delivered", "failed"] = Field(
+        description="pending until the job has ended, and in lists; waiting for the next attempt; delivered; "
+        "failed after the last attempt."
+    )
+    message: str | None = Field(description="Id of the message, its `webhook-id`.")
+    attempts: list[AttemptRecord]
+    due: datetime | None = Field(description="Time of the next attempt.")
+
+
 class JobRecord(ShownRecord):
     """One job."""
 
@@ -151,6 +173,11 @@ class JobRecord(ShownRecord):
         description="Queued jobs that start before this queued job if jobs run one at a time; null in lists."
     )
     batch: str | None = Field(description="Id of the batch that it belongs to.")
+    minutes: float | None = Field(
+        description="Estimated time of this queued job from its start to its end, without other jobs; null "
+        "in lists, and without a sound estimate."
+    )
+    webhook: WebhookRecord | None
     dataset: str | None = Field(
         description="Id of the input of a reconstruction, or of the result of a simulation."
     )

@@ -1,0 +1,1 @@
+"""Webhooks: signed messages to an address of the client when a job ends."""
