@@ -102,7 +102,7 @@ def test_it_sends_the_scan_and_fetches_three_files(
         "submit", scan_file, "--url", "http://lab:8000", "-o", tmp_path, "--iterations", 1, "--json"
     )
     assert result.exit_code == 0
-    url, (dataset, settings), closed = client.asked
+    url, (dataset, settings), _, closed = client.asked
     assert (url, dataset, closed) == ("http://lab:8000", "dataset-1", "closed")
     assert settings == Settings(iterations=1).to_dict()
     said = json.loads(result.stdout)
