@@ -32,6 +32,7 @@ def plans():
             if method in ("sart", "gauss-newton"):
                 settings = settings.changed(minutes=None)
             yield plan(summary(traces), settings, ())
+    yield plan(summary(None), Settings.of(method="sart", nodes=64, device="opencl"), ())
     yield plan(replace(summary(TRACES), echoes=TRACES), Settings.of(method="sart", reflection=True), ())
 
 
