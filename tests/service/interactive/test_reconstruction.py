@@ -107,8 +107,13 @@ def test_ctrl_c_stops_the_tasks_first(simulated: bentray.Scan, monkeypatch: pyte
 
     monkeypatch.setattr(reconstruction_run, "reconstruct", watched)
     monkeypatch.setattr(reconstruction, "progress_bar", Bar)
-    with pytest.raises(KeyboardInterrupt):
-        bentray.reconstruct(simulated, "sart", nodes=24)
+    # A shell starts what runs in the background with the signal ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            bentray.reconstruct(simulated, "sart", nodes=24)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert [type(error) for error in ended] == [Cancelled]
     assert "bentray" not in {thread.name for thread in threading.enumerate()}
 
