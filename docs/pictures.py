@@ -26,7 +26,7 @@ from PIL import Image, ImageDraw
 
 from bentray_kernels import eikonal, rays
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.phantoms import TABLE6_SIDE_M, TWO_HOLES, sampled, table6
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
@@ -277,6 +277,39 @@ def jobs_page() -> Image.Image:
         return _shot(page)
 
 
+def rendering_page() -> Image.Image:
+    """The page of volume rendering, with a ball with two holes as glass."""
+    with _service() as service, _browser((1400, 1060)) as page:
+        volume = io.BytesIO()
+        np.save(volume, np.round(255.0 * sampled(TWO_HOLES, 96)).astype(np.uint8))
+        made = _stored(service, "/v1/volumes?title=Ball with two holes", volume.getvalue())
+        page.goto(f"{service.url}/#/rendering/{made}?mode=refract")
+        page.locator("#glass[data-quality=full]").wait_for()
+        page.locator(".histogram").wait_for()
+        return _shot(page)
+
+
+def surface_page() -> Image.Image:
+    """The page of surface rendering, with two rings and a mirror ball, and the errors of the field."""
+    with _service() as service, _browser((1240, 1080)) as page:
+        ring = trimesh.creation.torus(1.0, 0.4, major_sections=96, minor_sections=48)
+        mesh = _stored(service, "/v1/meshes?title=Torus", ring.export(file_type="ply"))
+        asked = {"kind": "geometry-field", "mesh": mesh, "settings": {}}
+        job = httpx.post(f"{service.url}/v1/jobs", json=asked).raise_for_status().json()
+        service.client.wait(job["id"])
+        page.goto(f"{service.url}/#/surfaces/{mesh}?scene=mirror-ball&mode=self")
+        page.locator("#field-picture[data-quality=full]").wait_for()
+        page.locator("#accuracy table").wait_for()
+        return _shot(page)
+
+
+def _stored(service: _Service, address: str, content: bytes) -> str:
+    """The id of a volume or mesh that is uploaded."""
+    headers = {"Content-Type": "application/octet-stream"}
+    sent = httpx.post(service.url + address, content=content, headers=headers, timeout=60.0)
+    return str(sent.raise_for_status().json()["id"])
+
+
 def _page(
     scan: Dataset | None,
     ways: Sequence[Mapping[str, Any]],
@@ -389,6 +422,8 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
         scan_page,
         live_page,
         jobs_page,
+        rendering_page,
+        surface_page,
     )
 }
 

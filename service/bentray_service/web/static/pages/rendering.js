@@ -60,9 +60,9 @@ const PAGE = `
               <option value="warped-checkerboard">warped checkerboard</option><option value="warped-picture">warped picture</option>
             </select></label>
           <label><span class="caption">Supersampling</span>
-            <select name="supersampling">
-              <option value="none">none</option><option value="prss" selected>PRSS, after refraction</option>
-              <option value="real">real, more rays</option>
+            <select name="supersampling" title="PRSS: samples behind the volume after refraction; more rays: real supersampling, slower">
+              <option value="none">none</option><option value="prss" selected>PRSS</option>
+              <option value="real">more rays</option>
             </select></label>
           <label><span class="caption">Smoothing</span>
             <input name="smoothing" type="number" min="0" max="1000000" step="any" placeholder="automatic"></label>

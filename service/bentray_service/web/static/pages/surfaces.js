@@ -44,7 +44,7 @@ const PAGE = `
             </select></label>
           <label><span class="caption">Scene</span>
             <select name="scene">
-              <option value="object">object alone</option><option value="mirror-ball">two objects and a mirror ball</option>
+              <option value="object">object alone</option><option value="mirror-ball">two and a ball</option>
               <option value="two-mirrors">two objects</option>
             </select></label>
           <label><span class="caption">Field lookup</span>
@@ -57,8 +57,8 @@ const PAGE = `
             <select name="up"><option>z</option><option>y</option></select></label>
           <label><span class="caption">Refractive index</span>
             <input name="index" type="number" min="0.1" max="10" step="any" value="1.5" required></label>
-          <label><span class="caption">Share of reflected or refracted light</span>
-            <input name="share" type="number" min="0" max="1" step="any" value="0.85" required></label>
+          <label><span class="caption">Share of the light</span>
+            <input name="share" title="Reflected or refracted" type="number" min="0" max="1" step="any" value="0.85" required></label>
           <label><span class="caption">Azimuth, degrees</span>
             <input name="azimuth_deg" type="number" min="-36000" max="36000" step="any" value="-60" required></label>
           <label><span class="caption">Elevation, degrees</span>
