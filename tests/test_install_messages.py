@@ -65,7 +65,7 @@ def test_every_optional_library_is_in_its_extra() -> None:
 def test_every_package_that_is_named_is_known() -> None:
     known = set().union(*EXTRAS.values()) | {normal(one) for one in PROJECT["dependencies"]}
     # Tools and peers that no extra can hold; CONTRIBUTING.md and Makefile say why.
-    known |= {"uv", "pyfmm-kit", "k-wave-python"}
+    known |= {"uv", "pyfmm-kit", "k-wave-python", "py-rattler-build"}
     for name, text in texts():
         for words in re.findall(r"pip install ([^\n`\";&|]+)", text):
             plain = [word for word in words.split() if re.fullmatch(r"[a-z][a-z0-9-]+", word)]
