@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ..opencl.placement import Work, check_available, may_place, place
+from ..opencl.placement import Work, check_available, may_place, place, requested
 from .sart.device_slices import MEMORY_SHARE, TRIAL_EMITTERS, SliceSize
 from .settings import Settings
 from .solver_choice import sart_engine
@@ -86,4 +86,8 @@ def with_device(scan: ScanSize, settings: Settings) -> Settings:
     if settings.device == "opencl":
         check_available("opencl")
         return settings
-    return settings if place(work) is None else settings.changed(device="opencl")
+    session = place(work)
+    # Compiled tasks take all cores of a processor; the trial measured one core beside all of the driver.
+    if session is None or (session.device.kind == "cpu" and requested() == "auto"):
+        return settings
+    return settings.changed(device="opencl")

@@ -1,9 +1,12 @@
 """The device of a job: decided once by the trial, kept on a resume, and none where nothing exists for one."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.opencl import choice, placement
+from bentray_kernels.opencl import Device, choice, placement
 from bentray_kernels.tomography import Settings, device_choice
 from bentray_kernels.tomography.device_choice import ScanSize, device_work, with_device
 from bentray_workers.cluster import capacities
@@ -11,6 +14,7 @@ from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction.device_of_job import DECISION, settled
 
+GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True)
 SIZE = ScanSize(40, 256, 256, 0)
 SART = Settings(method="sart", nodes=32, decomposition="slices")
 
@@ -25,7 +29,7 @@ def path(scan, tmp_path):
 @pytest.fixture
 def trial(monkeypatch):
     """What the trial decides, and how often it is asked."""
-    asked, answer = [], [object()]
+    asked, answer = [], [SimpleNamespace(device=GPU)]
 
     def place(work, device="auto"):
         asked.append(work)
@@ -33,6 +37,7 @@ def trial(monkeypatch):
 
     monkeypatch.setattr(device_choice, "place", place)
     monkeypatch.setattr(device_choice, "may_place", lambda: True)
+    monkeypatch.delenv("BENTRAY_DEVICE", raising=False)
     return asked, answer
 
 
@@ -46,6 +51,14 @@ def test_auto_takes_the_device_where_the_trial_was_faster(trial):
     assert asked[0].memory_bytes > asked[0].buffer_bytes > 0
     assert with_device(SIZE, SART.changed(device="cpu")).device == "cpu"
     assert len(asked) == 2
+
+
+def test_auto_leaves_the_processor_to_compiled_tasks(trial, monkeypatch):
+    _, answer = trial
+    answer[0] = SimpleNamespace(device=replace(GPU, kind="cpu"))
+    assert with_device(SIZE, SART).device == "auto"
+    monkeypatch.setenv("BENTRAY_DEVICE", "opencl")
+    assert with_device(SIZE, SART).device == "opencl"
 
 
 @pytest.mark.parametrize(
