@@ -234,6 +234,7 @@ def _open(
     upload_ingest = UploadIngest(pieces, files, stores, limits, settings.upload_keep_s, ingest_queue, quota)
     upload_ingest.start()
     stack.callback(upload_ingest.stop)
+    audit = Audit(files.audit)
     housekeeper = Housekeeper(
         pieces,
         files,
@@ -245,6 +246,8 @@ def _open(
         orphans,
         settings.keep_days,
         settings.upload_keep_s,
+        audit=audit,
+        audit_keep_days=settings.audit_keep_days,
     )
     housekeeper.start()
     stack.callback(housekeeper.stop)
@@ -287,7 +290,7 @@ def _open(
         sign_in=access_control,
         key_watch=KeyWatch(Keys(database), Sessions(database), tenant_projects),
         feed=EventFeed(Jobs(database), leaving.is_set),
-        audit=Audit(files.audit),
+        audit=audit,
         readiness=readiness,
         threads=threads,
         webhooks=webhooks,

@@ -1,4 +1,4 @@
-"""Periodic deletion of expired uploads, old data and orphaned files."""
+"""Periodic deletion of expired uploads, old data, old audit files and orphaned files."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from .access.audit import Audit
 from .access.quota import Quota
 from .errors import DatabaseUnavailable, InUse, Locked, StorageUnavailable, UnknownId
 from .files.data_folder import Files
@@ -17,6 +18,7 @@ from .files.orphans import Orphans
 from .ingest.append import UploadLocks, remove
 from .rows.ages import ExpiredItem, ExpiryMarks
 from .rows.observed_time import ObservedTime
+from .rows.tenants import Tenant
 from .rows.typed_rows import UploadRow
 from .rows.uploads import Uploads
 
@@ -33,7 +35,9 @@ AGE_SECONDS = DAY_S
 # Larger steps of the system clock are treated as corrections, s.
 JUMP_SECONDS = 30.0
 
-UPLOAD = "upload"
+UPLOAD, AUDIT = "upload", "audit"
+# The audit log belongs to no tenant.
+NOBODY = Tenant("")
 
 
 class Housekeeper:
@@ -56,6 +60,8 @@ class Housekeeper:
         keep_days: float | None,
         upload_keep_s: float,
         clocks: Callable[[], tuple[float, float]] = lambda: (time.time(), time.monotonic()),
+        audit: Audit | None = None,
+        audit_keep_days: float | None = None,
     ) -> None:
         """Args:
         uploads, files, deletion, orphans: to clean up.
@@ -65,6 +71,7 @@ class Housekeeper:
         keep_days: maximum age of datasets, volumes, meshes and jobs without them; None: unlimited.
         upload_keep_s: keeping time of uploads, s.
         clocks: s since 1970, and monotonic seconds.
+        audit, audit_keep_days: the audit log, and the maximum age of its days; None: unlimited.
         """
         self._uploads = uploads
         self._files = files
@@ -77,6 +84,7 @@ class Housekeeper:
         self._keep_days = keep_days
         self._upload_wait_s = min(upload_keep_s, AGE_SECONDS)
         self._clocks = clocks
+        self._audit, self._audit_keep_days = audit, audit_keep_days
         self._last: tuple[float, float] | None = None
         self._leaving = threading.Event()
         self._thread = threading.Thread(target=self._loop, name="housekeeping", daemon=True)
@@ -117,14 +125,21 @@ class Housekeeper:
         if self._keep_days is not None:
             old = self._deletion.older_than(now - DAY_S * self._keep_days)
             stored = {ExpiredItem(one.tenant, one.what, one.id): one for one in old}
-        for aged, seconds in self._ages.mark({*uploads, *stored}, self._observed.count()).items():
+        days: set[ExpiredItem] = set()
+        if self._audit is not None and self._audit_keep_days is not None:
+            old_days = self._audit.days_before(now, self._audit_keep_days)
+            days = {ExpiredItem(NOBODY, AUDIT, day) for day in old_days}
+        for aged, seconds in self._ages.mark({*uploads, *stored, *days}, self._observed.count()).items():
             if aged.what == UPLOAD and seconds >= self._upload_wait_s:
                 try:
                     with self._hold(aged.id):
                         self.forget(uploads[aged])
                 except Locked:
                     continue
-            elif aged.what != UPLOAD and seconds >= AGE_SECONDS:
+            elif aged.what == AUDIT and seconds >= AGE_SECONDS and self._audit is not None:
+                self._audit.remove(aged.id)
+                log.info("deleted the audit log of %s after its keeping time", aged.id)
+            elif aged in stored and seconds >= AGE_SECONDS:
                 self._delete(stored[aged])
 
     def _now(self) -> float:

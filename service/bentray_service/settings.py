@@ -92,6 +92,9 @@ class ServiceSettings(BaseSettings):
         gt=0,
         description="Maximum age of datasets, volumes, meshes and jobs without them; default: unlimited.",
     )
+    audit_keep_days: float | None = Field(
+        None, gt=0, description="Days for which the audit log is kept; default: unlimited."
+    )
     min_free_bytes: int = Field(
         GIB // 2,
         ge=0,

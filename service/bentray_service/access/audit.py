@@ -7,7 +7,7 @@ import logging
 import os
 import re
 from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +59,16 @@ class Audit:
         except OSError as error:
             self.lost += 1
             log.error("the audit log could not be written (%s): %s", error.strerror, line)
+
+    def days_before(self, now: float, keep_days: float) -> list[str]:
+        """The days, e.g. ``2026-11-25``, that ended more than ``keep_days`` before ``now``, s since 1970."""
+        last = datetime.fromtimestamp(now, UTC) - timedelta(days=keep_days + 1.0)
+        names = (_NAME.fullmatch(path.name) for path in self._folder.glob("*.jsonl"))
+        return sorted(name[1] for name in names if name is not None and name[1] < f"{last:%Y-%m-%d}")
+
+    def remove(self, day: str) -> None:
+        """Delete the file of one day."""
+        (self._folder / f"{day}.jsonl").unlink(missing_ok=True)
 
 
 def entries(folder: Path) -> Iterator[Entry]:

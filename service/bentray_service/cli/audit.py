@@ -36,7 +36,7 @@ def audit(
     """Show the audit log: who read and changed what, oldest first.
 
     It has every authenticated request, except for polling jobs. The files in DATA/audit, one per day, are
-    append-only; old ones can be moved away.
+    append-only; BENTRAY_AUDIT_KEEP_DAYS deletes old ones.
 
     Example:  bentray audit --id ds-0123456789abcdef0123 --since 2026-11-01
     """

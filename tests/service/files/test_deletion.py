@@ -1,10 +1,12 @@
 """Deletion: files and rows of an object and of its results are removed, and no others."""
 
 import time
+from datetime import UTC, datetime
 
 import pytest
 from sqlalchemy import func, insert, select, update
 
+from bentray_service.access.audit import Audit
 from bentray_service.access.quota import Quota
 from bentray_service.errors import InUse, UnknownId
 from bentray_service.files.data_folder import Files
@@ -340,7 +342,31 @@ class Clocks:
         self.steady += seconds
 
 
-def housekeeper(shelf, clocks, keep_days=30.0, uploads=None):
+def test_the_audit_log_is_kept_as_long_as_it_is_said(shelf):
+    clocks, folder = Clocks(), shelf.files.audit
+    ages = (0, 2, 6.5, 10, 400)
+    days = [datetime.fromtimestamp(clocks.wall - age * DAY_S, UTC).strftime("%Y-%m-%d") for age in ages]
+    for day in days:
+        (folder / f"{day}.jsonl").write_text("{}\n")
+    (folder / "2001-01-01.jsonl.gz").touch()
+    keeper = housekeeper(shelf, clocks, audit=Audit(folder), audit_keep_days=7.0)
+
+    def left():
+        return sorted(path.name.partition(".")[0] for path in folder.glob("*.jsonl"))
+
+    keeper.sweep()
+    assert left() == sorted(days)
+    # A clock that was wrong deletes nothing.
+    clocks.wall += 500 * DAY_S
+    keeper.sweep()
+    clocks.wall -= 500 * DAY_S
+    keeper.sweep()
+    clocks.pass_by(DAY_S + 1.0)
+    keeper.sweep()
+    assert left() == sorted(days[:3])
+
+
+def housekeeper(shelf, clocks, keep_days=30.0, uploads=None, **how):
     observed = ObservedTime(shelf.database, lambda: clocks.steady)
     orphans = Orphans(shelf.files, shelf.database, is_store=True)
     return Housekeeper(
@@ -355,4 +381,5 @@ def housekeeper(shelf, clocks, keep_days=30.0, uploads=None):
         keep_days,
         DAY_S,
         clocks,
+        **how,
     )
