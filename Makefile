@@ -52,7 +52,7 @@ bench: install ## run the benchmark NAME; NAME=reconstruction ARGS=--quick
 	@mkdir -p build/bench
 	@$(BIN)/bentray bench $(NAME) $(ARGS) --json build/bench/$(NAME).json --pictures build/bench
 
-bench-device: install ## compare each engine on the OpenCL device of this machine with compiled code
+bench-device: install ## measure each engine and whole reconstructions on the OpenCL device of this machine; ARGS=--quick on a processor
 	@mkdir -p build/bench
 	@$(BIN)/bentray bench devices $(ARGS) --json build/bench/devices.json
 

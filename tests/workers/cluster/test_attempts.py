@@ -4,6 +4,8 @@ import distributed
 import pytest
 from distributed import KilledWorker
 
+from bentray_kernels.opencl import DeviceLostError
+from bentray_kernels.opencl.lost_device import cpu_only
 from bentray_kernels.task_graph import Task
 from bentray_workers.cluster import attempts
 from bentray_workers.cluster.attempts import MAX_DEATHS, Attempts, ResultsLostError, marked
@@ -113,3 +115,25 @@ def test_attempt_file_exists_while_the_task_runs(tmp_path):
         marked(marker, True, work, -1)
     assert seen == [True, True]
     assert not marker.exists()
+
+
+def test_a_lost_device_is_replaced_by_the_processor_once(tmp_path):
+    runs = []
+
+    def work(value):
+        runs.append(cpu_only())
+        if not cpu_only():
+            raise DeviceLostError("gone")
+        return 2 * value
+
+    assert marked(tmp_path / "marker", False, work, 3) == 6
+    assert runs == [False, True]
+    assert not (tmp_path / "marker").exists()
+
+    def broken():
+        runs.append(cpu_only())
+        raise DeviceLostError("gone for good")
+
+    with pytest.raises(DeviceLostError, match="for good"):
+        marked(tmp_path / "marker", False, broken)
+    assert runs[2:] == [False, True]
