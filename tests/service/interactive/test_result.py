@@ -38,7 +38,8 @@ def volume(values: np.ndarray) -> Result:
 
 def test_arrays_have_places_and_units(result: Result) -> None:
     assert result.axes == ("x", "y")
-    assert dict(result.units) == {name: unit for name, unit in UNITS.items() if name != "reflection"}
+    missing = ("uncertainty", "reflection")
+    assert dict(result.units) == {name: unit for name, unit in UNITS.items() if name not in missing}
     np.testing.assert_allclose(result.coordinates["x"], SPACING_M * (np.arange(12) - 5.5))
     np.testing.assert_array_equal(result.speed, made(nodes=12).speed)
     np.testing.assert_array_equal(result.attenuation, made(nodes=12).attenuation)
@@ -47,6 +48,17 @@ def test_arrays_have_places_and_units(result: Result) -> None:
     assert repr(result).startswith(
         "<bentray.Result of 12 x 12 nodes: speed, coverage, attenuation, recovery;"
     )
+
+
+def test_the_uncertainty_has_a_resolution_width(result: Result) -> None:
+    spread = np.linspace(0.0, 9.0, 144).reshape(12, 12)
+    known = result_of(replace(made(nodes=12), uncertainty=spread, resolution_width_m=(0.002,)), {})
+    np.testing.assert_array_equal(known.uncertainty, spread)
+    assert known.units["uncertainty"] == "m/s"
+    assert known.resolution_width_m == (0.002,)
+    assert result.resolution_width_m == ()
+    with pytest.raises(bentray.InvalidInput, match="uncertainty"):
+        _ = result.uncertainty
 
 
 def test_reflection_has_a_grid_of_its_own(result: Result) -> None:

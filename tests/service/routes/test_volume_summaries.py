@@ -83,6 +83,7 @@ def test_a_scan_without_truth_has_none(http, uploaded, work, submitted, until):
     here = f"/v1/volumes/{until(http, submitted(http, uploaded(http))['id'])['volume']}"
     assert http.get(f"{here}/summary").json() == {
         "quantities": ["speed", "coverage"],
+        "resolution_width_m": [],
         "grids": {},
         "candidates": [],
         "reason": "",
