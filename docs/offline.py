@@ -12,6 +12,7 @@ import re
 import zipfile
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from sphinx.util import logging
 
@@ -25,6 +26,7 @@ SCRIPT = re.compile(r"<script(?: type=\"text/javascript\")?>(.*?)</script>", re.
 STYLE = re.compile(r"<style(?: type=\"text/css\")?>(.*?)</style>", re.DOTALL)
 ATTRIBUTE = re.compile(r"(<[a-zA-Z][^<>]*?) style=\"([^\"]*)\"")
 IMAGE = re.compile(r"src=\"data:image/(png|svg\+xml);base64,([^\"]*)\"")
+DRAWING = re.compile(r"url\((['\"])data:image/svg\+xml;charset=utf-8,(.*?)\1\)", re.DOTALL)
 LEFT = re.compile(
     r"<script(?![^>]*\bsrc=)(?![^>]*json)|<style|<[a-z][^<>]*?\s(?:style|on\w+)=\"|\bsrc=\"data:"
 )
@@ -54,6 +56,10 @@ class Parts:
             link = f'<link rel="stylesheet" type="text/css" href="{up}{FOLDER}/{STYLES}">'
             marked = marked.replace("</head>", f"{link}\n</head>", 1)
         return marked
+
+    def with_files(self, text: str, up: str) -> str:
+        """A style sheet with files in place of drawings in data addresses."""
+        return DRAWING.sub(lambda one: f'url("{up}{self._stored(unquote(one[2]).encode(), "svg")}")', text)
 
     def write_styles(self) -> None:
         """Write the rules of all style attributes, with those of earlier runs."""
@@ -97,6 +103,12 @@ def separate(app: Any, error: Exception | None) -> None:
         if found := FOREIGN.search(separated) or LEFT.search(separated):
             log.warning("%s: inline code or a file of another host: %s", page.name, found[0])
     parts.write_styles()
+    for sheet in sorted(parts.output.rglob("*.css")):
+        text = sheet.read_text()
+        if (changed := parts.with_files(text, os.path.relpath(parts.output, sheet.parent) + "/")) != text:
+            sheet.write_text(changed)
+        if "url(data:" in changed.replace('"', "").replace("'", ""):
+            log.warning("%s: an image in a data address", sheet.name)
     for archive in sorted(parts.output.rglob("*.zip")):
         _without_dates(archive)
 

@@ -62,6 +62,17 @@ def test_pages_have_nothing_inline(tmp_path: Path) -> None:
     assert parts.separated(found, "../") == found, "a page that was not built again stays as it is"
 
 
+def test_style_sheets_have_no_data_addresses(tmp_path: Path) -> None:
+    parts = offline.Parts(tmp_path)
+    sheet = """a { --i: url('data:image/svg+xml;charset=utf-8,<svg x="1"/>'); b: url("own.svg") }
+    c { d: url("data:image/svg+xml;charset=utf-8,%3Csvg y='2'/%3E") }"""
+    found = parts.with_files(sheet, "../")
+    assert "data:" not in found
+    assert "own.svg" in found
+    drawings = [(tmp_path / name).read_text() for name in re.findall(r'url\("\.\./([^"]+)', found)]
+    assert drawings == ['<svg x="1"/>', "<svg y='2'/>"]
+
+
 def test_files_of_other_hosts_are_noticed() -> None:
     assert offline.FOREIGN.search('<script src="https://cdn.example.org/a.js">')
     assert offline.FOREIGN.search('<link rel="stylesheet" href="https://example.org/a.css">')
