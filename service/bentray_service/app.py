@@ -46,6 +46,7 @@ from .routes import (
     batches,
     cluster_health,
     datasets,
+    direct_uploads,
     events,
     geometry_fields,
     health,
@@ -149,6 +150,7 @@ def _routes() -> tuple[BaseRoute, ...]:
     router = APIRouter(responses=errors.problems("default"))
     for part in (
         tus,
+        direct_uploads,
         datasets,
         jobs,
         batches,
@@ -231,7 +233,9 @@ def _open(
     ingest_queue = FairQueue(readers_at_once(settings.ingest_memory_bytes))
     ingest_queue.start()
     stack.callback(ingest_queue.stop)
-    upload_ingest = UploadIngest(pieces, files, stores, limits, settings.upload_keep_s, ingest_queue, quota)
+    upload_ingest = UploadIngest(
+        pieces, files, stores, limits, settings.upload_keep_s, ingest_queue, quota, store.direct_uploads
+    )
     upload_ingest.start()
     stack.callback(upload_ingest.stop)
     audit = Audit(files.audit)
@@ -248,6 +252,7 @@ def _open(
         settings.upload_keep_s,
         audit=audit,
         audit_keep_days=settings.audit_keep_days,
+        direct=store.direct_uploads,
     )
     housekeeper.start()
     stack.callback(housekeeper.stop)
@@ -276,6 +281,7 @@ def _open(
         volumes=Volumes(database),
         meshes=Meshes(database),
         uploads=pieces,
+        direct_uploads=store.direct_uploads,
         quota=quota,
         upload_limits=UploadLimits(),
         ingest_queue=ingest_queue,

@@ -199,6 +199,13 @@ class DatabaseFull(Rejection, StorageFull, SQLAlchemyError):  # noqa: N818 - a r
         InvalidInput.__init__(self, "database", "no space to write a row", "more free disk space")
 
 
+class NoBucket(Rejection):
+    """The files of the service are not in a bucket."""
+
+    def __init__(self) -> None:
+        super().__init__("storage", "no bucket", "a resumable upload (/v1/uploads)")
+
+
 class NoSignIn(Rejection):
     """The service has no OpenID provider."""
 

@@ -14,6 +14,7 @@ from .access.quota import Quota
 from .errors import DatabaseUnavailable, InUse, Locked, StorageUnavailable, UnknownId
 from .files.data_folder import Files
 from .files.deletion import Deletion, StoredItem
+from .files.direct_uploads import DirectUploads
 from .files.orphans import Orphans
 from .ingest.append import UploadLocks, remove
 from .rows.ages import ExpiredItem, ExpiryMarks
@@ -62,6 +63,7 @@ class Housekeeper:
         clocks: Callable[[], tuple[float, float]] = lambda: (time.time(), time.monotonic()),
         audit: Audit | None = None,
         audit_keep_days: float | None = None,
+        direct: DirectUploads | None = None,
     ) -> None:
         """Args:
         uploads, files, deletion, orphans: to clean up.
@@ -72,6 +74,7 @@ class Housekeeper:
         upload_keep_s: keeping time of uploads, s.
         clocks: s since 1970, and monotonic seconds.
         audit, audit_keep_days: the audit log, and the maximum age of its days; None: unlimited.
+        direct: uploads in the bucket, if there is one.
         """
         self._uploads = uploads
         self._files = files
@@ -82,6 +85,7 @@ class Housekeeper:
         self._observed = observed
         self._orphans = orphans
         self._keep_days = keep_days
+        self._direct = direct
         self._upload_wait_s = min(upload_keep_s, AGE_SECONDS)
         self._clocks = clocks
         self._audit, self._audit_keep_days = audit, audit_keep_days
@@ -108,6 +112,8 @@ class Housekeeper:
                 self.sweep()
                 if time.monotonic() - tidied >= TIDY_SECONDS:
                     self._files.store.tidy(self._leaving.is_set)
+                    if self._direct is not None:
+                        self._direct.tidy(self._uploads.ids)
                     self._orphans.sweep(self._leaving.is_set)
                     tidied = time.monotonic()
             except DatabaseUnavailable as error:
@@ -169,8 +175,11 @@ class Housekeeper:
 
         Raises:
             InUse: while it is being read.
+            StorageUnavailable: when its data cannot be deleted from the bucket now.
         """
         if row["state"] == "reading":
             raise InUse("upload", f"{row['id']}, which is being read", "an upload that is not being read")
+        if row["multipart_id"] is not None and self._direct is not None:
+            self._direct.drop(row)
         remove(self._files.of(row["tenant"]).upload(row["id"]))
         self._uploads.remove(row["id"])

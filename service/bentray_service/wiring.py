@@ -16,6 +16,7 @@ from .access.sign_in import SignIn
 from .compute import Compute
 from .files.data_folder import Files
 from .files.deletion import Deletion
+from .files.direct_uploads import DirectUploads
 from .housekeeping import Housekeeper
 from .ingest.append import UploadLocks
 from .ingest.fair_queue import FairQueue
@@ -54,6 +55,7 @@ class Parts:
     meshes: Meshes
     geometry_fields: GeometryFields
     uploads: Uploads
+    direct_uploads: DirectUploads | None
     quota: Quota
     upload_limits: UploadLimits
     ingest_queue: FairQueue

@@ -10,6 +10,7 @@ from bentray_service.routes.jobs import JobRequest
 from bentray_service.routes.models.batch_records import BatchRequest
 from bentray_service.routes.models.name_changes import DatasetChanges, JobChanges
 from bentray_service.routes.models.project_records import MemberRequest, ProjectRequest
+from bentray_service.routes.models.upload_records import DirectUploadRequest, PartsRequest
 
 COMMITTED = Path(__file__).parents[2] / "openapi.json"
 
@@ -82,7 +83,10 @@ def test_every_error_response_is_described():
 
 
 def test_every_json_body_has_examples_that_are_taken():
-    models = (BatchRequest, DatasetChanges, JobChanges, MemberRequest, ProjectRequest)
+    models = (
+        *(BatchRequest, DatasetChanges, JobChanges, MemberRequest, ProjectRequest),
+        *(DirectUploadRequest, PartsRequest),
+    )
     changes = {f"#/components/schemas/{one.__name__}": one for one in models}
     found = 0
     for _, operation in operations():

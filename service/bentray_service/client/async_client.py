@@ -37,6 +37,8 @@ class AsyncClient(Connection):
     def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
         super().__init__(url, key, **options)
         self._http = httpx.AsyncClient(**self._options, transport=httpx.AsyncHTTPTransport(retries=2))
+        # For addresses of the bucket, which must not see the key.
+        self._bucket = httpx.AsyncClient(timeout=self._options["timeout"])
 
     async def __aenter__(self) -> Self:
         return self
@@ -47,6 +49,7 @@ class AsyncClient(Connection):
     async def close(self) -> None:
         """Close the connections."""
         await self._http.aclose()
+        await self._bucket.aclose()
 
     upload = _method(flows.upload)
     submit = _method(flows.submit)
@@ -123,10 +126,13 @@ class AsyncClient(Connection):
             del listening[step.path]
         return line
 
+    def _of(self, path: str) -> httpx.AsyncClient:
+        return self._http if path.startswith("/") else self._bucket
+
     @asynccontextmanager
     async def _respond(self, method: str, path: str, **request: Any) -> AsyncIterator[httpx.Response]:
         try:
-            async with self._http.stream(method, path, **request) as response:
+            async with self._of(path).stream(method, path, **request) as response:
                 if not response.is_success:
                     await response.aread()
                     raise from_response(response)

@@ -35,6 +35,8 @@ class Client(Connection):
     def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
         super().__init__(url, key, **options)
         self._http = httpx.Client(**self._options, transport=httpx.HTTPTransport(retries=2))
+        # For addresses of the bucket, which must not see the key.
+        self._bucket = httpx.Client(timeout=self._options["timeout"])
 
     def __enter__(self) -> Self:
         return self
@@ -45,6 +47,7 @@ class Client(Connection):
     def close(self) -> None:
         """Close the connections."""
         self._http.close()
+        self._bucket.close()
 
     upload = _method(flows.upload)
     submit = _method(flows.submit)
@@ -118,10 +121,13 @@ class Client(Connection):
             del listening[step.path]
         return line
 
+    def _of(self, path: str) -> httpx.Client:
+        return self._http if path.startswith("/") else self._bucket
+
     @contextmanager
     def _respond(self, method: str, path: str, **request: Any) -> Iterator[httpx.Response]:
         try:
-            with self._http.stream(method, path, **request) as response:
+            with self._of(path).stream(method, path, **request) as response:
                 if not response.is_success:
                     response.read()
                     raise from_response(response)

@@ -24,7 +24,7 @@ from .lists import volume as volume_record
 from .results import read_result
 from .steps import DownloadStep, Flow, RequestStep
 from .stored import DatasetId, JobId, StoredId, VolumeId, id_of, volume_of
-from .uploading import PLACES, OnBytes, UploadKind, send_file
+from .uploading import PLACES, OnBytes, UploadKind, send_direct, send_file
 from .waiting import wait_for
 
 Format = Literal["hdf5", "h5", "nifti", "metaimage", "nrrd", "mat", "vti", "ome-zarr", "dicom", "npy"]
@@ -44,6 +44,7 @@ def upload(
     *,
     kind: UploadKind = "dataset",
     resume: str | None = None,
+    direct: bool = False,
     **metadata: str,
 ) -> Flow[Uploaded]:
     """Upload a file in chunks; interrupted uploads are continued.
@@ -53,13 +54,17 @@ def upload(
         on_progress: called with ``(sent, total)``, bytes.
         kind: type of the file.
         resume: id of an interrupted upload, from ``ClientError.upload``.
+        direct: send the file straight to the bucket of the service, if its files are in one.
         metadata: ``title`` of a volume or mesh; ``spacing_m``, ``shape`` and ``dtype`` of a volume;
             ``map``, ``unit``, ``temperature_c``, ``sound_speed_mps`` and ``frequency_hz`` of a foreign scan.
 
     Returns:
         the record of the dataset, volume or mesh.
     """
-    response = yield from send_file(Path(path), on_progress, kind, resume, metadata)
+    if direct:
+        response = yield from send_direct(Path(path), on_progress, kind, metadata)
+    else:
+        response = yield from send_file(Path(path), on_progress, kind, resume, metadata)
     return RECORDS[kind].model_validate_json(response.content)
 
 

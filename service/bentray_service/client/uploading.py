@@ -11,7 +11,7 @@ import httpx
 
 from bentray_kernels.errors import InvalidInput
 
-from ..routes.models.upload_records import UploadRecord
+from ..routes.models.upload_records import DirectUploadRecord, PartAddresses, UploadRecord
 from .errors import ClientError, NoAnswer, from_problem
 from .steps import CHUNK_BYTES, Flow, PauseStep, RequestStep
 
@@ -52,6 +52,31 @@ def send_file(
         error.upload = place.rpartition("/")[2]
         raise
     return (yield from _read(place))
+
+
+def send_direct(
+    path: Path, on_progress: OnBytes | None, kind: UploadKind, metadata: Mapping[str, str]
+) -> Flow[httpx.Response]:
+    """Upload a file in parts to the bucket of the service; the result is as of ``send_file``."""
+    try:
+        total = path.stat().st_size
+    except OSError as error:
+        raise _unreadable(path, error) from error
+    request = {"json": {"kind": kind, "length": total, "metadata": {"filename": path.name, **metadata}}}
+    # An unused upload expires.
+    response = yield RequestStep("POST", "/v1/direct-uploads", request, repeatable=True)
+    upload = DirectUploadRecord.model_validate_json(response.content)
+    for number in range(1, upload.parts + 1):
+        # Asked for one by one, since addresses expire.
+        asked = {"json": {"numbers": [number]}}
+        response = yield RequestStep("POST", upload.links["parts"], asked, repeatable=True)
+        part = PartAddresses.model_validate_json(response.content).parts[0]
+        begin = (number - 1) * upload.part_bytes
+        headers = {"Content-Length": str(part.bytes)}
+        chunks = _chunks(path, begin, begin + part.bytes, on_progress, total)
+        yield RequestStep("PUT", part.url, {"headers": headers}, chunks, repeatable=True)
+    yield RequestStep("POST", upload.links["complete"], repeatable=True)
+    return (yield from _read(upload.links["self"]))
 
 
 def _begin(total: int, said: Mapping[str, str]) -> Flow[str]:
@@ -104,18 +129,18 @@ def _read(place: str) -> Flow[httpx.Response]:
 
 
 def _chunks(
-    path: Path, offset: int, total: int, on_progress: OnBytes | None
+    path: Path, offset: int, end: int, on_progress: OnBytes | None, total: int | None = None
 ) -> Callable[[], Iterator[bytes]]:
     def chunks() -> Iterator[bytes]:
         sent = offset
         try:
             with path.open("rb") as file:
                 file.seek(offset)
-                while sent < total and (chunk := file.read(min(CHUNK_BYTES, total - sent))):
+                while sent < end and (chunk := file.read(min(CHUNK_BYTES, end - sent))):
                     yield chunk
                     sent += len(chunk)
                     if on_progress is not None:
-                        on_progress(sent, total)
+                        on_progress(sent, end if total is None else total)
         except OSError as error:
             raise _unreadable(path, error) from error
 

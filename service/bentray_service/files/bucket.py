@@ -6,7 +6,7 @@ import errno
 import logging
 import math
 from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,7 +56,13 @@ class Bucket:
         self._name, _, prefix = self.url.removeprefix("s3://").partition("/")
         self._prefix = f"{prefix}/" if prefix else ""
         self._s3 = S3FileSystem(
-            config_kwargs={"connect_timeout": CONNECT_S, "read_timeout": READ_S, "retries": TRIES},
+            config_kwargs={
+                "connect_timeout": CONNECT_S,
+                "read_timeout": READ_S,
+                "retries": TRIES,
+                # Of presigned addresses, too; version 2 would not sign sizes.
+                "signature_version": "s3v4",
+            },
             default_block_size=PART_BYTES,
             max_concurrency=PARTS_AT_ONCE,
             use_listings_cache=False,
@@ -114,6 +120,56 @@ class Bucket:
                 response = self._call("delete_objects", Delete={"Objects": batch, "Quiet": True})
                 for failure in response.get("Errors", ()):
                     raise PermissionError(failure.get("Code"))
+
+    def begin_parts(self, key: str) -> str:
+        """Begin the upload of an object in parts by others; returns the id of the upload."""
+        with self._watched():
+            return str(self._call("create_multipart_upload", Key=self._prefix + key)["UploadId"])
+
+    def part_url(self, key: str, upload: str, number: int, size: int, seconds: int) -> str:
+        """Address for a PUT of one part of exactly ``size`` bytes, valid for some seconds."""
+        signed = {"UploadId": upload, "PartNumber": number, "ContentLength": size}
+        with self._watched():
+            return str(self._s3.url(self._place(key), seconds, client_method="upload_part", **signed))
+
+    def parts(self, key: str, upload: str) -> dict[int, tuple[str, int]] | None:
+        """Tag and size of the received parts by number; None if the upload was completed or ended."""
+        found: dict[int, tuple[str, int]] = {}
+        more: dict[str, int] = {}
+        try:
+            while True:
+                with self._watched(may_miss=True):
+                    page = self._call("list_parts", Key=self._prefix + key, UploadId=upload, **more)
+                for one in page.get("Parts", ()):
+                    found[int(one["PartNumber"])] = (str(one["ETag"]), int(one["Size"]))
+                if not page.get("IsTruncated"):
+                    return found
+                more = {"PartNumberMarker": page["NextPartNumberMarker"]}
+        except FileNotFoundError:
+            return None
+
+    def complete_parts(self, key: str, upload: str, tags: Mapping[int, str]) -> None:
+        """Assemble an object from its parts."""
+        parts = [{"PartNumber": number, "ETag": tags[number]} for number in sorted(tags)]
+        how = {"UploadId": upload, "MultipartUpload": {"Parts": parts}}
+        with self._watched():
+            self._s3.call_s3(
+                "complete_multipart_upload", Bucket=self._name, Key=self._prefix + key, **how, timeout=READ_S
+            )
+
+    def abort_parts(self, key: str, upload: str) -> None:
+        """Delete the parts of an upload; one that was completed or ended is ignored."""
+        with suppress(FileNotFoundError), self._watched(may_miss=True):
+            self._call("abort_multipart_upload", Key=self._prefix + key, UploadId=upload)
+
+    def begun_parts(self, under: str) -> list[tuple[str, str, float]]:
+        """Key, id and beginning, s since 1970, of uploads in parts whose keys start with ``under``."""
+        with self._watched():
+            page = self._call("list_multipart_uploads", Prefix=self._prefix + under)
+        return [
+            (str(one["Key"]).removeprefix(self._prefix), str(one["UploadId"]), one["Initiated"].timestamp())
+            for one in page.get("Uploads", ())
+        ]
 
     @contextmanager
     def _watched(self, *, may_miss: bool = False) -> Iterator[None]:

@@ -15,6 +15,7 @@ from ..errors import StorageUnavailable
 from ..rows.live_ids import LiveIds, Name
 from .bucket import Bucket
 from .cache import Cache
+from .direct_uploads import DirectUploads
 from .packing import metadata_of, packed, unpack
 from .tenant_files import KEPT
 
@@ -46,6 +47,7 @@ class BucketStore:
         """
         self._root = root
         self._bucket = bucket
+        self.direct_uploads = DirectUploads(bucket)
         self._mark = mark
         self._known = known
         self._cache = Cache(root, cache_bytes)

@@ -37,6 +37,7 @@ class CheckedStore:
         checksums: the table of checksums.
         """
         self._inner = inner
+        self.direct_uploads = inner.direct_uploads
         self._root = root
         self._checksums = checksums
         self._compared: dict[Path, tuple[str, tuple[int, ...]]] = {}

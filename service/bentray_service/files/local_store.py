@@ -9,11 +9,14 @@ from pathlib import Path
 
 from bentray_workers.files.atomic import sync
 
+from .direct_uploads import DirectUploads
 from .disk import remove_path
 
 
 class LocalStore:
     """Keeps files in place; see :class:`Store`."""
+
+    direct_uploads: DirectUploads | None = None
 
     def publish(self, path: Path) -> None:
         """Make the name durable; the content is made durable by the writer."""

@@ -6,12 +6,18 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Protocol
 
+from .direct_uploads import DirectUploads
+
 
 class Store(Protocol):
     """Keeps items: datasets, volumes, animations, meshes and geometry fields, each a file or a folder.
 
     An item is identified by its path in the data folder, see :class:`TenantFiles`; it is complete or absent.
     """
+
+    @property
+    def direct_uploads(self) -> DirectUploads | None:
+        """Uploads of clients to the store; None if it accepts none."""
 
     def publish(self, path: Path) -> None:
         """Keep the item at ``path`` permanently; to be called before its row is inserted.

@@ -22,6 +22,7 @@ from bentray_kernels.errors import InvalidInput
 from ..access.quota import Quota
 from ..errors import StorageFull, StorageUnavailable, UnknownId
 from ..files.data_folder import Files
+from ..files.direct_uploads import DirectUploads
 from ..rows.digests import digest_of
 from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
@@ -57,6 +58,7 @@ class UploadIngest:
         keep_s: float,
         queue: FairQueue,
         quota: Quota,
+        direct: DirectUploads | None,
     ) -> None:
         """Args:
         uploads: the table of uploads.
@@ -66,8 +68,10 @@ class UploadIngest:
         keep_s: how long the row of a completed upload is kept, s.
         queue: the ingest queue.
         quota: of the tenants.
+        direct: uploads in the bucket, if there is one.
         """
         self._uploads = uploads
+        self._direct = direct
         self._files = files
         self._stores = stores
         self._limits = limits
@@ -167,13 +171,31 @@ class UploadIngest:
             problem = self._refusal(row, tenant, store, path)
             if problem is not None:
                 if not self._leaving.is_set():
+                    self._drop(row)
                     self._uploads.mark_rejected(
                         row["id"], problem.model_dump(exclude_none=True), self._keep_s
                     )
                     path.unlink(missing_ok=True)
                 return
+        self._drop(row)
         self._uploads.mark_done(row["id"], self._keep_s)
         path.unlink(missing_ok=True)
+
+    def _drop(self, row: UploadRow) -> None:
+        """Delete what is in the bucket, before the row says so; the file here is still complete."""
+        if row["multipart_id"] is not None and self._direct is not None:
+            self._direct.drop_later(row)
+
+    def _fetch(self, row: UploadRow, path: Path) -> None:
+        """Get the data of a direct upload from the bucket, unless that was done before."""
+        if row["multipart_id"] is None or path.stat().st_size == row["length"]:
+            return
+        if self._direct is None:
+            raise StorageUnavailable("no bucket; BENTRAY_STORAGE_URL named one before")
+        try:
+            self._direct.fetch(row, path)
+        except FileNotFoundError:
+            raise InvalidInput("upload", "no data in the bucket", "a new upload") from None
 
     def _refusal(
         self, row: UploadRow, tenant: Tenant, store: UploadedTable[Any], path: Path
@@ -181,6 +203,7 @@ class UploadIngest:
         """Ingest an upload; returns the problem of a refused one, else None."""
         instance, files = f"/v1/uploads/{row['id']}", self._files.of(tenant)
         try:
+            self._fetch(row, path)
             summary = make_canonical(
                 row["what"],
                 path,

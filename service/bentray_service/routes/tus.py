@@ -164,6 +164,8 @@ async def append_upload(
         offset, expires = await run_in_threadpool(offset_of, service, tenant, row), row["expires"]
         if upload_offset != offset:
             raise WrongOffset("Upload-Offset", upload_offset, f"{offset}, of {row['length']} bytes")
+        if row["multipart_id"] is not None:
+            raise WrongOffset("upload", f"{row['id']}, sent to the bucket", "an upload to the service")
         if row["state"] == "receiving":
             length, path = row["length"], service.files.of(tenant).upload(upload_id)
             announced = int(request.headers.get("content-length", 0))

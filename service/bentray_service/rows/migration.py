@@ -6,7 +6,20 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from sqlalchemy import JSON, Column, Connection, MetaData, Table, text, update
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Column,
+    Connection,
+    Float,
+    Index,
+    Integer,
+    MetaData,
+    String,
+    Table,
+    text,
+    update,
+)
 
 from . import schema
 
@@ -36,6 +49,24 @@ UPLOADED_VOLUMES_OF_VERSION_2 = Table(
     Column("spacing_m", JSON, nullable=False),
     Column("origin_m", JSON, nullable=False),
     Column("value_range", JSON, nullable=False),
+)
+
+UPLOADS_OF_VERSION_3 = Table(
+    "uploads",
+    MetaData(),
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("id", String(32), nullable=False, unique=True),
+    Column("what", String(16), nullable=False),
+    Column("result_id", String(32), nullable=False),
+    Column("length", BigInteger, nullable=False),
+    Column("given", JSON, nullable=False),
+    Column("metadata", String(4000), nullable=False),
+    Column("state", String(16), nullable=False),
+    Column("problem", JSON(none_as_null=True)),
+    Column("created", Float, nullable=False),
+    Column("expires", Float, nullable=False),
+    Column("tenant", String(64), nullable=False, server_default="local"),
+    Index("uploads_by_state", "state", "number"),
 )
 
 
@@ -104,7 +135,7 @@ def _to_3(connection: Connection) -> None:
         ("jobs_by_age", "jobs", "number"),
     ):
         connection.execute(text(f"CREATE INDEX {name} ON {table} (tenant, {order})"))
-    for new in (schema.meshes, schema.geometry_fields, schema.keys, schema.uploads, schema.bucket_mark):
+    for new in (schema.meshes, schema.geometry_fields, schema.keys, UPLOADS_OF_VERSION_3, schema.bucket_mark):
         new.create(connection)
 
 
@@ -157,6 +188,11 @@ def _to_10(connection: Connection) -> None:
         new.create(connection)
 
 
+def _to_11(connection: Connection) -> None:
+    """Version 11: uploads to the bucket."""
+    connection.execute(text("ALTER TABLE uploads ADD COLUMN multipart_id VARCHAR(1024)"))
+
+
 def _count_stored_bytes(connection: Connection) -> None:
     """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
@@ -168,5 +204,5 @@ def _count_stored_bytes(connection: Connection) -> None:
 
 
 STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType(
-    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6, 6: _to_7, 7: _to_8, 8: _to_9, 9: _to_10}
+    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6, 6: _to_7, 7: _to_8, 8: _to_9, 9: _to_10, 10: _to_11}
 )

@@ -20,7 +20,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 10
+VERSION = 11
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -319,6 +319,8 @@ uploads = Table(
     # Metadata for the ingest process, and as sent by the client.
     Column("given", JSON, nullable=False),
     Column("metadata", String(4000), nullable=False),
+    # Id of an upload to the bucket in parts; null for data that is sent to the service.
+    Column("multipart_id", String(1024)),
     # receiving, reading, done, or refused with the problem.
     Column("state", String(16), nullable=False),
     Column("problem", JSON(none_as_null=True)),

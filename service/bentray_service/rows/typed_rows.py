@@ -220,6 +220,7 @@ class UploadRow(TypedDict):
     length: int
     given: Plain
     metadata: str
+    multipart_id: str | None
     state: Literal["receiving", "reading", "done", "refused"]
     problem: Plain | None
     created: float

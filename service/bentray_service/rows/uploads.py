@@ -78,9 +78,19 @@ class Uploads(TenantTable[UploadRow]):
             )
         return self.get(tenant, upload_id)
 
+    def set_multipart(self, row: UploadRow, multipart_id: str) -> UploadRow:
+        """Note the id in the bucket of an upload that goes there."""
+        self._change(row["id"], multipart_id=multipart_id)
+        return {**row, "multipart_id": multipart_id}
+
     def unread(self) -> list[UploadRow]:
         """Complete uploads of all tenants that wait for ingestion, oldest first."""
         return self._where(uploads.c.state == "reading")
+
+    def ids(self) -> set[str]:
+        """The ids of the uploads of all tenants."""
+        with self._database.read() as connection:
+            return set(connection.execute(select(uploads.c.id)).scalars())
 
     def receiving(self) -> list[UploadRow]:
         """Incomplete uploads of all tenants."""

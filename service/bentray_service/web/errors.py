@@ -79,6 +79,7 @@ PROBLEMS: Mapping[type[Exception], ProblemType] = {
     errors.StorageFull: ProblemType(507, "storage-full", "Disk full"),
     errors.StorageUnavailable: ProblemType(503, "storage-away", "Storage unavailable"),
     errors.DatabaseUnavailable: ProblemType(503, "database-away", "Database unavailable"),
+    errors.NoBucket: ProblemType(409, "no-bucket", "No bucket for direct uploads"),
     errors.NoSignIn: ProblemType(404, "no-sign-in", "No sign-in"),
     errors.ProviderUnavailable: ProblemType(503, "provider-away", "Sign-in unavailable"),
     errors.Busy: ProblemType(503, "busy", "No worker available in time"),

@@ -55,7 +55,7 @@ class Bench:
         limits, self.queue = IngestLimits(2**30, 10.0, folder), FairQueue(1)
         self.queue.start()
         stores, quota = {"dataset": self.store}, Quota(database, 10**6)
-        self.reader = UploadIngest(self.uploads, self.files, stores, limits, 60.0, self.queue, quota)
+        self.reader = UploadIngest(self.uploads, self.files, stores, limits, 60.0, self.queue, quota, None)
 
     def meet(self, what, source, result_id, files, limits, given, reserve, started):
         self.read.append(result_id)

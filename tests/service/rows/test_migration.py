@@ -51,7 +51,7 @@ INSERT INTO about VALUES (1, 0.0);
 DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
 
 
-@pytest.fixture(params=[1, 2, 3, 4, 5, 6, 7, 8, 9])
+@pytest.fixture(params=[1, 2, 3, 4, 5, 6, 7, 8, 9, 10])
 def old(request, tmp_path):
     """A database as an older version left it, with a finished and a waiting job."""
     path = tmp_path / "old.sqlite"
@@ -175,10 +175,10 @@ def test_keys_hold_afterwards(old):
 
 def test_failed_migration_keeps_the_old_database(old, monkeypatch):
     def broken(connection):
-        migration._to_10(connection)
+        migration._to_11(connection)
         raise RuntimeError("the power went")
 
-    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 9: broken})
+    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 10: broken})
     with pytest.raises(RuntimeError, match="power"):
         open_database(old)
     monkeypatch.undo()
@@ -270,6 +270,7 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "ALTER TABLE jobs ADD COLUMN webhook VARCHAR(2000)",
         "deliveries",
         "webhook_secrets",
+        "ALTER TABLE uploads ADD COLUMN multipart_id VARCHAR(1024)",
     ]
     assert told.said[-1].startswith("UPDATE about SET version")
 

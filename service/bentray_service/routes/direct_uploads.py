@@ -1,0 +1,149 @@
+"""/v1/direct-uploads: files that clients send straight to the bucket, by presigned addresses."""
+
+from __future__ import annotations
+
+import base64
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Depends, Response, status
+from fastapi.openapi.models import Example
+
+from bentray_kernels.errors import InvalidInput
+
+from ..errors import NoBucket, TooLarge, WrongOffset
+from ..files.direct_uploads import DirectUploads, part_sizes
+from ..rows.tenants import Tenant
+from ..rows.typed_rows import UploadRow
+from ..web.errors import problems
+from ..wiring import CallerTenant, Parts, Service
+from .bodies import SmallBody, accept_media_types
+from .models.upload_records import (
+    DirectUploadRecord,
+    DirectUploadRequest,
+    PartAddresses,
+    PartRecord,
+    PartsRequest,
+)
+from .record_conversion import upload_record
+from .upload_metadata import read_metadata
+
+FILES: dict[str, Example] = {
+    "scan": {"summary": "A scan of 3 GB", "value": {"kind": "dataset", "length": 3000000000}},
+    "volume": {
+        "summary": "A volume",
+        "value": {"kind": "volume", "length": 64000128, "metadata": {"spacing_m": "0.001"}},
+    },
+}
+NUMBERS: dict[str, Example] = {"parts": {"summary": "The first two", "value": {"numbers": [1, 2]}}}
+JSON = [Depends(accept_media_types("application/json"))]
+
+router = APIRouter(prefix="/v1/direct-uploads", tags=["uploads"], route_class=SmallBody)
+
+
+@router.post(
+    "",
+    status_code=status.HTTP_201_CREATED,
+    dependencies=JSON,
+    responses=problems(400, 409, 413, 415, 422, 503, 507),
+)
+def create_direct_upload(
+    upload: Annotated[DirectUploadRequest, Body(openapi_examples=FILES)],
+    response: Response,
+    service: Service,
+    tenant: CallerTenant,
+) -> DirectUploadRecord:
+    """Create an upload; send its parts to the addresses of `parts`, then `complete` it."""
+    direct = _direct(service)
+    said = {**upload.metadata, "kind": upload.kind}
+    header = ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
+    what, given = read_metadata(header)
+    most = service.settings.max_upload_bytes
+    if upload.length > most:
+        accepted = f"at most {most} bytes (BENTRAY_MAX_UPLOAD_BYTES)"
+        raise TooLarge("length", f"{upload.length} bytes", accepted)
+    service.upload_limits.check_begin(tenant)
+    keep_s, most_bytes = service.settings.upload_keep_s, service.quota.most_bytes
+    row = service.uploads.add(tenant, what, upload.length, given, header, keep_s, most_bytes)
+    try:
+        row = service.uploads.set_multipart(row, direct.begin(row["id"]))
+    except BaseException:
+        service.uploads.remove(row["id"])
+        raise
+    record = _record(row)
+    response.headers["Location"] = record.links["self"]
+    return record
+
+
+@router.post("/{upload_id}/parts", dependencies=JSON, responses=problems(400, 404, 409, 413, 415, 422, 503))
+def show_parts(
+    upload_id: str,
+    parts: Annotated[PartsRequest, Body(openapi_examples=NUMBERS)],
+    service: Service,
+    tenant: CallerTenant,
+) -> PartAddresses:
+    """Show addresses for parts, valid for an hour: PUT each, with exactly `bytes` and without a key.
+
+    A part may be sent again. Those with the size in `received` are in the bucket.
+    """
+    row, direct = _receiving(service, tenant, upload_id)
+    sizes = part_sizes(row["length"])
+    for number in parts.numbers:
+        if number > len(sizes):
+            raise InvalidInput("numbers", number, f"1 to {len(sizes)}")
+    received = direct.received(row)
+    service.uploads.keep(row["id"], service.settings.upload_keep_s)
+    return PartAddresses(
+        parts=[
+            PartRecord(number=one, bytes=sizes[one - 1], url=direct.part_url(row, one))
+            for one in parts.numbers
+        ],
+        received=[
+            number for number, size in received.items() if number <= len(sizes) and size == sizes[number - 1]
+        ],
+    )
+
+
+@router.post(
+    "/{upload_id}/complete", status_code=status.HTTP_202_ACCEPTED, responses=problems(404, 409, 423, 503)
+)
+def complete_direct_upload(upload_id: str, service: Service, tenant: CallerTenant) -> DirectUploadRecord:
+    """Complete an upload. It is ingested in the background; poll it with `GET /v1/uploads/{id}`."""
+    service.uploads.get(tenant, upload_id)
+    with service.hold(upload_id):
+        row = service.uploads.get(tenant, upload_id)
+        if row["multipart_id"] is None or row["state"] == "receiving":
+            row, direct = _receiving(service, tenant, upload_id)
+            # In the order of the numbers, and nothing beside them.
+            found = [size for _, size in sorted(direct.received(row).items())]
+            if found != part_sizes(row["length"]):
+                accepted = f"{len(part_sizes(row['length']))} parts, {row['length']} bytes in total"
+                raise WrongOffset("parts", f"{len(found)} parts, {sum(found)} bytes", accepted)
+            direct.complete(row)
+            # The mark of this service, which ingests it.
+            service.files.of(tenant).upload(upload_id).touch()
+            service.uploads.mark_complete(upload_id)
+            service.upload_ingest.notify()
+        return _record(service.uploads.get(tenant, upload_id))
+
+
+def _direct(service: Parts) -> DirectUploads:
+    if service.direct_uploads is None:
+        raise NoBucket()
+    return service.direct_uploads
+
+
+def _receiving(service: Parts, tenant: Tenant, upload_id: str) -> tuple[UploadRow, DirectUploads]:
+    row = service.uploads.get(tenant, upload_id)
+    if row["multipart_id"] is None:
+        raise WrongOffset("upload", f"{row['id']}, sent to the service", "a direct upload")
+    if row["state"] != "receiving":
+        raise WrongOffset("state", row["state"], "receiving")
+    return row, _direct(service)
+
+
+def _record(row: UploadRow) -> DirectUploadRecord:
+    here, record = f"/v1/direct-uploads/{row['id']}", upload_record(row, 0)
+    sizes = part_sizes(row["length"])
+    links = {**record.links, "parts": f"{here}/parts", "complete": f"{here}/complete"}
+    more = {"parts": len(sizes), "part_bytes": sizes[0], "links": links}
+    return DirectUploadRecord.model_validate({**record.model_dump(exclude={"offset"}), **more})

@@ -1,0 +1,198 @@
+"""/v1/direct-uploads: straight to the bucket by presigned addresses, with the checks of every upload."""
+
+import hashlib
+import time
+
+import httpx
+import numpy as np
+import pytest
+
+from bentray_service.client import Client
+from bentray_service.errors import StorageUnavailable
+from bentray_service.files import direct_uploads
+from bentray_service.files.bucket import Bucket
+
+PLACE = "/v1/direct-uploads"
+
+
+@pytest.fixture
+def service(start, bucket_url):
+    return lambda **settings: start(storage_url=bucket_url, **settings)
+
+
+@pytest.fixture
+def objects(bucket_url):
+    """Keys of the objects beside the stored items."""
+    return lambda: [one.key for one in Bucket(bucket_url).listed(direct_uploads.FOLDER)]
+
+
+def begun(http, data, **more):
+    answer = http.post(PLACE, json={"length": len(data), **more})
+    assert answer.status_code == 201, answer.text
+    return answer.json()
+
+
+def send(http, upload, data, numbers=None):
+    """Send parts as any program does: without the key, and knowing nothing of the service."""
+    numbers = numbers or list(range(1, upload["parts"] + 1))
+    answer = http.post(upload["links"]["parts"], json={"numbers": numbers})
+    assert answer.status_code == 200, answer.text
+    for part in answer.json()["parts"]:
+        begin = (part["number"] - 1) * upload["part_bytes"]
+        sent = httpx.put(part["url"], content=data[begin : begin + part["bytes"]])
+        assert sent.status_code == 200, sent.text
+    return answer.json()
+
+
+def ended(http, upload):
+    deadline = time.monotonic() + 60.0
+    while (found := http.get(upload["links"]["self"]).json())["state"] in ("receiving", "reading"):
+        assert time.monotonic() < deadline, found
+        time.sleep(0.02)
+    return found
+
+
+def test_parts_are_assembled_and_read_as_any_upload(service, scan, objects):
+    http = service()
+    path = scan(lambda file: file.create_dataset("ignored", data=np.random.default_rng(1).random(2_400_000)))
+    data = path.read_bytes()
+    assert len(data) > direct_uploads.PART_BYTES
+    upload = begun(http, data)
+    assert (upload["state"], upload["parts"], upload["part_bytes"]) == ("receiving", 2, 16 * 2**20)
+    used = http.get("/v1/access").json()
+    assert used["bytes_reserved"] == len(data)
+    send(http, upload, data, [2])
+    early = http.post(upload["links"]["complete"])
+    assert (early.status_code, early.json()["field"]) == (409, "parts")
+    assert send(http, upload, data)["received"] == [2]
+    # A part of another size would not be accepted.
+    url = http.post(upload["links"]["parts"], json={"numbers": [1]}).json()["parts"][0]["url"]
+    assert "content-length" in httpx.URL(url).params["X-Amz-SignedHeaders"]
+    for _ in range(2):
+        assert http.post(upload["links"]["complete"]).status_code == 202
+    done = ended(http, upload)
+    dataset = http.get(f"/v1/datasets/{done['result']}").json()
+    assert (dataset["title"], dataset["bytes"]) == ("Sixteen elements", len(data))
+    assert dataset["sha256"] == hashlib.sha256(data).hexdigest()
+    assert objects() == []
+    assert http.get("/v1/access").json()["bytes_reserved"] == 0
+
+
+def test_through_the_client(serve, scan, bucket_url, objects):
+    address = serve(storage_url=bucket_url)
+    with Client(address) as client:
+        seen = []
+        dataset = client.upload(scan(), lambda sent, total: seen.append((sent, total)), direct=True)
+        assert dataset.title == "Sixteen elements"
+        size = scan().stat().st_size
+        assert seen[-1] == (size, size)
+        assert client.datasets()[0].id == dataset.id
+    assert objects() == []
+
+
+def test_hostile_content_is_refused_and_forgotten(service, objects):
+    http = service()
+    upload = begun(http, b"certainly not HDF5")
+    send(http, upload, b"certainly not HDF5")
+    assert http.post(upload["links"]["complete"]).status_code == 202
+    found = ended(http, upload)
+    assert (found["state"], found["problem"]["status"]) == ("refused", 422)
+    assert objects() == []
+    assert http.get("/v1/access").json()["bytes_reserved"] == 0
+    assert http.post(upload["links"]["parts"], json={"numbers": [1]}).json()["field"] == "state"
+
+
+def test_what_is_larger_than_announced_is_not_taken(service, scan):
+    http = service()
+    upload = begun(http, b"x" * 100)
+    url = http.post(upload["links"]["parts"], json={"numbers": [1]}).json()["parts"][0]["url"]
+    # This server does not check signatures; a bucket would refuse the size.
+    assert httpx.put(url, content=b"x" * 101).status_code == 200
+    answer = http.post(upload["links"]["complete"])
+    assert (answer.status_code, answer.json()["found"]) == (409, "1 parts, 101 bytes")
+
+
+def test_the_quota_and_the_largest_size_hold(service):
+    http = service(max_tenant_bytes=1000, max_upload_bytes=900)
+    assert http.post(PLACE, json={"length": 901}).status_code == 413
+    begun(http, b"x" * 800)
+    assert http.post(PLACE, json={"length": 300}).status_code == 507
+
+
+def test_deletion_and_expiry_empty_the_bucket(service, objects, bucket_url):
+    http = service()
+    upload, other = begun(http, b"x" * 10), begun(http, b"x" * 10)
+    for one in (upload, other):
+        send(http, one, b"x" * 10)
+    assert len(Bucket(bucket_url).begun_parts(direct_uploads.FOLDER)) == 2
+    assert http.delete(upload["links"]["self"], headers={"Tus-Resumable": "1.0.0"}).status_code == 204
+    parts = http.app.state.parts
+    parts.housekeeper.forget(parts.uploads.get("local", other["id"]))
+    assert Bucket(bucket_url).begun_parts(direct_uploads.FOLDER) == []
+    assert http.get(other["links"]["self"]).status_code == 404
+
+
+def test_data_without_an_upload_is_removed_after_a_day(service, bucket_url, objects, monkeypatch):
+    service()
+    bucket = Bucket(bucket_url)
+    bucket.put_metadata("direct/up-gone", {})
+    bucket.put_metadata("direct/up-known", {})
+    bucket.begin_parts("direct/up-gone")
+    direct = direct_uploads.DirectUploads(bucket)
+    direct.tidy(lambda: {"up-known"})
+    assert len(objects()) == 2
+    monkeypatch.setattr(direct_uploads, "FORGOTTEN_S", -60.0)
+    direct.tidy(lambda: {"up-known"})
+    assert objects() == ["direct/up-known"]
+    assert bucket.begun_parts(direct_uploads.FOLDER) == []
+
+
+def test_a_crash_between_assembly_and_row_is_repaired(service, scan, objects):
+    http = service()
+    data = scan().read_bytes()
+    upload = begun(http, data)
+    send(http, upload, data)
+    parts = http.app.state.parts
+    parts.direct_uploads.complete(parts.uploads.get("local", upload["id"]))
+    assert http.post(upload["links"]["complete"]).status_code == 202
+    done = ended(http, upload)
+    assert done["state"] == "done"
+    assert http.get(f"/v1/datasets/{done['result']}").json()["title"] == "Sixteen elements"
+
+
+def test_a_bucket_that_is_away_is_waited_for(service, scan, s3_server, monkeypatch):
+    monkeypatch.setattr("bentray_service.ingest.upload_ingest.PATIENCE_SECONDS", 0.1)
+    http = service()
+    data = scan().read_bytes()
+    upload = begun(http, data)
+    send(http, upload, data)
+    direct = http.app.state.parts.direct_uploads
+    fetch, calls = direct.fetch, []
+
+    def away_once(row, path):
+        calls.append(row["id"])
+        if len(calls) == 1:
+            raise StorageUnavailable("away")
+        fetch(row, path)
+
+    monkeypatch.setattr(direct, "fetch", away_once)
+    assert http.post(upload["links"]["complete"]).status_code == 202
+    assert ended(http, upload)["state"] == "done"
+    assert len(calls) == 2
+
+
+def test_the_two_ways_are_not_mixed(service, start, scan):
+    http = service()
+    upload = begun(http, b"x" * 10)
+    headers = {
+        "Tus-Resumable": "1.0.0",
+        "Upload-Offset": "0",
+        "Content-Type": "application/offset+octet-stream",
+    }
+    answer = http.patch(upload["links"]["self"], content=b"x", headers=headers)
+    assert (answer.status_code, answer.json()["field"]) == (409, "upload")
+    tus = http.post("/v1/uploads", headers={"Tus-Resumable": "1.0.0", "Upload-Length": "9"}).json()["id"]
+    assert http.post(f"{PLACE}/{tus}/complete").json()["field"] == "upload"
+    local = start("local")
+    answer = local.post(PLACE, json={"length": 9})
+    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/no-bucket")
