@@ -1,0 +1,48 @@
+"""Table of memory, disk space and processor time of reconstructions, from their plans."""
+
+from __future__ import annotations
+
+from bentray_kernels.tomography import Settings
+from bentray_workers.files.dataset.counts import DatasetCounts
+from bentray_workers.reconstruction.planning import plan
+
+from .tables import table
+
+# Elements of a ring, nodes along each side of the image, and slices.
+SIZES = ((64, 96, 1), (128, 128, 1), (256, 192, 1), (256, 192, 40), (512, 256, 1), (512, 256, 44))
+METHODS = ("sart", "gauss-newton")
+MIB = 2.0**20
+
+
+def sizing() -> str:
+    """One row for each size and method: the largest task, result with checkpoints, seconds of a core."""
+    rows = []
+    for elements, nodes, slices in SIZES:
+        for method in METHODS:
+            settings = Settings.of(method=method, nodes=nodes, attenuation={"enabled": False})
+            planned = plan(_scan(elements, slices).summary(settings), settings, ())
+            memory, disk = planned.largest[1] / MIB, planned.stored_bytes / MIB
+            size = f"{elements}", f"{nodes}²", f"{slices}", method
+            rows.append((*size, f"{memory:.0f} MiB", f"{disk:.0f} MiB", f"{planned.work_s:.0f} s"))
+    head = ("elements", "nodes", "slices", "method", "largest task", "disk while it runs", "one core")
+    return table(head, rows)
+
+
+def _scan(elements: int, slices: int) -> DatasetCounts:
+    return DatasetCounts(
+        emissions=elements,
+        receivers=elements,
+        elements=elements,
+        slices=slices,
+        in_space=False,
+        height_m=0.004 * (slices - 1),
+        width_m=0.16,
+        times=True,
+        amplitudes=False,
+        traces_bytes=0,
+        samples=0,
+        sample_bytes=0,
+        rate_hz=None,
+        frequency_hz=None,
+        water_mps=1500.0,
+    )
