@@ -60,6 +60,12 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
     "PATCH /v1/uploads/{upload_id}": {413: {"body"}, 460: {"body"}, 400: {"Upload-Checksum"}},
     # A volume, or a mesh, that the job can be done with.
     "POST /v1/jobs": {422: {*(f"settings.{name}" for name in SETTINGS), "settings", "volume", "mesh"}},
+    # As those of each of its jobs.
+    "POST /v1/batches": {422: {*(f"settings.{name}" for name in SETTINGS), "settings"}},
+    # A name that no other project has, as many as a tenant may have; a member, as many as a project may have.
+    "POST /v1/projects": {422: {"name", "projects"}},
+    "PATCH /v1/projects/{project_id}": {422: {"name"}},
+    "PUT /v1/projects/{project_id}/members": {422: {"member", "members", "role"}},
     "POST /v1/plans": {422: {*(f"settings.{name}" for name in SETTINGS), "settings", "volume", "mesh"}},
     # An emission and a slice that the scan has; traces that it has.
     "GET /v1/datasets/{dataset_id}/traces": {422: {"emission", "slice", "quantity"}},

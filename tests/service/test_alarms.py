@@ -118,6 +118,7 @@ def test_every_alarm_has_its_entry_in_the_runbook():
             assert part in entry, f"{name} has no {part}"
 
 
+@pytest.mark.nightly
 def test_alarms_fire_when_they_should_and_not_before(tmp_path):
     assert set(ILL) == {rule["alert"] for rule in RULES}
     if shutil.which("promtool") is None:

@@ -61,7 +61,7 @@ checks = {{ ensure_resource_availability = {{ enabled = false }} }}
 # The systematic requests of these, one a bound of each parameter, are a thousand, or draw large pictures.
 MANY = """
 [[operations]]
-include-path-regex = "/(jobs|plans)$|[.]png$|^/v1/uploads$"
+include-path-regex = "/(jobs|plans|batches)$|[.]png$|^/v1/uploads$"
 phases = { coverage = { enabled = false } }
 """
 

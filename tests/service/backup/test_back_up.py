@@ -249,6 +249,7 @@ def killed(module, call, *words):
     assert done.returncode == -signal.SIGKILL, done.stderr
 
 
+@pytest.mark.nightly
 def test_killed_on_both_ways(used, start, monkeypatch, tmp_path):
     members = used()
     expected = {name: seen(member) for name, member in members.items()}

@@ -38,7 +38,7 @@ SCANS = {
 
 
 @pytest.mark.parametrize("which", SCANS)
-@pytest.mark.parametrize("assumed", [False, True])
+@pytest.mark.parametrize("assumed", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_the_result_is_that_of_a_file_that_states_it(tmp_path, which, assumed):
     data = SCANS[which]()
     # 16.0 °C, too cold for the chords by 13 m/s.

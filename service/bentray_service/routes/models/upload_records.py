@@ -16,7 +16,8 @@ class DirectUploadRequest(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     kind: Literal["dataset", "volume", "mesh"] = "dataset"
-    length: int = Field(ge=1, le=2**63 - 1, description="Size of the file, bytes.")
+    # What every reader of JSON holds as a whole number.
+    length: int = Field(ge=1, le=2**53 - 1, description="Size of the file, bytes.")
     metadata: dict[str, Annotated[str, Field(max_length=1000)]] = Field(
         default_factory=dict,
         max_length=20,

@@ -178,7 +178,7 @@ def test_empty_field_returns_no_hit():
 
 
 @pytest.mark.real
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_bunny_keeps_target_g2():
     mesh = bunny().in_unit_cube()
     surface = surface_of(Chart(mesh, np.zeros((len(mesh.faces), 3, 2))))

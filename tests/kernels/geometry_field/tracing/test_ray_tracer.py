@@ -344,7 +344,8 @@ def test_rays_that_leave_the_surface_use_the_published_inner_field(way):
     assert off[1] < off[0] < 0.5
     # Each ray ends at the recorded point: one and the same for all rays, and none at all.
     body = (picture(scene, depth=0) != picture(replace(scene, instances=(AWAY,)), depth=0)).any(axis=2)
-    one_point = drawn(inner_uv=np.full_like(shape.reference.inner_uv, 0.25))
+    recorded = shape.reference.inner_uv[np.isfinite(shape.reference.inner_uv).all(axis=-1)]
+    one_point = drawn(inner_uv=np.full_like(shape.reference.inner_uv, 1.0) * recorded[len(recorded) // 2])
     nowhere = drawn(inner_uv=np.full_like(shape.reference.inner_uv, np.nan))
     assert (plain != one_point).any(axis=2)[body].mean() > 0.2
     assert (nowhere != one_point).any(axis=2)[body].mean() > 0.2

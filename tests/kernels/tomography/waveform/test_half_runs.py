@@ -80,6 +80,7 @@ def refined():
     return plain, reconstruct(recorded(), plan.changed(uncertainty=True), seen.append), seen
 
 
+@pytest.mark.nightly
 def test_most_nodes_lie_within_two_deviations(refined):
     plain, found, seen = refined
     assert np.array_equal(found.speed, plain.speed)
