@@ -30,6 +30,7 @@ def test_the_image_on_a_device_is_that_of_compiled_code():
     np.testing.assert_array_equal(reconstruct(scan(), ON_DEVICE).reflection.db, there.reflection.db)
 
 
+@pytest.mark.opencl
 def test_a_device_that_fails_leaves_the_sums_to_compiled_code(monkeypatch):
     calls = []
 
