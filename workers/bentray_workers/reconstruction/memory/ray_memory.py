@@ -31,8 +31,9 @@ FIELD_BYTES_PER_NODE = 80
 # between nodes touches the corners of its cells. In 3-D a level ray stays in its plane.
 ENTRIES_LEVEL, ENTRIES_IN_SPACE = 1.55, 3.1
 
-# Arrays of the size of all probes of one solve: its iterates, transforms and products, with copies.
-PROBE_ARRAYS = 22
+# Arrays of the size of all probes of one solve: its iterates, transforms and products, with
+# copies, and what the transforms of one processor take more than those of another.
+PROBE_ARRAYS = 26
 
 # An entry is a column of 4 bytes and a length of 4.
 ENTRY_BYTES = 8
