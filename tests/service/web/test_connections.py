@@ -15,6 +15,7 @@ import pytest
 from bentray_service.web import descriptors, protocol
 from bentray_service.web.addresses import networks
 from bentray_service.web.connections import KEPT, MAX_CONNECTIONS, SPARE, ConnectionLimits, Connections
+from bentray_service.web.listening import Listening
 
 from .speaking import connected, read_answer, read_to_end, served
 
@@ -211,6 +212,14 @@ def test_a_client_that_does_not_read_is_cut_off(monkeypatch):
     with served(app) as server, connected(server) as connection:
         connection.sendall(OTHER)
         assert ended.wait(20.0)
+
+
+def test_answers_in_two_segments_do_not_wait_for_an_acknowledgement():
+    with Listening() as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        with socket.create_connection(listening.getsockname()), listening.accept()[0] as accepted:
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 def test_descriptor_shortage_closes_idle_connections(app, monkeypatch, caplog):
