@@ -36,7 +36,7 @@ SLOW_S, USUAL_S = 10.0, 0.13
 # Files that take far longer than their number of tests suggests, s of an idle machine; they begin first, each
 # in one process. One that is missing here may begin last, and its process then works alone.
 LONG_S = {
-    "service/test_schema.py": 80.0,
+    "service/test_schema.py": 15.0,
     "service/web/test_scan_page.py": 60.0,
     "faults/test_kills.py": 60.0,
     "service/web/test_every_page.py": 50.0,

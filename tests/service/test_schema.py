@@ -58,8 +58,8 @@ parameters = {{ {ids} }}
 include-path-regex = "^/v1/jobs/"
 checks = {{ ensure_resource_availability = {{ enabled = false }} }}
 """
-# The systematic requests of these, one a bound of each parameter, are a thousand, draw large pictures, or wait
-# for the end of a stream.
+# The systematic requests of these, one a bound of each parameter, are a thousand, draw large pictures, or
+# wait for the end of a stream.
 MANY = """
 [[operations]]
 include-path-regex = "/(jobs|plans|batches)$|[.]png$|^/v1/uploads$|/events$"

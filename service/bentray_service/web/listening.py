@@ -24,8 +24,8 @@ class Listening(socket.socket):
 
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
-        # Connections inherit it. asyncio sets it only where the protocol of the socket is named; without it an
-        # answer in two segments waits 40 ms for an acknowledgement.
+        # Connections inherit it. asyncio sets it only where the protocol of the socket is named; without it
+        # an answer in two segments waits 40 ms for an acknowledgement.
         if self.family in (socket.AF_INET, socket.AF_INET6):
             self.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._kept: int | None = os.open(os.devnull, os.O_RDONLY)
