@@ -50,7 +50,7 @@ def page(browser: Any) -> Iterator[Any]:
 
 
 class SharedService(NamedTuple):
-    """A service for all tests of a file, which leave its scans and jobs as they are.
+    """A service for all tests of a file, which change only scans and jobs of their own.
 
     Attributes:
         address: of the service.
@@ -79,3 +79,9 @@ def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SharedS
         settings = ServiceSettings(data_dir=folder / "data", renders_per_minute=0)
         with serving(settings, FakeCluster()) as address:
             yield SharedService(address, partial(write_scan, folder / "scan.h5"), work, monkeypatch, folder)
+
+
+@pytest.fixture
+def address(shared_service: SharedService) -> str:
+    """Of the service of all tests of a file; each has scans and results of its own."""
+    return shared_service.address

@@ -22,6 +22,8 @@ from .live_results import in_turns, started
 
 pytestmark = pytest.mark.browser
 
+# Ends of the addresses of pages whose parts axe has seen in another one.
+REPEATED = ("?planes=3", "?mode=swipe")
 SERIOUS = ("serious", "critical")
 # WCAG 2.2 AA with what it includes; in the dark what depends on colours.
 LEVELS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
@@ -29,9 +31,9 @@ RULES = {
     "light": {"runOnly": {"type": "tag", "values": LEVELS}},
     "dark": {"runOnly": {"type": "rule", "values": ["color-contrast", "link-in-text-block"]}},
 }
-TELEPHONE, LAPTOP = (390, 844), (1400, 900)
+NARROWEST, TELEPHONE, LAPTOP = (360, 740), (390, 844), (1400, 900)
 # Width and height when a page is opened, and after it: of telephones, and of 4K and a laptop.
-SIZES = (((360, 740), TELEPHONE), ((3840, 2160), LAPTOP))
+SIZES = ((NARROWEST, TELEPHONE), ((3840, 2160), LAPTOP))
 
 
 @pytest.fixture(scope="module")
@@ -94,8 +96,58 @@ def opened(page, address, path, text):
     page.locator("main").get_by_text(text).first.wait_for()
 
 
+def serious(page, path, scheme):
+    """What axe finds in this page: the parts, by the name of the rule."""
+    report = Axe().run(page, options=RULES[scheme]).response
+    assert report["passes"], path
+    return {
+        f"{path.partition('?')[0]} {scheme} {page.viewport_size['width']} {one['id']}": [
+            node["html"][:120] for node in one["nodes"][:3]
+        ]
+        for one in report["violations"]
+        if one["impact"] in SERIOUS
+    }
+
+
+def show_alerts(page):
+    """The messages that the shell shows when a key ends, and when the service is away."""
+    page.evaluate("document.dispatchEvent(new CustomEvent('locked', { detail: 'The key has expired' }))")
+    page.evaluate("document.dispatchEvent(new CustomEvent('connection', { detail: false }))")
+
+
+def sideways(page):
+    return page.evaluate("document.documentElement.scrollWidth > innerWidth")
+
+
+def test_every_page_on_a_laptop_and_on_the_narrowest_telephone(page, places):
+    """Each page once: axe finds nothing serious, nothing scrolls sideways, no request leaves the service."""
+    address, pages = places
+    found, wide, asked = {}, [], []
+    page.on("request", lambda request: asked.append(request.url))
+    page.emulate_media(color_scheme="light")
+    for path, text in pages.items():
+        resized(page, LAPTOP)
+        opened(page, address, path, text)
+        for size in (LAPTOP, NARROWEST):
+            resized(page, size)
+            if sideways(page):
+                wide.append((size[0], path))
+        resized(page, LAPTOP)
+        if not path.endswith(REPEATED):
+            if path == "/jobs":
+                show_alerts(page)
+            found |= serious(page, path, "light")
+    assert found == {}
+    assert wide == []
+    assert len(asked) > len(pages)
+    own = (f"{address}/", f"blob:{address}/", "data:")
+    assert [one for one in asked if not one.startswith(own) and one != "about:blank"] == []
+    expect(page.locator("h1")).to_have_count(1)
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize("scheme", RULES)
-def test_axe_finds_nothing_serious(page, places, scheme):
+def test_axe_finds_nothing_serious_in_any_colours_or_width(page, places, scheme):
     address, pages = places
     page.emulate_media(color_scheme=scheme)
     found = {}
@@ -103,36 +155,23 @@ def test_axe_finds_nothing_serious(page, places, scheme):
         resized(page, LAPTOP)
         opened(page, address, path, text)
         if path == "/jobs":
-            page.evaluate(
-                "document.dispatchEvent(new CustomEvent('locked', { detail: 'The key has expired' }))"
-            )
-            page.evaluate("document.dispatchEvent(new CustomEvent('connection', { detail: false }))")
-        # Pages of jobs on a telephone, too.
-        for size in (LAPTOP, TELEPHONE) if path.startswith("/jobs/") and scheme == "light" else (LAPTOP,):
+            show_alerts(page)
+        for size in (LAPTOP, TELEPHONE):
             resized(page, size)
-            report = Axe().run(page, options=RULES[scheme]).response
-            assert report["passes"], path
-            for one in report["violations"]:
-                if one["impact"] in SERIOUS:
-                    where = [node["html"][:120] for node in one["nodes"][:3]]
-                    found[f"{path.partition('?')[0]} {size[0]} {one['id']}"] = where
+            found |= serious(page, path, scheme)
     assert found == {}
 
 
-def test_nothing_scrolls_sideways_and_no_request_leaves_the_service(page, places):
+@pytest.mark.nightly
+def test_nothing_scrolls_sideways_at_any_width(page, places):
     address, pages = places
-    wide, asked = [], []
-    page.on("request", lambda request: asked.append(request.url))
+    wide = []
     for first, second in SIZES:
         for path, text in pages.items():
             resized(page, first)
             opened(page, address, path, text)
             for size in (first, second):
                 resized(page, size)
-                if page.evaluate("document.documentElement.scrollWidth > innerWidth"):
+                if sideways(page):
                     wide.append((size[0], path))
     assert wide == []
-    assert len(asked) > len(pages)
-    own = (f"{address}/", f"blob:{address}/", "data:")
-    assert [one for one in asked if not one.startswith(own) and one != "about:blank"] == []
-    expect(page.locator("h1")).to_have_count(1)

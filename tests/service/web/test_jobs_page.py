@@ -21,9 +21,8 @@ def two_frames(client, path, turntable, target, work_dir, **control):
     first.save(target, "PNG", save_all=True, append_images=[second])
 
 
-def test_a_turntable_is_shown_and_plays_when_asked(page, serve, scan, work, monkeypatch):
+def test_a_turntable_is_shown_and_plays_when_asked(page, address, work, monkeypatch):
     monkeypatch.setattr(kinds, "draw_turntable", two_frames)
-    address = serve()
     values = io.BytesIO()
     np.save(values, sampled(ONE_HOLE, 12))
     stream = {"Content-Type": "application/octet-stream"}

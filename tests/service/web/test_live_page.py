@@ -34,8 +34,7 @@ def tab_to(page, text):
     raise AssertionError(f"{text} has not been reached")
 
 
-def test_it_sharpens_until_the_result_is_shown(page, serve, scan, turns):
-    address = serve()
+def test_it_sharpens_until_the_result_is_shown(page, address, scan, turns):
     page.goto(f"{address}/#/jobs/{started(address, scan)['id']}")
     page.get_by_text("The image appears after the first iteration").wait_for()
     page.get_by_text("0 % of this step").wait_for()
@@ -83,8 +82,7 @@ def test_it_sharpens_until_the_result_is_shown(page, serve, scan, turns):
     assert page.locator(".live-views").count() == 0
 
 
-def test_it_can_be_cancelled_and_run_again(page, serve, scan, turns):
-    address = serve()
+def test_it_can_be_cancelled_and_run_again(page, address, scan, turns):
     job = started(address, scan)
     page.goto(f"{address}/#/jobs/{job['id']}")
     page.get_by_text("The image appears after the first iteration").wait_for()
@@ -99,9 +97,8 @@ def test_it_can_be_cancelled_and_run_again(page, serve, scan, turns):
     expect(page.get_by_label("Nodes per side")).to_have_value("16")
 
 
-def test_a_failure_is_explained(page, serve, scan, work):
+def test_a_failure_is_explained(page, address, scan, work):
     work.error = InvalidInput("settings", "no finite speed at 3 nodes", "smaller relaxation")
-    address = serve()
     page.goto(f"{address}/#/jobs/{started(address, scan)['id']}")
     reason = page.get_by_role("alert").filter(
         has_text="no finite speed at 3 nodes; accepted: smaller relaxation"

@@ -51,7 +51,7 @@ PRESS_UNTIL_DRAWN = """async () => {
         await new Promise((go) => setTimeout(go, 400));
     }
 }"""
-SIZE = {"width": 256, "height": 256}
+SIZE = {"width": 128, "height": 128}
 
 
 @pytest.fixture(scope="module")
@@ -100,9 +100,8 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_its_pictures_are_those_of_the_service(page, serve, name):
+def test_its_pictures_are_those_of_the_service(page, address, name):
     values, spacing, chosen, surfaces = CASES[name]
-    address = serve()
     volume = stored(address, values(), spacing)
     page.goto(address)
     page.evaluate(LOAD, {"links": volume["links"], "spacing": volume["spacing_m"], "filter": chosen})
@@ -133,10 +132,10 @@ def pretend(page, takes_ms, name="SwiftShader|"):
     page.route("**/ray_caster.js", changed)
 
 
-def moved(page, serve, tmp_path):
+def moved(page, address, tmp_path):
     """Store a volume in the page, and turn it once."""
     np.save(tmp_path / "ball.npy", sampled(ONE_HOLE, 12))
-    page.goto(serve() + "/#/rendering")
+    page.goto(address + "/#/rendering")
     page.set_input_files("#volume-file", tmp_path / "ball.npy")
     page.get_by_text("ball.npy is stored").wait_for()
     page.locator("#glass[data-quality=full]").wait_for()
@@ -146,10 +145,10 @@ def moved(page, serve, tmp_path):
     page.keyboard.press("ArrowRight")
 
 
-def test_the_page_draws_previews_here_once_the_volume_is_loaded(page, serve, tmp_path):
+def test_the_page_draws_previews_here_once_the_volume_is_loaded(page, address, tmp_path):
     pretend(page, "1.0")
     with page.expect_response("**/coefficients*"):
-        moved(page, serve, tmp_path)
+        moved(page, address, tmp_path)
     page.evaluate(PRESS_UNTIL_DRAWN)
     # At rest the service draws.
     page.locator("#glass[data-quality=full][data-source=service]").wait_for()
@@ -158,15 +157,15 @@ def test_the_page_draws_previews_here_once_the_volume_is_loaded(page, serve, tmp
 
 
 @pytest.mark.parametrize("card", [True, False])
-def test_the_service_draws_where_this_would_be_slow(page, serve, tmp_path, card):
+def test_the_service_draws_where_this_would_be_slow(page, address, tmp_path, card):
     loads = []
     page.on("request", lambda request: loads.append(request.url) if "coefficients" in request.url else None)
     if card:
         pretend(page, "26.0")
         with page.expect_response("**/coefficients*"):
-            moved(page, serve, tmp_path)
+            moved(page, address, tmp_path)
     else:
-        moved(page, serve, tmp_path)
+        moved(page, address, tmp_path)
     for azimuth in (40, 45, 50):
         page.keyboard.press("ArrowRight")
         page.locator(f"#glass[data-quality=full][data-address*='azimuth_deg={azimuth}&']").wait_for()

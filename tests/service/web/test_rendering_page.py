@@ -201,9 +201,9 @@ def test_a_preview_that_comes_late_is_not_shown(ball):
     assert whole(page, azimuth_deg="40").get_attribute("data-pictures") == pictures
 
 
-def test_an_iso_value_is_chosen_by_its_histogram(page, serve, tmp_path):
+def test_an_iso_value_is_chosen_by_its_histogram(page, address, tmp_path):
     values = np.round(200.0 * sampled(ONE_HOLE, 14)).astype(np.uint8)
-    page.goto(serve() + "/#/rendering")
+    page.goto(address + "/#/rendering")
     page.set_input_files("#volume-file", saved(tmp_path, values))
     histogram = page.get_by_role("img", name=re.compile(r"^Histogram of 2,744 nodes from 0 to 200"))
     histogram.wait_for()

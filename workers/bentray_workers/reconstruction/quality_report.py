@@ -10,7 +10,7 @@ from typing import Any
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.calibration import Calibration, calibrate, water_times
-from bentray_kernels.acquisition.quality import Finding, Report, examine_slices
+from bentray_kernels.acquisition.quality import Examined, Finding, Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.picker_names import DEFAULT_PICKER
@@ -32,7 +32,7 @@ class Quality:
 
     Attributes:
         report: plain values for JSON, see ``acquisition.quality.Report``.
-        page: PNG about the slice with the most findings.
+        page: PNG about the slice with the most findings; empty if it was not requested.
         picked: the corrected dataset with travel times; None for a rejected scan.
         examined: the report itself.
     """
@@ -81,6 +81,8 @@ def examine_file(
     progress: OnEmission | None = None,
     largest_bytes: int | None = None,
     water_temperature_c: float | None = None,
+    *,
+    draw: bool = True,
 ) -> Quality:
     """Examine a dataset file.
 
@@ -90,28 +92,35 @@ def examine_file(
         progress: called after each emission, in each pass over the traces.
         largest_bytes: of traces; None: no limit, since they are never all in memory.
         water_temperature_c: in place of that of the file, °C.
+        draw: make the page, which takes longer than the report of a small scan.
 
     Raises:
         InvalidInput: from the file, for an unknown picker, or for more traces than allowed.
     """
     if largest_bytes is not None:
         _check_size(path, largest_bytes)
-    return _examined(path, read_scan(path).in_water_of(water_temperature_c), picker, progress)
+    return _examined(path, read_scan(path).in_water_of(water_temperature_c), picker, progress, draw=draw)
 
 
-def _examined(path: Path, whole: Dataset, picker: str, progress: OnEmission | None) -> Quality:
-    # It loads Matplotlib, which the service, where the task is only submitted, does not need.
-    from ..images.quality_page import quality_png
-
+def _examined(
+    path: Path, whole: Dataset, picker: str, progress: OnEmission | None, *, draw: bool = True
+) -> Quality:
     examined = examine_slices(whole, _slices(path, whole), picker, progress)
     if frequency := _estimated_frequency(path):
         findings = (frequency, *examined.report.findings)
         examined = replace(examined, report=replace(examined.report, findings=findings))
+    page = _drawn(path, whole, examined) if draw else b""
+    return Quality(examined.report.to_dict(), page, examined.picked, examined.report)
+
+
+def _drawn(path: Path, whole: Dataset, examined: Examined) -> bytes:
+    # It loads Matplotlib, which the service, where the task is only submitted, does not need.
+    from ..images.quality_page import quality_png
+
     of_slices = [f.slice for f in examined.report.findings]
     worst = max(set(of_slices), key=of_slices.count, default=0)
     with open_slice(path, whole, worst) as one:
-        page = quality_png(one, examined, worst if whole.slice_z_m is not None else None)
-    return Quality(examined.report.to_dict(), page, examined.picked, examined.report)
+        return quality_png(one, examined, worst if whole.slice_z_m is not None else None)
 
 
 def _estimated_frequency(path: Path) -> Finding | None:
@@ -132,18 +141,20 @@ def _slices(path: Path, whole: Dataset) -> Iterator[Dataset]:
 
 def quality_report(path: Path, picker: str, water_temperature_c: float | None = None) -> dict[str, Any]:
     """Task: the report alone."""
-    return _cancellable(path, picker, water_temperature_c).report
+    return _cancellable(path, picker, water_temperature_c, draw=False).report
 
 
 def quality_page(path: Path, picker: str, water_temperature_c: float | None = None) -> bytes:
     """Task: the page alone."""
-    return _cancellable(path, picker, water_temperature_c).page
+    return _cancellable(path, picker, water_temperature_c, draw=True).page
 
 
-def _cancellable(path: Path, picker: str, water_temperature_c: float | None) -> Quality:
+def _cancellable(path: Path, picker: str, water_temperature_c: float | None, *, draw: bool) -> Quality:
     """An examination that ends early when its task is cancelled."""
     check = cancellation_check()
-    return examine_file(path, picker, lambda done, total: check(), LARGEST_BYTES, water_temperature_c)
+    return examine_file(
+        path, picker, lambda done, total: check(), LARGEST_BYTES, water_temperature_c, draw=draw
+    )
 
 
 def _check_size(path: Path, largest_bytes: int) -> None:
