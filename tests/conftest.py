@@ -37,13 +37,13 @@ SLOW_S, USUAL_S = 10.0, 0.13
 # in one process. One that is missing here may begin last, and its process then works alone.
 LONG_S = {
     "service/test_schema.py": 15.0,
-    "service/web/test_scan_page.py": 60.0,
+    "service/web/test_scan_page.py": 30.0,
     "faults/test_kills.py": 60.0,
-    "service/web/test_every_page.py": 50.0,
+    "service/web/test_every_page.py": 15.0,
     "deploy/test_installation.py": 40.0,
     "workers/cluster/test_pipelines.py": 40.0,
-    "service/web/test_rendering_page.py": 35.0,
-    "service/web/test_ray_caster.py": 35.0,
+    "service/web/test_rendering_page.py": 25.0,
+    "service/web/test_ray_caster.py": 20.0,
     "service/web/test_story.py": 30.0,
     "service/ingest/test_hostile_files.py": 30.0,
     "service/web/test_result_page.py": 25.0,

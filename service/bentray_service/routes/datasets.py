@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Annotated
+from urllib.parse import urlencode
 
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 from pydantic import Field
@@ -17,6 +18,7 @@ from . import quality, scan_views
 from .bodies import Limit, accept_media_types
 from .downloads import download, download_of
 from .models.job_records import DatasetList, DatasetRecord
+from .models.name_changes import TEXT
 from .record_conversion import dataset_record
 from .upload_metadata import scan_metadata
 from .uploads import body_of, receive_upload
@@ -80,14 +82,29 @@ async def upload_dataset(
     return record
 
 
-@router.get("", responses=problems(422))
+@router.get("", responses=problems(404, 422))
 def list_datasets(
     service: Service,
     tenant: CallerTenant,
     limit: Limit = 100,
+    before: Annotated[str | None, Query(description="Only datasets older than this one.")] = None,
+    text: Annotated[
+        str | None,
+        Query(
+            max_length=200,
+            pattern=TEXT,
+            description="Only datasets with this text in their id, name, title or notes, in capitals or "
+            "small letters.",
+        ),
+    ] = None,
 ) -> DatasetList:
-    """List datasets, newest first."""
-    return DatasetList(datasets=[dataset_record(row) for row in service.datasets.newest(tenant, limit)])
+    """List datasets, newest first; `next` is the address of the next page."""
+    rows = service.datasets.found(tenant, limit + 1, before, text)
+    shown = [dataset_record(row) for row in rows[:limit]]
+    if len(rows) == len(shown):
+        return DatasetList(datasets=shown, next=None)
+    page = {"limit": limit, "before": shown[-1].id, **({} if text is None else {"text": text})}
+    return DatasetList(datasets=shown, next=f"/v1/datasets?{urlencode(page)}")
 
 
 @router.get("/{dataset_id}", responses=problems(404))

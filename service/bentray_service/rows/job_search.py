@@ -22,7 +22,7 @@ def matches(tenant: Tenant, words: str) -> ColumnElement[bool]:
         words: without NUL, which PostgreSQL stores in no text.
     """
     scans = select(datasets.c.id).where(
-        datasets.c.tenant == tenant, _any(words, datasets.c.name, datasets.c.title)
+        datasets.c.tenant == tenant, contains(words, datasets.c.name, datasets.c.title)
     )
     made_here = select(datasets.c.job_id).where(datasets.c.id.in_(scans), datasets.c.job_id.is_not(None))
     made = jobs.alias()
@@ -32,8 +32,8 @@ def matches(tenant: Tenant, words: str) -> ColumnElement[bool]:
         .where(volumes.c.tenant == tenant, made.c.dataset_id.in_(scans))
     )
     return or_(
-        _any(words, jobs.c.id, jobs.c.name, jobs.c.notes, jobs.c.started_by),
-        _any(words, jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id),
+        contains(words, jobs.c.id, jobs.c.name, jobs.c.notes, jobs.c.started_by),
+        contains(words, jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id),
         jobs.c.dataset_id.in_(scans),
         jobs.c.id.in_(made_here),
         jobs.c.volume_id.in_(reconstructed),
@@ -43,10 +43,10 @@ def matches(tenant: Tenant, words: str) -> ColumnElement[bool]:
 
 
 def _titled(table: Any, tenant: Tenant, words: str) -> Any:
-    return select(table.c.id).where(table.c.tenant == tenant, _any(words, table.c.title))
+    return select(table.c.id).where(table.c.tenant == tenant, contains(words, table.c.title))
 
 
-def _any(words: str, *columns: ColumnElement[str]) -> ColumnElement[bool]:
+def contains(words: str, *columns: ColumnElement[str]) -> ColumnElement[bool]:
     """Whether one of the columns contains the words, as they are: no character is a pattern."""
     for special in (ESCAPE, "%", "_"):
         words = words.replace(special, ESCAPE + special)

@@ -11,6 +11,7 @@ from ..errors import UnknownId
 from . import schema
 from .database import Database
 from .ids import checked
+from .job_search import contains
 from .schema import datasets, jobs, uploaded_volumes, volumes
 from .tenants import Tenant
 from .typed_rows import DatasetRow, FieldRow, MeshRow, Plain, VolumeRow
@@ -88,6 +89,28 @@ class Datasets(UploadedTable[DatasetRow], NamedTable[DatasetRow]):
     """Scans, uploaded or simulated."""
 
     table, what = datasets, "dataset"
+
+    def found(
+        self, tenant: Tenant, limit: int, before: str | None = None, text: str | None = None
+    ) -> list[DatasetRow]:
+        """Up to ``limit`` scans of this tenant, newest first.
+
+        Args:
+            tenant: owner.
+            limit: maximum number.
+            before: only scans older than the one with this id.
+            text: only scans with this text in their id, name, title or notes, see ``job_search.contains``.
+
+        Raises:
+            UnknownId: when the tenant has no such scan.
+        """
+        scans = datasets.c
+        query = select(datasets).where(scans.tenant == tenant).order_by(scans.number.desc()).limit(limit)
+        if text:
+            query = query.where(contains(text, scans.id, scans.name, scans.title, scans.notes))
+        if before is not None:
+            query = query.where(scans.number < self.get(tenant, before)["number"])
+        return cast(list[DatasetRow], self._database.rows(query))
 
 
 class Meshes(UploadedTable[MeshRow]):

@@ -98,7 +98,7 @@ def test_from_settings_to_an_image(serving, until, tmp_path):
         made = http.get(done["links"]["dataset"]).json()
         assert (made["id"], made["job"], made["elements"]) == (done["dataset"], job["id"], 16)
         assert (made["has_truth"], made["has_travel_times"], made["has_traces"]) == (True, True, False)
-        assert http.get("/v1/datasets").json() == {"datasets": [made]}
+        assert http.get("/v1/datasets").json() == {"datasets": [made], "next": None}
         assert [one["id"] for one in http.get("/v1/jobs?kind=simulation").json()["jobs"]] == [job["id"]]
         # The command line makes the same file, and an upload of it is kept as the same file.
         path = tmp_path / "scan.h5"
@@ -131,7 +131,7 @@ def test_wave_simulation_and_deletion_of_its_job(serving, until):
         assert (made["has_traces"], made["has_travel_times"], made["ntx"]) == (True, False, 4)
         assert http.delete(done["links"]["dataset"]).status_code == 204
         assert http.get(done["links"]["self"]).status_code == 404
-        assert http.get("/v1/datasets").json() == {"datasets": []}
+        assert http.get("/v1/datasets").json() == {"datasets": [], "next": None}
         assert not list((http.app.state.parts.files.of(LOCAL).root / "datasets").iterdir())
 
 
@@ -219,5 +219,5 @@ def test_another_tenant_finds_neither_job_nor_dataset(serving, until):
         asked = {"kind": "reconstruction", "dataset": done["dataset"]}
         answer = http.post("/v1/jobs", json=asked, headers=auth["other"])
         assert (answer.status_code, answer.json()["field"]) == (404, "dataset")
-        assert http.get("/v1/datasets", headers=auth["other"]).json() == {"datasets": []}
+        assert http.get("/v1/datasets", headers=auth["other"]).json() == {"datasets": [], "next": None}
         assert len(http.get("/v1/datasets").json()["datasets"]) == 1

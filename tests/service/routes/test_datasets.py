@@ -1,11 +1,14 @@
 """/v1/datasets: accepted and rejected uploads."""
 
 import hashlib
+from itertools import chain
 
 import h5py
 import numpy as np
 import pytest
+from sqlalchemy import insert
 
+from bentray_service.rows.schema import datasets
 from bentray_service.rows.tenants import LOCAL
 from bentray_workers.files.dataset import read_dataset
 
@@ -34,7 +37,7 @@ def test_upload_answers_with_the_record(start, scan):
     assert (body["has_traces"], body["has_travel_times"], body["has_truth"]) == (False, True, False)
     assert (body["bytes"], body["sha256"]) == (len(content), hashlib.sha256(content).hexdigest())
     assert http.get(answer.headers["location"]).json() == body
-    assert http.get("/v1/datasets").json() == {"datasets": [body]}
+    assert http.get("/v1/datasets").json() == {"datasets": [body], "next": None}
 
 
 def test_only_the_canonical_file_is_kept(start, scan):
@@ -116,7 +119,7 @@ def test_bad_contents_are_named(start, scan, spoil, field):
     assert field in body["field"]
     assert body["found"]
     assert body["accepted"]
-    assert http.get("/v1/datasets").json() == {"datasets": []}
+    assert http.get("/v1/datasets").json() == {"datasets": [], "next": None}
     root = http.app.state.parts.files.of(LOCAL).root
     assert not list((root / "incoming").iterdir())
     assert not list((root / "datasets").iterdir())
@@ -181,3 +184,36 @@ def test_unknown_and_hostile_ids(start, path):
 def test_wrong_limit(start, limit):
     body = problem(start().get(f"/v1/datasets?limit={limit}"))
     assert (body["status"], body["field"], body["found"]) == (422, "limit", repr(limit))
+
+
+def test_a_thousand_scans_are_searched_and_read_in_pages(start, uploaded):
+    http = start()
+    stored = http.app.state.parts.datasets
+    first = uploaded(http)
+    row = {name: value for name, value in stored.get(LOCAL, first).items() if name != "number"}
+    copies = [
+        {**row, "id": f"ds-{k:020x}", "name": f"Visit {k}", "notes": "100 %" if k == 700 else "left_side"}
+        for k in range(1000)
+    ]
+    other = {**row, "id": "ds-" + "f" * 20, "name": "Visit 999 of another", "tenant": "other"}
+    with stored._database.write() as connection:
+        connection.execute(insert(datasets), [*copies, other])
+
+    def pages(address):
+        while address:
+            page = http.get(address).json()
+            yield [one["id"] for one in page["datasets"]]
+            address = page["next"]
+
+    found = list(pages("/v1/datasets?limit=400"))
+    assert [len(page) for page in found] == [400, 400, 201]
+    assert [*chain(*found)] == [one["id"] for one in reversed(copies)] + [first]
+    visits = list(pages("/v1/datasets?text=vISIT 99&limit=4"))
+    assert [*chain(*visits)] == [f"ds-{k:020x}" for k in (*range(999, 989, -1), 99)]
+    assert [len(page) for page in visits] == [4, 4, 3]
+    # By notes, by the title of the file and by the id; no character is a pattern.
+    assert list(pages("/v1/datasets?text=100 %25")) == [[f"ds-{700:020x}"]]
+    assert list(pages("/v1/datasets?text=left%25side")) == [[]]
+    assert len(http.get("/v1/datasets?text=sixteen&limit=1000").json()["datasets"]) == 1000
+    assert list(pages(f"/v1/datasets?text={first}")) == [[first]]
+    assert http.get("/v1/datasets?before=ds-00000000000000000bad").status_code == 404

@@ -70,6 +70,6 @@ def test_nothing_is_left_of_a_hostile_file(start, hostile):
         "database.json",
         *(f"bentray.sqlite{more}" for more in ("", "-wal", "-shm")),
     }
-    assert http.get("/v1/datasets").json() == {"datasets": []}
+    assert http.get("/v1/datasets").json() == {"datasets": [], "next": None}
     assert http.get("/v1/volumes").json() == {"volumes": []}
     assert http.get("/v1/meshes").json() == {"meshes": []}

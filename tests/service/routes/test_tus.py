@@ -129,7 +129,7 @@ def test_rejects_unreadable_uploads_with_a_problem(start, scan):
     assert (record["state"], record["result"]) == ("refused", None)
     assert record["problem"]["field"] == "geometry/element_position_m"
     assert record["problem"]["instance"] == place
-    assert http.get("/v1/datasets").json() == {"datasets": []}
+    assert http.get("/v1/datasets").json() == {"datasets": [], "next": None}
     assert left_in(http) == []
 
 

@@ -156,7 +156,7 @@ def test_the_page_draws_previews_here_once_the_volume_is_loaded(page, address, t
     assert ["browser", "full"] not in page.evaluate("window.sources")
 
 
-@pytest.mark.parametrize("card", [True, False])
+@pytest.mark.parametrize("card", [True, pytest.param(False, marks=pytest.mark.nightly)])
 def test_the_service_draws_where_this_would_be_slow(page, address, tmp_path, card):
     loads = []
     page.on("request", lambda request: loads.append(request.url) if "coefficients" in request.url else None)

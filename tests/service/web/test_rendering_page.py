@@ -224,12 +224,6 @@ def test_an_iso_value_is_chosen_by_its_histogram(page, address, tmp_path):
     assert float(histogram.locator("line").get_attribute("x1")) == pytest.approx(256 * 40 / 200)
 
 
-def test_no_sideways_scrolling_on_a_telephone(ball):
-    page = ball
-    page.set_viewport_size({"width": 360, "height": 740})
-    assert page.evaluate("document.documentElement.scrollWidth") <= 360
-
-
 def test_display_errors_are_shown_as_text(ball, tmp_path):
     page = ball
     page.get_by_label("Iso-value", exact=True).fill("7")

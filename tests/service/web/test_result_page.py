@@ -199,7 +199,7 @@ def test_a_profile_is_the_linear_interpolation_of_the_array(page, result):
     np.testing.assert_allclose(value, map_coordinates(SPEED, places, order=1), rtol=1e-12)
 
 
-@pytest.mark.parametrize("shape", ["Rectangle", "Ellipse"])
+@pytest.mark.parametrize("shape", [pytest.param("Rectangle", marks=pytest.mark.nightly), "Ellipse"])
 def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result, shape):
     ready(page, result)
     page.get_by_label(shape).check()

@@ -38,6 +38,8 @@ def sent(page, address, scan):
     page.get_by_text("16 emitters").wait_for()
 
 
+# With a key: the first test of test_shell.py.
+@pytest.mark.nightly
 def test_upload_start_watch(page, address, scan, work):
     sent(page, address, scan)
     page.get_by_text("All settings").click()
@@ -184,6 +186,8 @@ def test_a_volume_in_space_is_shown_as_glass(page, address, scan, work, monkeypa
     expect(page.get_by_text("Volume rendering", exact=True).and_(page.locator("#jobs *"))).to_have_count(1)
 
 
+# On the page of a job: test_live_page.py.
+@pytest.mark.nightly
 def test_cancel(page, address, scan, work):
     sent(page, address, scan)
     work.hold.clear()
@@ -192,6 +196,8 @@ def test_cancel(page, address, scan, work):
     page.locator(".state", has_text="cancelled").wait_for()
 
 
+# With all that comes before and after: test_story.py.
+@pytest.mark.nightly
 def test_by_keyboard_alone(page, address, scan, work):
     sent(page, address, scan)
     page.locator("#theme").focus()

@@ -2,6 +2,7 @@
 
 import base64
 
+import httpx
 import pytest
 from playwright.sync_api import expect
 from scipy.io import savemat
@@ -12,6 +13,8 @@ from bentray_workers.simulation.waves import WaveSimulationSettings
 from ...workers.foreign_scans.scans import delta_tof, positions
 
 pytestmark = pytest.mark.browser
+
+HDF5 = {"Content-Type": "application/x-hdf5"}
 
 
 def test_an_empty_list_says_so(page, serve):
@@ -50,9 +53,32 @@ def test_several_files_are_dropped_beside_the_zone(page, serve, scan, tmp_path):
     expect(page.locator("#scans li")).to_have_count(2)
 
 
-def test_errors_are_shown_as_text(page, serve, tmp_path):
+def test_scans_are_found_by_their_names_and_read_in_pages(page, serve, scan):
+    address = serve()
+    for name in ("Left", "Right", "Left again"):
+        sent = httpx.post(f"{address}/v1/datasets", content=scan().read_bytes(), headers=HDF5).json()
+        httpx.patch(f"{address}{sent['links']['self']}", json={"title": name}).raise_for_status()
+    # Two scans on a page, as if there were many.
+    page.route("**/v1/datasets?*", lambda route: route.continue_(url=route.request.url.replace("=25", "=2")))
+    page.goto(address)
+    names = page.locator("#scans a")
+    expect(names).to_have_text(["Left again", "Right"])
+    page.get_by_role("link", name="Older scans").click()
+    expect(names).to_have_text(["Left"])
+    page.get_by_role("link", name="Newest scans").click()
+    expect(names).to_have_text(["Left again", "Right"])
+    page.get_by_label("Name, notes or id").fill("left")
+    expect(names).to_have_text(["Left again", "Left"])
+    assert page.url.endswith("#/?text=left")
+    page.reload()
+    expect(names).to_have_text(["Left again", "Left"])
+    page.get_by_label("Name, notes or id").fill("middle")
+    page.get_by_text("No scan has this text.").wait_for()
+
+
+def test_errors_are_shown_as_text(page, address, tmp_path):
     (tmp_path / "notes.h5").write_text("only text")
-    page.goto(serve())
+    page.goto(address)
     page.set_input_files("#scan-file", tmp_path / "notes.h5")
     alert = page.locator("#scan-error")
     expect(alert).to_contain_text("notes.h5 is not a scan that can be read. ")
@@ -63,9 +89,9 @@ def test_errors_are_shown_as_text(page, serve, tmp_path):
     page.get_by_role("heading", name="openUSCT (HDF5)").wait_for()
 
 
-def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_rejected(page, serve, tmp_path):
+def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_rejected(page, address, tmp_path):
     savemat(tmp_path / "scan.mat", {"pos": 1e3 * positions(), "dtof": 1e6 * delta_tof()})
-    page.goto(serve())
+    page.goto(address)
     page.set_input_files("#scan-file", tmp_path / "scan.mat")
     page.locator("#scan-error").wait_for()
     assert "--map element_position=NAME" in page.locator("#scan-error").inner_text()
@@ -78,7 +104,7 @@ def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_rejected(pa
     expect(page.locator("#dataset-facts")).to_contain_text("water 1494")
 
 
-def test_a_sample_scan_is_simulated_and_opened(page, serve, monkeypatch):
+def test_a_sample_scan_is_simulated_and_opened(page, address, monkeypatch):
     requests = []
     made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 64, "ntx": 32}
     made |= {"nrx": 64, "slices": 1, "has_traces": True, "has_travel_times": False, "has_truth": True}
@@ -90,7 +116,7 @@ def test_a_sample_scan_is_simulated_and_opened(page, serve, monkeypatch):
         return made
 
     monkeypatch.setattr(kinds, "simulate_to_file", simulate_scan)
-    page.goto(serve())
+    page.goto(address)
     page.get_by_role("button", name="Simulate a sample scan").click()
     page.get_by_role("heading", name="A phantom").wait_for()
     assert "#/scans/" in page.url
@@ -99,10 +125,9 @@ def test_a_sample_scan_is_simulated_and_opened(page, serve, monkeypatch):
     assert (request.elements, request.emissions) == (64, 32)
 
 
-def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, serve, scan):
+def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, address, scan):
     """The first piece arrives, the second breaks off, and the page is loaded again."""
-    where = serve()
-    page.goto(where)
+    page.goto(address)
     # Pieces of a few bytes, as if the file were large.
     page.route(
         "**/resumable_upload.js",
@@ -123,7 +148,7 @@ def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, serve, s
         "**/v1/uploads/*",
         lambda route: broken(route) if route.request.method == "PATCH" else route.continue_(),
     )
-    page.goto(where)
+    page.goto(address)
     page.reload()
     file = scan()
     page.set_input_files("#scan-file", file)
@@ -133,9 +158,9 @@ def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, serve, s
     assert sent[-1] == (file.stat().st_size - 1) // 4096 * 4096
 
 
-def test_an_upload_that_a_closed_page_left_is_continued(page, serve, scan):
-    where, file = serve(), scan()
-    page.goto(where)
+def test_an_upload_that_a_closed_page_left_is_continued(page, address, scan):
+    file = scan()
+    page.goto(address)
     offsets: list[int] = []
 
     def first_piece_only(route):

@@ -49,6 +49,7 @@ class DatasetList(BaseModel):
     """Datasets, newest first."""
 
     datasets: list[DatasetRecord]
+    next: str | None = Field(None, description="Address of the next page; null on the last page.")
 
 
 class ProgressRecord(BaseModel):

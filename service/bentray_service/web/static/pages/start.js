@@ -1,8 +1,9 @@
 // Start: upload a scan, and the list of scans.
 import { inTime } from "../parts/amounts.js";
 import { at, make, showError } from "../parts/dom.js";
-import { go } from "../parts/address.js";
-import { load, titleOf } from "../parts/titles.js";
+import { go, keepQuery } from "../parts/address.js";
+import { request } from "../parts/api.js";
+import { titleOf } from "../parts/titles.js";
 import { startJob } from "../parts/panel.js";
 import { uploads } from "../parts/uploads.js";
 
@@ -39,9 +40,19 @@ const PAGE = `
   <section aria-labelledby="scans-title">
     <h2 id="scans-title">Stored scans</h2>
     <p id="scans-error" class="error" role="alert" hidden></p>
-    <p id="empty" class="empty" hidden>No scan yet. Upload one, or simulate a sample.</p>
+    <form id="scan-filter" class="filters" role="search" aria-label="Scans" hidden>
+      <label><span class="caption">Name, notes or id</span>
+        <input name="text" type="search" maxlength="200" autocomplete="off"></label>
+    </form>
+    <p id="empty" class="empty" role="status" hidden></p>
     <ul id="scans" class="records"></ul>
+    <nav id="scan-pages" class="pages" aria-label="Pages of the list"></nav>
   </section>`;
+
+const NONE = "No scan yet. Upload one, or simulate a sample.";
+// Scans on one page of the list, and the pause in typing after which they are searched.
+const PAGE_LENGTH = 25;
+const TYPING_MS = 300;
 
 // A scan that is simulated within seconds, with traces, so that both Fast and Best apply.
 const SAMPLE = {
@@ -68,9 +79,22 @@ function entry(scan) {
   return item;
 }
 
-export function open(root) {
+function pageLink(text, query, more) {
+  const address = new URLSearchParams(query);
+  address.delete("before");
+  if (more) address.set("before", more);
+  const anchor = make("a", "button", text);
+  anchor.href = `#/${address.size ? `?${address}` : ""}`;
+  return anchor;
+}
+
+export function open(root, { query }) {
   root.innerHTML = PAGE;
   let closed = false;
+  let asked = new URLSearchParams([...query].filter(([name]) => ["text", "before"].includes(name)));
+  const filter = at("scan-filter");
+  const field = filter.elements.text;
+  field.value = asked.get("text") ?? "";
   const sendAgain = uploads("scan", metadata, (scan, several) => closed || (several ? showScans() : go(`/scans/${scan.id}`)));
   at("sample").addEventListener("click", () => startJob(SAMPLE, "sample-error", (job) => closed || go(`/jobs/${job.id}?then=scan`)));
   at("own").addEventListener("submit", (event) => {
@@ -79,17 +103,42 @@ export function open(root) {
   });
 
   function showScans() {
-    load("datasets")
-      .then((scans) => {
-        if (closed) return;
-        at("scans").replaceChildren(...scans.map(entry));
-        at("empty").hidden = scans.length > 0;
+    const mine = asked;
+    request(`/v1/datasets?${new URLSearchParams([...mine, ["limit", PAGE_LENGTH]])}`)
+      .then(({ datasets, next }) => {
+        // The text may have been changed in the meantime.
+        if (closed || mine !== asked) return;
+        showError("scans-error", null);
+        at("scans").replaceChildren(...datasets.map(entry));
+        at("empty").textContent = datasets.length ? "" : mine.has("text") ? "No scan has this text." : NONE;
+        at("empty").hidden = datasets.length > 0;
+        filter.hidden = !datasets.length && !mine.size;
+        const older = next && new URLSearchParams(next.split("?")[1]).get("before");
+        const links = [mine.has("before") && pageLink("Newest scans", mine, ""), older && pageLink("Older scans", mine, older)];
+        at("scan-pages").replaceChildren(...links.filter(Boolean));
       })
       .catch((error) => showError("scans-error", error));
   }
 
+  let timer = 0;
+  const find = (wait) => {
+    clearTimeout(timer);
+    timer = setTimeout(() => {
+      const text = field.value.trim();
+      asked = new URLSearchParams(text ? { text } : {});
+      keepQuery(asked);
+      showScans();
+    }, wait);
+  };
+  field.addEventListener("input", () => find(TYPING_MS));
+  filter.addEventListener("submit", (event) => {
+    event.preventDefault();
+    find(0);
+  });
+
   showScans();
   return () => {
     closed = true;
+    clearTimeout(timer);
   };
 }
