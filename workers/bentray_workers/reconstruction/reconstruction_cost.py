@@ -13,8 +13,8 @@ from types import MappingProxyType
 
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import WIDE
 from bentray_kernels.tomography.model_selection.selection import (
-    SIMPLE,
-    STRAIGHT_LINES,
+    CHEAPEST,
+    SHARPER,
     candidate_settings,
     final_settings,
 )
@@ -101,8 +101,8 @@ def _rays_seconds(scan: Summary, settings: Settings) -> float:
     if not settings.selects_model:
         return _method_seconds(scan, settings)
     wide = scan.period and settings.decomposition != "volume"
-    # Sharper candidates follow only where bent rays are clearly better; the most costly of these is final.
-    candidates = (*WIDE, WIDE[1]) if wide else (*SIMPLE, *STRAIGHT_LINES)
+    # The usual trials where bent rays are chosen; the most costly reconstruction is the final one.
+    candidates = (*WIDE, WIDE[1]) if wide else (*CHEAPEST, *SHARPER)
     if settings.rays == "straight":
         candidates = tuple(one for one in candidates if one["rays"] == "straight")
     final = final_settings(settings, {"rays": settings.rays, "method": "gauss-newton"})

@@ -19,6 +19,9 @@ HELD_OUT = 10
 # candidates have half the nodes along a side, so that a quarter of the pairs are as many for each of these.
 ELEMENTS = 128
 
+# The same of views: finite-frequency rays are so wide that these pairs show as much as all.
+ELEMENTS_OF_VIEWS = 64
+
 # Views: all pairs between two sectors of the array, an eighth of it each. These three pairs of sectors
 # lie across the object and hold three pairs in thirty-two.
 SECTORS = 8
@@ -31,14 +34,15 @@ def part_of(dataset: Dataset, part: Part) -> Dataset:
     A pair and its reverse belong to the same part, in all slices. ``held-out`` are scattered pairs whose
     neighbours are in the training part, so any smooth model predicts them well; ``held-out-views`` are whole
     views, without neighbours in the training part. Of a scan with twice ``ELEMENTS``
-    or more, both scattered parts leave out every second element or more, for speed.
+    or more, both scattered parts leave out every second element or more, for speed; so do views from twice
+    ``ELEMENTS_OF_VIEWS``.
     """
     if part == "all":
         return dataset
     held = _views(dataset) if part.endswith("views") else _scattered(dataset)
     selected = held if part.startswith("held-out") else ~held
-    if not part.endswith("views"):
-        selected &= np.logical_and.outer(_thinned(dataset.tx), _thinned(dataset.rx))
+    least = ELEMENTS_OF_VIEWS if part.endswith("views") else ELEMENTS
+    selected &= np.logical_and.outer(_thinned(dataset.tx, least), _thinned(dataset.rx, least))
     shape = selected.shape if dataset.slice_z_m is None else (dataset.slices, *selected.shape)
     valid = np.broadcast_to(selected, shape)
     return replace(dataset, valid=valid.copy() if dataset.valid is None else valid & dataset.valid)
@@ -53,9 +57,9 @@ def _scattered(dataset: Dataset) -> Flags:
     return np.asarray((mixed % np.uint64(HELD_OUT)) == 0)
 
 
-def _thinned(index: Ints) -> Flags:
-    """Every second, third … of these elements, so that at least ``ELEMENTS`` remain."""
-    return np.asarray(np.arange(len(index)) % max(1, len(index) // ELEMENTS) == 0)
+def _thinned(index: Ints, least: int) -> Flags:
+    """Every second, third … of these elements, so that at least so many remain."""
+    return np.asarray(np.arange(len(index)) % max(1, len(index) // least) == 0)
 
 
 def _views(dataset: Dataset) -> Flags:

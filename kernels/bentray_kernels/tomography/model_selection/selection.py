@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -27,10 +28,13 @@ from .held_out import Part
 PAIRS: tuple[Part, Part] = ("shown", "held-out")
 VIEWS: tuple[Part, Part] = ("shown-views", "held-out-views")
 
-# Candidates with thin rays: bent ones lose where picked times are not solutions of the Eikonal equation.
-SIMPLE: tuple[dict[str, Any], ...] = (
+# Candidates with thin rays: bent ones lose where picked times are not solutions of the Eikonal equation. The
+# cheapest of each kind are tried first.
+CHEAPEST: tuple[dict[str, Any], ...] = (
     {"rays": "straight", "method": "sart"},
     {"rays": "curved", "method": "sart"},
+)
+OTHER_BENT: tuple[dict[str, Any], ...] = (
     {"rays": "curved", "method": "sart", "front_smoothing_nodes": 4.0},
     {"rays": "curved", "method": "gauss-newton"},
 )
@@ -45,10 +49,10 @@ SHARPER: tuple[dict[str, Any], ...] = (
     {"rays": "curved", "method": "gauss-newton", "penalty_strength": 0.1},
     {"rays": "curved", "method": "gauss-newton", "edge_mps": 7.0},
 )
-CANDIDATES = (*SIMPLE, *STRAIGHT_LINES, *SHARPER)
+CANDIDATES = (*CHEAPEST, *STRAIGHT_LINES, *OTHER_BENT, *SHARPER)
 
 # Candidates are reconstructed on half the nodes, but not fewer than this.
-TRIAL_NODES = 64
+TRIAL_NODES = 48
 
 # Bent rays must predict held-out pairs this much better than straight ones, the simpler model, and sharper
 # images than smoother ones. On a wave simulation whose bent image was 2 m/s worse than the straight one the
@@ -109,7 +113,7 @@ def select_model(
 
     Where the frequency is known, finite-frequency rays are tried first, straight and bent, on held-out views,
     see ``choose_finite_frequency``. Otherwise, or where these rays do not explain the times, thin rays are
-    tried on held-out pairs, see ``choose``; those that cost most only where bent rays are clearly better.
+    tried on held-out pairs, see ``next_candidates`` and ``choose``.
     The reconstruction then stops at the noise of the times (discrepancy principle of Morozov), unless the
     candidate shows that the noise is lower.
 
@@ -133,40 +137,76 @@ def select_model(
     trials: list[Trial] = []
     chosen, before = None, 0
 
-    def run(candidates: Sequence[dict[str, Any]], parts: tuple[Part, Part], later: int) -> list[Trial]:
+    def graphs_of(candidates: Sequence[dict[str, Any]], parts: tuple[Part, Part]) -> list[CandidateGraph]:
+        return _graphs(settings, candidates, index, parts, scan_of)
+
+    def run(
+        candidates: Sequence[dict[str, Any]], graphs: Sequence[CandidateGraph], later: int
+    ) -> list[Trial]:
         nonlocal before
-        graphs = _graphs(settings, candidates, index, parts, scan_of)
         run_graphs(graphs, before, later + rest)
         before += sum(graph.total for graph in graphs)
         return _trials(candidates, graphs)
 
-    def passes(candidates: Sequence[dict[str, Any]]) -> int:
-        return sum(graph.total for graph in _graphs(settings, candidates, index, PAIRS, scan_of))
+    missing = _missing_part(PAIRS, settings, index, scan_of)
+    allowed = [one for one in CANDIDATES if settings.rays == "curved" or one["rays"] == "straight"]
+    thin = dict(zip(map(label, allowed), graphs_of(allowed, PAIRS), strict=True)) if not missing else {}
 
     if wide and not _missing_part(VIEWS, settings, index, scan_of):
-        bent_rays = settings.rays != "straight"
-        trials = run(wide if bent_rays else wide[:1], VIEWS, passes(SIMPLE) + passes(SHARPER))
-        chosen = choose_finite_frequency(trials, mean_time(dataset)) if bent_rays else trials[0]
+        tried = wide if settings.rays != "straight" else wide[:1]
+        trials = run(tried, graphs_of(tried, VIEWS), sum(graph.total for graph in thin.values()))
+        chosen = trials[0] if len(trials) == 1 else choose_finite_frequency(trials, mean_time(dataset))
     if chosen is None:
-        if _missing_part(PAIRS, settings, index, scan_of):
+        if missing:
             return final_settings(settings, {**UNVALIDATED, "rays": settings.rays}), (), before
-        simple = SIMPLE if wide else (*SIMPLE, *STRAIGHT_LINES)
-        trials = run(_allowed(simple, settings), PAIRS, passes(SHARPER))
+        trials = []
+        while following := next_candidates(trials, settings.rays, known_frequency=bool(wide)):
+            graphs = [thin.pop(label(one)) for one in following]
+            trials += run(following, graphs, sum(graph.total for graph in thin.values()))
         chosen = choose(trials)
-        if chosen.settings["rays"] == "curved":
-            sharper = run(SHARPER, PAIRS, 0)
-            trials += sharper
-            best = min(sharper, key=lambda trial: trial.held_out_rms_s)
-            # Noise in the times becomes structure more easily with these.
-            chosen = best if best.held_out_rms_s < CLEARLY * chosen.held_out_rms_s else chosen
     others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
     selected = final_settings(settings, chosen.settings)
     return stop_at_noise(selected, chosen, travel_time_noise(dataset)), (chosen, *others), before
 
 
-def _allowed(candidates: Sequence[dict[str, Any]], settings: Settings) -> list[dict[str, Any]]:
-    """Candidates with the requested rays: all of them, unless straight rays are requested."""
-    return [one for one in candidates if settings.rays == "curved" or one["rays"] == "straight"]
+def next_candidates(
+    trials: Sequence[Trial], rays: str, *, known_frequency: bool
+) -> tuple[dict[str, Any], ...]:
+    """The candidates that can still be chosen, the cheap ones before the costly ones; empty at the end.
+
+    Bent SART without a lower misfit than straight SART ends the trials of bent rays. Otherwise the sharper
+    candidates are next, which were the best on every scan with times of the Eikonal equation; others only if
+    those are not clearly better than bent and straight rays.
+
+    Args:
+        trials: so far.
+        rays: ``straight`` if straight rays are requested: bent ones are not tried.
+        known_frequency: whether SART is the only method with straight rays.
+    """
+    lines = () if known_frequency else STRAIGHT_LINES
+    rounds: tuple[tuple[dict[str, Any], ...], ...] = ((*CHEAPEST[:1], *lines),)
+    if rays != "straight":
+        rounds = (CHEAPEST,)
+        if trials:
+            straight, bent = (_trial_of(one, trials).held_out_rms_s for one in CHEAPEST)
+            if bent >= straight:
+                rounds = (lines,)
+            elif bent >= CLEARLY * straight:
+                rounds = (lines, SHARPER, OTHER_BENT)
+            else:
+                rounds = (SHARPER, (*lines, *OTHER_BENT))
+            if choose(trials).settings in SHARPER:
+                return ()
+    return next((part for part in rounds if not _tried(part, trials)), ())
+
+
+def _tried(candidates: Sequence[dict[str, Any]], trials: Sequence[Trial]) -> bool:
+    """Whether there is a trial of each."""
+    return all(any(trial.settings == one for trial in trials) for one in candidates)
+
+
+def _trial_of(candidate: dict[str, Any], trials: Sequence[Trial]) -> Trial:
+    return next(trial for trial in trials if trial.settings == candidate)
 
 
 def _graphs(
@@ -212,13 +252,29 @@ def _missing_part(
 
 
 def choose(trials: Sequence[Trial]) -> Trial:
-    """The trial with the lowest misfit; one with straight rays unless bent ones are clearly better."""
-    best = min(trials, key=lambda trial: trial.held_out_rms_s)
-    straight = min(
-        (trial for trial in trials if trial.settings["rays"] == "straight"),
-        key=lambda trial: trial.held_out_rms_s,
-    )
-    return best if best.held_out_rms_s < CLEARLY * straight.held_out_rms_s else straight
+    """The trial with the lowest misfit; straight rays unless bent ones are clearly better.
+
+    Sharper candidates must be clearly better than other bent rays, and than straight rays twice as clearly:
+    noise in the times becomes structure more easily with these.
+    """
+    sharper = [trial for trial in trials if trial.settings in SHARPER]
+    simple = [trial for trial in trials if trial not in sharper]
+    best, straight = min(simple, key=_rms), min((t for t in simple if not _bent(t)), key=_rms)
+    bent = min((_rms(trial) for trial in simple if _bent(trial)), default=math.inf)
+    if sharper:
+        sharpest = min(sharper, key=_rms)
+        if _rms(sharpest) < CLEARLY * min(bent, CLEARLY * _rms(straight)):
+            return sharpest
+    return best if _rms(best) < CLEARLY * _rms(straight) else straight
+
+
+def _bent(trial: Trial) -> bool:
+    return bool(trial.settings["rays"] != "straight")
+
+
+def _rms(trial: Trial) -> float:
+    """Root mean square misfit of the held-out pairs, s."""
+    return trial.held_out_rms_s
 
 
 def explain_trials(trials: Sequence[Trial]) -> str:

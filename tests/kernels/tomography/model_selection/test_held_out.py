@@ -43,6 +43,15 @@ def test_scattered_pairs_of_many_elements_are_those_of_some(elements, kept):
     assert not (parts[0] & parts[1]).any()
 
 
+@pytest.mark.parametrize(("elements", "kept"), [(127, 1), (128, 2), (256, 4)])
+def test_views_of_many_elements_are_those_of_some(elements, kept):
+    parts = [np.isfinite(part_of(ring(elements), part).differential_tof()) for part in VIEWS]
+    used = np.flatnonzero((parts[0] | parts[1]).any(axis=0))
+    assert np.array_equal(used, np.arange(0, elements, kept))
+    assert not (parts[0] & parts[1]).any()
+    assert 0.08 < parts[1].sum() / (parts[0] | parts[1]).sum() < 0.11
+
+
 def test_views_are_a_tenth_and_whole_sectors():
     held = np.isfinite(part_of(ring(64), "held-out-views").differential_tof())
     assert held.mean() == pytest.approx(6 / 64)

@@ -18,13 +18,16 @@ from bentray_kernels.tomography.model_selection.finite_frequency_candidates impo
 from bentray_kernels.tomography.model_selection.held_out import part_of
 from bentray_kernels.tomography.model_selection.selection import (
     CANDIDATES,
+    CHEAPEST,
+    OTHER_BENT,
     SHARPER,
-    SIMPLE,
+    STRAIGHT_LINES,
     advice_of,
     candidate_settings,
     choose,
     explain_trials,
     final_settings,
+    next_candidates,
     trial_table,
 )
 from bentray_kernels.tomography.reconstruction import MemoryScan
@@ -69,9 +72,12 @@ def test_eikonal_times_select_bent_rays(scan):
     assert done[-1] == seen[-1].total
     assert seen[-1].history == result.history
     assert result.settings.method in ("sart", "gauss-newton")
-    assert len(result.trials) == len(CANDIDATES)
+    # A sharper candidate that wins makes the other bent ones superfluous.
+    tried = [trial.settings for trial in result.trials]
+    assert all(one in tried for one in (*CHEAPEST, *SHARPER))
+    assert not any(one in tried for one in OTHER_BENT)
     assert explain_trials(result.trials).startswith("auto chose bent rays, ")
-    assert [row[2] for row in trial_table(result.trials)] == ["chosen"] + [""] * (len(CANDIDATES) - 1)
+    assert [row[2] for row in trial_table(result.trials)] == ["chosen"] + [""] * (len(result.trials) - 1)
     # What was chosen gives the same bits when asked for by itself.
     again = reconstruct(scan, result.settings)
     assert np.array_equal(again.speed, result.speed)
@@ -135,7 +141,7 @@ def test_exact_times_select_thin_bent_rays_at_any_frequency(scan):
     result = reconstruct(replace(scan, center_frequency_hz=4e5), PLAN, seen.append)
     assert result.settings.rays == "curved"
     assert result.settings.numerics.ray_width_m == 0.0
-    assert len(result.trials) == len(SIMPLE) + len(SHARPER)
+    assert len(result.trials) == len(CHEAPEST) + len(SHARPER)
     assert [p.done / p.total for p in seen] == sorted(p.done / p.total for p in seen)
     assert seen[-1].done == seen[-1].total
 
@@ -189,7 +195,8 @@ def test_where_no_view_can_be_held_out_pairs_are(scan):
         center_frequency_hz=4e5,
     )
     result = reconstruct(few, replace(PLAN, nodes=24, iterations=1))
-    assert len(result.trials) in (len(SIMPLE), len(SIMPLE) + len(SHARPER))
+    tried = [trial.settings for trial in result.trials]
+    assert all(one in tried for one in CHEAPEST)
     # By SART alone, for the frequency is known.
     straight = [trial.settings for trial in result.trials if trial.settings["rays"] == "straight"]
     assert straight == [{"rays": "straight", "method": "sart"}]
@@ -204,6 +211,56 @@ def test_bent_rays_must_be_clearly_better():
     assert choose([straight, bent]) is straight
     assert choose([straight, replace(bent, held_out_rms_s=80e-9)]).settings["rays"] == "curved"
     assert choose([trial("straight", 110e-9), straight, bent]) is straight
+
+
+def of(candidate, held_out_ns):
+    return Trial(candidate, 1e-9 * held_out_ns, 1e-9 * held_out_ns)
+
+
+@pytest.mark.parametrize(
+    ("straight", "bent", "rounds"),
+    [(100, 101, [STRAIGHT_LINES]), (100, 80, [SHARPER]), (100, 95, [STRAIGHT_LINES, SHARPER])],
+    ids=["bent rays are dropped", "straight rays are dropped", "undecided"],
+)
+def test_candidates_that_cannot_win_are_not_tried(straight, bent, rounds):
+    trials = [of(CHEAPEST[0], straight), of(CHEAPEST[1], bent)]
+    for expected in rounds:
+        following = next_candidates(trials, "curved", known_frequency=False)
+        assert following == expected
+        # Sharper candidates win wherever they are tried.
+        trials += [of(one, 50 if one in SHARPER else 120) for one in following]
+    assert next_candidates(trials, "curved", known_frequency=False) == ()
+    assert choose(trials).settings in (SHARPER if rounds[-1] == SHARPER else CHEAPEST[:1])
+
+
+@pytest.mark.parametrize("bent", [80, 95])
+def test_all_candidates_are_tried_where_sharper_ones_gain_nothing(bent):
+    trials = [of(CHEAPEST[0], 100), of(CHEAPEST[1], bent)]
+    while following := next_candidates(trials, "curved", known_frequency=False):
+        assert not any(trial.settings in following for trial in trials)
+        trials += [of(one, 97) for one in following]
+    assert len(trials) == len(CANDIDATES)
+    assert choose(trials).settings["rays"] == ("curved" if bent == 80 else "straight")
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_the_first_candidates_are_the_cheapest_of_each_kind(known):
+    assert next_candidates([], "curved", known_frequency=known) == CHEAPEST
+    assert next_candidates([], "straight", known_frequency=known) == (
+        CHEAPEST[:1] if known else (CHEAPEST[0], *STRAIGHT_LINES)
+    )
+    trials = [of(CHEAPEST[0], 100), of(CHEAPEST[1], 100)]
+    # With a known frequency SART is the only method of straight rays.
+    assert next_candidates(trials, "curved", known_frequency=known) == (() if known else STRAIGHT_LINES)
+
+
+def test_sharper_candidates_must_be_twice_as_clearly_better_than_straight_rays():
+    trials = [of(CHEAPEST[0], 100), of(CHEAPEST[1], 95), *(of(one, 94) for one in OTHER_BENT)]
+    assert choose([*trials, of(SHARPER[0], 84)]).settings == SHARPER[0]
+    assert choose([*trials, of(SHARPER[0], 86)]).settings == CHEAPEST[0]
+    # Nor a gain over straight rays alone.
+    close = [trials[0], of(CHEAPEST[1], 85)]
+    assert choose([*close, of(SHARPER[0], 80)]).settings == CHEAPEST[1]
 
 
 def test_the_reconstruction_stops_at_the_noise():
