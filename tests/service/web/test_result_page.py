@@ -232,6 +232,41 @@ def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result,
     assert cells[2] == f"{contrast:.2f}"
 
 
+def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_service):
+    address, scan, work, monkeypatch, _ = shared_service
+    # On a grid that has a node at each of the image.
+    x, y = np.ogrid[-20.0:40.0, -30.0:30.0]
+
+    def with_truth(file):
+        file["truth/sound_speed_mps"] = 1500.0 + 0.1 * x**2 + 0.05 * (y - 3.0) ** 2
+        file["truth"].attrs.update(spacing_m=1e-3, origin_m=[-0.02, -0.03])
+
+    job = finished(address, lambda: scan(with_truth), work, monkeypatch, SPEED)
+    place = (-4.0, -12.0, 4.0, 2.0)
+    ready(page, f"{address}/#/jobs/{job}?ellipse={','.join(map(str, place))}")
+    table = page.locator(".statistics")
+    expect(table.locator("tr").first).to_have_text("Sixteen elementsTruth")
+    rows = {
+        one.locator("th").inner_text(): one.locator("td").all_inner_texts()
+        for one in table.locator("tr:has(td)").all()
+    }
+    a, b = X0 + DX * np.arange(24)[:, None], Y0 + DY * np.arange(16)[None, :]
+    away = np.hypot((a - 0.0) / 4.0, (b + 5.0) / 7.0)
+    for column, values in enumerate((SPEED, 1500.0 + 0.1 * a**2 + 0.05 * (b - 3.0) ** 2)):
+        inside, beside = values[away <= 1.0], values[(away > 1.25) & (away <= 2.0)]
+        assert float(rows["Mean (m/s)"][column]) == pytest.approx(inside.mean(), abs=0.006)
+        contrast = float(rows["Contrast to surroundings (m/s)"][column])
+        assert contrast == pytest.approx(inside.mean() - beside.mean(), abs=0.006)
+    with page.expect_download() as download:
+        page.locator(".measure.region").get_by_role("button", name="Save as CSV").click()
+    head, *lines = table_of(download)
+    assert [line[0] for line in lines] == ["Sixteen elements", "Truth"]
+    assert float(lines[1][head.index("contrast")]) == pytest.approx(contrast, abs=0.006)
+    # Of the speed alone.
+    page.get_by_role("button", name="Coverage").click()
+    expect(table.locator("td").first).to_have_text("1.0000")
+
+
 def test_the_image_is_used_by_keys_alone(page, result):
     ready(page, result)
     page.locator("#skip").focus()

@@ -31,7 +31,7 @@ export function regionCsv(found, { unit }, region) {
   return lines([head, ...rows]);
 }
 
-// set: { setProfile(place), setRegion(region) }. Returns { show(curves, state, quantity) }.
+// set: { setProfile(place), setRegion(region) }. Returns { show(curves, state, quantity, beside) }.
 export function measuresPanel(root, set) {
   const parts = {};
   for (const [name, title] of [["profile", "Profile"], ["region", "Region"]]) {
@@ -78,7 +78,8 @@ export function measuresPanel(root, set) {
   }
 
   return {
-    show(curves, { profile, region }, quantity) {
+    // beside: images whose region is measured, too, such as the truth.
+    show(curves, { profile, region }, quantity, beside = []) {
       fill(parts.profile, profile);
       fill(parts.region, region?.place);
       const unit = quantity.unit ? ` (${quantity.unit})` : "";
@@ -93,7 +94,7 @@ export function measuresPanel(root, set) {
       }
       if (region) {
         parts.region.shape = region.shape;
-        const found = curves.map((one) => ({ title: one.title, statistics: regionOf(one.plane, region.shape, region.place) }));
+        const found = [...curves, ...beside].map((one) => ({ title: one.title, statistics: regionOf(one.plane, region.shape, region.place) }));
         const table = make("table", "statistics");
         const rows = [
           ["", found.map((one) => one.title)],

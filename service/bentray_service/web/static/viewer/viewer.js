@@ -24,6 +24,8 @@ export function viewer(root, panes, state, keep) {
   let fields = [];
   // Of the uncertainty of the only pane, while it fades the image.
   let spread = null;
+  // The true image of the only pane, read for the first region.
+  let truth = null;
   let tiles = [];
   let automatic = [0, 1];
   let hover = null;
@@ -238,7 +240,18 @@ export function viewer(root, panes, state, keep) {
       ...(tile.other ? [{ title: panes[tile.other].title, plane: planeOf(tile.other, tile.axis) }] : []),
     ]);
     if (curves.length && chosen[0].other) curves[0].title = panes[0].title;
-    if (curves.length) measures.show(curves, state, quantity());
+    if (curves.length) measures.show(curves, state, quantity(), trueOnes());
+  }
+
+  // The truth beside a region of the speed; read once, and then drawn.
+  function trueOnes() {
+    if (!state.region || state.quantity !== "speed" || panes.length > 1 || !panes[0].stored.includes("truth")) return [];
+    truth ??= panes[0].values.field("truth").then((field) => {
+      truth = field;
+      refresh();
+    }, () => {});
+    if (!truth.nearest) return [];
+    return [{ title: QUANTITIES.truth.title, plane: truth.plane(state.axis, truth.nearest(state.axis, state.cursor[AXES.indexOf(state.axis)])) }];
   }
 
   function change(part) {
