@@ -12,6 +12,8 @@ from typing import Any
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 PATIENCE_MS = 300_000
+# Movements of the pointer a second, as of a mouse; more would only take the processor from the pictures.
+MOVES_HZ = 125.0
 # Pixels that the pointer moves at a time, and between its turning points.
 STEP_PX, SWING_PX = 3, 150
 CORNER_PX = 5
@@ -34,10 +36,12 @@ class Turned:
 
     Attributes:
         rate: previews a second.
+        previews: their number.
         rests_s: time from the last movement of the pointer to the full picture, s, of each motion.
     """
 
     rate: float
+    previews: int
     rests_s: tuple[float, ...]
 
 
@@ -97,6 +101,7 @@ def turn(page: Any, address: str, seconds: float, motions: int) -> Turned:
         while time.perf_counter() - begun < seconds:
             place += STEP_PX
             page.mouse.move(x + abs(place % (2 * SWING_PX) - SWING_PX), y)
+            time.sleep(max(0.0, begun + place / STEP_PX / MOVES_HZ - time.perf_counter()))
         moving_s += time.perf_counter() - begun
         page.mouse.up()
         page.wait_for_function(RESTED)
@@ -104,4 +109,4 @@ def turn(page: Any, address: str, seconds: float, motions: int) -> Turned:
         # Previews of the last views may be shown after the pointer has stopped.
         shown += sum(quality == "preview" and at <= seen["moved"] for at, quality in seen["pictures"])
         rests.append((seen["pictures"][-1][0] - seen["moved"]) / 1e3)
-    return Turned(shown / moving_s, tuple(rests))
+    return Turned(shown / moving_s, shown, tuple(rests))

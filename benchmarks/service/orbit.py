@@ -7,6 +7,7 @@ import os
 import tempfile
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from urllib.parse import urlencode
 
 import httpx
 import numpy as np
+import psutil
 import trimesh
 
 from bentray_kernels.meshes.example_surfaces import torus
@@ -30,10 +32,10 @@ NODES, QUICK_NODES = 192, 64
 RING, QUICK_RING = (96, 48), (24, 16)
 # Of its geometry field; the defaults unless quick.
 QUICK_FIELD = {"samples": 8, "inner_samples": 4, "divisions": 4, "image_size": 33}
-SECONDS, QUICK_SECONDS = 20.0, 4.0
-RESTS, QUICK_RESTS = 8, 2
-# Of each motion in the page.
-MOTION_S = 5.0
+SECONDS, QUICK_SECONDS = 5.0, 2.0
+RESTS, QUICK_RESTS = 5, 2
+# Motions in the page, and the time of each.
+MOTIONS, MOTION_S = 4, 2.0
 FIELD_S = 1800.0
 # As in pages/rendering.js and pages/surfaces.js.
 PREVIEW = {"width": 256, "height": 256}
@@ -142,6 +144,24 @@ def stored_field(http: httpx.Client, quick: bool) -> tuple[str, str]:
     return mesh, str(job["links"]["image"])
 
 
+def processor_s() -> dict[str, float]:
+    """Processor time of the processes below this one so far, s: of the service with workers, the browser."""
+    spent = {"service": 0.0, "browser": 0.0}
+    for one in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            times = one.cpu_times()
+            spent["service" if "python" in one.name() else "browser"] += times.user + times.system
+    return spent
+
+
+def shares(before: dict[str, float], frames: int) -> str:
+    """Processor time a frame since ``before``, in words."""
+    taken = {name: 1e3 * (now - before[name]) / max(1, frames) for name, now in processor_s().items()}
+    return "processor time a frame " + ", ".join(
+        f"{name} {ms:.0f} ms" for name, ms in taken.items() if ms >= 0.5
+    )
+
+
 def _sent(http: httpx.Client, address: str, content: bytes) -> dict[str, Any]:
     headers = {"Content-Type": "application/octet-stream"}
     record: dict[str, Any] = http.post(address, content=content, headers=headers).raise_for_status().json()
@@ -157,13 +177,16 @@ def turned(http: httpx.Client, picture: str, mode: Shown, quick: bool, detail: s
         http.get(f"{picture}?{query}").raise_for_status()
         return time.perf_counter() - begun
 
-    # The scene is built for the first picture.
+    # The scene is built, and kernels are compiled, for the first pictures.
     built = seconds({**mode.preview, **PREVIEW}, -1.0)
+    seconds({**mode.full, **FULL}, -1.0)
     taken: list[float] = []
+    before = processor_s()
     while sum(taken) < (QUICK_SECONDS if quick else SECONDS):
         taken.append(seconds({**mode.preview, **PREVIEW}, 0.7 * len(taken)))
     p50, p95 = 1e3 * np.percentile(taken, [50, 95])
-    rate = f"p50 {p50:.0f} ms, p95 {p95:.0f} ms, one request at a time; first picture {built:.1f} s; {detail}"
+    rate = f"p50 {p50:.0f} ms, p95 {p95:.0f} ms, one request at a time; first picture {built:.1f} s"
+    rate += f"; {shares(before, len(taken))}; {detail}"
     yield Row(f"orbit, {mode.name} at 256²", len(taken) / sum(taken), 10.0, ">=", "1/s", rate)
     full = [seconds({**mode.full, **FULL}, 0.3 + 40.0 * k) for k in range(QUICK_RESTS if quick else RESTS)]
     words = f"median of {len(full)} pictures of 512², longest {max(full):.2f} s; {detail}"
@@ -179,10 +202,13 @@ def turned_in_page(page: str, mode: Shown, quick: bool, detail: str) -> Iterator
     if reason := _orbit_page.missing():
         yield from (Row(label, None, goal, op, unit, reason) for label, goal, op, unit in labels)
         return
-    motions = QUICK_RESTS if quick else RESTS
+    motions = QUICK_RESTS if quick else MOTIONS
     with _orbit_page.opened() as tab:
+        before = processor_s()
         seen = _orbit_page.turn(tab, f"{page}?{urlencode(mode.view)}", MOTION_S, motions)
+        spent = shares(before, seen.previews)
     detail = f"headless Chromium on the same machine; {detail}"
-    yield Row(labels[0][0], seen.rate, *labels[0][1:], f"{motions} motions of {MOTION_S:g} s; {detail}")
+    moving = f"{motions} motions of {MOTION_S:g} s, {spent} with the pictures at rest"
+    yield Row(labels[0][0], seen.rate, *labels[0][1:], f"{moving}; {detail}")
     words = f"median of {motions}, longest {max(seen.rests_s):.2f} s; after the last movement; {detail}"
     yield Row(labels[1][0], float(np.median(seen.rests_s)), *labels[1][1:], words)
