@@ -311,15 +311,12 @@ class Result:
         return f"<bentray.Result of {size} nodes: {', '.join(self.values)}; {name} {spread}>"
 
     def _repr_html_(self) -> str:
-        from bentray_workers.images.canvas import drawing, new_figure, to_png
         from bentray_workers.images.captions import facts
 
+        from .result_drawing import pictures_png
+
         shown = list(self.values)[:1] + [name for name in ("attenuation",) if name in self.values]
-        with drawing():
-            figure = new_figure(4.6 * len(shown), 3.7)
-            for axes, name in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
-                self._draw(axes, name, ("z", None), (None, None))
-            png = to_png(figure)
+        png = pictures_png(shown, lambda axes, name: self._draw(axes, name, ("z", None), (None, None)))
         rows = [
             (f"{name} ({self.units[name]})", f"{np.nanmin(array):.6g} to {np.nanmax(array):.6g}")
             for name, array in self.values.items()
@@ -367,23 +364,13 @@ class Result:
         cut: tuple[str, int | None],
         limits: tuple[float | None, float | None],
     ) -> None:
-        from bentray_workers.images.captions import LABELS, NAMES
-        from bentray_workers.images.maps import SPEED
-        from bentray_workers.images.plane import plane_of
-        from bentray_workers.images.report import COLORMAPS
-        from bentray_workers.images.slice import requested_limits, usual_limits
-
-        from .plotting import draw_plane
+        from .result_drawing import draw_quantity
 
         name = next(iter(self.values)) if quantity is None else quantity
-        grid = self._grid(name)
-        plane = plane_of(self._of(name), *grid, *cut)
-        crossed = None if name == "reflection" else self.values.get("coverage")
-        coverage = None if crossed is None else plane_of(crossed, *grid, *cut).image
-        chosen = requested_limits(usual_limits(name, plane.image, coverage), *limits)
-        title = NAMES.get(name) or self.attributes.get("title", "")
-        label = LABELS.get(name) or f"value ({self.units[name]})".replace(" ()", "")
-        draw_plane(axes, plane, chosen, colormap=COLORMAPS.get(name, SPEED), title=title, label=label)
+        coverage = None if name == "reflection" else self.values.get("coverage")
+        title = self.attributes.get("title", "")
+        images = self._of(name), coverage
+        draw_quantity(axes, name, images, self._grid(name), cut, limits, unit=self.units[name], title=title)
 
     def _compared(self, other: Result, quantity: str) -> Comparison:
         from .comparison import Comparison, at_nodes
