@@ -4,15 +4,17 @@ import json
 import sqlite3
 
 import pytest
-from sqlalchemy import create_engine, inspect, text
+from sqlalchemy import create_engine, inspect, select, text
 from sqlalchemy.dialects import postgresql
 from sqlalchemy.exc import IntegrityError
 
 from bentray_service.rows import migration, schema
 from bentray_service.rows.database import open_database
+from bentray_service.rows.deliveries import WebhookSecrets
 from bentray_service.rows.ids import new_id, volume_of
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.projects import Projects
 from bentray_service.rows.stored_tables import Datasets, Volumes
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.rows.usage import Usage, usage_of
@@ -275,7 +277,8 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
     assert told.said[-1].startswith("UPDATE about SET version")
 
 
-def test_a_real_postgres_keeps_its_jobs_and_is_as_a_new_one_afterwards(postgresql_server):
+@pytest.mark.parametrize("version", [1, 6])
+def test_a_real_postgres_keeps_its_jobs_and_is_as_a_new_one_afterwards(postgresql_server, version):
     addresses = [postgresql_server.new_database() for _ in range(2)]
     engine = create_engine(addresses[0])
     with engine.begin() as connection:
@@ -286,10 +289,29 @@ def test_a_real_postgres_keeps_its_jobs_and_is_as_a_new_one_afterwards(postgresq
             f"INSERT INTO jobs VALUES (1, '{WAITING}', 'reconstruction', 'ds-x', '{{}}', 'queued',"
             " 0, 0, 0, '[]', NULL, 5, NULL, NULL)"
         )
+        for step in range(1, version):
+            migration.STEPS[step](connection)
+        connection.execute(text(f"UPDATE about SET version = {version}"))
+        if version == 6:
+            # What only the tables of this version hold: an upload under way, and an owner of a job.
+            connection.exec_driver_sql(
+                "INSERT INTO uploads VALUES (4, 'up-x', 'dataset', 'ds-y', 9, '{}', '', 'receiving', NULL,"
+                " 1, 4e9, 'clinic'); UPDATE jobs SET started_by = 'alice'"
+            )
     engine.dispose()
     opened, new = map(open_database, addresses)
     assert described(opened) == described(new)
-    assert Queue(opened).claim()["id"] == WAITING
+    job = Queue(opened).claim()
+    assert (job["id"], job["webhook"], job["batch_id"]) == (WAITING, None, None)
+    if version == 6:
+        assert job["started_by"] == "alice"
+        (upload,) = opened.rows(select(schema.uploads))
+        assert (upload["id"], upload["multipart_id"], upload["tenant"]) == ("up-x", None, "clinic")
+    # What the new tables are for works in the migrated database.
+    project = Projects(opened).add(LOCAL, "Trial 7", "user:alice")
+    assert Projects(opened).all(LOCAL, "user:alice") == [project]
+    secret = WebhookSecrets(opened).create(LOCAL)
+    assert WebhookSecrets(opened).of(LOCAL) == [secret]
     for database, address in zip((opened, new), addresses, strict=True):
         database.close()
         postgresql_server.drop(address)

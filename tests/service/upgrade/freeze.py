@@ -16,6 +16,7 @@ import json
 import tarfile
 import tempfile
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +26,18 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_service.rows.database import open_database
+from bentray_service.rows.deliveries import WebhookSecrets
 from bentray_service.rows.schema import VERSION
+from bentray_service.rows.tenants import Tenant
 from bentray_workers.files.dataset import write_dataset
 
 from ...faults.live_service import LiveService
 
 TENANTS = ("clinic", "lab")
-LISTS = ("jobs", "datasets", "volumes", "meshes")
+LISTS = ("jobs", "datasets", "volumes", "meshes", "batches")
+# A webhook at which nobody listens: its message waits for another attempt when the service is killed.
+WEBHOOK, NETWORK = "http://127.0.0.1:9/ended", "127.0.0.0/8"
 DONE = {"method": "sart", "nodes": 24, "iterations": 2, "attenuation": {"enabled": False}}
 # Killed after its first checkpoints.
 LONG = {**DONE, "nodes": 32, "iterations": 60}
@@ -59,8 +65,9 @@ def main() -> None:
     """Write the archive."""
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
-        service = LiveService(root, TENANTS, workers=1)
+        service = LiveService(root, TENANTS, workers=1, BENTRAY_WEBHOOK_NETWORKS=NETWORK)
         try:
+            _create_secrets(service)
             expected = {tenant: _use(root, service, tenant) for tenant in TENANTS}
             _begin_long_job(service, expected)
         finally:
@@ -75,6 +82,12 @@ def main() -> None:
     print(f"{target}: {target.stat().st_size} bytes")  # noqa: T201 - a program
 
 
+def _create_secrets(service: LiveService) -> None:
+    with closing(open_database(f"sqlite:///{service.data / 'bentray.sqlite'}")) as database:
+        for tenant in TENANTS:
+            WebhookSecrets(database).create(Tenant(tenant))
+
+
 def _use(root: Path, service: LiveService, tenant: str) -> dict[str, Any]:
     """What a tenant does with everything that is stored; returns what it then sees."""
     with _client(service, tenant) as http:
@@ -82,14 +95,24 @@ def _use(root: Path, service: LiveService, tenant: str) -> dict[str, Any]:
         write_dataset(scan, _scan())
         dataset = _made(http.post("/v1/datasets", content=scan.read_bytes(), headers=_type("x-hdf5")))
         _made(http.patch(f"/v1/datasets/{dataset}", json={"title": f"Scan of {tenant}", "notes": "cold"}))
-        job = _made(http.post("/v1/jobs", json=_request(dataset, DONE)))
+        job = _made(http.post("/v1/jobs", json={**_request(dataset, DONE), "webhook": WEBHOOK}))
         _wait(http, job)
+        _wait_for_attempt(http, job)
         _made(http.patch(f"/v1/jobs/{job}", json={"name": "the first"}))
         volume = io.BytesIO()
         np.savez(volume, speed=np.linspace(1400.0, 1600.0, 8**3).reshape(8, 8, 8))
         _made(http.post("/v1/volumes", content=volume.getvalue(), headers=_type("octet-stream")))
         _made(http.post("/v1/meshes", content=TETRAHEDRON, headers=_type("octet-stream")))
-        return {"dataset": dataset, "done": job, **_seen(http)}
+        batch = http.post("/v1/batches", json={"datasets": [dataset], "name": "Ward 3", "settings": DONE})
+        _made(batch)
+        _wait(http, batch.json()["jobs"][0]["id"])
+        project = http.post("/v1/projects", json={"name": f"Trial of {tenant}"})
+        _made(project)
+        member = {"member": "user:alice", "role": "reader"}
+        http.put(project.json()["links"]["members"], json=member).raise_for_status()
+        projects = [http.get(project.json()["links"]["self"]).json()]
+        webhook = http.get(f"/v1/jobs/{job}").json()["webhook"]
+        return {"dataset": dataset, "done": job, "projects": projects, "webhook": webhook, **_seen(http)}
 
 
 def _begin_long_job(service: LiveService, expected: dict[str, Any]) -> None:
@@ -141,6 +164,13 @@ def _wait(http: httpx.Client, job: str) -> None:
     deadline = time.monotonic() + 600.0
     while (state := http.get(f"/v1/jobs/{job}").json()["state"]) != "succeeded":
         assert state in ("queued", "running")
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+
+
+def _wait_for_attempt(http: httpx.Client, job: str) -> None:
+    deadline = time.monotonic() + 60.0
+    while not http.get(f"/v1/jobs/{job}").json()["webhook"]["attempts"]:
         assert time.monotonic() < deadline
         time.sleep(0.1)
 
