@@ -76,7 +76,9 @@ def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SharedS
         work = FakeWork()
         monkeypatch.setattr(reconstruction_run, "reconstruct", work)
         # Tests look at it faster than a person.
-        settings = ServiceSettings(data_dir=folder / "data", renders_per_minute=0)
+        settings = ServiceSettings(
+            data_dir=folder / "data", renders_per_minute=0, webhook_networks="127.0.0.0/8"
+        )
         with serving(settings, FakeCluster()) as address:
             yield SharedService(address, partial(write_scan, folder / "scan.h5"), work, monkeypatch, folder)
 

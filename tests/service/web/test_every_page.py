@@ -75,6 +75,7 @@ def places(shared_service):
         f"/rendering/{ball['id']}?mode=refract": "azimuth",
         "/surfaces": "Surface rendering",
         "/service": "worker",
+        "/batch": "Sixteen elements",
     }
 
 

@@ -8,6 +8,7 @@ import { parse } from "./parts/address.js";
 const PAGES = [
   [/^\/$/, "start", "#/"],
   [/^\/scans\/([^/]+)$/, "scan", "#/"],
+  [/^\/batch$/, "batch", "#/"],
   [/^\/jobs$/, "jobs", "#/jobs"],
   [/^\/jobs\/([^/]+)$/, "job", "#/jobs"],
   [/^\/compare\/([^/]+)$/, "compare", "#/jobs"],

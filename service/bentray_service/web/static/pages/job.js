@@ -1,10 +1,24 @@
-// One job: its progress while it runs, then its result.
+// One job: its progress while it runs, then its result; and below it the messages to its webhook.
 import { parse } from "../parts/address.js";
 import { request } from "../parts/api.js";
+import { make } from "../parts/dom.js";
 import { jobList } from "../parts/job_list.js";
 import { liveJob } from "../parts/live_job.js";
+import { showWebhook } from "../parts/webhook_panel.js";
 
-export async function open(root, parameters) {
+export async function open(page, parameters) {
+  const { id } = parameters;
+  const [root, below] = [make("div"), make("div")];
+  page.append(root, below);
+  const closeMain = await openMain(root, parameters);
+  const closeWebhook = showWebhook(below, id);
+  return () => {
+    closeWebhook();
+    closeMain();
+  };
+}
+
+async function openMain(root, parameters) {
   const { id } = parameters;
   // Who asked for a sample wants its scan, and "back" to lead to the start.
   const opensScan = parse(location.hash).query.get("then") === "scan";

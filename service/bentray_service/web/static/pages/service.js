@@ -1,8 +1,9 @@
-// The service: workers, queues, storage against its quota, and keys of the tenant.
+// The service: workers, queues, storage against its quota, keys of the tenant, and its projects.
 import { counted, inBytes, inTime } from "../parts/amounts.js";
 import { request } from "../parts/api.js";
 import { description } from "../parts/defaults.js";
 import { at, make, showError } from "../parts/dom.js";
+import { showProjects } from "../parts/projects.js";
 import { headedTable, share } from "../parts/tables.js";
 
 const PAGE = `
@@ -26,6 +27,11 @@ const PAGE = `
     <h2 id="keys-title">API keys</h2>
     <div id="keys"></div>
     <p id="keys-error" class="error" role="alert" hidden></p>
+  </section>
+  <section class="panel" aria-labelledby="projects-title">
+    <h2 id="projects-title">Projects</h2>
+    <div id="projects"></div>
+    <p id="projects-error" class="error" role="alert" hidden></p>
   </section>`;
 
 // Workers send their state every half a second or more rarely.
@@ -140,8 +146,13 @@ export async function open(root) {
   };
   document.addEventListener("visibilitychange", onVisible);
   const storage = request("/v1/access/storage").then((found) => closed || !at("storage") || showStorage(found), (error) => showError("storage-error", error));
-  const keys = request("/v1/access/keys").then((found) => closed || !at("keys") || showKeys(found, access), (error) => showError("keys-error", error));
-  await Promise.all([refresh(), storage, keys]);
+  const listed = request("/v1/access/keys");
+  const keys = listed.then((found) => closed || !at("keys") || showKeys(found, access), (error) => showError("keys-error", error));
+  const projects = listed
+    .catch(() => ({ keys: [] }))
+    .then((found) => closed || !at("projects") || showProjects(at("projects"), access, found.keys))
+    .catch((error) => showError("projects-error", error));
+  await Promise.all([refresh(), storage, keys, projects]);
   return () => {
     closed = true;
     clearTimeout(timer);

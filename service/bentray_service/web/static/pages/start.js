@@ -44,6 +44,7 @@ const PAGE = `
       <label><span class="caption">Name, notes or id</span>
         <input name="text" type="search" maxlength="200" autocomplete="off"></label>
     </form>
+    <p id="several" class="links" hidden><a class="button" href="#/batch">Reconstruct several scans</a></p>
     <p id="empty" class="empty" role="status" hidden></p>
     <ul id="scans" class="records"></ul>
     <nav id="scan-pages" class="pages" aria-label="Pages of the list"></nav>
@@ -112,6 +113,7 @@ export function open(root, { query }) {
         at("scans").replaceChildren(...datasets.map(entry));
         at("empty").textContent = datasets.length ? "" : mine.has("text") ? "No scan has this text." : NONE;
         at("empty").hidden = datasets.length > 0;
+        at("several").hidden = datasets.length < 2;
         filter.hidden = !datasets.length && !mine.size;
         const older = next && new URLSearchParams(next.split("?")[1]).get("before");
         const links = [mine.has("before") && pageLink("Newest scans", mine, ""), older && pageLink("Older scans", mine, older)];
