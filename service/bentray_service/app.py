@@ -187,7 +187,13 @@ def _open(
     database = open_database(settings.database)
     stack.callback(database.close)
     store = CheckedStore(
-        open_store(settings.storage_url, files.root, database, settings.cache_bytes),
+        open_store(
+            settings.storage_url,
+            files.root,
+            database,
+            settings.cache_bytes,
+            settings.storage_public_endpoint,
+        ),
         files.root,
         Checksums(database),
     )

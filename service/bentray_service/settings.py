@@ -56,6 +56,12 @@ class ServiceSettings(BaseSettings):
         pattern=r"^s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9!_.*'()-]+)*/?$",
         description="s3://bucket/prefix to store the files; default: data_dir.",
     )
+    storage_public_endpoint: str | None = Field(
+        None,
+        pattern=r"^https?://[^/?#@\s]+$",
+        description="Address of the S3 server for clients, without a path; addresses of direct uploads are "
+        "signed for it; default: that of the service.",
+    )
     cache_bytes: int = Field(
         50 * GIB, ge=0, description="Size of the cache of storage_url in data_dir, in bytes."
     )

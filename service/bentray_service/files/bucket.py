@@ -48,26 +48,18 @@ class BucketObject:
 class Bucket:
     """A bucket; keys are relative to the prefix. Credentials come from the usual AWS variables."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, public_endpoint: str | None = None) -> None:
         """Args:
         url: ``s3://bucket`` or ``s3://bucket/prefix``.
+        public_endpoint: address of the server for clients, by which ``part_url`` signs; None: that of the
+            service.
         """
         self.url = url.rstrip("/")
         self._name, _, prefix = self.url.removeprefix("s3://").partition("/")
         self._prefix = f"{prefix}/" if prefix else ""
-        self._s3 = S3FileSystem(
-            config_kwargs={
-                "connect_timeout": CONNECT_S,
-                "read_timeout": READ_S,
-                "retries": TRIES,
-                # Of presigned addresses, too; version 2 would not sign sizes.
-                "signature_version": "s3v4",
-            },
-            default_block_size=PART_BYTES,
-            max_concurrency=PARTS_AT_ONCE,
-            use_listings_cache=False,
-        )
-        self._s3.retries = 2
+        self._s3 = _file_system(None)
+        # The host is signed, too, so that addresses cannot be rewritten afterwards. Signing connects nowhere.
+        self._signing = self._s3 if public_endpoint is None else _file_system(public_endpoint)
 
     def put(self, path: Path, key: str, metadata: Mapping[str, str]) -> None:
         """Upload a file with metadata; the object is complete or absent."""
@@ -130,7 +122,7 @@ class Bucket:
         """Address for a PUT of one part of exactly ``size`` bytes, valid for some seconds."""
         signed = {"UploadId": upload, "PartNumber": number, "ContentLength": size}
         with self._watched():
-            return str(self._s3.url(self._place(key), seconds, client_method="upload_part", **signed))
+            return str(self._signing.url(self._place(key), seconds, client_method="upload_part", **signed))
 
     def parts(self, key: str, upload: str) -> dict[int, tuple[str, int]] | None:
         """Tag and size of the received parts by number; None if the upload was completed or ended."""
@@ -189,3 +181,22 @@ class Bucket:
 
     def _place(self, key: str) -> str:
         return f"{self._name}/{self._prefix}{key}"
+
+
+def _file_system(endpoint: str | None) -> S3FileSystem:
+    """A client of an S3 server, by default of the one that the AWS variables name."""
+    made = S3FileSystem(
+        endpoint_url=endpoint,
+        config_kwargs={
+            "connect_timeout": CONNECT_S,
+            "read_timeout": READ_S,
+            "retries": TRIES,
+            # Of presigned addresses, too; version 2 would not sign sizes.
+            "signature_version": "s3v4",
+        },
+        default_block_size=PART_BYTES,
+        max_concurrency=PARTS_AT_ONCE,
+        use_listings_cache=False,
+    )
+    made.retries = 2
+    return made

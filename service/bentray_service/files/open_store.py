@@ -16,7 +16,9 @@ from .store import Store
 FIELD = "BENTRAY_STORAGE_URL"
 
 
-def open_store(url: str | None, root: Path, database: Database, cache_bytes: int) -> Store:
+def open_store(
+    url: str | None, root: Path, database: Database, cache_bytes: int, public_endpoint: str | None = None
+) -> Store:
     """Open the store of a service.
 
     Args:
@@ -24,6 +26,7 @@ def open_store(url: str | None, root: Path, database: Database, cache_bytes: int
         root: the data folder.
         database: with the rows of the stored items.
         cache_bytes: see ``BucketStore``.
+        public_endpoint: see ``Bucket``.
 
     Raises:
         InvalidInput: when the bucket is not readable and writable, belongs to another database, or the
@@ -37,7 +40,7 @@ def open_store(url: str | None, root: Path, database: Database, cache_bytes: int
     except ImportError as error:
         found = f"{url}, without the module {error.name}"
         raise InvalidInput(FIELD, found, "an address, with bentray[s3] installed") from error
-    bucket, mark = Bucket(url), mark_of(database)
+    bucket, mark = Bucket(url, public_endpoint), mark_of(database)
     try:
         metadata = bucket.metadata(MARK)
         if metadata is None and next(bucket.listed(), None) is not None:

@@ -78,6 +78,24 @@ def test_parts_are_assembled_and_read_as_any_upload(service, scan, objects):
     assert http.get("/v1/access").json()["bytes_reserved"] == 0
 
 
+def test_addresses_are_signed_for_the_public_endpoint(service, scan, s3_server, monkeypatch, objects):
+    """The service reaches the server by one name, clients by another; the host is in the signature."""
+    http = service(storage_public_endpoint=f"http://localhost:{s3_server.port}")
+    data = scan().read_bytes()
+    upload = begun(http, data)
+    (part,) = http.post(upload["links"]["parts"], json={"numbers": [1]}).json()["parts"]
+    url = httpx.URL(part["url"])
+    assert (url.host, url.port) == ("localhost", s3_server.port)
+    assert "host" in url.params["X-Amz-SignedHeaders"].split(";")
+    # As a bucket checks it: the signature of this host, and of no other.
+    signed = Bucket("s3://any", f"http://localhost:{s3_server.port}"), Bucket("s3://any")
+    assert len({httpx.URL(one.part_url("k", "u", 1, 9, 60)).params["X-Amz-Signature"] for one in signed}) == 2
+    send(http, upload, data)
+    assert http.post(upload["links"]["complete"]).status_code == 202
+    assert ended(http, upload)["state"] == "done"
+    assert objects() == []
+
+
 def test_through_the_client(serve, scan, bucket_url, objects):
     address = serve(storage_url=bucket_url)
     with Client(address) as client:
