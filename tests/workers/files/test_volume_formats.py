@@ -60,7 +60,7 @@ def test_a_volume_of_ours(tmp_path):
     write_volume(tmp_path / "v.h5", volume)
     read = import_volume(tmp_path / "v.h5")
     np.testing.assert_array_equal(read.values, volume.values)
-    assert replace(read, values=volume.values) == volume
+    assert (read.spacing_m, read.origin_m, read.title) == (volume.spacing_m, volume.origin_m, volume.title)
 
 
 def test_a_reconstruction_gives_its_speed(tmp_path):
