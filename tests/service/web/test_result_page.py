@@ -245,7 +245,7 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
     place = (-4.0, -12.0, 4.0, 2.0)
     ready(page, f"{address}/#/jobs/{job}?ellipse={','.join(map(str, place))}")
     table = page.locator(".statistics")
-    expect(table.locator("tr").first).to_have_text("Sixteen elementsTruth")
+    expect(table.locator("tr").first).to_have_text("ResultTruth")
     rows = {
         one.locator("th").inner_text(): one.locator("td").all_inner_texts()
         for one in table.locator("tr:has(td)").all()
@@ -260,7 +260,7 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
     with page.expect_download() as download:
         page.locator(".measure.region").get_by_role("button", name="Save as CSV").click()
     head, *lines = table_of(download)
-    assert [line[0] for line in lines] == ["Sixteen elements", "Truth"]
+    assert [line[0] for line in lines] == ["Result", "Truth"]
     assert float(lines[1][head.index("contrast")]) == pytest.approx(contrast, abs=0.006)
     # Of the speed alone.
     page.get_by_role("button", name="Coverage").click()

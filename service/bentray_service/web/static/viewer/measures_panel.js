@@ -94,7 +94,8 @@ export function measuresPanel(root, set) {
       }
       if (region) {
         parts.region.shape = region.shape;
-        const found = [...curves, ...beside].map((one) => ({ title: one.title, statistics: regionOf(one.plane, region.shape, region.place) }));
+        const named = beside.length ? curves.map((one) => ({ ...one, title: "Result" })) : curves;
+        const found = [...named, ...beside].map((one) => ({ title: one.title, statistics: regionOf(one.plane, region.shape, region.place) }));
         const table = make("table", "statistics");
         const rows = [
           ["", found.map((one) => one.title)],
