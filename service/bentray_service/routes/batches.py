@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Body, Depends, Header, Response, status
+from fastapi import APIRouter, Body, Depends, Response, status
 from fastapi.openapi.models import Example
 
 from bentray_kernels.errors import InvalidInput
@@ -17,7 +17,7 @@ from ..rows.jobs import NewJob, Submission
 from ..rows.schema import ENDED
 from ..web.errors import problems
 from ..wiring import CallerTenant, CurrentCaller, Service
-from .bodies import Limit, SmallBody, accept_media_types
+from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types
 from .models.batch_records import BatchList, BatchRecord, BatchRequest
 from .record_conversion import batch_record
 
@@ -49,14 +49,7 @@ def start_batch(
     response: Response,
     service: Service,
     caller: CurrentCaller,
-    idempotency_key: Annotated[
-        str | None,
-        Header(
-            min_length=1,
-            max_length=200,
-            description="Idempotency key: a repeated request with the same key starts no second batch.",
-        ),
-    ] = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> BatchRecord:
     """Queue one reconstruction for each dataset. All are stored before the response, or none."""
     datasets, settings = batch_request.datasets, batch_request.settings

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine
 from typing import Annotated, Any
 
-from fastapi import Query, Request, Response
+from fastapi import Header, Query, Request, Response
 from fastapi.routing import APIRoute
 from starlette.types import Message
 
@@ -13,6 +13,15 @@ from ..errors import TooLarge, WrongMediaType
 
 # Parameter of all lists.
 Limit = Annotated[int, Query(ge=1, le=1000, description="Maximum number of records.")]
+# Header of requests that start jobs.
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        min_length=1,
+        max_length=200,
+        description="Idempotency key: a repeated request with the same key starts nothing a second time.",
+    ),
+]
 # Jobs are a few hundred bytes.
 LONGEST_JSON = 64 * 1024
 

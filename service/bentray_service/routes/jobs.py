@@ -6,7 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Annotated, Literal, Union
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
+from fastapi import APIRouter, Body, Depends, Query, Request, Response, status
 
 from ..errors import NoAnimation
 from ..files.deletion import StoredItem
@@ -16,7 +16,7 @@ from ..rows.schema import ENDED
 from ..rows.typed_rows import JobRow
 from ..web.errors import problems
 from ..wiring import CallerTenant, CurrentCaller, Parts, Service
-from .bodies import Limit, SmallBody, accept_media_types
+from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types
 from .downloads import download, download_of
 from .models.job_records import JobList, JobRecord, State
 from .models.name_changes import TEXT
@@ -54,14 +54,7 @@ def start_job(
     response: Response,
     service: Service,
     caller: CurrentCaller,
-    idempotency_key: Annotated[
-        str | None,
-        Header(
-            min_length=1,
-            max_length=200,
-            description="Idempotency key: a repeated request with the same key starts no second job.",
-        ),
-    ] = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> JobRecord:
     """Queue a job. It is stored before the response and survives a restart of the service."""
     kind: str = job_request.kind
