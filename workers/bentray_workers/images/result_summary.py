@@ -22,8 +22,9 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         ``resolution_width_m``: of each slice, or one, m; empty without uncertainty;
         ``grids``: shape, spacing and origin of quantities whose grid is not that of the speed;
         ``candidates``: the models that were compared, the chosen one first, each with ``label``,
-        ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s`` and
-        ``chosen``; ``reason``: of this choice, empty without candidates; ``truth``: None without a truth,
+        ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s``,
+        ``chosen`` and ``rejection`` (why a lower misfit was not chosen, else empty); ``reason``: of this
+        choice, empty without candidates; ``truth``: None without a truth,
         else ``region``, ``nodes``, errors, similarities (None if they do not exist), mean and spread of
         image and truth there; or ``region`` with the reason why it is not compared, and ``nodes``.
 
@@ -31,7 +32,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         InvalidInput: naming the field of a file.
     """
     # Loaded only where it runs.
-    from bentray_kernels.tomography.model_selection.selection import advice_of, label
+    from bentray_kernels.tomography.model_selection.selection import advice_of, label, rejection
 
     from .truth_comparison import NotComparable, compare
 
@@ -78,6 +79,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
                 "held_out_mean_s": trial.held_out_mean_s,
                 "training_rms_s": trial.shown_rms_s,
                 "chosen": k == 0,
+                "rejection": rejection(trial, own.trials),
             }
             for k, trial in enumerate(own.trials)
         ],

@@ -17,6 +17,7 @@ from ..stage_graphs import Scan
 from ..stopping import stop_at_noise, travel_time_noise
 from .candidates import CandidateGraph
 from .finite_frequency_candidates import (
+    EXACT,
     STRAIGHT,
     choose_finite_frequency,
     finite_frequency_candidates,
@@ -300,12 +301,33 @@ def explain_trials(trials: Sequence[Trial]) -> str:
 
 
 def trial_table(trials: Sequence[Trial]) -> list[tuple[str, str, str]]:
-    """Rows of a table of candidates: label, misfit of held-out pairs, and whether it was chosen."""
+    """Rows of a table of candidates: label, misfit of held-out pairs, and ``chosen`` or ``rejection``."""
     misfit = _misfit_of(trials)
     return [
-        (label(trial.settings), f"{1e9 * misfit(trial):.0f} ns", "chosen" if k == 0 else "")
+        (
+            label(trial.settings),
+            f"{1e9 * misfit(trial):.0f} ns",
+            "chosen" if k == 0 else rejection(trial, trials),
+        )
         for k, trial in enumerate(trials)
     ]
+
+
+def rejection(trial: Trial, trials: Sequence[Trial]) -> str:
+    """Why a candidate with a lower misfit than the chosen one, the first, was not chosen; else empty."""
+    chosen, misfit = trials[0], _misfit_of(trials)
+    if trial is chosen or misfit(trial) >= misfit(chosen):
+        return ""
+    bent, wide = _bent(trial), "ray_width_m" in chosen.settings
+    if wide and "ray_width_m" not in trial.settings:
+        part, why = EXACT, "thin rays fit wrong picks too"
+    elif not bent:
+        part, why = STRAIGHT, "straight rays fit smooth times with a wrong image"
+    elif trial.settings in SHARPER:
+        return "not clearly lower: sharper images also show the noise"
+    else:
+        part, why = CLEARLY, "the simpler model is kept"
+    return f"must be below {1e9 * part * misfit(chosen):.0f} ns: {why}"
 
 
 def _misfit_of(trials: Sequence[Trial]) -> Callable[[Trial], float]:

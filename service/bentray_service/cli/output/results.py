@@ -59,5 +59,5 @@ def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
     print_lines(found["provenance"][name] for name in ("water", "geometry") if name in found["provenance"])
     print_table(title, ("figure", "value"), summary(found))
     if found["candidates"]:
-        print_table("", ("candidate", "held-out misfit", ""), found["candidates"], {"held-out misfit"})
+        print_table("", ("candidate", "held-out misfit", "result"), found["candidates"], {"held-out misfit"})
     print_lines([*([found["reason"]] if found["reason"] else []), *found["outputs"].values()])

@@ -17,6 +17,7 @@ class CandidateRecord(BaseModel):
     )
     training_rms_s: float = Field(description="Rms misfit of the other pairs, s.")
     chosen: bool
+    rejection: str = Field(description="Why it was not chosen although its misfit is lower; else empty.")
 
 
 class TruthErrors(BaseModel):

@@ -28,6 +28,7 @@ from bentray_kernels.tomography.model_selection.selection import (
     explain_trials,
     final_settings,
     next_candidates,
+    rejection,
     trial_table,
 )
 from bentray_kernels.tomography.reconstruction import MemoryScan
@@ -321,4 +322,26 @@ def test_the_reason_is_one_and_the_table_names_what_differs():
     assert trial_table([plain, smooth]) == [
         ("straight rays", "100 ns", "chosen"),
         ("bent rays, smoothed wave front", "120 ns", ""),
+    ]
+
+
+def test_the_table_says_why_a_lower_misfit_was_not_chosen():
+    plain, close = trial("straight", 100e-9), trial("curved", 95e-9)
+    assert trial_table([plain, close])[1] == (
+        "bent rays",
+        "95 ns",
+        "must be below 92 ns: the simpler model is kept",
+    )
+    sharp = replace(close, settings=dict(SHARPER[0]))
+    assert rejection(sharp, [plain, sharp]) == "not clearly lower: sharper images also show the noise"
+
+    def of(mean_s, **settings):
+        return replace(plain, held_out_mean_s=mean_s, settings={"method": "gauss-newton", **settings})
+
+    bent = of(100e-9, rays="curved", ray_width_m=0.003)
+    straight, thin = of(90e-9, rays="straight", ray_width_m=0.003), of(70e-9, rays="curved")
+    assert [rejection(one, [bent, straight, thin]) for one in (bent, straight, thin)] == [
+        "",
+        "must be below 80 ns: straight rays fit smooth times with a wrong image",
+        "must be below 60 ns: thin rays fit wrong picks too",
     ]

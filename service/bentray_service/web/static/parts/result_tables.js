@@ -47,7 +47,7 @@ export function choiceTable({ candidates, reason }, job) {
   if (!candidates.length) return job.advice ? section("Notes", make("p", "", job.advice)) : null;
   const table = make("table", "choice-table");
   const head = table.createTHead().insertRow();
-  for (const name of ["Candidate", "Held-out misfit, mean", "Held-out, rms", "Training, rms"]) {
+  for (const name of ["Candidate", "Held-out misfit, mean", "Held-out, rms", "Training, rms", "Result"]) {
     const cell = make("th", "", name);
     cell.scope = "col";
     head.append(cell);
@@ -55,8 +55,8 @@ export function choiceTable({ candidates, reason }, job) {
   const body = table.createTBody();
   for (const one of candidates) {
     const row = body.insertRow();
-    const label = one.chosen ? `${one.label} (chosen)` : one.label;
-    const cells = [label, inNanoseconds(one.held_out_mean_s), inNanoseconds(one.held_out_rms_s), inNanoseconds(one.training_rms_s)];
+    const misfits = [one.held_out_mean_s, one.held_out_rms_s, one.training_rms_s].map(inNanoseconds);
+    const cells = [one.label, ...misfits, one.chosen ? "chosen" : one.rejection];
     row.append(...cells.map((cell) => make("td", "", cell)));
     if (one.chosen) row.className = "chosen";
   }
