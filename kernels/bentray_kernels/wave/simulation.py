@@ -131,6 +131,7 @@ def forward(
     by: Unknown = "speed",
     spans: Spans | None = None,
     poll: Poll = no_poll,
+    storage: NDArray[Any] | None = None,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Traces, and the source of scattered waves in the image at every ``every``-th step.
 
@@ -140,6 +141,7 @@ def forward(
         by: the variable whose change scatters.
         spans: the nodes that matter, see ``light_cone``; all by default, and for a 3-D medium.
         poll: see ``time_blocks``.
+        storage: of the shape and type of ``scattered``, for reuse; fresh memory by default.
 
     Returns:
         traces: (nrx, nt).
@@ -161,7 +163,7 @@ def forward(
         # A point source is 1 / spacing^3 on its node; the factors contain spacing^2.
         traces *= kind.type(scale / medium.spacing)
         return traces, np.empty((0, *medium.speed.shape), kind)
-    scattered = np.empty((-(-nt // every) if every else 0, *medium.speed.shape), kind)
+    scattered = np.empty(*fields_of(medium, nt, every)) if storage is None else storage
     inner = tuple(slice(medium.margin, medium.margin + nodes) for nodes in medium.speed.shape)
     fade = medium.fade[inner]
     turn = (1 - fade) / (1 + fade)
@@ -170,6 +172,11 @@ def forward(
         _forward(begin, end, *arguments, spans, medium.margin, every, by == "attenuation", turn, scattered)
     traces *= kind.type(scale)
     return traces, scattered
+
+
+def fields_of(medium: Medium, nt: int, every: int) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of the stored fields of one emission in a plane, see ``forward``."""
+    return (-(-nt // every) if every else 0, *medium.speed.shape), medium.keep.dtype
 
 
 @kernel

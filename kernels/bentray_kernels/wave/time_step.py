@@ -8,6 +8,7 @@ from ..compiled import kernel
 from .light_cone import TILE
 from .points import REACH
 from .stencil import HALO
+from .vector_width import use_widest_vectors
 
 TAPS = 2 * REACH
 
@@ -26,6 +27,7 @@ def advance(now: Any, old: Any, keep: Any, fade: Any, drive: Any, weights: Any, 
         weights: (5,), of the Laplacian, of the same type.
         spans: (rows of tiles, 2), the nodes that matter, see ``light_cone``.
     """
+    use_widest_vectors()
     flush = now.dtype.type(FLUSH)
     for i in range(HALO, now.shape[0] - HALO):
         begin, end = spans[(i - HALO) // TILE, 0], spans[(i - HALO) // TILE, 1]
@@ -57,6 +59,7 @@ def advance_storing(
         scratch: (ny,), a row.
         stored: of the image's shape; filled where nodes matter.
     """
+    use_widest_vectors()
     flush = now.dtype.type(FLUSH)
     for i in range(HALO, now.shape[0] - HALO):
         begin, end = spans[(i - HALO) // TILE, 0], spans[(i - HALO) // TILE, 1]
