@@ -16,7 +16,7 @@ from ...task_graph import Task
 from ..result import Iteration
 from .delay_and_sum import Signals, Sums, empty_sums, sum_echoes
 from .delay_and_sum_opencl import sum_echoes_opencl
-from .echoes import Pulse, analytic, echo_window, measure_pulse, upsampling
+from .echoes import Pulse, analytic, echo_window, high_pass, measure_pulse, upsampling
 from .element_times import ElementTimes, joined, solve_times, times_between
 from .reflection_plan import EchoScan, ReflectionPlan, emissions_per_task
 
@@ -198,12 +198,16 @@ def measure_scan_pulse(scan: EchoScan, plan: ReflectionPlan, times: list[Element
     chosen = emissions[:: max(1, len(emissions) // PULSE_EMISSIONS)]
     with scan.open() as dataset:
         recorded = dataset.waveform
+        rate = dataset.sampling_rate_hz
         assert recorded is not None
+        assert rate is not None
         if recorded.water is not None:
             shots, expected = recorded.water, _water_times(plan, chosen)
         else:
             shots, expected = recorded.object, _transmitted(plan, times, chosen)
-        return measure_pulse([shots[e] for e in chosen], expected, plan.used[chosen], _sample_times(dataset))
+        # One emission at a time is in memory.
+        traces = (high_pass(np.asarray(shots[e], np.float32), rate, plan.frequency_hz) for e in chosen)
+        return measure_pulse(traces, expected, plan.used[chosen], _sample_times(dataset))
 
 
 def sum_emissions(
@@ -260,8 +264,10 @@ def echo_signals(
         traces = scale[:, None] * np.asarray(recorded.object[e], dtype=np.float64)
         used[n] &= np.isfinite(traces).all(axis=1)
         traces[~used[n]] = 0.0
+        traces = high_pass(traces, rate, plan.frequency_hz)
         traces *= echo_window(transmitted_s[n], pulse, at, 1.0 / plan.frequency_hz)
-        parts[n] = analytic(traces, factor)
+        # The beginning of the window has made low frequencies again, of equal phase in all traces.
+        parts[n] = analytic(high_pass(traces, rate, plan.frequency_hz), factor)
     # Beyond the record the nearest sample is read.
     parts[..., 0] = 0.0
     parts[..., -1] = 0.0

@@ -108,6 +108,25 @@ def test_transmitted_waves_are_muted():
     assert image.db[away > 0.008].max() < -8.0
 
 
+def test_slow_tails_of_transmitted_waves_leave_no_energy_in_the_image():
+    # As strong as the echo, longer than the mute, and with equal phase in all traces.
+    elements = ring()
+    direct = np.linalg.norm(elements[:, None] - elements[None], axis=-1) / WATER + DELAY
+    late = np.maximum(T0 + np.arange(400) / RATE_HZ - direct[..., None], 0.0)
+    tail = late / 4e-6 * np.exp(1.0 - late / 4e-6)
+    whole, alone = scan().waveform.object + tail, scan().waveform.water + tail
+    images = [
+        reconstruct(scan(waveform=Waveform(whole.astype(np.float32), water)), SETTINGS).reflection
+        for water in (alone.astype(np.float32), None)
+    ]
+    for image in images:
+        x, y = (image.origin_m[k] + image.spacing_m[k] * np.arange(image.db.shape[k]) for k in (0, 1))
+        away = np.hypot(x[:, None] - POINT[0], y[None, :] - POINT[1])
+        assert away.flat[image.db.argmax()] <= PIXEL
+        # Without the high pass it has -7 dB.
+        assert image.db[away > 0.008].max() < -18.0
+
+
 def test_several_slices_are_stacked():
     one = scan()
     both = np.stack([one.waveform.object, 0.5 * one.waveform.object])
