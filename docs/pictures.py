@@ -175,7 +175,9 @@ def quantities() -> Image.Image:
     with drawing():
         figure = new_figure(17.2, 4.2)
         draw_quantities(figure, made)
-        return Image.open(io.BytesIO(to_png(figure)))
+        # The fine lines of the reflection take more than a committed file may have.
+        drawn = Image.open(io.BytesIO(to_png(figure))).convert("RGB")
+        return drawn.resize((1500, round(1500 * drawn.height / drawn.width)), Image.Resampling.LANCZOS)
 
 
 def draw_quantities(figure: Figure, made: Reconstruction) -> None:
