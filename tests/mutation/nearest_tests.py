@@ -25,7 +25,7 @@ FOLDERS = (
 # for devices are left out because their loops are OpenCL sources.
 OTHER = re.compile(
     r"(__init__|registry|\w*settings|requirements|rules|finding|pickers|\w*checkpoint|\w*_graphs?|dataset"
-    r"|emissions|waveform|memory|memory_\w+|device_\w+|waveform_cost|result|solver_choice|candidates|numerics"
+    r"|emissions|waveform|memory|memory_\w+|device_\w+|vector_width|waveform_cost|result|solver_choice|candidates|numerics"
     r"|decomposition|geometry_summary|examination|\w*_opencl|finite_frequency_candidates|reconstruction"
     r"|inversion_state|time_blocks|image_grid|problem|packed_scene|scene|defects|example_surfaces)\.py"
 )
