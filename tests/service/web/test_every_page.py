@@ -116,8 +116,14 @@ def show_alerts(page):
     page.evaluate("document.dispatchEvent(new CustomEvent('connection', { detail: false }))")
 
 
-def sideways(page):
-    return page.evaluate("document.documentElement.scrollWidth > innerWidth")
+def sideways(page, path, *sizes):
+    """Widths of the sizes at which the page scrolls sideways, with its path."""
+    found = []
+    for size in sizes:
+        resized(page, size)
+        if page.evaluate("document.documentElement.scrollWidth > innerWidth"):
+            found.append((size[0], path))
+    return found
 
 
 def test_every_page_on_a_laptop_and_on_the_narrowest_telephone(page, places):
@@ -129,10 +135,7 @@ def test_every_page_on_a_laptop_and_on_the_narrowest_telephone(page, places):
     for path, text in pages.items():
         resized(page, LAPTOP)
         opened(page, address, path, text)
-        for size in (LAPTOP, NARROWEST):
-            resized(page, size)
-            if sideways(page):
-                wide.append((size[0], path))
+        wide += sideways(page, path, LAPTOP, NARROWEST)
         resized(page, LAPTOP)
         if not path.endswith(REPEATED):
             if path == "/jobs":
@@ -171,8 +174,5 @@ def test_nothing_scrolls_sideways_at_any_width(page, places):
         for path, text in pages.items():
             resized(page, first)
             opened(page, address, path, text)
-            for size in (first, second):
-                resized(page, size)
-                if sideways(page):
-                    wide.append((size[0], path))
+            wide += sideways(page, path, first, second)
     assert wide == []

@@ -28,8 +28,6 @@ PROGRAM = Path(__file__).with_name("ray_task_memory.py")
 ROOT = Path(__file__).parents[3]
 RING = Summary(256, 256, 256 * 256, 1, False, 0.0, 0.16, 0, True)
 BOTH = ("recon", "render")
-# What a small call takes besides on Python 3.13, of which plans do not know: up to 3.5 MB, on 3.12 nothing.
-MORE_BYTES = 0 if sys.version_info < (3, 13) else 4 * MIB
 LARGE, SMALL = WorkerCapacity(8 * 1024 * MIB, BOTH), WorkerCapacity(560 * MIB, BOTH)
 
 
@@ -82,7 +80,7 @@ def test_tasks_stay_within_the_planned_memory(asked, elements, heights):
     wrong = {
         name: (told[name], taken)
         for name, taken in measured.items()
-        if not taken - MORE_BYTES <= told[name] <= 1.5 * taken + 4 * MIB
+        if not taken <= told[name] <= 1.5 * taken + 4 * MIB
     }
     assert not wrong
 

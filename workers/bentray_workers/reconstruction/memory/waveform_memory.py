@@ -20,6 +20,9 @@ from ...files.dataset.counts import Traces
 # Overhead of Python in any task.
 FLOOR_BYTES = 13 * 2**20 // 2
 
+# Of the waves through the image that are compared, besides those of the start of a band.
+VALIDATION_BYTES = 2 * 2**20
+
 # Bytes per sample: simulated and recorded water shots, spectra and windows; traces, window and residuals of
 # one emitter; entries of the resampler while it is made.
 SHOT_BYTES, LOOK_BYTES, SAMPLER_BYTES = 144, 96, 64
@@ -88,7 +91,7 @@ def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -
         return {}
     plan = _scale(traces, width_m).bands(settings)
     (judge,) = validation_settings(WaveSettings(plan)).bands
-    sizes = {"validate_image": _band_bytes(traces, width_m, settings, judge)["start_band"]}
+    sizes = {"validate_image": _band_bytes(traces, width_m, settings, judge)["start_band"] + VALIDATION_BYTES}
     for band in plan if refines(settings) else ():
         for name, size in _band_bytes(traces, width_m, settings, band).items():
             sizes[name] = max(size, sizes.get(name, 0))
@@ -143,7 +146,9 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
         + 12 * image,
         "evaluate_emitter": base + in_flight + LOOK_BYTES * samples + medium + 4 * image,
         # The results of all emitters, and the L-BFGS pairs before and after.
+        # Threads of compiled code keep the memory of the stored fields, see ``adjoint``.
         "update_image": base
+        + (in_flight if wave_engine(settings) == "compiled" else 0)
         + 2 * image * looks
         + 4 * WaveSettings((band,)).memory * image
         + STEP_BYTES * extent.nodes**2,
