@@ -48,7 +48,7 @@ def test_no_group_of_tasks_is_kept(cluster: Cluster) -> None:
     # Other tests of this process may have clusters of their own.
     before = {id(one) for one in alive(TaskGroup)}
     run_tasks(cluster)
-    # The event loop may still handle the last message. Names only, as a list of the groups would itself keep them.
+    # The event loop may still handle the last message. A list of the groups themselves would keep them.
     deadline = time.monotonic() + FORGET_S
     while kept := [repr(one) for one in alive(TaskGroup) if id(one) not in before]:
         assert time.monotonic() < deadline, kept
