@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -77,6 +78,23 @@ def test_the_source_distribution_gives_the_same_wheel(dist: Path, tmp_path: Path
         assert (source / name).exists(), name
     run("-m", "hatchling", "build", "-d", str(tmp_path / "again"), "-t", "wheel", folder=source)
     assert only(tmp_path / "again", "*.whl").read_bytes() == only(dist, "*.whl").read_bytes()
+
+
+def test_the_files_in_the_image_give_the_same_wheel(dist: Path, tmp_path: Path) -> None:
+    """A file that the build needs and the Dockerfile does not copy would stop the build of the image."""
+    source, text = tmp_path / "build", (ROOT / "deploy" / "Dockerfile").read_text()
+    for names, folder in re.findall(
+        r"^COPY (?!--from|requirements|deploy/\w+\.sh)(.+) (\S+)$", text, re.MULTILINE
+    ):
+        for name in (one for one in names.split() if one != "buil[d]"):
+            if (ROOT / name).is_dir():
+                shutil.copytree(ROOT / name, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
+            else:
+                (source / folder).mkdir(parents=True, exist_ok=True)
+                shutil.copy(ROOT / name, source / folder)
+    run("-m", "hatchling", "build", "-d", str(tmp_path / "dist"), "-t", "wheel", folder=source)
+    here, there = (set(zipfile.ZipFile(only(one, "*.whl")).namelist()) for one in (dist, tmp_path / "dist"))
+    assert there == {name for name in here if not name.startswith(DOCUMENTATION)}
 
 
 def test_a_documentation_that_is_not_built_is_no_release(tmp_path: Path) -> None:
