@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 from bentray_service.openapi import description
 from bentray_service.routes.jobs import JobRequest
 from bentray_service.routes.models.batch_records import BatchRequest
-from bentray_service.routes.models.name_changes import DatasetChanges, JobChanges
+from bentray_service.routes.models.name_changes import DatasetChanges, JobChanges, ScanCorrection
 from bentray_service.routes.models.project_records import MemberRequest, ProjectRequest
 from bentray_service.routes.models.upload_records import DirectUploadRequest, PartsRequest
 
@@ -85,7 +85,7 @@ def test_every_error_response_is_described():
 def test_every_json_body_has_examples_that_are_taken():
     models = (
         *(BatchRequest, DatasetChanges, JobChanges, MemberRequest, ProjectRequest),
-        *(DirectUploadRequest, PartsRequest),
+        *(DirectUploadRequest, PartsRequest, ScanCorrection),
     )
     changes = {f"#/components/schemas/{one.__name__}": one for one in models}
     found = 0

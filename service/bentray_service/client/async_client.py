@@ -52,6 +52,7 @@ class AsyncClient(Connection):
         await self._bucket.aclose()
 
     upload = _method(flows.upload)
+    correct_dataset = _method(flows.correct_dataset)
     submit = _method(flows.submit)
     simulate = _method(flows.simulate)
     reconstruct = _method(flows.reconstruct)

@@ -50,6 +50,7 @@ class Client(Connection):
         self._bucket.close()
 
     upload = _method(flows.upload)
+    correct_dataset = _method(flows.correct_dataset)
     submit = _method(flows.submit)
     simulate = _method(flows.simulate)
     reconstruct = _method(flows.reconstruct)

@@ -16,6 +16,7 @@ from ..interactive.progress_bar import progress_bar
 from ..interactive.result import Result
 from ..interactive.setting_types import Method, PhantomName, ReconstructionSettings, SimulationSettings
 from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
+from ..routes.models.name_changes import LengthUnit, TimeUnit
 from ..routes.models.surface_records import MeshRecord
 from ..settings_request import known_setting, nested, plain_numbers
 from .connection import Connection
@@ -66,6 +67,43 @@ def upload(
     else:
         response = yield from send_file(Path(path), on_progress, kind, resume, metadata)
     return RECORDS[kind].model_validate_json(response.content)
+
+
+def correct_dataset(
+    connection: Connection,
+    dataset: DatasetId,
+    *,
+    times_in: TimeUnit | None = None,
+    times_read_as: TimeUnit = "s",
+    positions_in: LengthUnit | None = None,
+    positions_read_as: LengthUnit = "m",
+    sampling_rate_hz: float | None = None,
+    frequency_hz: float | None = None,
+) -> Flow[DatasetRecord]:
+    """Make a corrected copy of a scan whose units or frequency were stated wrongly; the scan stays as it is.
+
+    Args:
+        dataset: id or record of the scan.
+        times_in: unit of the times in the original file.
+        times_read_as: unit in which they were read, as stated at upload.
+        positions_in, positions_read_as: the same of lengths.
+        sampling_rate_hz: of the traces; None: follows the unit of times.
+        frequency_hz: centre frequency.
+
+    Returns:
+        the record of the copy.
+    """
+    given = {
+        "times_in": times_in,
+        "times_read_as": times_read_as,
+        "positions_in": positions_in,
+        "positions_read_as": positions_read_as,
+        "sampling_rate_hz": sampling_rate_hz,
+        "frequency_hz": frequency_hz,
+    }
+    place = f"/v1/datasets/{id_of(dataset)}/corrections"
+    response = yield RequestStep("POST", place, {"json": plain_numbers(given)})
+    return DatasetRecord.model_validate_json(response.content)
 
 
 def submit(

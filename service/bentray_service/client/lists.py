@@ -34,9 +34,16 @@ JobKind = Literal["reconstruction", "simulation", "refraction", "geometry-field"
 LIMIT = Range(1, 1000)
 
 
-def datasets(connection: Connection, limit: int = 100) -> Flow[RecordList[DatasetRecord]]:
-    """List the newest scans, at most 1000."""
-    found = yield from _list(DatasetList, "/v1/datasets", limit)
+def datasets(
+    connection: Connection, limit: int = 100, *, text: str | None = None
+) -> Flow[RecordList[DatasetRecord]]:
+    """List the newest scans, at most 1000.
+
+    Args:
+        limit: largest number of scans.
+        text: only scans with this text in id, name, title or notes.
+    """
+    found = yield from _list(DatasetList, "/v1/datasets", limit, text)
     return RecordList(found.datasets)
 
 
@@ -117,6 +124,6 @@ def get(model: type[Answer], path: str, params: dict[str, Any] | None = None) ->
     return model.model_validate_json(response.content)
 
 
-def _list(model: type[Answer], path: str, limit: int) -> Flow[Answer]:
+def _list(model: type[Answer], path: str, limit: int, text: str | None = None) -> Flow[Answer]:
     LIMIT.check("limit", limit)
-    return (yield from get(model, path, {"limit": limit}))
+    return (yield from get(model, path, {"limit": limit} | ({} if text is None else {"text": text})))

@@ -29,6 +29,9 @@ OPEN_FILES = 64
 # Maximum ratio of the size of the canonical file to that of a large upload, due to fast compression.
 PACKING = 2
 
+# Key of the metadata of a dataset that is a stored scan to be corrected; its id is ``origin``.
+CORRECTION = "correction"
+
 # Accepted types, with a description of the formats.
 ACCEPTED = {
     "dataset": "a scan as uct-transmission, zea or openUSCT (HDF5), MATLAB 5 or 7.3, .npz of arrays, or a "
@@ -114,6 +117,11 @@ def convert_upload(
 
 
 def _dataset(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:
+    if CORRECTION in given:
+        from bentray_workers.files.dataset.correct import Correction, correct_dataset
+
+        correction = Correction(**given[CORRECTION])
+        return record_of(correct_dataset(source, target, correction, origin=given["origin"], on_size=on_size))
     from bentray_workers.foreign_scans import ScanMetadata, convert_dataset
 
     return record_of(convert_dataset(source, target, on_size=on_size, given=ScanMetadata.of(**given)))

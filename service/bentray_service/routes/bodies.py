@@ -54,7 +54,14 @@ class SmallBody(APIRoute):
                 if len(body) > LONGEST_JSON:
                     raise TooLarge("body", f"more than {LONGEST_JSON} bytes", f"at most {LONGEST_JSON} bytes")
 
+            replayed = False
+
             async def again() -> Message:
+                nonlocal replayed
+                if replayed:
+                    # Waits for the end of the connection.
+                    return await request.receive()
+                replayed = True
                 return {"type": "http.request", "body": bytes(body), "more_body": False}
 
             return await handler(Request(request.scope, again))

@@ -1,23 +1,42 @@
-"""PATCH of /v1/datasets and /v1/jobs: names, notes and stated water."""
+"""PATCH of /v1/datasets and /v1/jobs: names, notes and stated water; and corrected copies of scans."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Depends
+from fastapi import APIRouter, Body, Depends, Request, Response, status
 from fastapi.openapi.models import Example
+from starlette.concurrency import run_in_threadpool
 
+from bentray_workers.files.dataset.correct import Correction
+
+from ..ingest.canonical import IngestLimits
+from ..ingest.corrected_scan import add_corrected
+from ..rows.ids import new_id
+from ..rows.typed_rows import DatasetRow
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service
 from .bodies import SmallBody, accept_media_types
 from .models.job_records import DatasetRecord, JobRecord
-from .models.name_changes import DatasetChanges, JobChanges
+from .models.name_changes import DatasetChanges, JobChanges, ScanCorrection
 from .record_conversion import dataset_record, job_record
+from .uploads import run_in_turn
 
 JSON = [Depends(accept_media_types("application/json"))]
 REFUSALS = problems(400, 404, 413, 415, 422)
 OF_A_SCAN: dict[str, Example] = {
     "named": {"value": {"title": "Left breast", "notes": "Second visit.", "water_temperature_c": 31.2}}
+}
+CORRECTIONS: dict[str, Example] = {
+    "times": {
+        "summary": "Milliseconds were read as microseconds",
+        "value": {"times_in": "ms", "times_read_as": "us"},
+    },
+    "positions": {
+        "summary": "Millimetres were read as centimetres; another frequency",
+        "value": {"positions_in": "mm", "positions_read_as": "cm", "frequency_hz": 500000},
+    },
 }
 OF_A_JOB: dict[str, Example] = {"named": {"value": {"name": "With the new water speed"}}}
 
@@ -42,6 +61,45 @@ def change_dataset(
     if "water_temperature_c" in changes.model_fields_set:
         given["water_temperature_c"] = changes.water_temperature_c
     return dataset_record(service.datasets.describe(tenant, dataset_id, **given))
+
+
+@router.post(
+    "/datasets/{dataset_id}/corrections",
+    tags=["datasets"],
+    status_code=status.HTTP_201_CREATED,
+    dependencies=JSON,
+    responses=problems(400, 404, 413, 415, 422, 503, 507),
+)
+async def correct_dataset(
+    dataset_id: str,
+    correction: Annotated[ScanCorrection, Body(openapi_examples=CORRECTIONS)],
+    request: Request,
+    response: Response,
+    service: Service,
+    tenant: CallerTenant,
+) -> DatasetRecord:
+    """Make a corrected copy of a scan whose units, sampling rate or frequency were stated wrongly.
+
+    The copy passes the checks of an upload and is a scan of its own. The scan itself stays as it is, since
+    its reconstructions were made of it; delete it when they are no longer needed.
+    """
+    given = correction.model_dump(exclude_none=True)
+    # A correction that changes nothing is rejected before any work.
+    Correction(**given)
+    scan = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
+    copy_id, settings, files = new_id("dataset"), service.settings, service.files.of(tenant)
+    reserve = partial(service.quota.resize, tenant, copy_id)
+    limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
+
+    def work() -> DatasetRow:
+        service.files.store.fetch(files.dataset(scan["id"]))
+        return add_corrected(tenant, scan, given, copy_id, service.datasets, files, limits, reserve)
+
+    with service.upload_limits(tenant):
+        async with service.quota.reserved(tenant, copy_id, scan["bytes"]):
+            record = dataset_record(await run_in_turn(request, service.ingest_queue, tenant, work))
+    response.headers["Location"] = record.links["self"]
+    return record
 
 
 @router.patch("/jobs/{job_id}", tags=["jobs"], dependencies=JSON, responses=REFUSALS)

@@ -46,6 +46,23 @@ def test_a_file_is_not_converted_into_itself(bentray: Callable[..., Result], tmp
     assert (tmp_path / "scan.h5").read_bytes() == before
 
 
+def test_a_dataset_file_is_corrected(bentray: Callable[..., Result], tmp_path: Path) -> None:
+    savemat(tmp_path / "scan.mat", travel_times())
+    assert bentray("convert", tmp_path / "scan.mat", "-o", tmp_path / "scan.h5").exit_code == 0
+    words = ("correct", tmp_path / "scan.h5", "-o", tmp_path / "new.h5")
+    result = bentray(*words, "--frequency", 5e5)
+    assert result.exit_code == 0, result.stderr
+    assert " ".join(result.stdout.split()).startswith("Corrected copy of scan.h5: frequency 500000 Hz. ")
+    made, wrong = read_dataset(tmp_path / "new.h5"), read_dataset(tmp_path / "scan.h5")
+    assert made.center_frequency_hz == 5e5
+    np.testing.assert_array_equal(made.delta_tof_s, wrong.delta_tof_s)
+    nothing = bentray(*words, "--force")
+    assert nothing.exit_code == 2
+    assert "which changes nothing" in nothing.stderr
+    unit = bentray(*words, "--force", "--times-in", "min")
+    assert "times_in: found 'min'; accepted: one of s, ms, us, ns" in " ".join(unit.stderr.split())
+
+
 def own_variables(path: Path) -> tuple[object, ...]:
     """A file in mm and µs under own names; returns the options that describe it."""
     own = {"pos": 1e3 * positions(), "dtof": 1e6 * delta_tof()}

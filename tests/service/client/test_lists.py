@@ -27,6 +27,8 @@ def test_everything_stored_is_listed_newest_first(client, scan, tmp_path):
     done = [client.wait(client.submit(first, nodes=16, method="sart", iterations=1)) for _ in range(3)]
     assert [one.id for one in client.datasets()] == [second.id, first.id]
     assert [one.id for one in client.datasets(1)] == [second.id]
+    assert [one.id for one in client.datasets(text=first.id.upper())] == [first.id]
+    assert client.datasets(text="no such scan") == []
     assert [one.id for one in client.jobs()] == [job.id for job in reversed(done)]
     assert [one.id for one in client.volumes()] == [job.volume for job in reversed(done)]
     assert client.meshes() == []
@@ -34,6 +36,15 @@ def test_everything_stored_is_listed_newest_first(client, scan, tmp_path):
     assert client.volume(done[0]).job == done[0].id
     assert client.jobs(state="failed") == []
     assert len(client.jobs(kind="reconstruction", text=done[1].id)) == 1
+
+
+def test_a_corrected_copy_of_a_scan(client, scan):
+    first = client.upload(scan())
+    made = client.correct_dataset(first, frequency_hz=np.float64(5e5))
+    assert made.source == f"Corrected copy of {first.id}: frequency 500000 Hz"
+    assert client.dataset(first) == first
+    with pytest.raises(ClientError, match="times_in"):
+        client.correct_dataset(first)
 
 
 def test_more_jobs_than_one_request_gives(client, scan, monkeypatch):

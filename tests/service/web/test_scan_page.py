@@ -354,6 +354,32 @@ def test_name_notes_and_water_are_edited(page, own_traced, work):
     assert traced("")["water_temperature_c"] is None
 
 
+def test_a_scan_in_wrong_units_is_corrected_as_the_page_proposes(page, address, scan):
+    def in_microseconds(file):
+        file["traveltime/delta_tof_s"][...] *= 1e-3
+
+    wrong = opened(page, address, stored(address, scan(in_microseconds)))
+    proposed = page.locator("#proposed")
+    expect(proposed).to_contain_text("Were times in ms read as µs?")
+    page.get_by_role("button", name="Correct units or frequency").click()
+    form = page.locator("#correct-form")
+    expect(form.get_by_label("Times in the original file")).to_be_focused()
+    expect(form.get_by_label("Times in the original file")).to_have_value("ms")
+    expect(form.get_by_label("Times were read as")).to_have_value("us")
+    # What is not plausible is refused, and the form stays.
+    form.get_by_label("Lengths in the original file").select_option("um")
+    form.get_by_role("button", name="Make a corrected copy").click()
+    expect(form.get_by_role("alert")).to_contain_text("after the correction")
+    form.get_by_label("Lengths in the original file").select_option("as they were read")
+    form.get_by_label("Centre frequency (kHz)").fill("500")
+    form.get_by_role("button", name="Make a corrected copy").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Sixteen elements, corrected")
+    expect(page.locator("#scan-facts")).to_contain_text("500.0 kHz, stated in the file")
+    expect(page.locator("#scan-notes")).to_contain_text("times in ms, read as us before")
+    expect(page.locator("#proposed")).to_be_hidden()
+    assert wrong("")["notes"] == ""
+
+
 def test_without_a_water_shot_there_is_none_to_choose(page, address, tmp_path):
     made = trace_scan(blob_delay(12), elements=12, noise=0.01)
     write_dataset(tmp_path / "bare.h5", replace(made, waveform=replace(made.waveform, water=None)))

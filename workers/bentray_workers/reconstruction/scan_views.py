@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.picker_names import DEFAULT_PICKER
 
 from ..files.dataset import read_dataset
-from ..files.dataset.scan import spectrum_of
+from ..files.dataset.scan import measured_spectrum, spectrum_of
 from ..files.dataset.traces import lacks_water, open_slice, trace_samples
+from ..files.dataset.units import propose
 
 # Elements of a drawing, and receivers and samples of the traces of a view; of more, every n-th is taken.
 MAX_ELEMENTS, MAX_RECEIVERS, MAX_SAMPLES = 4096, 512, 1024
@@ -38,7 +39,8 @@ def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> di
     """
     recorded = read_dataset(path, traces=False)
     scan = recorded.in_water_of(water_temperature_c)
-    frequency = _frequency(path, scan)
+    measured = _measured_frequency(path, scan)
+    frequency = measured if scan.center_frequency_hz is None else scan.center_frequency_hz
     every = max(1, math.ceil(len(scan.element_position_m) / MAX_ELEMENTS))
     shown = np.arange(0, len(scan.element_position_m), every)
     same = int((scan.tx[:, None] == scan.rx[None, :]).sum())
@@ -63,6 +65,7 @@ def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> di
         "water_in_file": stated_water(recorded),
         "pairs": pairs,
         "timed_pairs": int(np.isfinite(scan.differential_tof()).sum()) if scan.picked else None,
+        "proposed_corrections": [asdict(one) for one in propose(recorded, measured)],
     }
 
 
@@ -122,6 +125,14 @@ def emission_traces(
         "pick_s": None if picks is None else _numbers((straight + picks)[receivers]),
         "picker": picker,
     }
+
+
+def _measured_frequency(path: Path, scan: Dataset) -> float | None:
+    """Centre frequency of the traces, Hz; None without a pulse in them."""
+    with suppress(InvalidInput):
+        spectrum = measured_spectrum(path, scan)
+        return None if spectrum is None else spectrum.center_frequency_hz
+    return None
 
 
 def _frequency(path: Path, scan: Dataset) -> float | None:

@@ -1,12 +1,12 @@
-"""Changes of names, notes and other statements of the user."""
+"""Changes of names, notes and other statements of the user, and corrections of scans."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from bentray_kernels.limits import WATER_C
+from bentray_kernels.limits import FREQUENCY_HZ, SAMPLING_HZ, WATER_C
 
 # PostgreSQL stores no NUL in a text.
 TEXT = r"^[^\u0000]*$"
@@ -29,6 +29,43 @@ class DatasetChanges(BaseModel):
         strict=True,
         description="Temperature of the water, °C, for later reconstructions and views, in place of that of "
         "the file, which stays as it is; null: that of the file again.",
+    )
+
+
+TimeUnit = Literal["s", "ms", "us", "ns"]
+LengthUnit = Literal["m", "cm", "mm", "um"]
+
+
+class ScanCorrection(BaseModel):
+    """What was stated wrongly about a scan; what is absent or null stays."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    times_in: TimeUnit | None = Field(
+        None,
+        description="Unit of the times in the original file: travel times and their deviations, time "
+        "of the first sample, and sample interval.",
+    )
+    times_read_as: TimeUnit = Field(
+        "s", description="Unit in which they were read: as stated at upload, s in the upload format."
+    )
+    positions_in: LengthUnit | None = Field(
+        None,
+        description="Unit of the lengths in the original file: positions, radius, heights of slices, "
+        "and grid of the truth.",
+    )
+    positions_read_as: LengthUnit = Field(
+        "m", description="Unit in which they were read: as stated at upload, m in the upload format."
+    )
+    sampling_rate_hz: float | None = Field(
+        None,
+        ge=SAMPLING_HZ.least,
+        le=SAMPLING_HZ.most,
+        strict=True,
+        description="Sampling rate of the traces, Hz; null: follows the unit of times.",
+    )
+    frequency_hz: float | None = Field(
+        None, ge=FREQUENCY_HZ.least, le=FREQUENCY_HZ.most, strict=True, description="Centre frequency, Hz."
     )
 
 

@@ -45,6 +45,16 @@ class QualityRecord(ShownRecord):
     findings: list[FindingRecord]
 
 
+class ProposedCorrection(BaseModel):
+    """A correction that the numbers of a scan suggest."""
+
+    what: Literal["times", "positions", "frequency"]
+    unit: str = Field(description="Likely unit in the original file; empty for a frequency.")
+    read_as: str = Field(description="Unit in which it was then read; empty for a frequency.")
+    frequency_hz: float | None = Field(description="Centre frequency of the traces; null for units.")
+    reason: str
+
+
 class GeometryRecord(BaseModel):
     """Elements, acquisition and water of a scan."""
 
@@ -68,6 +78,10 @@ class GeometryRecord(BaseModel):
     pairs: int = Field(description="Pairs of different elements, over all slices.")
     timed_pairs: int | None = Field(
         description="Pairs with a valid travel time in the file; null for a scan with traces alone."
+    )
+    proposed_corrections: list[ProposedCorrection] = Field(
+        description="Units and frequency that the numbers of the scan suggest in place of its own; see "
+        "`POST /v1/datasets/{dataset_id}/corrections`."
     )
 
 

@@ -2,7 +2,8 @@
 
 from ..hdf5_reading import Limits
 from .copy import copy_dataset
+from .correct import Correction, correct_dataset
 from .read import read_dataset
 from .write import write_dataset
 
-__all__ = ["Limits", "copy_dataset", "read_dataset", "write_dataset"]
+__all__ = ["Correction", "Limits", "copy_dataset", "correct_dataset", "read_dataset", "write_dataset"]

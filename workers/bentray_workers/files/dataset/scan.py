@@ -44,6 +44,11 @@ def spectrum_of(path: Path, dataset: Dataset) -> PulseSpectrum | None:
     """
     if dataset.center_frequency_hz is not None:
         return None
+    return measured_spectrum(path, dataset)
+
+
+def measured_spectrum(path: Path, dataset: Dataset) -> PulseSpectrum | None:
+    """As ``spectrum_of``, also for a scan with a centre frequency."""
     with opened(path, Limits()) as reader:
         return spectrum_in(reader, stacked=dataset.slice_z_m is not None)
 

@@ -132,17 +132,18 @@ async function showSettings(scan, from) {
 }
 
 // The elements and the facts; a function that marks the element that emits.
-function showGeometry(scan, geometry, correctWater) {
+function showGeometry(scan, geometry, editor) {
   const { picture, mark } = drawElements(geometry);
   const words = make("figcaption", "facts", `${inWordsOf(geometry)}. Circles emit, dots receive.`);
   at("elements").replaceChildren(picture, words);
   fillFacts(at("scan-facts"), factRows(geometry, scan));
-  at("scan-facts").querySelector("[data-term=Water]").append(" ", correctButton(correctWater));
+  at("scan-facts").querySelector("[data-term=Water]").append(" ", correctButton(editor.openWater));
+  editor.propose(geometry.proposed_corrections);
   return mark;
 }
 
 // What workers read from the scan, each part on its own, so that one that fails hides no other. Returns close().
-function showScan(scan, correctWater) {
+function showScan(scan, editor) {
   const page = `/v1/datasets/${scan.id}/quality.png`;
   at("quality-page").href = page;
   let reported = false;
@@ -160,7 +161,7 @@ function showScan(scan, correctWater) {
   let closed = false;
   const unless = (show) => (found) => (closed ? () => {} : show(found));
   const geometry = request(`/v1/datasets/${scan.id}/geometry`);
-  const drawn = geometry.then(unless((found) => showGeometry(scan, found, correctWater))).catch(
+  const drawn = geometry.then(unless((found) => showGeometry(scan, found, editor))).catch(
     unless((error) => {
       showError("geometry-error", error);
       return () => {};
@@ -225,14 +226,14 @@ export async function open(root, { id, query }) {
     (error) => showError("run-error", error),
   );
   let water = scan.water_temperature_c;
-  const correctWater = scanEditor(at("scan-editor"), scan, (changed) => {
+  const editor = scanEditor(at("scan-editor"), scan, (changed) => {
     entitle(changed);
     if (changed.water_temperature_c === water) return;
     water = changed.water_temperature_c;
     closeShot();
-    closeShot = showScan(changed, correctWater);
+    closeShot = showScan(changed, editor);
   });
-  let closeShot = showScan(scan, correctWater);
+  let closeShot = showScan(scan, editor);
   return () => {
     closed = true;
     own.close();

@@ -1,0 +1,56 @@
+"""`bentray correct`: a corrected copy of a dataset file with wrong units or a wrong frequency."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options.paths import check_apart, output_file
+from .options.scan_options import input_scan
+from .output.terminal import AsJson, print_json, print_lines
+
+
+def correct(
+    file: Annotated[Path, typer.Argument(help="Dataset file; it stays as it is.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Corrected dataset file to write (.h5).")],
+    times_in: Annotated[
+        str | None, typer.Option("--times-in", help="Unit of the times in the original file: s, ms, us, ns.")
+    ] = None,
+    times_read_as: Annotated[
+        str, typer.Option("--times-read-as", help="Unit in which they were read.")
+    ] = "s",
+    positions_in: Annotated[
+        str | None, typer.Option("--positions-in", help="Unit of the lengths in it: m, cm, mm, um.")
+    ] = None,
+    positions_read_as: Annotated[
+        str, typer.Option("--positions-read-as", help="Unit in which they were read.")
+    ] = "m",
+    sampling_rate_hz: Annotated[
+        float | None, typer.Option("--sampling-rate", help="Sampling rate of the traces, Hz.")
+    ] = None,
+    frequency_hz: Annotated[float | None, typer.Option("--frequency", help="Centre frequency, Hz.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write a corrected copy of a dataset file whose units or frequency were stated wrongly.
+
+    The copy passes the checks of an upload and states the correction in its source. The times are travel
+    times, their deviations, the time of the first sample and the sample interval.
+
+    Example:  bentray correct scan.h5 -o corrected.h5 --positions-in mm --positions-read-as cm
+    """
+    source, target = input_scan(file), output_file(output, force=force, suffix=".h5")
+    check_apart({"output": target}, {"file": source})
+
+    from bentray_workers.files.dataset import Correction, correct_dataset
+
+    correction = Correction(
+        times_in, times_read_as, positions_in, positions_read_as, sampling_rate_hz, frequency_hz
+    )
+    dataset = correct_dataset(source, target, correction)
+    if as_json:
+        print_json({"file": str(source), "output": str(target), "source": dataset.source})
+        return
+    print_lines([dataset.source, str(target)])

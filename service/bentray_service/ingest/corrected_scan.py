@@ -1,0 +1,55 @@
+"""A corrected copy of a stored scan, with the names and notes of the user."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..files.tenant_files import TenantFiles
+from ..rows.digests import digest_of
+from ..rows.stored_tables import Datasets
+from ..rows.tenants import Tenant
+from ..rows.typed_rows import DatasetRow
+from .canonical import IngestLimits, make_canonical
+from .ingest_process import CORRECTION
+
+LONGEST_NAME, LONGEST_NOTES = 200, 4000
+ENDING = ", corrected"
+
+
+def add_corrected(
+    tenant: Tenant,
+    scan: DatasetRow,
+    correction: Mapping[str, Any],
+    new_id: str,
+    datasets: Datasets,
+    files: TenantFiles,
+    limits: IngestLimits,
+    reserve: Callable[[int], None],
+) -> DatasetRow:
+    """Write the corrected copy of a scan in a separate process, as for an upload, and insert its row.
+
+    Args:
+        tenant: owner of both.
+        scan: stored; neither its row nor its file is changed, since its results were made of them.
+        correction: arguments of ``Correction``.
+        new_id: of the copy.
+        datasets: the table.
+        files: of the tenant; the file of ``scan`` is here.
+        limits: of the process.
+        reserve: reserves storage, bytes, replacing an earlier reservation.
+
+    Raises:
+        InvalidInput, QuotaExceeded, StorageFull, StorageUnavailable: as ``make_canonical``.
+    """
+    given = {CORRECTION: dict(correction), "origin": scan["id"]}
+    summary = make_canonical("dataset", files.dataset(scan["id"]), new_id, files, limits, given, reserve)
+    path = files.dataset(new_id)
+    statement = summary["source"].partition(". ")[0]
+    own = {
+        "name": (scan["name"] or scan["title"] or scan["id"])[: LONGEST_NAME - len(ENDING)] + ENDING,
+        "notes": "\n".join(part for part in (statement, scan["notes"]) if part)[:LONGEST_NOTES],
+        "water_temperature_c": scan["water_temperature_c"],
+    }
+    size, digest = path.stat().st_size, digest_of(path).sha256
+    return datasets.add(tenant, new_id, size=size, sha256=digest, summary=summary | own)

@@ -1,0 +1,141 @@
+"""POST of /v1/datasets/{id}/corrections: a corrected copy; the scan and its results stay; refusals."""
+
+import hashlib
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from bentray_service.routes.models.name_changes import LengthUnit, TimeUnit
+from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import Tenant
+from bentray_workers.files.dataset import read_dataset
+from bentray_workers.files.dataset.units import POSITION_UNITS, TIME_UNITS
+
+WRONG = {"times_in": "ms", "times_read_as": "us"}
+
+
+@pytest.fixture
+def http(start, work):
+    return start()
+
+
+def in_microseconds(file):
+    """The times of the small scan, a thousandth of what they are."""
+    file["traveltime/delta_tof_s"][...] *= 1e-3
+
+
+@pytest.fixture
+def here(http, scan):
+    stream = {"Content-Type": "application/x-hdf5"}
+    answer = http.post("/v1/datasets", content=scan(in_microseconds).read_bytes(), headers=stream)
+    return answer.json()["links"]["self"]
+
+
+def downloaded(http, here, path):
+    path.write_bytes(http.get(f"{here}/file").content)
+    return read_dataset(path)
+
+
+def test_units_are_those_of_the_workers():
+    assert get_args(TimeUnit) == tuple(TIME_UNITS)
+    assert get_args(LengthUnit) == tuple(POSITION_UNITS)
+
+
+@pytest.mark.ingest_process
+def test_the_copy_is_a_scan_of_its_own_and_the_scan_stays(http, here, tmp_path, submitted, until):
+    job = until(http, submitted(http, here.rpartition("/")[2])["id"])
+    http.patch(here, json={"title": "Left", "notes": "Second visit", "water_temperature_c": 31.5})
+    before, file = http.get(here).json(), http.get(f"{here}/file").content
+    answer = http.post(f"{here}/corrections", json={**WRONG, "frequency_hz": 500000})
+    assert answer.status_code == 201, answer.text
+    made = answer.json()
+    assert answer.headers["location"] == made["links"]["self"] != here
+    assert (made["title"], made["water_temperature_c"]) == ("Left, corrected", 31.5)
+    stated = f"Corrected copy of {before['id']}: times in ms, read as us before (x 1000), frequency 500000 Hz"
+    assert made["notes"] == f"{stated}\nSecond visit"
+    assert made["source"] == stated
+    # A result still belongs to the scan that it was made of.
+    assert (http.get(here).json(), http.get(f"{here}/file").content) == (before, file)
+    assert http.get(job["links"]["volume"]).json()["dataset"] == before["id"]
+    wrong, right = (
+        downloaded(http, here, tmp_path / "a.h5"),
+        downloaded(http, made["links"]["self"], tmp_path / "b.h5"),
+    )
+    np.testing.assert_allclose(right.delta_tof_s, 1e3 * wrong.delta_tof_s)
+    assert (wrong.center_frequency_hz, right.center_frequency_hz, right.source) == (1e6, 5e5, stated)
+    content = (tmp_path / "b.h5").read_bytes()
+    assert (made["bytes"], made["sha256"]) == (len(content), hashlib.sha256(content).hexdigest())
+    assert [one["id"] for one in http.get("/v1/datasets").json()["datasets"]] == [made["id"], before["id"]]
+
+
+def test_the_geometry_proposes_the_correction(http, here):
+    (proposal,) = http.get(f"{here}/geometry").json()["proposed_corrections"]
+    assert (proposal["what"], proposal["unit"], proposal["read_as"]) == ("times", "ms", "us")
+    made = http.post(
+        f"{here}/corrections", json={"times_in": proposal["unit"], "times_read_as": proposal["read_as"]}
+    ).json()
+    assert http.get(f"{made['links']['self']}/geometry").json()["proposed_corrections"] == []
+
+
+@pytest.mark.parametrize(
+    ("wrong", "field", "accepted"),
+    [
+        ({}, "correction", "times_in or positions_in"),
+        ({"times_in": "min"}, "times_in", "'s', 'ms', 'us' or 'ns'"),
+        ({"frequency_hz": "1 MHz"}, "frequency_hz", "number"),
+        ({"frequency_hz": 10}, "frequency_hz", "1000"),
+        ({"temperature": 20}, "temperature", "no such field"),
+        ({"positions_in": "um"}, "geometry/element_position_m", "m"),
+        ({"times_in": "s", "times_read_as": "us"}, "traveltime/delta_tof_s", "300 to 6000 m/s"),
+    ],
+)
+def test_refusals_name_field_and_accepted_values_and_leave_nothing(http, here, wrong, field, accepted):
+    answer = http.post(f"{here}/corrections", json=wrong)
+    assert (answer.status_code, answer.json()["field"]) == (422, field), answer.text
+    assert accepted in answer.json()["accepted"]
+    assert len(http.get("/v1/datasets").json()["datasets"]) == 1
+    folder = http.app.state.parts.files.of(Tenant("local")).root
+    assert len(list((folder / "datasets").iterdir())) == 1
+    assert list((folder / "incoming").iterdir()) == []
+
+
+def test_the_quota_holds(start, scan, work):
+    size = scan().stat().st_size
+    http = start(max_tenant_bytes=2 * size)
+    stream = {"Content-Type": "application/x-hdf5"}
+    here = http.post("/v1/datasets", content=scan().read_bytes(), headers=stream).json()["links"]["self"]
+    statuses = [http.post(f"{here}/corrections", json={"frequency_hz": 5e5}).status_code for _ in range(5)]
+    assert set(statuses) <= {201, 507}
+    assert statuses[-1] == 507
+    assert len(http.get("/v1/datasets").json()["datasets"]) == 1 + statuses.count(201)
+
+
+def test_another_tenant_corrects_nothing(http, scan):
+    tokens = {}
+    for tenant, scopes in (("local", ("read", "write")), ("other", ("read", "write")), ("reader", ("read",))):
+        token = ApiKey.new()
+        Keys(http.app.state.parts.database).add(token, Tenant(tenant), tenant, scopes)
+        tokens[tenant] = {"Authorization": f"Bearer {token.shown()}"}
+    stream = {"Content-Type": "application/x-hdf5", **tokens["local"]}
+    here = http.post("/v1/datasets", content=scan().read_bytes(), headers=stream).json()["links"]["self"]
+    for tenant, status in (("other", 404), ("reader", 403)):
+        theirs = http.post(f"{here}/corrections", json={"frequency_hz": 500000}, headers=tokens[tenant])
+        assert theirs.status_code == status
+    assert len(http.get("/v1/datasets", headers=tokens["local"]).json()["datasets"]) == 1
+
+
+def test_a_service_that_dies_before_the_row_leaves_the_scan(http, here, monkeypatch):
+    """Whatever file it leaves has no row; ``Orphans`` removes it, as for uploads."""
+    before, file = http.get(here).json(), http.get(f"{here}/file").content
+
+    def killed(*_, **__):
+        raise RuntimeError("in place of a kill")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(http.app.state.parts.datasets, "add", killed)
+        assert http.post(f"{here}/corrections", json=WRONG).status_code == 500
+    assert http.get("/v1/datasets").json()["datasets"] == [before]
+    assert http.get(f"{here}/file").content == file
+    assert http.post(f"{here}/corrections", json=WRONG).status_code == 201

@@ -1,0 +1,145 @@
+"""Corrected copies: values scale exactly and back; nothing else changes; what is implausible is refused."""
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.dataset import Correction, copy, correct_dataset, read_dataset, write_dataset
+from bentray_workers.files.dataset.correct import LENGTHS, TIMES, corrected
+
+from ..datasets import small
+from ..test_dataset_files import assert_same
+
+
+def usual(**changes):
+    return replace(small(), **changes)
+
+
+@pytest.mark.parametrize(
+    "dataset", [small(), usual(radius_m=0.1, sigma_s=np.full((12, 24), 1e-7), t0_s=2e-5)]
+)
+def test_a_correction_and_its_inverse_restore_the_scan(tmp_path, dataset):
+    dataset = replace(dataset, delta_tof_s=1e-3 * dataset.delta_tof_s, sampling_rate_hz=1e10)
+    source, wrong, target = (tmp_path / name for name in ("source.h5", "wrong.h5", "target.h5"))
+    write_dataset(source, dataset)
+    before = source.read_bytes()
+    correct_dataset(source, wrong, Correction("ms", "us", "cm", "mm"))
+    told = correct_dataset(wrong, target, Correction("us", "ms", "mm", "cm"), origin="ds-1")
+    made = read_dataset(target)
+    assert source.read_bytes() == before
+    assert told.source == made.source
+    stated = "Corrected copy of ds-1: times in us, read as ms before (x 0.001), lengths in mm, read as cm"
+    assert made.source.startswith(stated)
+    assert "Corrected copy of source.h5: times in ms" in made.source
+    for name in (*TIMES, *LENGTHS, "sampling_rate_hz"):
+        own, other = getattr(made, name), getattr(dataset, name)
+        assert (own is None) == (other is None), name
+        if own is not None:
+            np.testing.assert_allclose(own, other, rtol=1e-12, err_msg=name)
+    assert made.truth.spacing_m == pytest.approx(dataset.truth.spacing_m)
+    for name in ("object", "water"):
+        np.testing.assert_array_equal(getattr(made.waveform, name), getattr(dataset.waveform, name))
+    for name in ("tx", "rx", "valid"):
+        np.testing.assert_array_equal(getattr(made, name), getattr(dataset, name))
+
+
+def test_each_statement_changes_its_fields_alone():
+    dataset = usual(
+        sampling_rate_hz=1e10,
+        center_frequency_hz=2e6,
+        amplitude_frequency_hz=2e6,
+        t0_s=1e-6,
+        delta_tof_s=1e-3 * small().delta_tof_s,
+        sigma_s=np.full((12, 24), 1e-9),
+    )
+
+    def changed(**stated):
+        made = corrected(dataset, Correction(**stated), "ds-1")
+        assert made.source.startswith(f"Corrected copy of ds-1: {Correction(**stated).words()}")
+        return replace(made, source=dataset.source)
+
+    times = changed(times_in="ms", times_read_as="us")
+    assert_same(
+        times,
+        replace(
+            dataset,
+            delta_tof_s=1e3 * dataset.delta_tof_s,
+            sigma_s=1e3 * dataset.sigma_s,
+            sampling_rate_hz=1e7,
+            t0_s=1e3 * dataset.t0_s,
+        ),
+    )
+    assert_same(changed(sampling_rate_hz=2e7), replace(dataset, sampling_rate_hz=2e7))
+    assert_same(
+        changed(frequency_hz=5e5),
+        replace(dataset, center_frequency_hz=5e5, amplitude_frequency_hz=5e5),
+    )
+    other = replace(dataset, amplitude_frequency_hz=1e6)
+    assert corrected(other, Correction(frequency_hz=5e5), "x").amplitude_frequency_hz == 1e6
+    lengths = changed(positions_in="cm", positions_read_as="mm")
+    np.testing.assert_allclose(lengths.element_position_m, 10.0 * dataset.element_position_m)
+    assert lengths.truth.spacing_m == pytest.approx((1e-2, 1e-2))
+    assert lengths.truth.origin_m == pytest.approx((-0.16, -0.16))
+    np.testing.assert_array_equal(lengths.delta_tof_s, dataset.delta_tof_s)
+
+
+def test_a_sampling_rate_below_the_pulse_is_refused_unless_it_is_stated():
+    dataset = usual(delta_tof_s=1e-3 * small().delta_tof_s)
+    with pytest.raises(InvalidInput, match="state sampling_rate_hz if it was right") as caught:
+        corrected(dataset, Correction("ms", "us"), "ds-1")
+    assert caught.value.field == "sampling_rate_hz"
+    made = corrected(dataset, Correction("ms", "us", sampling_rate_hz=1e7), "ds-1")
+    assert made.sampling_rate_hz == 1e7
+
+
+@pytest.mark.parametrize(
+    ("stated", "field", "accepted"),
+    [
+        ({}, "correction", "times_in or positions_in"),
+        ({"times_in": "s"}, "correction", "times_in or positions_in"),
+        ({"times_read_as": "ms"}, "correction", "times_in or positions_in"),
+        ({"times_in": "min"}, "times_in", "one of s, ms, us, ns"),
+        ({"positions_in": "mm", "positions_read_as": "inch"}, "positions_read_as", "one of m, cm, mm, um"),
+        ({"frequency_hz": 1.0}, "frequency_hz", "1000 to"),
+        ({"sampling_rate_hz": float("nan")}, "sampling_rate_hz", "1000 to"),
+    ],
+)
+def test_wrong_corrections_name_their_field(stated, field, accepted):
+    with pytest.raises(InvalidInput) as caught:
+        Correction(**stated)
+    assert caught.value.field == field
+    assert accepted in caught.value.accepted
+
+
+def test_an_implausible_scan_is_refused_and_nothing_is_written(tmp_path):
+    write_dataset(tmp_path / "scan.h5", small())
+    with pytest.raises(InvalidInput, match="after the correction") as caught:
+        correct_dataset(tmp_path / "scan.h5", tmp_path / "new.h5", Correction(positions_in="um"))
+    assert caught.value.field == "geometry/element_position_m"
+    assert "write" not in caught.value.accepted
+    assert [path.name for path in tmp_path.iterdir()] == ["scan.h5"]
+
+
+def test_traces_are_copied_in_pieces(tmp_path, monkeypatch):
+    dataset = small()
+    traces = np.zeros((4, 8, 65536), np.int16)
+    kept = dict.fromkeys(("tof_s", "delta_tof_s", "sigma_s", "log_ratio_np", "valid", "slice_z_m"))
+    dataset = replace(
+        dataset,
+        **kept,
+        tx=np.arange(4) % len(dataset.element_position_m),
+        rx=np.arange(8) % len(dataset.element_position_m),
+        sampling_rate_hz=1e7,
+        waveform=replace(dataset.waveform, object=traces, water=None, object_scale=None, water_scale=None),
+    )
+    write_dataset(tmp_path / "scan.h5", dataset)
+    monkeypatch.setattr(copy, "PIECE_BYTES", 2**17)
+    correct_dataset(tmp_path / "scan.h5", tmp_path / "warm.h5", Correction(frequency_hz=5e5))
+    tracemalloc.start()
+    correct_dataset(tmp_path / "scan.h5", tmp_path / "new.h5", Correction(frequency_hz=5e5))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 0.5 * traces.nbytes
