@@ -20,14 +20,15 @@ WIDE: tuple[dict[str, Any], ...] = (
 )
 THIN = WIDE[1]
 
-# Standard deviation of the Gaussian across a fat ray, wavelengths, and its penalty relative to the settings.
-# The misfit cannot select the width: thinner rays fit everything better, wrong picks included.
-WIDTH_WAVES = 1.0
+# Standard deviation of the Gaussian across a fat ray: this part of √(wavelength · width of the array), the
+# scale of the Fresnel zone of the longest rays, but at most one wavelength; and its penalty relative to the
+# settings. The misfit cannot select the width: thinner rays fit everything better, wrong picks included. One
+# wavelength was chosen on arrays of 39 and 50 wavelengths; it is too wide on those of 10 to 25.
+FRESNEL_PART = 0.16
 STIFFER = 2.0
 
 # Fat rays are rejected where the misfit of thin ones is below this part of theirs: it was 0.4 to 0.5 on times
-# of the Eikonal equation labelled 400 kHz, 0.5 on a scan of ten wavelengths, 0.8 to 1.3 on other picks from
-# wave simulations.
+# of the Eikonal equation labelled 400 kHz, 0.7 to 1.3 on picks from wave simulations.
 EXACT = 0.6
 
 # Where the misfit of held-out views is below this part of the times themselves, both kinds explain the scan:
@@ -41,8 +42,9 @@ def finite_frequency_candidates(dataset: Dataset, settings: Settings) -> list[di
     """Candidates of a scan with a known frequency; none without it, and none for volumes."""
     if dataset.center_frequency_hz is None or settings.decomposition == "volume":
         return []
+    wavelength = dataset.water_speed_mps / dataset.center_frequency_hz
     more = {
-        "ray_width_m": WIDTH_WAVES * dataset.water_speed_mps / dataset.center_frequency_hz,
+        "ray_width_m": min(wavelength, FRESNEL_PART * math.sqrt(wavelength * array_width(dataset))),
         "penalty_strength": STIFFER * settings.gauss_newton.penalty_strength,
     }
     return [*({**changes, **more} for changes in WIDE), THIN]
@@ -64,6 +66,11 @@ def choose_finite_frequency(trials: Sequence[Trial], mean_time_s: float) -> Tria
     best = straight if mean_misfit(straight) < part * mean_misfit(bent) else bent
     thin = min((t for t in trials if "ray_width_m" not in t.settings), key=mean_misfit)
     return None if mean_misfit(thin) < EXACT * mean_misfit(best) else best
+
+
+def array_width(dataset: Dataset) -> float:
+    """The larger extent of the array along x or y, m: the diameter of a ring."""
+    return float(np.ptp(dataset.element_position_m[:, :2], axis=0).max())
 
 
 def mean_time(dataset: Dataset) -> float:

@@ -160,6 +160,17 @@ def test_frequency_adds_finite_frequency_candidates(scan):
     assert [one.get("penalty_strength", 0.3) for one in offered] == pytest.approx([0.6, 0.6, 0.3])
 
 
+def test_finite_frequency_rays_are_as_wide_as_the_fresnel_zone_but_at_most_a_wavelength(scan):
+    def width(frequency):
+        told = replace(scan, center_frequency_hz=frequency)
+        return finite_frequency_candidates(told, PLAN)[0]["ray_width_m"]
+
+    # The ring is 13 and 26 wavelengths wide.
+    assert width(1e5) == pytest.approx(np.sqrt(2.0) * width(2e5))
+    assert 0.5 * WATER / 1e5 < width(1e5) < 0.7 * WATER / 1e5
+    assert width(1e6) == pytest.approx(WATER / 1e6)
+
+
 def test_of_wide_rays_those_that_predict_views_better_are_chosen_unless_thin_ones_are_exact():
     def of(held_out, **changes):
         return Trial({"method": "gauss-newton", **changes}, 9.0 * held_out, held_out, held_out)
