@@ -15,7 +15,7 @@ from .scan_limits import scan_limits
 from .scan_readers import scan_readers
 from .scoreboard import scoreboard
 from .service_settings import settings_table
-from .sizing import sizing
+from .sizing import measured_sizing, sizing
 
 # A page includes one of these by a comment on its own line: <!-- from the code: commands -->
 PARTS: dict[str, Callable[[], str]] = {
@@ -28,6 +28,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "scan readers": scan_readers,
     "scoreboard": scoreboard,
     "sizing": sizing,
+    "measured sizing": measured_sizing,
     "service settings": settings_table,
     "reconstruction settings": reconstruction_settings,
 }

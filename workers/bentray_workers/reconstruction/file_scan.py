@@ -23,6 +23,7 @@ from ..files.dataset.scan import read_scan
 from ..files.dataset.traces import open_slice
 from ..files.findings import read_findings
 from ..files.reference import with_reference
+from .memory.ray_memory import PROBLEMS_KEPT
 
 
 class FileScan(NamedTuple):
@@ -89,7 +90,7 @@ def _stages(scan: FileScan) -> tuple[Settings, ...]:
     return stages(read_once(scan.path, scan.stamp, scan.settings.water_temperature_c), scan.settings)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=PROBLEMS_KEPT)
 def _problem(scan: FileScan, index: int, stage: int) -> Problem:
     return _new_problem(scan, index, stage)
 

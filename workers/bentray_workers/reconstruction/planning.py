@@ -10,7 +10,13 @@ from typing import Any, Literal
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import WIDTH_M
 from bentray_kernels.tomography.directivity import check_normals
-from bentray_kernels.tomography.model_selection.selection import CANDIDATES, final_settings, label
+from bentray_kernels.tomography.model_selection.finite_frequency_candidates import WIDE
+from bentray_kernels.tomography.model_selection.selection import (
+    CANDIDATES,
+    candidate_settings,
+    final_settings,
+    label,
+)
 from bentray_kernels.tomography.reflection.reflection_plan import check_reflection
 from bentray_kernels.tomography.requirements import check_waveform
 from bentray_kernels.tomography.sart.device_slices import MEMORY_SHARE
@@ -246,7 +252,15 @@ def _stored_bytes(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> 
     picked = len(PAIR_ARRAYS) * REAL * scan.pairs if scan.traces_bytes else 0
     each = len(IMAGES) * REAL * math.prod(shape) + KEPT * state_bytes(shape, settings) + RECORD_BYTES
     each += reflection_bytes(scan, settings)
-    return problems * each + picked
+    return problems * each + picked + _trials_bytes(scan, settings)
+
+
+def _trials_bytes(scan: Summary, settings: Settings) -> int:
+    """Checkpoints of all candidates of auto, which stay until the end of the job."""
+    if not settings.selects_model:
+        return 0
+    plans = candidate_settings(settings, (*CANDIDATES, *WIDE))
+    return sum(KEPT * state_bytes(shape_of(scan, one), one) + RECORD_BYTES for one in plans)
 
 
 def _largest_part(scan: Summary, methods: Sequence[Settings], name: str) -> str:

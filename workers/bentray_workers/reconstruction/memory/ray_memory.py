@@ -35,6 +35,14 @@ ENTRIES_LEVEL, ENTRIES_IN_SPACE = 1.55, 3.1
 # copies, and what the transforms of one processor take more than those of another.
 PROBE_ARRAYS = 26
 
+# Problems that a process keeps, of slices and stages.
+PROBLEMS_KEPT = 8
+
+# Memory that rays take in a worker over that of the rays of one iteration: those of the next do not fit where
+# these were; and while one slice is updated, rays of others are traced already. ``bentray bench sizing``
+# measured up to 1.36 for one slice and 2.4 for several.
+RAYS_OF_SLICE, RAYS_OF_SLICES = 1.4, 3.0
+
 # An entry is a column of 4 bytes and a length of 4.
 ENTRY_BYTES = 8
 
@@ -126,9 +134,12 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
     """
     shape, rays = shape_of(scan, settings), rays_of(scan, settings)
     image, field = REAL * math.prod(shape), _field_of_task(scan, settings)
+    problems = 1 if settings.decomposition == "volume" else scan.slices
     # A process caches times and losses of the dataset, and those of recent problems.
-    data = 3 * REAL * scan.pairs + 3 * REAL * emitters_of(scan, settings) * scan.receivers
-    state = FLOOR_BYTES + state_bytes(shape, settings)
+    kept = min(PROBLEMS_KEPT, problems * (settings.numerics.coarser_grids + 1))
+    data = 3 * REAL * scan.pairs + kept * 3 * REAL * emitters_of(scan, settings) * scan.receivers
+    # Before and after the task, and as the message between worker and service.
+    state = FLOOR_BYTES + 3 * state_bytes(shape, settings)
 
     def tracing(rows: int) -> dict[str, int]:
         share = min(BATCH, emitters_of(scan, settings)) / max(1, emitters_of(scan, settings))
@@ -145,6 +156,8 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
     if settings.method == "gauss-newton":
         parts["trace_rays"] = tracing(rays)
         parts["update_gauss_newton"] = solving(rays)
+        held = min(RAYS_OF_SLICE * problems, RAYS_OF_SLICES)
+        parts["update_gauss_newton"]["rays"] = math.ceil(held * parts["update_gauss_newton"]["rays"])
     elif sart_engine(settings, len(shape)) == "opencl":
         parts["update_sart_slices"] = _parts_together(scan, settings, data)
     elif solver_of(settings, len(shape)).compiled:
