@@ -22,6 +22,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
+    "shared_scans",
     "sphinx_gallery.gen_gallery",
     "from_code",
     "mathml",

@@ -6,7 +6,7 @@ little in the second, where no first arrival crosses the depth of the fat.
 """
 
 # %%
-# Scans with 96 elements, images by SART with three iterations. The mean absolute error is over the range of
+# Scans with 64 elements, images by SART with three iterations. The mean absolute error is over the range of
 # the phantom, inside the breast; below it that of the best constant, to which every image must be compared.
 
 import matplotlib.pyplot as plt
@@ -16,7 +16,7 @@ import bentray
 
 figure, axes = plt.subplots(2, 3, figsize=(9.5, 6), layout="constrained", sharex=True, sharey=True)
 for row, water in zip(axes, (1375.0, 1500.0), strict=True):
-    scan = bentray.simulate(elements=96, nodes=64, coupling_mps=water, progress=False)
+    scan = bentray.simulate(elements=64, nodes=64, coupling_mps=water, progress=False)
     for ax, rays in zip(row[1:], ("straight", "curved"), strict=True):
         result = bentray.reconstruct(scan, "sart", rays=rays, nodes=64, iterations=3, progress=False)
         found = result.compare()

@@ -14,7 +14,7 @@ import numpy as np
 
 import bentray
 
-scan = bentray.simulate(elements=64, nodes=48, coupling_mps=1400.0, snr=30.0, progress=False)
+scan = bentray.simulate(elements=48, nodes=48, coupling_mps=1400.0, snr=30.0, progress=False)
 kinds = {
     "total variation": {"penalty": "total-variation"},
     "total variation with edges": {"penalty": "total-variation", "edge_mps": 7.0},

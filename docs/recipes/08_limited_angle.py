@@ -14,13 +14,13 @@ import numpy as np
 
 import bentray
 
-ring = bentray.simulate(elements=96, nodes=64, coupling_mps=1375.0, progress=False)
+ring = bentray.simulate(elements=64, nodes=64, coupling_mps=1375.0, progress=False)
 ring.save("ring.h5")
 
 
 def arc_of(degrees, target):
     """The scan of the elements within an arc."""
-    kept = np.arange(96) < 96 * degrees // 360
+    kept = np.arange(64) < 64 * degrees // 360
     with h5py.File("ring.h5") as source, h5py.File(target, "w") as file:
         source.copy("/", file, name="scan")
         for name in list(file["scan"]):
@@ -38,7 +38,7 @@ for ax, degrees in zip(axes, (360, 270, 200), strict=True):
     found = result.compare()
     result.plot(low=1360, high=1570, ax=ax)
     ax.set_title(f"{degrees}°: {found.rms:.0f} m/s rms")
-    x, y = 1e3 * scan.position_m[: 96 * degrees // 360].T
+    x, y = 1e3 * scan.position_m[: 64 * degrees // 360].T
     ax.plot(x, y, ".", color="black", markersize=2)
 print(f"constant: {np.std(found.other[found.region]):.0f} m/s rms")
 

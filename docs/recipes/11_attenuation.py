@@ -13,7 +13,7 @@ import numpy as np
 
 import bentray
 
-scan = bentray.simulate(elements=96, nodes=64, coupling_mps=1375.0, attenuation=True, progress=False)
+scan = bentray.simulate(elements=64, nodes=64, coupling_mps=1375.0, attenuation=True, progress=False)
 result = bentray.reconstruct(scan, "gauss-newton", nodes=64, attenuation=True, progress=False)
 found = result.compare(quantity="attenuation")
 

@@ -5,7 +5,7 @@ Coverage, residuals and a checkerboard show how much of an image the data suppor
 """
 
 # %%
-# The same phantom with 24 and with 96 elements, both with a resolution check.
+# The same phantom with 24 and with 64 elements, both with a resolution check.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 import bentray
 
 figure, axes = plt.subplots(2, 3, figsize=(10.5, 6.2), layout="constrained", sharex=True, sharey=True)
-for row, elements in zip(axes, (24, 96), strict=True):
+for row, elements in zip(axes, (24, 64), strict=True):
     scan = bentray.simulate(elements=elements, nodes=64, coupling_mps=1375.0, progress=False)
     result = bentray.reconstruct(scan, "gauss-newton", nodes=64, resolution_check=True, progress=False)
     for ax, quantity in zip(row, ("speed", "coverage", "recovery"), strict=True):
