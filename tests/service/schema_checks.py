@@ -29,7 +29,11 @@ VIEW = {
     "ray_spacing",
     # Rays of the whole picture.
     "width, height, degree",
+    # The tests forbid OpenCL devices.
+    "device",
 }
+# An address on the public internet.
+WEBHOOK = "webhook"
 # Random bytes are none of the files that are accepted, or are empty.
 FILE = {"file", "body"}
 SETTINGS = {
@@ -59,14 +63,26 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
     # What is left of it; the digest of this body. Schemathesis itself sends "0", against the pattern.
     "PATCH /v1/uploads/{upload_id}": {413: {"body"}, 460: {"body"}, 400: {"Upload-Checksum"}},
     # A volume, or a mesh, that the job can be done with.
-    "POST /v1/jobs": {422: {*(f"settings.{name}" for name in SETTINGS), "settings", "volume", "mesh"}},
-    # As those of each of its jobs.
-    "POST /v1/batches": {422: {*(f"settings.{name}" for name in SETTINGS), "settings"}},
+    "POST /v1/jobs": {
+        422: {*(f"settings.{name}" for name in SETTINGS), "settings", "volume", "mesh", WEBHOOK}
+    },
+    # As those of each of its jobs; each dataset once.
+    "POST /v1/batches": {422: {*(f"settings.{name}" for name in SETTINGS), "settings", "datasets", WEBHOOK}},
     # A name that no other project has, as many as a tenant may have; a member, as many as a project may have.
     "POST /v1/projects": {422: {"name", "projects"}},
     "PATCH /v1/projects/{project_id}": {422: {"name"}},
     "PUT /v1/projects/{project_id}/members": {422: {"member", "members", "role"}},
-    "POST /v1/plans": {422: {*(f"settings.{name}" for name in SETTINGS), "settings", "volume", "mesh"}},
+    "POST /v1/plans": {
+        422: {*(f"settings.{name}" for name in SETTINGS), "settings", "volume", "mesh", WEBHOOK}
+    },
+    # As an upload, a scan that is plausible after the correction; what the scan has; not what it was before.
+    "POST /v1/datasets/{dataset_id}/corrections": {
+        422: {
+            *("times_in", "times_read_as", "positions_in", "positions_read_as", "sampling_rate_hz"),
+            *("frequency_hz", "corrections", "traveltime/delta_tof_s", "geometry/element_position_m"),
+            *("acquisition/sampling_rate_hz", "acquisition/center_frequency_hz", "acquisition/t0_s"),
+        }
+    },
     # An emission and a slice that the scan has; traces that it has.
     "GET /v1/datasets/{dataset_id}/traces": {422: {"emission", "slice", "quantity"}},
     "GET /v1/volumes/{volume_id}/slice.png": {

@@ -20,6 +20,9 @@ from ...files.dataset.counts import Traces
 # Overhead of Python in any task.
 FLOOR_BYTES = 13 * 2**20 // 2
 
+# Of a band's grid, windows and spectra, which are small beside the arrays.
+START_BYTES = 2**20
+
 # Of the waves through the image that are compared, besides those of the start of a band.
 VALIDATION_BYTES = 2 * 2**20
 
@@ -140,6 +143,7 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
         )
     return {
         "start_band": base
+        + START_BYTES
         + 2 * traces.read_bytes
         + max(SAMPLER_BYTES * traces.samples * extent.steps, SHOTS * SHOT_BYTES * samples)
         + medium
