@@ -223,7 +223,7 @@ def overview() -> Image.Image:
 def viewer(
     scan: Dataset | None = None,
     settings: Mapping[str, Any] = MappingProxyType({"method": "sart", "nodes": 96}),
-    size: tuple[int, int] = (1200, 1180),
+    size: tuple[int, int] = (1200, 1360),
 ) -> Image.Image:
     """The page of a result, with a profile and a region."""
     marks = "profile=-75,0,75,0&ellipse=-12,12,18,44"

@@ -17,10 +17,12 @@ from typing import Any
 import pytest
 import yaml
 
-ROOT = Path(__file__).resolve().parents[2]
+from . import programs
+from .conftest import RELEASED
+from .programs import ROOT
+
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PROJECT = PYPROJECT["project"]
-RELEASED = {"SOURCE_DATE_EPOCH": "1767225600"}
 # In the wheel.
 DOCUMENTATION = "bentray_service/web/built_documentation/"
 PACKAGES = PYPROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
@@ -29,29 +31,8 @@ ADDRESSES = ("/", "/docs", "/documentation/", "/static/app.js", "/openapi.json")
 
 
 def run(*command: str, folder: Path) -> str:
-    done = subprocess.run(
-        [sys.executable, *command],
-        cwd=folder,
-        env=os.environ | RELEASED,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    return done.stdout
-
-
-@pytest.fixture(scope="module")
-def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Wheel and sdist of this tree, with a documentation of two files."""
-    folder, pages = tmp_path_factory.mktemp("dist"), tmp_path_factory.mktemp("pages")
-    (pages / "_static").mkdir()
-    (pages / "_static" / "pages.css").write_text("p { color: black; }")
-    (pages / "index.html").write_text(f"<!doctype html><title>Bentray</title><p>{'text ' * 300}</p>")
-    with pytest.MonkeyPatch.context() as environment:
-        environment.setenv("BENTRAY_DOCUMENTATION", str(pages))
-        run("-m", "hatchling", "build", "-d", str(folder), "-t", "sdist", "-t", "wheel", folder=ROOT)
-    return folder
+    """The output of Python in a folder, at the time of a release."""
+    return programs.run(sys.executable, *command, folder=folder, variables=os.environ | RELEASED)
 
 
 def only(folder: Path, pattern: str) -> Path:

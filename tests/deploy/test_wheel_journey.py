@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from .programs import ROOT, run
+
 PAGES = ("/", "/docs", "/documentation/", "/openapi.json")
 SESSION = """
 import sys, bentray
@@ -49,33 +50,15 @@ class Environment:
         self.variables = {**kept, "HOME": str(self.home), "PATH": f"{self.programs}:/usr/bin:/bin"}
 
     def run(self, program: str, *words: str) -> str:
-        done = subprocess.run(
-            [str(self.programs / program), *words],
-            cwd=self.home,
-            env=self.variables,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr[-2000:]
-        return done.stdout
+        command = (str(self.programs / program), *words)
+        return run(*command, folder=self.home, variables=self.variables)
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Environment:
+def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Environment:
     """As how-to/install-without-a-network.md says, but from the package index."""
     folder = tmp_path_factory.mktemp("journey")
-    pages = folder / "pages"
-    pages.mkdir()
-    (pages / "index.html").write_text("<!doctype html><title>Bentray</title>")
-    subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-d", str(folder / "dist"), "-t", "wheel"],
-        cwd=ROOT,
-        env={**os.environ, "BENTRAY_DOCUMENTATION": str(pages)},
-        check=True,
-        capture_output=True,
-    )
-    (wheel,) = (folder / "dist").glob("*.whl")
+    (wheel,) = dist.glob("*.whl")
     shutil.copy(ROOT / "requirements.lock", folder)
     subprocess.run([sys.executable, "-m", "venv", str(folder / "env")], check=True)
     found = Environment(folder)

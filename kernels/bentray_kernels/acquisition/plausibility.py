@@ -29,13 +29,26 @@ LENGTHS = {"cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "km": 1e3}
 TIMES = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
 
 
+class ImplausibleUnit(InvalidInput):
+    """Lengths or times that are wrong in SI units.
+
+    Attributes:
+        plain: what is accepted, without the likely unit.
+        unit: the likely unit; empty where none is.
+    """
+
+    def __init__(self, field: str, value: object, plain: str, hint: str = "", unit: str = "") -> None:
+        self.plain, self.unit = plain, unit
+        super().__init__(field, value, f"{plain}{hint}")
+
+
 def check_plausible(dataset: Dataset) -> None:
     """Reject a scan whose lengths or times are in another unit, or physically impossible.
 
     Traces are not read: they may remain in the file.
 
     Raises:
-        InvalidInput: naming the field, its value, and the unit that is likely.
+        InvalidInput: naming the field and its value; ``ImplausibleUnit`` with the unit that is likely.
     """
     _check_places(dataset)
     for place, times in (
@@ -60,30 +73,29 @@ def _check_places(dataset: Dataset) -> None:
     # Halved, so that the difference of the largest numbers is finite.
     width = 2.0 * float(np.ptp(0.5 * position, axis=0).max())
     if not WIDTH_M.holds(width):
-        raise InvalidInput(
-            POSITION, f"an array {width:.4g} m wide", f"{WIDTH_M.words}{_length_hint(width, 'positions')}"
-        )
+        found = f"an array {width:.4g} m wide"
+        raise ImplausibleUnit(POSITION, found, WIDTH_M.words, *_length_hint(width, "positions"))
     rules.within_or_nan(POSITION, position, PLACE_M)
     if dataset.radius_m is not None and not RADIUS_M.holds(dataset.radius_m):
-        hint = _length_hint(2.0 * dataset.radius_m, "radius")
-        raise InvalidInput("geometry@radius_m", f"{dataset.radius_m:.4g}", f"{RADIUS_M.words}{hint}")
+        found, hint = f"{dataset.radius_m:.4g}", _length_hint(2.0 * dataset.radius_m, "radius")
+        raise ImplausibleUnit("geometry@radius_m", found, RADIUS_M.words, *hint)
     if dataset.slice_z_m is not None:
         height = 2.0 * float(np.ptp(0.5 * dataset.slice_z_m))
         if height > WIDTH_M.most:
-            accepted = f"at most {WIDTH_M.most:g} m{_length_hint(height, 'heights')}"
-            raise InvalidInput("slice/z_m", f"slices over {height:.4g} m", accepted)
+            found, hint = f"slices over {height:.4g} m", _length_hint(height, "heights")
+            raise ImplausibleUnit("slice/z_m", found, f"at most {WIDTH_M.most:g} m", *hint)
         rules.within_or_nan("slice/z_m", dataset.slice_z_m, PLACE_M)
 
 
-def _length_hint(width: float, what: str) -> str:
-    """A hint at the unit in which a width would be nearest to the typical one."""
+def _length_hint(width: float, what: str) -> tuple[str, str]:
+    """A hint at the unit in which a width would be nearest to the typical one, and that unit."""
     widths = {unit: width * factor for unit, factor in LENGTHS.items() if WIDTH_M.holds(width * factor)}
     if not widths:
-        return ""
+        return "", ""
     unit = min(widths, key=lambda name: abs(np.log(widths[name] / USUAL_M)))
     verb = "looks" if what == "radius" else "look"
     this = "this" if what == "radius" else "these"
-    return f"; {this} {what} {verb} like {unit}: write m"
+    return f"; {this} {what} {verb} like {unit}: write m", unit
 
 
 def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
@@ -104,9 +116,10 @@ def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
     low, high = BULK_MPS
     middle = np.argsort(time)[time.size // 2]
     value = f"{time[middle]:.4g} s between elements {distance[middle]:.3g} m apart, as most pairs have"
-    hint = next((f"; these times look like {unit}: write s" for unit in TIMES if plausible(TIMES[unit])), "")
-    accepted = f"times in s of sound that runs at {low:g} to {high:g} m/s between them{hint}"
-    raise InvalidInput(place, value, accepted)
+    unit = next((unit for unit in TIMES if plausible(TIMES[unit])), "")
+    hint = f"; these times look like {unit}: write s" if unit else ""
+    plain = f"times in s of sound that runs at {low:g} to {high:g} m/s between them"
+    raise ImplausibleUnit(place, value, plain, hint, unit)
 
 
 def _sample_pairs(dataset: Dataset, times: Floats) -> tuple[Floats, Floats]:

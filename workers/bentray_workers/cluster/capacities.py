@@ -22,7 +22,7 @@ MIB = 2**20
 
 Lane = Literal["recon", "opencl"]
 
-# Memory of a warm worker (266 MiB were measured), and of a picture drawn beside its task.
+# Memory of a warm worker (380 MiB were measured), and of a picture drawn beside its task.
 WARM_BYTES = 384 * MIB
 
 # Dask pauses a worker that uses more than this part of its memory limit.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.plausibility import ImplausibleUnit
 from bentray_kernels.errors import InvalidInput
 
 from ..files.dataset.copy import copy_dataset
@@ -20,9 +20,6 @@ from .open_scan import OpenScan, open_scan
 from .readers import reader_of
 from .scan_metadata import POSITION, ArraysWithMetadata, ScanMetadata
 from .scan_reader import Layout
-
-# The unit that ``check_plausible`` proposes.
-PROPOSED = re.compile(r"looks? like (\S+): write (?:m|s)$")
 
 
 def convert_dataset(
@@ -84,11 +81,10 @@ def _read(scan: OpenScan, given: ScanMetadata) -> tuple[Arrays, Layout]:
     arrays: Arrays = ArraysWithMetadata(own, given) if given else own
     try:
         return arrays, reads(arrays)
-    except InvalidInput as error:
-        proposed = PROPOSED.search(error.accepted)
-        if proposed is None:
+    except ImplausibleUnit as error:
+        if not error.unit:
             raise
-        accepted = f"{error.accepted}, or state the unit: --unit {proposed[1].replace('µ', 'u')}"
+        accepted = f"{error.accepted}, or state the unit: --unit {error.unit.replace('µ', 'u')}"
         raise InvalidInput(error.field, error.value, accepted) from None
 
 

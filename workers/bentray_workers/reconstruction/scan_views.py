@@ -19,7 +19,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.picker_names import DEFAULT_PICKER
 
 from ..files.dataset import read_dataset
-from ..files.dataset.scan import measured_spectrum, spectrum_of
+from ..files.dataset.scan import measured_spectrum
 from ..files.dataset.traces import lacks_water, open_slice, trace_samples
 from ..files.dataset.units import propose
 
@@ -40,7 +40,7 @@ def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> di
     recorded = read_dataset(path, traces=False)
     scan = recorded.in_water_of(water_temperature_c)
     measured = _measured_frequency(path, scan)
-    frequency = measured if scan.center_frequency_hz is None else scan.center_frequency_hz
+    frequency = scan.center_frequency_hz or measured
     every = max(1, math.ceil(len(scan.element_position_m) / MAX_ELEMENTS))
     shown = np.arange(0, len(scan.element_position_m), every)
     same = int((scan.tx[:, None] == scan.rx[None, :]).sum())
@@ -95,7 +95,11 @@ def emission_traces(
         if not 0 <= value < count:
             raise InvalidInput(name, value, f"0 to {count - 1}")
     # The picker alone needs it; its estimate reads traces of other emissions too.
-    frequency = None if scan.picked or lacks_water(path) else _frequency(path, scan)
+    frequency = (
+        None
+        if scan.picked or lacks_water(path)
+        else scan.center_frequency_hz or _measured_frequency(path, scan)
+    )
     with open_slice(path, scan, index) as one:
         traces = None if one.waveform is None else getattr(one.waveform, what)
         if traces is None or one.sampling_rate_hz is None:
@@ -129,18 +133,10 @@ def emission_traces(
 
 def _measured_frequency(path: Path, scan: Dataset) -> float | None:
     """Centre frequency of the traces, Hz; None without a pulse in them."""
+    # Traces without a pulse are a finding of the quality report.
     with suppress(InvalidInput):
         spectrum = measured_spectrum(path, scan)
         return None if spectrum is None else spectrum.center_frequency_hz
-    return None
-
-
-def _frequency(path: Path, scan: Dataset) -> float | None:
-    """Centre frequency of the file, Hz, else that of its traces; None without a pulse in them."""
-    # Traces without a pulse are a finding of the quality report.
-    with suppress(InvalidInput):
-        spectrum = spectrum_of(path, scan)
-        return scan.center_frequency_hz if spectrum is None else spectrum.center_frequency_hz
     return None
 
 

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as some
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import Correction, copy, correct_dataset, read_dataset, write_dataset
@@ -44,6 +46,37 @@ def test_a_correction_and_its_inverse_restore_the_scan(tmp_path, dataset):
         np.testing.assert_array_equal(getattr(made.waveform, name), getattr(dataset.waveform, name))
     for name in ("tx", "rx", "valid"):
         np.testing.assert_array_equal(getattr(made, name), getattr(dataset, name))
+
+
+# Units of the file and units read, by which this scan stays plausible.
+UNITS = [
+    (*times, *lengths)
+    for times in (("ms", "us"), ("us", "ns"), ("s", "ms"), (None, "s"))
+    for lengths in (("cm", "mm"), ("mm", "cm"), (None, "m"))
+    if times[0] or lengths[0]
+]
+
+
+@given(
+    units=some.sampled_from(UNITS),
+    share=some.floats(1e-9, 1e-3),
+    t0_s=some.just(0.0) | some.floats(1e-9, 1e-6),
+    sampling_rate_hz=some.floats(1e10, 9e10),
+)
+def test_the_inverse_of_any_correction_restores_every_value(units, share, t0_s, sampling_rate_hz):
+    true_times, read_times, true_lengths, read_lengths = units
+    dataset = usual(
+        delta_tof_s=share * small().delta_tof_s, tof_s=None, t0_s=t0_s, sampling_rate_hz=sampling_rate_hz
+    )
+    inverse = Correction(
+        true_times and read_times, true_times or "s", true_lengths and read_lengths, true_lengths or "m"
+    )
+    made = corrected(corrected(dataset, Correction(*units), "scan"), inverse, "scan")
+    for name in (*TIMES, *LENGTHS, "sampling_rate_hz"):
+        own, stored = getattr(made, name), getattr(dataset, name)
+        assert (own is None) == (stored is None), name
+        if stored is not None:
+            np.testing.assert_allclose(own, stored, rtol=1e-12, err_msg=name)
 
 
 def test_each_statement_changes_its_fields_alone():

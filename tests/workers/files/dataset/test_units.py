@@ -46,9 +46,12 @@ def test_lengths_in_another_unit(factor):
     np.testing.assert_allclose(made.element_position_m, usual.element_position_m)
 
 
+@pytest.mark.parametrize("contrast", [0.3, 1.0, 4.0])
 @pytest.mark.parametrize("factor", [1e-3, 1e-6, 1e-9])
-def test_times_in_another_unit(factor):
-    (proposal,) = propose(replace(breast(), delta_tof_s=factor * breast().delta_tof_s), None)
+def test_times_in_another_unit(factor, contrast):
+    usual = replace(breast(), delta_tof_s=contrast * breast().delta_tof_s)
+    assert propose(usual, None) == []
+    (proposal,) = propose(replace(usual, delta_tof_s=factor * usual.delta_tof_s), None)
     assert proposal.what == "times"
     assert TIME_UNITS[proposal.unit] / TIME_UNITS[proposal.read_as] == pytest.approx(1.0 / factor)
 

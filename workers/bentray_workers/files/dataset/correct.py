@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.plausibility import check_plausible
+from bentray_kernels.acquisition.plausibility import ImplausibleUnit, check_plausible
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import FREQUENCY_HZ, SAMPLING_HZ
 
@@ -154,7 +154,7 @@ def corrected(dataset: Dataset, correction: Correction, origin: str) -> Dataset:
             )
     except InvalidInput as error:
         # A unit that is proposed there is that of the corrected values.
-        accepted = error.accepted.partition("; these")[0].partition("; this")[0]
+        accepted = error.plain if isinstance(error, ImplausibleUnit) else error.accepted
         raise InvalidInput(error.field, f"{error.value}, after the correction", accepted) from error
     return made
 

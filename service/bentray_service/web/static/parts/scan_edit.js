@@ -156,7 +156,7 @@ function corrector(scan) {
 function proposalInWords({ what, unit, read_as: readAs, frequency_hz: hertz, reason }) {
   if (what === "frequency") return `${reason}. Was the frequency ${1e-3 * hertz} kHz?`;
   const [words, units] = what === "times" ? ["times", TIMES] : ["lengths", LENGTHS];
-  return `${reason}. Were ${words} in ${units[unit]} read as ${units[readAs]}? Correct units or frequency has this filled in.`;
+  return `${reason}. Were ${words} in ${units[unit]} read as ${units[readAs]}? The form “Correct units or frequency” is filled in with this.`;
 }
 
 // A button beside the fact "Water" that opens the form.
