@@ -50,8 +50,8 @@ class Service:
         self.url = f"http://127.0.0.1:{self._port}"
         self._environment = {**os.environ, "BENTRAY_DATA_DIR": str(folder)}
 
-    def start(self):
-        command = [sys.executable, "-c", PROGRAM, str(self._port)]
+    def start(self, prelude=""):
+        command = [sys.executable, "-c", prelude + PROGRAM, str(self._port)]
         self._process = subprocess.Popen(command, env=self._environment)
         wait_for(lambda: httpx.get(f"{self.url}/health/live").is_success)
 
