@@ -62,7 +62,7 @@ def places(shared_service):
     marks = "profile=-8,-15,0,-5&ellipse=-8,-15,0,-5"
     return address, {
         "/": "Sixteen elements",
-        # With the form of all settings open.
+        # With the form of all settings open, and that of corrections with a refusal.
         f"/scans/{sent.json()['id']}?from={plane[0]}": "Receiving element 0",
         f"/jobs/{plane[0]}?{marks}": "node ",
         f"/jobs/{volume}?planes=3": "node ",
@@ -95,6 +95,10 @@ def opened(page, address, path, text):
     page.goto("about:blank")
     page.goto(f"{address}/#{path}")
     page.locator("main").get_by_text(text).first.wait_for()
+    if path.startswith("/scans/"):
+        page.get_by_role("button", name="Correct units or frequency").click()
+        page.get_by_role("button", name="Make a corrected copy").click()
+        page.locator("#correct-error").get_by_text("changes nothing").wait_for()
 
 
 def serious(page, path, scheme):
