@@ -46,7 +46,6 @@ from .routes import (
     batches,
     cluster_health,
     datasets,
-    direct_uploads,
     events,
     geometry_fields,
     health,
@@ -59,9 +58,9 @@ from .routes import (
     projects,
     refraction,
     sign_in,
-    tus,
     volumes,
 )
+from .routes.uploads import direct_uploads, tus
 from .rows.ages import ExpiryMarks
 from .rows.batches import Batches
 from .rows.checksums import Checksums

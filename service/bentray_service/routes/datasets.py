@@ -20,8 +20,8 @@ from .downloads import download, download_of
 from .models.job_records import DatasetList, DatasetRecord
 from .models.name_changes import TEXT
 from .record_conversion import dataset_record
-from .upload_metadata import scan_metadata
-from .uploads import body_of, receive_upload
+from .uploads.one_shot_uploads import body_of, receive_upload
+from .uploads.upload_metadata import scan_metadata
 
 HDF5 = "application/x-hdf5"
 MEDIA_TYPES = (HDF5, "application/octet-stream")

@@ -23,7 +23,7 @@ from .bodies import Limit, accept_media_types
 from .models.surface_records import MeshList, MeshRecord
 from .pictures import while_connected
 from .record_conversion import mesh_record
-from .uploads import body_of, receive_upload
+from .uploads.one_shot_uploads import body_of, receive_upload
 
 MEDIA_TYPES = (
     "application/octet-stream",

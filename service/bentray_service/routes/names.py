@@ -21,7 +21,7 @@ from .bodies import SmallBody, accept_media_types
 from .models.job_records import DatasetRecord, JobRecord
 from .models.name_changes import DatasetChanges, JobChanges, ScanCorrection
 from .record_conversion import dataset_record, job_record
-from .uploads import run_in_turn
+from .uploads.one_shot_uploads import run_in_turn
 
 JSON = [Depends(accept_media_types("application/json"))]
 REFUSALS = problems(400, 404, 413, 415, 422)

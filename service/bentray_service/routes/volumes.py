@@ -15,8 +15,8 @@ from . import coefficients, histograms, slices, volume_data, volume_summaries
 from .bodies import Limit, accept_media_types
 from .models.job_records import VolumeList, VolumeRecord
 from .record_conversion import volume_record
-from .upload_metadata import SHAPE, SPACING, volume_metadata
-from .uploads import body_of, receive_upload
+from .uploads.one_shot_uploads import body_of, receive_upload
+from .uploads.upload_metadata import SHAPE, SPACING, volume_metadata
 
 MEDIA_TYPES = ("application/octet-stream", "application/x-npy", "application/x-hdf5")
 

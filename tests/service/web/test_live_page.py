@@ -113,7 +113,7 @@ def test_progress_between_two_reports_is_even(page, shared_service):
     page.goto(shared_service.address)
     shares, left, next_phase = page.evaluate(
         """async () => {
-          const { ProgressEstimate } = await import("/static/parts/progress_estimate.js");
+          const { ProgressEstimate } = await import("/static/jobs/progress_estimate.js");
           const one = new ProgressEstimate();
           const shares = [];
           for (let now = 0; now <= 40; now += 1) {
@@ -137,7 +137,7 @@ def test_a_total_that_changes_changes_the_pace_and_the_bar_never_jumps(page, sha
     page.goto(shared_service.address)
     shares, left = page.evaluate(
         """async () => {
-          const { ProgressEstimate } = await import("/static/parts/progress_estimate.js");
+          const { ProgressEstimate } = await import("/static/jobs/progress_estimate.js");
           const one = new ProgressEstimate();
           const shares = [], left = [];
           // Trials end early: fewer tasks than planned. Later there are some more.

@@ -2,9 +2,9 @@
 import { parse } from "../parts/address.js";
 import { request } from "../parts/api.js";
 import { make } from "../parts/dom.js";
-import { jobList } from "../parts/job_list.js";
-import { liveJob } from "../parts/live_job.js";
-import { showWebhook } from "../parts/webhook_panel.js";
+import { jobList } from "../jobs/job_list.js";
+import { liveJob } from "../jobs/live_job.js";
+import { showWebhook } from "../jobs/webhook_panel.js";
 
 export async function open(page, parameters) {
   const { id } = parameters;

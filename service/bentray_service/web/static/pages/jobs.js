@@ -1,7 +1,7 @@
 // All jobs in a table, newest first, below batches of them; with "batch" in the address those of one batch.
 import { make } from "../parts/dom.js";
-import { jobTable } from "../parts/job_table.js";
-import { showBatches } from "../parts/batches.js";
+import { jobTable } from "../jobs/job_table.js";
+import { showBatches } from "../jobs/batches.js";
 
 export async function open(root, { query }) {
   const batch = query.get("batch");

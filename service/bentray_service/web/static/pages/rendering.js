@@ -4,7 +4,7 @@ import { request } from "../parts/api.js";
 import { fillDefaults } from "../parts/defaults.js";
 import { at, showError } from "../parts/dom.js";
 import { drawHistogram } from "../parts/histogram.js";
-import { jobList } from "../parts/job_list.js";
+import { jobList } from "../jobs/job_list.js";
 import { withKey } from "../parts/key.js";
 import { orbit } from "../parts/orbit.js";
 import { deleteStored, fillSelect, startJob } from "../parts/panel.js";

@@ -1,15 +1,15 @@
 // One scan: its geometry, facts, quality and traces, the reconstruction to start, and the reconstructions of it.
 import { request } from "../parts/api.js";
 import { at, make, showError } from "../parts/dom.js";
-import { jobList } from "../parts/job_list.js";
+import { jobList } from "../jobs/job_list.js";
 import { show, withKey } from "../parts/key.js";
 import { startJob } from "../parts/panel.js";
 import { planInWords, planOf, queueInWords, timeInWords } from "../parts/plan_estimate.js";
-import { drawElements, inWordsOf } from "../parts/scan_drawing.js";
-import { correctButton, scanEditor } from "../parts/scan_edit.js";
-import { factRows, fillFacts, showQuality } from "../parts/scan_facts.js";
+import { drawElements, inWordsOf } from "../scans/scan_drawing.js";
+import { correctButton, scanEditor } from "../scans/scan_edit.js";
+import { factRows, fillFacts, showQuality } from "../scans/scan_facts.js";
 import { settingsForm } from "../parts/settings_form.js";
-import { openShot } from "../parts/shot.js";
+import { openShot } from "../scans/shot.js";
 import { titleOf } from "../parts/titles.js";
 
 const PAGE = `

@@ -4,7 +4,7 @@ import { request } from "../parts/api.js";
 import { fillDefaults } from "../parts/defaults.js";
 import { at, make, showError } from "../parts/dom.js";
 import { objectAt, objectsOf, placeAt } from "../parts/ground.js";
-import { jobList } from "../parts/job_list.js";
+import { jobList } from "../jobs/job_list.js";
 import { orbit } from "../parts/orbit.js";
 import { deleteStored, fillSelect, startJob } from "../parts/panel.js";
 import { pictureStream, rateOf } from "../parts/picture_stream.js";

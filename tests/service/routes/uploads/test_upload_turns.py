@@ -10,8 +10,8 @@ from starlette.requests import ClientDisconnect, Request
 from bentray_service.errors import Busy
 from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.upload_limits import MAX_PER_TENANT
-from bentray_service.routes import uploads
-from bentray_service.routes.uploads import run_in_turn
+from bentray_service.routes.uploads import one_shot_uploads
+from bentray_service.routes.uploads.one_shot_uploads import run_in_turn
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
@@ -82,7 +82,7 @@ def test_disconnected_client_leaves_the_queue(queue):
 
 
 def test_long_wait_is_rejected_with_503(queue, monkeypatch):
-    monkeypatch.setattr(uploads, "LONGEST_WAIT_S", 0.01)
+    monkeypatch.setattr(one_shot_uploads, "LONGEST_WAIT_S", 0.01)
 
     async def ask():
         request = Request({"type": "http"}, asyncio.Event().wait)

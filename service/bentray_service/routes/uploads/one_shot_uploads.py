@@ -11,15 +11,15 @@ from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
-from ..errors import Busy
-from ..ingest.canonical import IngestLimits, make_canonical
-from ..ingest.fair_queue import FairQueue
-from ..ingest.ingest_process import ACCEPTED
-from ..ingest.receive import Received, receive
-from ..rows.ids import new_id
-from ..rows.stored_tables import UploadedTable
-from ..rows.tenants import Tenant
-from ..wiring import Parts
+from ...errors import Busy
+from ...ingest.canonical import IngestLimits, make_canonical
+from ...ingest.fair_queue import FairQueue
+from ...ingest.ingest_process import ACCEPTED
+from ...ingest.receive import Received, receive
+from ...rows.ids import new_id
+from ...rows.stored_tables import UploadedTable
+from ...rows.tenants import Tenant
+from ...wiring import Parts
 
 # Longest wait of a request in the ingest queue, s; proxies rarely wait longer.
 LONGEST_WAIT_S = 300.0

@@ -1,13 +1,13 @@
 // The table of jobs: one row a job, with filters and pages in the address; kept up to date while it is open.
-import { keepQuery } from "./address.js";
-import { request } from "./api.js";
-import { make } from "./dom.js";
+import { keepQuery } from "../parts/address.js";
+import { request } from "../parts/api.js";
+import { make } from "../parts/dom.js";
 import { followJobs } from "./followed_jobs.js";
 import { jobFilters } from "./job_filters.js";
-import { inTime } from "./amounts.js";
-import { duration, inWords, moment } from "./job_words.js";
-import { methodOf } from "./results.js";
-import { loadTitles, titleOfJob } from "./titles.js";
+import { inTime } from "../parts/amounts.js";
+import { duration, inWords, moment } from "../parts/job_words.js";
+import { methodOf } from "../parts/results.js";
+import { loadTitles, titleOfJob } from "../parts/titles.js";
 
 const PAGE = 25;
 const ENDED = ["succeeded", "failed", "cancelled"];

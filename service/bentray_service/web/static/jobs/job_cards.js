@@ -1,10 +1,10 @@
 // The list of jobs: one card a job, kept and updated in place so that the focus and the pictures stay.
-import { inNanoseconds } from "./amounts.js";
-import { inWords, request } from "./api.js";
-import { make } from "./dom.js";
-import { duration } from "./job_words.js";
-import { show, showOnceNear, withKey } from "./key.js";
-import { glassOf, queryOf } from "./views.js";
+import { inNanoseconds } from "../parts/amounts.js";
+import { inWords, request } from "../parts/api.js";
+import { make } from "../parts/dom.js";
+import { duration } from "../parts/job_words.js";
+import { show, showOnceNear, withKey } from "../parts/key.js";
+import { glassOf, queryOf } from "../parts/views.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RAYS = { curved: "Bent rays", straight: "Straight rays" };

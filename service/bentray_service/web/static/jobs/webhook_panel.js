@@ -1,8 +1,8 @@
 // The webhook of a job: state of its message, every attempt to send it with the answer, and the time of the next one.
-import { inTime } from "./amounts.js";
-import { request } from "./api.js";
-import { make } from "./dom.js";
-import { headedTable } from "./tables.js";
+import { inTime } from "../parts/amounts.js";
+import { request } from "../parts/api.js";
+import { make } from "../parts/dom.js";
+import { headedTable } from "../parts/tables.js";
 
 const FRESH_MS = 5000;
 const STATES = {

@@ -1,5 +1,5 @@
 // Changes of jobs as they happen: one stream of server-sent events, opened again when it ends.
-import { authorization } from "./key.js";
+import { authorization } from "../parts/key.js";
 
 const STREAM = "/v1/events";
 const SOON_MS = 200;

@@ -1,5 +1,5 @@
 // What is known about a scan, and what is wrong with it, in words.
-import { make } from "./dom.js";
+import { make } from "../parts/dom.js";
 
 const percent = (part, whole) => (whole ? `${((100 * part) / whole).toFixed(1)} %` : "none");
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from benchmarks.reconstruction._travel_times import TravelTimes
 
-from ._small_ring import ELEMENTS, NODES, SIDE_M, WATER_MPS, dataset, ring
+from .._small_ring import ELEMENTS, NODES, SIDE_M, WATER_MPS, dataset, ring
 
 
 def test_each_pair_comes_once_and_with_the_mean_of_both_ways() -> None:

@@ -1,6 +1,6 @@
 // The shot of a scan: which emission, its traces on a canvas, and the arrivals of one receiver as text.
-import { request } from "./api.js";
-import { at, make, showError } from "./dom.js";
+import { request } from "../parts/api.js";
+import { at, make, showError } from "../parts/dom.js";
 import { ShotCanvas } from "./shot_canvas.js";
 
 const SHOT = `

@@ -8,10 +8,10 @@ import pytest
 
 from bentray_workers.files.dataset import write_dataset
 
-from ...effort import effort
-from ...workers.files.datasets import small
-from ..ingest import hostile_datasets, hostile_meshes, hostile_volumes
-from ..ingest.damage import damaged
+from ....effort import effort
+from ....workers.files.datasets import small
+from ...ingest import hostile_datasets, hostile_meshes, hostile_volumes
+from ...ingest.damage import damaged
 
 pytestmark = pytest.mark.ingest_process
 

@@ -10,21 +10,21 @@ from fastapi.openapi.models import Example
 
 from bentray_kernels.errors import InvalidInput
 
-from ..errors import NoBucket, TooLarge, WrongOffset
-from ..files.direct_uploads import DirectUploads, part_sizes
-from ..rows.tenants import Tenant
-from ..rows.typed_rows import UploadRow
-from ..web.errors import problems
-from ..wiring import CallerTenant, Parts, Service
-from .bodies import SmallBody, accept_media_types
-from .models.upload_records import (
+from ...errors import NoBucket, TooLarge, WrongOffset
+from ...files.direct_uploads import DirectUploads, part_sizes
+from ...rows.tenants import Tenant
+from ...rows.typed_rows import UploadRow
+from ...web.errors import problems
+from ...wiring import CallerTenant, Parts, Service
+from ..bodies import SmallBody, accept_media_types
+from ..models.upload_records import (
     DirectUploadRecord,
     DirectUploadRequest,
     PartAddresses,
     PartRecord,
     PartsRequest,
 )
-from .record_conversion import upload_record
+from ..record_conversion import upload_record
 from .upload_metadata import read_metadata
 
 FILES: dict[str, Example] = {

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.reconstruction import _tomography_peers
 from benchmarks.reconstruction._tomography_peers import PEERS, installed
 
-from ._small_ring import DISC_MPS, WATER_MPS, disc, ring
+from .._small_ring import DISC_MPS, WATER_MPS, disc, ring
 
 
 @pytest.mark.parametrize("name", list(PEERS))

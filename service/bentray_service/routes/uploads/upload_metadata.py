@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPACING_M
 from bentray_kernels.ranges import Range
 
-from ..ingest.ingest_process import ACCEPTED
+from ...ingest.ingest_process import ACCEPTED
 
 LONGEST_TITLE = 200
 # Nodes along an axis of a volume of raw bytes.

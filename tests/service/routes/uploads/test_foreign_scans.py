@@ -10,11 +10,11 @@ import pytest
 from scipy.io import savemat
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.routes.upload_metadata import read_metadata
+from bentray_service.routes.uploads.upload_metadata import read_metadata
 
-from ...workers.foreign_scans.hdf5_scans import openusct_fields, write_fields, zea_fields
-from ...workers.foreign_scans.kit_measurement import write_measurement, zipped
-from ...workers.foreign_scans.scans import delta_tof, positions, travel_times, waveforms, write_matlab73
+from ....workers.foreign_scans.hdf5_scans import openusct_fields, write_fields, zea_fields
+from ....workers.foreign_scans.kit_measurement import write_measurement, zipped
+from ....workers.foreign_scans.scans import delta_tof, positions, travel_times, waveforms, write_matlab73
 
 BINARY = {"Content-Type": "application/octet-stream"}
 

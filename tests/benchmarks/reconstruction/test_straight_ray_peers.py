@@ -9,7 +9,7 @@ import pytest
 from benchmarks.reconstruction._straight_ray_peers import cgls, roughness, sart, sirt, straight_matrix
 from benchmarks.reconstruction._travel_times import TravelTimes
 
-from ._small_ring import DISC_MPS, disc, ring
+from .._small_ring import DISC_MPS, disc, ring
 
 
 def test_a_row_is_as_long_as_its_ray_where_all_nodes_may_change() -> None:

@@ -3,7 +3,7 @@ import { showColourBar } from "../viewer/colour_bar.js";
 import { ImageView } from "../viewer/image_view.js";
 import { robustLimits } from "../viewer/measures.js";
 import { QUANTITIES } from "../viewer/quantities.js";
-import { make } from "./dom.js";
+import { make } from "../parts/dom.js";
 
 const { map: MAP, words: WORDS, unit: UNIT } = QUANTITIES.speed;
 // The range widens at once to that of a result, and narrows by this share of the way with each image.

@@ -14,16 +14,16 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Request, Response, status
 from starlette.concurrency import run_in_threadpool
 
-from ..errors import StorageFull, TooLarge, WrongOffset, WrongProtocol
-from ..ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, received_bytes
-from ..rows.tenants import Tenant
-from ..rows.typed_rows import UploadRow
-from ..web.errors import problems
-from ..web.tus_headers import PLACE, VERSION
-from ..wiring import CallerTenant, Parts, Service
-from .bodies import accept_media_types
-from .models.upload_records import UploadRecord
-from .record_conversion import result_link, upload_record
+from ...errors import StorageFull, TooLarge, WrongOffset, WrongProtocol
+from ...ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, received_bytes
+from ...rows.tenants import Tenant
+from ...rows.typed_rows import UploadRow
+from ...web.errors import problems
+from ...web.tus_headers import PLACE, VERSION
+from ...wiring import CallerTenant, Parts, Service
+from ..bodies import accept_media_types
+from ..models.upload_records import UploadRecord
+from ..record_conversion import result_link, upload_record
 from .upload_metadata import METADATA, read_metadata
 
 MEDIA_TYPE = "application/offset+octet-stream"

@@ -1,7 +1,7 @@
 // The filters of the table of jobs: the parameters of GET /v1/jobs, with the values that its description accepts.
-import { description } from "./defaults.js";
-import { make } from "./dom.js";
-import { inWords } from "./job_words.js";
+import { description } from "../parts/defaults.js";
+import { make } from "../parts/dom.js";
+import { inWords } from "../parts/job_words.js";
 
 const TYPING_MS = 300;
 const CHOICES = ["state", "kind"];

@@ -14,7 +14,7 @@ from bentray_workers.cluster.capacities import MIB
 from bentray_workers.files.dataset.summary import summary_of
 from bentray_workers.reconstruction.planning import plan
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "docs"))
 
 from from_code.sizing import DISK, MEMORY, ROWS, measured_sizing  # noqa: E402

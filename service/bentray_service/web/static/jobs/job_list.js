@@ -1,9 +1,9 @@
 // A list of jobs as cards, kept up to date while the page is open.
-import { request } from "./api.js";
-import { make, showError } from "./dom.js";
+import { request } from "../parts/api.js";
+import { make, showError } from "../parts/dom.js";
 import { followJobs } from "./followed_jobs.js";
 import { showJobs } from "./job_cards.js";
-import { loadTitles, titleOfJob } from "./titles.js";
+import { loadTitles, titleOfJob } from "../parts/titles.js";
 
 // The newest ones are shown, the others are in the table of jobs.
 const MOST = 6;

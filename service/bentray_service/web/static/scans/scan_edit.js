@@ -1,9 +1,9 @@
 // Name, notes and water of a scan: shown, and changed in a form; a corrected copy of a scan in wrong units. Its file stays as it is.
-import { go } from "./address.js";
-import { request } from "./api.js";
-import { at, make, showError } from "./dom.js";
-import { deleteStored } from "./panel.js";
-import { titleOf } from "./titles.js";
+import { go } from "../parts/address.js";
+import { request } from "../parts/api.js";
+import { at, make, showError } from "../parts/dom.js";
+import { deleteStored } from "../parts/panel.js";
+import { titleOf } from "../parts/titles.js";
 
 const TIMES = { s: "s", ms: "ms", us: "µs", ns: "ns" };
 const LENGTHS = { m: "m", cm: "cm", mm: "mm", um: "µm" };

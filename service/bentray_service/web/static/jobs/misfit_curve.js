@@ -1,7 +1,7 @@
 // The misfit of a reconstruction after each iteration, as a curve with axes.
 import { plot } from "../viewer/plot.js";
-import { inNanoseconds } from "./amounts.js";
-import { make } from "./dom.js";
+import { inNanoseconds } from "../parts/amounts.js";
+import { make } from "../parts/dom.js";
 import { residuals } from "./job_cards.js";
 
 const WAITING = "The misfit of the first iteration follows";

@@ -1,14 +1,14 @@
 // An unfinished job: what happens now, even progress with the time left, the image and the misfit so far; a failure with its reason.
-import { inWords, request } from "./api.js";
-import { make } from "./dom.js";
+import { inWords, request } from "../parts/api.js";
+import { make } from "../parts/dom.js";
 import { followJobs } from "./followed_jobs.js";
 import { placeInQueue, planned, summaryOf } from "./job_cards.js";
-import { duration } from "./job_words.js";
+import { duration } from "../parts/job_words.js";
 import { comparesModels, misfitCurve } from "./misfit_curve.js";
 import { previewPicture } from "./preview_picture.js";
 import { ProgressEstimate } from "./progress_estimate.js";
-import { methodOf } from "./results.js";
-import { loadTitles, titleOfJob } from "./titles.js";
+import { methodOf } from "../parts/results.js";
+import { loadTitles, titleOfJob } from "../parts/titles.js";
 
 const TICK_MS = 500;
 // Between two images, and between two questions to the workers while nothing is done yet.

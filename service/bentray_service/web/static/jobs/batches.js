@@ -1,8 +1,8 @@
 // Batches of reconstructions above the table of jobs: one with its settings, or the newest, each with one progress.
-import { request } from "./api.js";
-import { make } from "./dom.js";
+import { request } from "../parts/api.js";
+import { make } from "../parts/dom.js";
 import { UNFINISHED } from "./followed_jobs.js";
-import { duration, moment } from "./job_words.js";
+import { duration, moment } from "../parts/job_words.js";
 
 const SHOWN = 5;
 const BUSY_MS = 2000;

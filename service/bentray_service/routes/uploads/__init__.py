@@ -1,0 +1,1 @@
+"""Routes of uploads: resumable (tus), directly to the store, and in one request, with their metadata."""
