@@ -9,8 +9,8 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-# The gallery draws without a screen.
-os.environ["MPLBACKEND"] = "agg"
+# The gallery draws without a screen, and shows no progress bars on the terminal that builds it.
+os.environ |= {"MPLBACKEND": "agg", "TTY_COMPATIBLE": "0"}
 
 project = "Bentray"
 author = "The Bentray founders"
@@ -23,6 +23,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "shared_scans",
+    "notebook_titles",
     "sphinx_gallery.gen_gallery",
     "from_code",
     "mathml",
@@ -55,6 +56,7 @@ autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_class_signature = "separated"
 python_use_unqualified_type_names = True
+python_display_short_literal_types = True
 
 # The gallery: each file of recipes/ is executed, and becomes a page and a notebook. Recipes write files
 # beside themselves, so copies of them are executed.

@@ -21,6 +21,7 @@ import httpx
 import matplotlib.pyplot as plt
 import numpy as np
 import trimesh
+from browser import browser
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
@@ -48,11 +49,8 @@ from benchmarks.shared._small_png import in_full_colour
 FOLDER = Path(__file__).parent / "pictures"
 # Beside the checkout, where the tests with real scans look for it.
 OTHERS = FOLDER.parents[2] / "shared" / "data" / "ring_wave_a.h5"
-CHROMIUM = Path("/usr/bin/chromium")
 BENTRAY = [sys.executable, "-m", "bentray_service.cli"]
 MM = 1e3
-# Of a page: the machine may compile kernels first.
-PATIENCE_MS = 600_000.0
 
 # A simulated scan with traces, as that of the start page.
 SAMPLE = {
@@ -240,7 +238,7 @@ def comparison() -> Image.Image:
 
 def scan_page() -> Image.Image:
     """The page of a scan with traces: elements, quality, the traces of an emission."""
-    with _service() as service, _browser((1400, 1650)) as page:
+    with _service() as service, browser((1400, 1650)) as page:
         made = service.client.wait(service.client.simulate(SAMPLE).id).dataset
         page.goto(f"{service.url}/#/scans/{made}")
         page.get_by_label("Emission number").fill("8")
@@ -252,7 +250,7 @@ def scan_page() -> Image.Image:
 
 def live_page() -> Image.Image:
     """The page of a running job, after some iterations."""
-    with _service() as service, _browser((1400, 1240)) as page:
+    with _service() as service, browser((1400, 1240)) as page:
         slow = {"method": "sart", "nodes": 128, "iterations": 60}
         job = service.client.submit(service.uploaded(), slow)
         page.goto(f"{service.url}/#/jobs/{job.id}")
@@ -263,7 +261,7 @@ def live_page() -> Image.Image:
 
 def jobs_page() -> Image.Image:
     """The table of jobs: some succeeded, one under way, one cancelled."""
-    with _service() as service, _browser((1400, 640)) as page:
+    with _service() as service, browser((1400, 640)) as page:
         client, scan = service.client, service.uploaded()
         for rays, name in {"straight": "Straight rays", "curved": "Bent rays"}.items():
             job = client.wait(client.submit(scan, {"method": "sart", "nodes": 64, "rays": rays}).id)
@@ -281,7 +279,7 @@ def jobs_page() -> Image.Image:
 
 def rendering_page() -> Image.Image:
     """The page of volume rendering, with a ball with two holes as glass."""
-    with _service() as service, _browser((1400, 1060)) as page:
+    with _service() as service, browser((1400, 1060)) as page:
         volume = io.BytesIO()
         np.save(volume, np.round(255.0 * sampled(TWO_HOLES, 96)).astype(np.uint8))
         made = _stored(service, "/v1/volumes?title=Ball with two holes", volume.getvalue())
@@ -293,7 +291,7 @@ def rendering_page() -> Image.Image:
 
 def surface_page() -> Image.Image:
     """The page of surface rendering, with two rings and a mirror ball, and the errors of the field."""
-    with _service() as service, _browser((1240, 1080)) as page:
+    with _service() as service, browser((1240, 1080)) as page:
         ring = trimesh.creation.torus(1.0, 0.4, major_sections=96, minor_sections=48)
         mesh = _stored(service, "/v1/meshes?title=Torus", ring.export(file_type="ply"))
         asked = {"kind": "geometry-field", "mesh": mesh, "settings": {}}
@@ -319,7 +317,7 @@ def _page(
     address_of: Callable[[list[str]], str],
 ) -> Image.Image:
     """The web page with the results of a scan in these ways."""
-    with _service() as service, _browser(size) as page:
+    with _service() as service, browser(size) as page:
         client, uploaded = service.client, service.uploaded(scan)
         jobs = [client.wait(client.submit(uploaded, dict(one)).id).id for one in ways]
         page.goto(f"{service.url}/{address_of(jobs)}")
@@ -347,19 +345,6 @@ def _service() -> Iterator[_Service]:
         folder = Path(name)
         with running_service(folder / "data", folder / "log") as url, Client(url) as client:
             yield _Service(url, client, folder)
-
-
-@contextmanager
-def _browser(size: tuple[int, int]) -> Iterator[Any]:
-    """A page of Chromium of this width and height, pixels."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.set_default_timeout(PATIENCE_MS)
-        yield page
-        browser.close()
 
 
 def _shot(page: Any) -> Image.Image:

@@ -16,6 +16,7 @@ sys.path.insert(0, str(DOCS))
 sphinx = pytest.importorskip("sphinx")
 
 import mathml  # noqa: E402
+import notebook_titles  # noqa: E402
 import offline  # noqa: E402
 
 PAGE = """<html><head><style>p { color: red; }</style></head><body>
@@ -85,3 +86,10 @@ def test_archives_do_not_depend_on_times(tmp_path: Path) -> None:
             archive.writestr(zipfile.ZipInfo("recipe.py", when), "text")
         offline._without_dates(tmp_path / name)
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+
+
+def test_notebooks_name_pages_by_their_titles() -> None:
+    text = "see :doc:`/gallery/05_coupling_speed` and\n:doc:`/mathematics/eikonal`."
+    assert notebook_titles.with_titles(text) == (
+        "see *The speed of the water decides* and\n*The Eikonal equation and its solvers*."
+    )

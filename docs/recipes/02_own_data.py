@@ -53,7 +53,7 @@ with h5py.File("disc.h5", "w") as file:
 
 scan = bentray.read("disc.h5")
 print(scan)
-image = bentray.reconstruct(scan, "gauss-newton", nodes=64, progress=False)
+image = bentray.reconstruct(scan, "gauss-newton", nodes=64)
 
 # %%
 # The disc has 1450 m/s. These times follow straight lines, so that straight rays would be the right model

@@ -16,9 +16,9 @@ import bentray
 
 figure, axes = plt.subplots(2, 3, figsize=(9.5, 6), layout="constrained", sharex=True, sharey=True)
 for row, water in zip(axes, (1375.0, 1500.0), strict=True):
-    scan = bentray.simulate(elements=64, nodes=64, coupling_mps=water, progress=False)
+    scan = bentray.simulate(elements=64, nodes=64, coupling_mps=water)
     for ax, rays in zip(row[1:], ("straight", "curved"), strict=True):
-        result = bentray.reconstruct(scan, "sart", rays=rays, nodes=64, iterations=3, progress=False)
+        result = bentray.reconstruct(scan, "sart", rays=rays, nodes=64, iterations=3)
         found = result.compare()
         true = found.other[found.region]
         error = found.mean_absolute / np.ptp(true)

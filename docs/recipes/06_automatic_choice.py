@@ -13,8 +13,8 @@ import numpy as np
 
 import bentray
 
-scan = bentray.simulate(elements=64, nodes=64, coupling_mps=1420.0, noise_s=5e-8, progress=False)
-result = bentray.reconstruct(scan, nodes=64, progress=False)
+scan = bentray.simulate(elements=64, nodes=64, coupling_mps=1420.0, noise_s=5e-8)
+result = bentray.reconstruct(scan, nodes=64)
 print(result)
 
 # %%
@@ -37,7 +37,7 @@ for trial in result.trials:
     if len(known) < len(trial.settings):
         continue
     method = known.pop("method")
-    image = bentray.reconstruct(scan, method, nodes=64, progress=False, **known)
+    image = bentray.reconstruct(scan, method, nodes=64, **known)
     label = ", ".join([method, *map(str, known.values())])
     ax.plot(1e9 * trial.held_out_rms_s, image.compare().rms, "o", label=label)
 chosen = result.compare()

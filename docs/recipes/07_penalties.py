@@ -14,7 +14,7 @@ import numpy as np
 
 import bentray
 
-scan = bentray.simulate(elements=48, nodes=48, coupling_mps=1400.0, snr=30.0, progress=False)
+scan = bentray.simulate(elements=48, nodes=48, coupling_mps=1400.0, snr=30.0)
 kinds = {
     "total variation": {"penalty": "total-variation"},
     "total variation with edges": {"penalty": "total-variation", "edge_mps": 7.0},
@@ -25,9 +25,7 @@ strengths = (0.1, 0.5)
 figure, axes = plt.subplots(2, 2, figsize=(8.6, 7), layout="constrained")
 for ax, (name, penalty) in zip(axes.flat, kinds.items(), strict=True):
     images = [
-        bentray.reconstruct(
-            scan, "gauss-newton", nodes=48, penalty_strength=strength, progress=False, **penalty
-        )
+        bentray.reconstruct(scan, "gauss-newton", nodes=48, penalty_strength=strength, **penalty)
         for strength in strengths
     ]
     errors = [image.compare().rms for image in images]

@@ -14,7 +14,7 @@ import numpy as np
 
 import bentray
 
-ring = bentray.simulate(elements=64, nodes=64, coupling_mps=1375.0, progress=False)
+ring = bentray.simulate(elements=64, nodes=64, coupling_mps=1375.0)
 ring.save("ring.h5")
 
 
@@ -34,7 +34,7 @@ def arc_of(degrees, target):
 figure, axes = plt.subplots(1, 3, figsize=(10, 3.4), layout="constrained", sharey=True)
 for ax, degrees in zip(axes, (360, 270, 200), strict=True):
     scan = ring if degrees == 360 else arc_of(degrees, f"arc{degrees}.h5")
-    result = bentray.reconstruct(scan, "gauss-newton", nodes=64, progress=False)
+    result = bentray.reconstruct(scan, "gauss-newton", nodes=64)
     found = result.compare()
     result.plot(low=1360, high=1570, ax=ax)
     ax.set_title(f"{degrees}°: {found.rms:.0f} m/s rms")

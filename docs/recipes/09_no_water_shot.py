@@ -23,7 +23,6 @@ scan = bentray.simulate(
     frequency_hz=3e5,
     side_m=0.06,
     snr=30.0,
-    progress=False,
 )
 scan.save("traces.h5")
 with h5py.File("traces.h5", "r+") as file:
@@ -53,8 +52,8 @@ plt.show()
 # is in the provenance of the result.
 
 images = {
-    "with water shot": bentray.reconstruct(scan, "gauss-newton", nodes=64, progress=False),
-    "without": bentray.reconstruct(without, "gauss-newton", nodes=64, progress=False),
+    "with water shot": bentray.reconstruct(scan, "gauss-newton", nodes=64),
+    "without": bentray.reconstruct(without, "gauss-newton", nodes=64),
 }
 figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.6), layout="constrained", sharey=True)
 for ax, (name, image) in zip(axes, images.items(), strict=True):

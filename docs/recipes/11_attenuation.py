@@ -13,8 +13,8 @@ import numpy as np
 
 import bentray
 
-scan = bentray.simulate(elements=64, nodes=64, coupling_mps=1375.0, attenuation=True, progress=False)
-result = bentray.reconstruct(scan, "gauss-newton", nodes=64, attenuation=True, progress=False)
+scan = bentray.simulate(elements=64, nodes=64, coupling_mps=1375.0, attenuation=True)
+result = bentray.reconstruct(scan, "gauss-newton", nodes=64, attenuation=True)
 found = result.compare(quantity="attenuation")
 
 figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.6), layout="constrained", sharey=True)
@@ -32,9 +32,9 @@ plt.show()
 # %%
 # The same error of the best constant, and of straight rays:
 
-straight = bentray.reconstruct(
-    scan, "gauss-newton", rays="straight", nodes=64, attenuation=True, progress=False
-).compare(quantity="attenuation")
+straight = bentray.reconstruct(scan, "gauss-newton", rays="straight", nodes=64, attenuation=True).compare(
+    quantity="attenuation"
+)
 print(f"bent rays {found.rms / result_range:.0%}, straight rays {straight.rms / result_range:.0%}", end=", ")
 print(f"constant {np.std(found.other[found.region]) / result_range:.0%} of the range, rms")
 

@@ -12,10 +12,8 @@ import matplotlib.pyplot as plt
 
 import bentray
 
-scan = bentray.simulate(
-    waveform=True, elements=64, emissions=24, nodes=64, frequency_hz=3e5, side_m=0.06, progress=False
-)
-settings = {"nodes": 64, "reflection": True, "progress": False}
+scan = bentray.simulate(waveform=True, elements=64, emissions=24, nodes=64, frequency_hz=3e5, side_m=0.06)
+settings = {"nodes": 64, "reflection": True}
 bent = bentray.reconstruct(scan, "gauss-newton", **settings)
 water = bentray.reconstruct(scan, "gauss-newton", delays="water", **settings)
 

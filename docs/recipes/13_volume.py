@@ -50,9 +50,7 @@ with h5py.File("rings.h5", "w") as file:
     file["acquisition/rx"] = np.arange(64)
     file.create_group("water").attrs["sound_speed_mps"] = 1500.0
     file["traveltime/delta_tof_s"] = delta
-result = bentray.reconstruct(
-    "rings.h5", "gauss-newton", decomposition="volume", nodes=28, iterations=3, progress=False
-)
+result = bentray.reconstruct("rings.h5", "gauss-newton", decomposition="volume", nodes=28, iterations=3)
 print(result)
 
 # %%

@@ -14,8 +14,8 @@ import bentray
 
 figure, axes = plt.subplots(2, 3, figsize=(10.5, 6.2), layout="constrained", sharex=True, sharey=True)
 for row, elements in zip(axes, (24, 64), strict=True):
-    scan = bentray.simulate(elements=elements, nodes=64, coupling_mps=1375.0, progress=False)
-    result = bentray.reconstruct(scan, "gauss-newton", nodes=64, resolution_check=True, progress=False)
+    scan = bentray.simulate(elements=elements, nodes=64, coupling_mps=1375.0)
+    result = bentray.reconstruct(scan, "gauss-newton", nodes=64, resolution_check=True)
     for ax, quantity in zip(row, ("speed", "coverage", "recovery"), strict=True):
         result.plot(quantity, ax=ax)
     inside = result.coverage > 0
