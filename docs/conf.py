@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 # The gallery draws without a screen, and shows no progress bars on the terminal that builds it.
@@ -82,3 +84,18 @@ sphinx_gallery_conf = {
     "matplotlib_animations": False,
     "thumbnail_size": (400, 280),
 }
+
+
+def _with_short_types(
+    app: object, what: str, name: str, obj: object, options: object, lines: list[str]
+) -> None:
+    """Show the types of attributes, which napoleon writes in full, by their last names."""
+    lines[:] = [
+        re.sub(r"(?<![~.\w])(?:\w+\.)+\w+", r"~\g<0>", line) if line.lstrip().startswith(":type:") else line
+        for line in lines
+    ]
+
+
+def setup(app: Any) -> None:
+    """Connect the function above, after that of napoleon."""
+    app.connect("autodoc-process-docstring", _with_short_types, priority=900)

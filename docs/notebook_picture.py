@@ -1,8 +1,8 @@
 """Generate the picture of the ten-line start in a notebook: `.venv/bin/python docs/notebook_picture.py`.
 
 The first recipe of the gallery is executed as the notebook that readers download, by Jupyter's kernel. This
-needs the tools for tests and documentation, Debian's Chromium and `pip install ipykernel nbclient nbconvert`,
-which the lock files leave out: they would bring a hundred packages for one picture.
+needs the tools for tests and documentation, Debian's Chromium and `pip install -e ".[notebook]"`. The lock
+files leave the last out: it would bring a hundred packages for one picture.
 """
 
 from __future__ import annotations

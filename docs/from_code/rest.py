@@ -55,7 +55,7 @@ def _route(method: str, path: str, operation: Node) -> str:
 
 def _responses(responses: Node) -> list[str]:
     found = []
-    for code, answer in responses.items():
+    for code, answer in sorted(responses.items()):
         if code == "default":
             continue
         kinds = {

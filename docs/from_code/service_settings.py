@@ -36,4 +36,4 @@ def _accepted(field: Any) -> str:
         for kind, (name, sign) in LIMITS.items()
         if isinstance(limit, kind)
     )
-    return " ".join(limits)
+    return ", ".join(limits)

@@ -66,9 +66,22 @@ result.plot(low=1450, high=1545, ax=axes[2])
 axes[2].set_title("image, z = 0")
 plt.show()
 
-places = np.stack(np.meshgrid(*(result.coordinates[a] for a in "xyz"), indexing="ij"), axis=-1)
-index = np.clip(np.rint((places + side / 2) / spacing).astype(int), 0, nodes - 1)
-inside = np.linalg.norm(places, axis=-1) < 0.036
-there = true[tuple(np.moveaxis(index, -1, 0))][inside]
-error = np.sqrt(np.mean((result.speed[inside] - there) ** 2))
-print(f"{error:.1f} m/s rms within 36 mm; constant {np.std(there):.1f}")
+# %%
+# As a dataset of xarray (``pip install "bentray[xarray]"``), with coordinates and units: a profile by
+# position in m, and the error at the nodes of the image.
+
+import xarray
+
+images = result.to_xarray()
+truth = xarray.DataArray(true, coords={"x": line, "y": line, "z": line})
+figure, ax = plt.subplots(figsize=(6.4, 3.4), layout="constrained")
+for name, volume in {"truth": truth, "image": images.speed}.items():
+    volume.sel(y=0.0, z=0.005, method="nearest").plot(ax=ax, label=name)
+ax.set_title("profile through the core, y = 0, z = 5 mm")
+ax.legend()
+plt.show()
+
+there = truth.reindex_like(images, method="nearest")
+inside = images.x**2 + images.y**2 + images.z**2 < 0.036**2
+error = ((images.speed - there).where(inside) ** 2).mean() ** 0.5
+print(f"{error:.1f} m/s rms within 36 mm; constant {there.where(inside).std():.1f}")

@@ -105,7 +105,7 @@ def type_words(schema: Node) -> str:
         f"{words} {schema[key]}" for key, words in (("minimum", "≥"), ("maximum", "≤")) if key in schema
     ]
     name = str(schema.get("format") or schema.get("type", "any"))
-    return " ".join([name, *limits])
+    return f"{name} {', '.join(limits)}".rstrip()
 
 
 def _schema(name: str, schema: Node) -> str:
