@@ -75,7 +75,7 @@ def compared(before: Reconstruction, after: Reconstruction) -> dict[str, Any]:
     """The difference of each array: None if identical, the maximum difference, or a description."""
     import numpy as np
 
-    from bentray_workers.files.reconstruction import IMAGES, REFLECTION
+    from bentray_workers.files.quantities import IMAGES, REFLECTION
 
     differences: dict[str, Any] = {}
     arrays: list[tuple[str, Any, Any]] = [

@@ -24,6 +24,7 @@ from bentray_kernels.tomography import (
     region_statistics,
 )
 from bentray_workers.files.export.optional_library import import_optional
+from bentray_workers.files.quantities import QUANTITIES
 from bentray_workers.files.volume import Volume
 
 from ..html_tables import figures_html, picture_html
@@ -38,15 +39,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# Units of the arrays of a reconstruction.
-UNITS = {
-    "speed": "m/s",
-    "coverage": "m",
-    "attenuation": "Np/m",
-    "recovery": "1",
-    "uncertainty": "m/s",
-    "reflection": "dB",
-}
 # Axes of the reflection, before that of heights: it has a grid of its own.
 REFLECTION_AXES = ("reflection_x", "reflection_y")
 # Name of the only array of an uploaded volume.
@@ -446,9 +438,9 @@ def result_of(
         values: dict[str, NDArray[Any]] = {VALUE: image.values}
         units, known = {VALUE: unit}, {"title": image.title} if image.title else {}
     else:
-        held = {name: image.image(name) for name in UNITS}
+        held = {name: image.image(name) for name in QUANTITIES}
         values = {name: one.values for name, one in held.items() if one is not None}
-        units = {name: UNITS[name] for name in values}
+        units = {name: QUANTITIES[name].unit for name in values}
         known = {**image.provenance, "settings": json.dumps(image.settings.to_dict())}
     shape = next(iter(values.values())).shape
     axes = tuple("xyz"[: len(shape)])

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.quantities import QUANTITIES, QuantityName
 from bentray_workers.rendering.histogram import BINS, DEFAULT_BINS
 
 from ..web.errors import problems
@@ -30,7 +31,7 @@ async def show_histogram(
     service: Service,
     tenant: CallerTenant,
     quantity: Annotated[
-        Literal["speed", "coverage", "attenuation", "recovery", "uncertainty", "reflection", "value"] | None,
+        Literal[QuantityName, "value"] | None,
         Query(
             description="Reconstructions: speed (default), coverage, attenuation if the scan has amplitudes, "
             "recovery if resolution_check was set, uncertainty (m/s) and reflection (dB) if requested. "
@@ -49,11 +50,7 @@ async def show_histogram(
     uploaded = "job_id" not in volume
     chosen = quantity or ("value" if uploaded else "speed")
     if (chosen == "value") != uploaded:
-        accepted = (
-            "value: this is an uploaded volume"
-            if uploaded
-            else "speed, coverage, attenuation, recovery, uncertainty or reflection"
-        )
+        accepted = "value: this is an uploaded volume" if uploaded else "one of " + ", ".join(QUANTITIES)
         raise InvalidInput("quantity", repr(quantity), accepted)
     path = service.files.of(tenant).volume(volume["id"])
     work = service.pictures.histogram(tenant, volume, path, chosen, bins)

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.quantities import QUANTITIES, QuantityName
 from bentray_workers.images.plane import check_plane
 from bentray_workers.images.slice_style import (
     COLORMAPS,
@@ -70,7 +71,7 @@ async def slice_png(
         int | None, Query(ge=0, description="Index along this axis; default: the middle.")
     ] = None,
     quantity: Annotated[
-        Literal["speed", "coverage", "attenuation", "recovery", "uncertainty", "reflection", "value"] | None,
+        Literal[QuantityName, "value"] | None,
         Query(
             description="Quantity to show. Reconstructions: speed (default), coverage, "
             "attenuation if the scan has amplitudes, recovery if resolution_check was set, "
@@ -97,7 +98,7 @@ async def slice_png(
     how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(style)}
     if "job_id" in volume:
         if quantity == "value":
-            accepted = "speed, coverage, attenuation, recovery, uncertainty or reflection"
+            accepted = "one of " + ", ".join(QUANTITIES)
             raise InvalidInput("quantity", "'value'", accepted)
         how["quantity"] = quantity or "speed"
     elif quantity not in (None, "value"):

@@ -9,6 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import FREQUENCY_HZ
+from bentray_workers.files.quantities import QuantityName
 from bentray_workers.files.reconstruction import shape_of_quantity
 from bentray_workers.files.volume_export import FORMATS, Selection, largest_bytes
 
@@ -49,7 +50,7 @@ async def volume_data(
         ),
     ] = "hdf5",
     quantity: Annotated[
-        Literal["speed", "attenuation", "coverage", "recovery", "uncertainty", "reflection", "truth"],
+        Literal[QuantityName, "truth"],
         Query(
             description="Quantity of npy, nifti, metaimage and nrrd of a reconstruction; truth: the true "
             "speed at its nodes, NaN outside, of a scan that has it. uncertainty: standard deviation of the "

@@ -19,6 +19,7 @@ from bentray_kernels.tomography.stored_settings import from_stored
 from .dataset.write import write_array
 from .hdf5_reading import Limits, Reader, opened
 from .hdf5_writing import atomic_hdf5
+from .quantities import IMAGES, REFLECTION
 from .reconstruction_format import FORMAT, VERSION
 
 HISTORY = {
@@ -32,16 +33,6 @@ HISTORY = {
 
 # Columns of full-waveform refinements; NaN for other stages. Absent in older files.
 WAVES = ("band_low_hz", "band_high_hz", "misfit", "held_out_misfit", "of_attenuation")
-IMAGES = {
-    "speed": "speed_mps",
-    "coverage": "coverage_m",
-    "attenuation": "attenuation_np_m",
-    "recovery": "recovery",
-    "uncertainty": "uncertainty_mps",
-}
-# The reflection image has attributes spacing_m and origin_m of its own.
-REFLECTION = "reflection_db"
-QUANTITIES = (*IMAGES, "reflection")
 
 
 def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
@@ -103,7 +94,8 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
         coverage = _image(reader, "coverage_m", speed.shape)
         extra = {
             name: _image(reader, IMAGES[name], speed.shape) if reader.has(IMAGES[name]) else None
-            for name in ("attenuation", "recovery", "uncertainty")
+            for name in IMAGES
+            if name not in ("speed", "coverage")
         }
         water = reader.number("", "water_speed_mps", "m/s")
         if water is None:

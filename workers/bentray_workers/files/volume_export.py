@@ -26,27 +26,15 @@ from .export.nrrd_writing import write_nrrd
 from .export.ome_zarr_writing import write_ome_zarr
 from .export.vti_writing import write_vti
 from .hdf5_reading import Limits, opened
-from .reconstruction import IMAGES, QUANTITIES, REFLECTION, read_reconstruction
+from .quantities import IMAGES, QUANTITIES, REFLECTION
+from .reconstruction import read_reconstruction
 from .volume import FORMAT, Volume, read_volume
 
-SPEED, ATTENUATION, ATTENUATION_DB = "speed_mps", "attenuation_np_m", "attenuation_db_cm_mhz"
-UNITS = {
-    SPEED: "m/s",
-    "coverage_m": "m",
-    ATTENUATION: "Np/m",
-    ATTENUATION_DB: "dB/(cm.MHz)",
-    "recovery": "1",
-    "uncertainty_mps": "m/s",
-    REFLECTION: "dB",
-}
+ATTENUATION, ATTENUATION_DB = IMAGES["attenuation"], "attenuation_db_cm_mhz"
+UNITS = {**{one.array: one.unit for one in QUANTITIES.values()}, ATTENUATION_DB: "dB/(cm.MHz)"}
 TITLES = {
-    SPEED: "Speed of sound, m/s",
-    ATTENUATION: "Attenuation, Np/m",
-    ATTENUATION_DB: "Attenuation, dB/(cm MHz)",
-    "coverage_m": "Ray length per node, m",
-    "recovery": "Recovered fraction of a checkerboard",
-    "uncertainty_mps": "Standard deviation of the speed of sound, m/s",
-    REFLECTION: "Reflection, dB",
+    **{one.array: one.label[0].upper() + one.label[1:] for one in QUANTITIES.values()},
+    ATTENUATION_DB: "Attenuation (dB/(cm MHz))",
 }
 # Formats with one image.
 SINGLE = ("npy", "nifti", "metaimage", "nrrd")

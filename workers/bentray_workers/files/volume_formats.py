@@ -153,7 +153,7 @@ def _hdf5(path: Path, check: ShapeCheck) -> Volume:
     from .reconstruction import read_reconstruction
 
     result = read_reconstruction(path, limits=limits)
-    return Volume.of(result.speed, result.spacing_m, result.origin_m, "Speed of sound, m/s")
+    return Volume.of(result.speed, result.spacing_m, result.origin_m, "Sound speed (m/s)")
 
 
 def _spacing(given: VolumeMetadata) -> tuple[float, ...]:

@@ -7,22 +7,10 @@ import math
 from bentray_kernels.tomography import Reconstruction, Settings
 from bentray_kernels.tomography.solver_choice import solver_of
 
-LABELS = {
-    "speed": "sound speed (m/s)",
-    "coverage": "ray length per node (m)",
-    "attenuation": "attenuation (Np/m)",
-    "recovery": "recovered fraction of a checkerboard",
-    "uncertainty": "standard deviation of the speed (m/s)",
-    "reflection": "reflection (dB)",
-}
-NAMES = {
-    "speed": "Sound speed",
-    "coverage": "Coverage",
-    "attenuation": "Attenuation (experimental)",
-    "recovery": "Resolution check",
-    "uncertainty": "Uncertainty",
-    "reflection": "Reflection",
-}
+from ..files.quantities import QUANTITIES
+
+LABELS = {name: one.label for name, one in QUANTITIES.items()}
+NAMES = {name: one.title for name, one in QUANTITIES.items()}
 
 
 def slice_caption(result: Reconstruction, index: int) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..files.dataset.read import read_dataset
-from ..files.reconstruction import QUANTITIES, read_reconstruction
+from ..files.quantities import QUANTITIES
+from ..files.reconstruction import read_reconstruction
 
 
 def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:

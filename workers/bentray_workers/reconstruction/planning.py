@@ -29,7 +29,7 @@ from ..cluster.checkpoints import KEPT
 from ..cluster.task_words import task_in_words
 from ..files.dataset.counts import Summary
 from ..files.dataset.format import PAIR_ARRAYS
-from ..files.reconstruction import IMAGES
+from ..files.quantities import IMAGES
 from .memory.picking_memory import picking_tasks
 from .memory.ray_memory import (
     call_bytes,

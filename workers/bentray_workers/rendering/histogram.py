@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range
 
+from ..files.quantities import QUANTITIES
 from ..files.reconstruction import read_reconstruction
 from ..files.volume import read_volume
 from .refraction_view import check_even
@@ -20,15 +21,6 @@ from .scene_cache import default_surface
 BINS = Range(2, 1024)
 DEFAULT_BINS = 256
 
-UNITS = {
-    "speed": "m/s",
-    "coverage": "m",
-    "attenuation": "Np/m",
-    "recovery": "",
-    "uncertainty": "m/s",
-    "reflection": "dB",
-    "value": "",
-}
 # The quantities that are rendered.
 RENDERED = ("speed", "value")
 
@@ -53,6 +45,7 @@ def volume_histogram(path: Path, quantity: str, bins: int) -> dict[str, Any]:
     BINS.check("bins", bins)
     values, spacing_m = _read(path, quantity)
     counts, edges = np.histogram(values, bins)
+    unit = "" if quantity == "value" else QUANTITIES[quantity].unit
     iso = smoothing = None
     if quantity in RENDERED:
         with suppress(InvalidInput):
@@ -60,7 +53,7 @@ def volume_histogram(path: Path, quantity: str, bins: int) -> dict[str, Any]:
             iso, smoothing = default_surface(path)
     return {
         "quantity": quantity,
-        "unit": UNITS[quantity],
+        "unit": "" if unit == "1" else unit,
         "counts": counts.tolist(),
         "edges": edges.tolist(),
         "minimum": float(values.min()),
@@ -80,6 +73,6 @@ def _read(path: Path, quantity: str) -> tuple[NDArray[Any], tuple[float, ...]]:
     result = read_reconstruction(path)
     image = result.image(quantity)
     if image is None:
-        held = [name for name in UNITS if getattr(result, name, None) is not None]
+        held = [name for name in QUANTITIES if getattr(result, name) is not None]
         raise InvalidInput("quantity", repr(quantity), f"one of {', '.join(held)}: this file has no other")
     return image.values, image.spacing_m

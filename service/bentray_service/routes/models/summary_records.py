@@ -6,6 +6,8 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
+from bentray_workers.files.quantities import QuantityName
+
 
 class CandidateRecord(BaseModel):
     """A model that auto compared, reconstructed from a part of the pairs."""
@@ -49,9 +51,9 @@ class GridRecord(BaseModel):
 class SummaryRecord(BaseModel):
     """What a reconstruction holds, and how its model was chosen."""
 
-    quantities: list[
-        Literal["speed", "coverage", "attenuation", "recovery", "uncertainty", "reflection", "truth"]
-    ] = Field(description="Those that can be shown and downloaded.")
+    quantities: list[Literal[QuantityName, "truth"]] = Field(
+        description="Those that can be shown and downloaded."
+    )
     resolution_width_m: list[float] = Field(
         description="Standard deviation, m, of the Gaussian that smooths the truth like the image: one for "
         "each slice, or one of a slice or volume; the uncertainty refers to it. Empty without uncertainty."

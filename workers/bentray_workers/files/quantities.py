@@ -1,0 +1,44 @@
+"""The quantities of a reconstruction: unit, array in files, and words; a new one is added here first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Literal, NamedTuple
+
+QuantityName = Literal["speed", "coverage", "attenuation", "recovery", "uncertainty", "reflection"]
+
+
+class Quantity(NamedTuple):
+    """A quantity of a reconstruction.
+
+    Attributes:
+        unit: of its values; 1 of a fraction.
+        array: its name in files.
+        title: above its image.
+        label: of its values, with the unit.
+    """
+
+    unit: str
+    array: str
+    title: str
+    label: str
+
+
+QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
+    {
+        "speed": Quantity("m/s", "speed_mps", "Sound speed", "sound speed (m/s)"),
+        "coverage": Quantity("m", "coverage_m", "Coverage", "ray length per node (m)"),
+        "attenuation": Quantity(
+            "Np/m", "attenuation_np_m", "Attenuation (experimental)", "attenuation (Np/m)"
+        ),
+        "recovery": Quantity("1", "recovery", "Resolution check", "recovered fraction of a checkerboard"),
+        "uncertainty": Quantity(
+            "m/s", "uncertainty_mps", "Uncertainty", "standard deviation of the speed (m/s)"
+        ),
+        "reflection": Quantity("dB", "reflection_db", "Reflection", "reflection (dB)"),
+    }
+)
+REFLECTION = QUANTITIES["reflection"].array
+# The arrays on the nodes of the speed; the reflection has pixels of its own.
+IMAGES = {name: one.array for name, one in QUANTITIES.items() if one.array != REFLECTION}
