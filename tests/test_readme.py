@@ -155,7 +155,7 @@ def test_the_lines_that_write_a_scan_write_one_that_is_read_and_reconstructed(
     delta = np.full((8, 8), -1e-6)
     delta[0, 1] = np.nan
     monkeypatch.chdir(tmp_path)
-    exec(write, {"position": position, "delta": delta, "n": 8})
+    exec(write, {"position": position, "delta": delta})
     dataset = read_dataset(tmp_path / "scan.h5")
     np.testing.assert_array_equal(dataset.element_position_m, position)
     assert dataset.water_speed_mps == pytest.approx(1482.3, abs=0.1), "that of water of 20 degrees"

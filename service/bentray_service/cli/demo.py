@@ -47,6 +47,7 @@ def demo(
     """
     folder = output_folder(output)
 
+    from bentray_workers.compilation.cache_misses import announce
     from bentray_workers.files.dataset import write_dataset
     from bentray_workers.images.comparison import comparison_png
     from bentray_workers.simulation.plane import SimulationSettings
@@ -64,6 +65,7 @@ def demo(
         Client(url) as client,
     ):
         remark(f"The service runs at {url}. Simulating a scan: {elements} transducers, {nodes}² nodes.")
+        announce()
         with progress_bar("Simulating") as step:
             dataset = simulate(settings, lambda progress: step(progress.done, progress.total, "emitters"))
         scan = folder / "phantom.h5"

@@ -100,6 +100,7 @@ def simulate(
     """
     path = output_file(output, force=force)
 
+    from bentray_workers.compilation.cache_misses import announce
     from bentray_workers.files.dataset import read_dataset
     from bentray_workers.simulation.request import PhantomScan
     from bentray_workers.simulation.simulation_run import simulate_to_file
@@ -122,6 +123,7 @@ def simulate(
         "side_m": side,
     }
     settings = PhantomScan(phantom=phantom.value, waveform=waveform, **request).chosen()
+    announce()
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
         simulate_to_file(None, settings, path, on_progress=lambda now: step(now.done, now.total, "tasks"))

@@ -47,6 +47,7 @@ def reconstruct(
     """
     from bentray_kernels.ranges import Range
     from bentray_kernels.tomography.requirements import check_scan
+    from bentray_workers.compilation.cache_misses import announce
     from bentray_workers.reconstruction.reconstruction_run import reconstruct as run
 
     from ..settings_request import nested, plain_numbers, settings_of
@@ -56,6 +57,7 @@ def reconstruct(
         Range(1, MOST_THREADS).check("threads", threads)
     source = scan if isinstance(scan, Scan) else read(scan)
     check_scan(source.dataset, chosen, source.samples)
+    announce()
     begun = time.perf_counter()
     with progress_bar("Reconstructing", shown=progress) as step:
 

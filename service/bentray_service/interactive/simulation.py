@@ -30,12 +30,14 @@ def simulate(
             spelt most like it.
         KeyboardInterrupt: once the tasks have stopped.
     """
+    from bentray_workers.compilation.cache_misses import announce
     from bentray_workers.simulation.request import PhantomScan
     from bentray_workers.simulation.simulation_run import simulate_to_file
 
     from ..settings_request import plain_numbers, record_of
 
     request = record_of(PhantomScan, plain_numbers({"phantom": phantom, **settings})).chosen()
+    announce()
 
     def write(target: Path) -> None:
         with progress_bar("Simulating", shown=progress) as step:

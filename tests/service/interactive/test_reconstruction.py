@@ -16,6 +16,7 @@ from bentray_kernels.tomography.result import Progress
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.interactive import reconstruction
 from bentray_service.interactive.interruption import OnProgress, Stop, run_interruptibly
+from bentray_workers.compilation import cache_misses
 from bentray_workers.reconstruction import reconstruction_run
 
 
@@ -141,3 +142,11 @@ def test_progress_is_shown_by_the_calling_thread() -> None:
 
     assert run_interruptibly(work, show) == "made"
     assert seen == [(3, threading.current_thread().name)]
+
+
+def test_compilation_is_announced(simulated: bentray.Scan, monkeypatch: pytest.MonkeyPatch) -> None:
+    announced: list[str] = []
+    monkeypatch.setattr(cache_misses, "announce", lambda: announced.append("kernels"))
+    bentray.reconstruct(simulated, "sart", nodes=16, iterations=1)
+    bentray.simulate(nodes=16, elements=8)
+    assert announced == ["kernels"] * 2

@@ -165,7 +165,7 @@ def test_array_in_space_that_is_no_ring_is_planned_as_a_volume():
         ({}, "slices", "40 slices in parallel"),
         ({"method": "gauss-newton"}, "emitters", "he 256 emitters"),
         ({"decomposition": "volume"}, "volume", "10240 emitters"),
-        ({"method": "auto"}, "emitters", "in parallel"),
+        ({"method": "auto"}, "emitters", "emitters of each of 40 slices in parallel"),
     ],
 )
 def test_choice_is_described_in_one_sentence(changes, decomposition, words):

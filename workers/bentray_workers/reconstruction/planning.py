@@ -297,10 +297,11 @@ def _why(
     capacities: Sequence[WorkerCapacity],
     able: Sequence[WorkerCapacity],
 ) -> str:
-    slices = f"{scan.slices} slice{'s' if scan.slices > 1 else ''}"
+    slices = f"{scan.slices} slices" if scan.slices > 1 else "one slice"
+    each = f"each of {scan.slices} slices" if scan.slices > 1 else "the slice"
     cut: dict[Decomposition, Callable[[], str]] = {
         "slices": lambda: f"{slices} in parallel; SART uses the emitters of a slice one after the other",
-        "emitters": lambda: f"the {scan.emitters} emitters of each of {slices} in parallel",
+        "emitters": lambda: f"the {scan.emitters} emitters of {each} in parallel",
         "volume": lambda: (
             f"one volume of {emitters_of(scan, settings)} emitters"
             + (" one after the other (SART)" if settings.method == "sart" else " in parallel")
