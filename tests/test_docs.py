@@ -158,15 +158,8 @@ def _ring() -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("curl") is None, reason="no curl, which the examples use")
-@pytest.mark.parametrize(
-    "page",
-    [
-        # The first page for every change, the others at night.
-        pytest.param(page, marks=() if page.stem == "quick-start" else pytest.mark.nightly)
-        for page in filled_pages()
-    ],
-    ids=lambda page: str(page.relative_to(DOCS)),
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("page", filled_pages(), ids=lambda page: str(page.relative_to(DOCS)))
 def test_the_examples_of_a_page_run(page: Path, service: str, scans: Path, tmp_path: Path) -> None:
     text = page.read_text()
     if "scan.h5" in text:

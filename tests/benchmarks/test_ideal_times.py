@@ -11,7 +11,9 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 ELEMENTS = 8
 
 
-@pytest.mark.parametrize(("nodes", "radius_m"), [(160, 0.09), (160, 0.102)])
+@pytest.mark.parametrize(
+    ("nodes", "radius_m"), [pytest.param(160, 0.09, marks=pytest.mark.nightly), (160, 0.102)]
+)
 def test_ideal_times_match_the_phantom(nodes, radius_m):
     """In water as fast as fat, for steps of edges shape shadows; the wider ring lies beyond the truth."""
     phantom, everyone = table6(1375.0), np.arange(ELEMENTS)

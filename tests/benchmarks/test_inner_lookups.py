@@ -22,6 +22,7 @@ def dent():
     return world_with_fields(turned(dented(4)), 8, 8, 129)
 
 
+@pytest.mark.nightly
 def test_exact_rays_through_a_ball_are_its_chords(ball):
     rays = _, origins, directions = leaving_rays(ball.surface, RAYS, True)
     from_middle = origins - 0.5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from benchmarks.geometry_field._reference_lookup import linear_uv, nearest_uv
 
 from bentray_kernels.geometry_field.tables.cube import samples
@@ -41,6 +42,7 @@ def test_the_table_holds_where_its_own_rays_end():
     np.testing.assert_allclose(table[i[met], j[met]], ends[:, :2], atol=1e-5)
 
 
+@pytest.mark.nightly
 def test_the_samples_own_rays_are_looked_up_exactly():
     _, table = flat_table(3)
     places = samples(N)

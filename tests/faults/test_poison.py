@@ -19,7 +19,8 @@ from bentray_workers.cluster.resources import OFFERED, THREADS
 from bentray_workers.cluster.task_pool import open_pool
 from bentray_workers.reconstruction import reconstruction_run
 
-pytestmark = pytest.mark.slow
+# For every change tests/workers/cluster/test_pipelines.py kills a worker under the same limit of deaths.
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 PLAN = Settings.of(nodes=48, attenuation=False, method="gauss-newton", iterations=8, penalty_strength=0.003)
 

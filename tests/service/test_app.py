@@ -132,8 +132,9 @@ def a_turntable(http, scan):
     return {"kind": "refraction", "volume": volume.json()["id"], "settings": settings}
 
 
-# Reconstructions lose their service in tests/faults too.
-@pytest.mark.parametrize("asked", [pytest.param(a_reconstruction, marks=pytest.mark.nightly), a_turntable])
+# A service is killed for every change in tests/faults, where more of it is looked at.
+@pytest.mark.nightly
+@pytest.mark.parametrize("asked", [a_reconstruction, a_turntable])
 def test_a_killed_service_loses_no_job(tmp_path, scan, asked):
     """The real thing: SIGKILL while a job runs, then the same folder again."""
     program = (

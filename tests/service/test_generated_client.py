@@ -41,6 +41,7 @@ def generated(tmp_path_factory) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_it_compiles_uploads_and_runs_a_job(generated, serve, work, scan, monkeypatch):
     assert compileall.compile_dir(generated / "bentray_client", quiet=1)
     monkeypatch.syspath_prepend(str(generated))

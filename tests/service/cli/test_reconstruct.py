@@ -27,6 +27,12 @@ from bentray_workers.files.reconstruction import read_reconstruction
 QUICK = ("--nodes", 32, "--iterations", 2)
 
 
+@pytest.fixture(autouse=True)
+def workers_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Worker processes take long to start; their bits are in tests/workers/cluster/test_pipelines.py."""
+    monkeypatch.setattr(connection, "open_cluster", partial(connection.open_cluster, processes=False))
+
+
 def test_it_writes_volume_picture_and_figures(
     bentray: Callable[..., Result], scan_file: Path, tmp_path: Path, drawn: Any
 ) -> None:
@@ -70,10 +76,8 @@ def test_without_json_it_ends_with_a_table_and_the_paths(
 
 
 def test_several_workers_give_the_same_bits(
-    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
 ) -> None:
-    # In this process: the bits of worker processes are in tests/workers/cluster/test_pipelines.py.
-    monkeypatch.setattr(connection, "open_cluster", partial(connection.open_cluster, processes=False))
     for workers in (1, 2):
         done = bentray("reconstruct", scan_file, "-o", tmp_path / str(workers), *QUICK, "--workers", workers)
         assert done.exit_code == 0

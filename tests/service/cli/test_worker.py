@@ -88,6 +88,7 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path) -> None:
     settings = Settings(method="sart", nodes=32, iterations=1)
     with open_cluster(machine.address) as cluster:

@@ -50,9 +50,6 @@ def geometry_field(client, folder, work, on_progress):
     return [path.read_bytes() for path in sorted((work / "made").glob("*.npy"))]
 
 
-PIPELINES = [reconstruction, simulation, turntable, geometry_field]
-
-
 @pytest.fixture
 def inputs(scan, tmp_path):
     """What the pipelines read."""
@@ -77,7 +74,17 @@ def mortal(tmp_path_factory):
         yield client
 
 
-@pytest.mark.parametrize("pipeline", PIPELINES, ids=lambda pipeline: pipeline.__name__)
+@pytest.mark.parametrize(
+    "pipeline",
+    # Two for every change: a single task loop runs them all.
+    [
+        reconstruction,
+        turntable,
+        pytest.param(simulation, marks=pytest.mark.nightly),
+        pytest.param(geometry_field, marks=pytest.mark.nightly),
+    ],
+    ids=lambda pipeline: pipeline.__name__,
+)
 def test_killed_worker_keeps_the_bits(mortal, inputs, pipeline, monkeypatch):
     """Nor does the cluster: the expected bits are those of one thread or more of this process."""
     # Seven tasks for the larger table of the field.

@@ -38,27 +38,16 @@ def ring(elements, heights):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("asked", "elements", "heights"),
     [
         ({"nodes": 64, "resolution_check": True, "uncertainty": True}, 128, 0),
-        pytest.param({"nodes": 96}, 192, 0, marks=pytest.mark.nightly),
-        pytest.param(
-            {"nodes": 64, "method": "gauss-newton", "resolution_check": True, "uncertainty": True},
-            128,
-            0,
-            marks=pytest.mark.nightly,
-        ),
-        pytest.param({"nodes": 96, "method": "gauss-newton"}, 144, 0, marks=pytest.mark.nightly),
-        pytest.param(
-            {"nodes": 48, "method": "gauss-newton", "decomposition": "volume"},
-            12,
-            8,
-            marks=pytest.mark.nightly,
-        ),
-        pytest.param(
-            {"nodes": 64, "decomposition": "volume", "attenuation": False}, 12, 8, marks=pytest.mark.nightly
-        ),
+        ({"nodes": 96}, 192, 0),
+        ({"nodes": 64, "method": "gauss-newton", "resolution_check": True, "uncertainty": True}, 128, 0),
+        ({"nodes": 96, "method": "gauss-newton"}, 144, 0),
+        ({"nodes": 48, "method": "gauss-newton", "decomposition": "volume"}, 12, 8),
+        ({"nodes": 64, "decomposition": "volume", "attenuation": False}, 12, 8),
     ],
     ids=["sart 64", "sart 96", "gauss-newton 64", "gauss-newton 96", "gauss-newton volume", "sart volume"],
 )

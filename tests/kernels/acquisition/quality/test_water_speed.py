@@ -35,7 +35,7 @@ def found(dataset: Dataset) -> list:
     return [f for f in examine(dataset).report.findings if f.check == WATER_SPEED]
 
 
-@pytest.mark.parametrize("off", [-2.0, 0.0, 2.0])
+@pytest.mark.parametrize("off", [pytest.param(-2.0, marks=pytest.mark.nightly), 0.0, 2.0])
 def test_errors_of_a_thermometer_are_no_finding(off):
     assert not found(without_water(stated(WATER_MPS + off)))
 

@@ -21,7 +21,7 @@ def estimated(dataset):
     return estimate_water(bare, Measures.of(bare.waveform.object, bare))[1]
 
 
-@pytest.mark.parametrize("start_s", [0.0, 1e-6, -1e-6])
+@pytest.mark.parametrize("start_s", [pytest.param(0.0, marks=pytest.mark.nightly), 1e-6, -1e-6])
 def test_estimate_matches_the_omitted_water_shot(start_s):
     dataset, emission, reception = with_elements(
         scan(DELAY_S, elements=ELEMENTS, noise=0.02), 3, start_s, 0.3
@@ -55,7 +55,14 @@ def test_delays_of_elements_are_found():
     assert np.abs(off - off.mean()).max() < 1e-8
 
 
-@pytest.mark.parametrize("picker", ["aic", "threshold", "correlation", "matched"])
+@pytest.mark.parametrize(
+    "picker",
+    [
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in ("aic", "threshold")),
+        "correlation",
+        "matched",
+    ],
+)
 def test_times_are_those_with_the_water_shot(picker):
     dataset, _, _ = with_elements(scan(DELAY_S, elements=ELEMENTS, noise=0.03), 5, 0.0, 0.3)
     with_water = pick(dataset, picker)

@@ -54,6 +54,7 @@ def test_the_error_falls_with_the_pixels(ball):
 
 
 @pytest.mark.real
+@pytest.mark.nightly
 def test_bunny():
     chart = parameterise(bunny()).chart
     error = geometric_error(chart.mesh, geometry_image(chart, 512).mesh(), 20_000)

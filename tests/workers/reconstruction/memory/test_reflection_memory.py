@@ -55,7 +55,11 @@ def test_buffers_of_a_device_are_planned():
 
 @pytest.mark.parametrize(
     ("elements", "samples", "changes"),
-    [(24, 1500, {}), (48, 300, {"gain": "attenuation", "nodes": 96}), (16, 200, {"pixel_m": 6e-5})],
+    [
+        (24, 1500, {}),
+        pytest.param(48, 300, {"gain": "attenuation", "nodes": 96}, marks=pytest.mark.nightly),
+        pytest.param(16, 200, {"pixel_m": 6e-5}, marks=pytest.mark.nightly),
+    ],
 )
 def test_tasks_allocate_what_is_planned(elements, samples, changes):
     settings = Settings.of(**{"method": "sart", "nodes": 48, "reflection": True, **changes})
