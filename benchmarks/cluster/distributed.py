@@ -23,10 +23,10 @@ from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_service.pictures import Pictures
 from bentray_service.rows.tenants import LOCAL
-from bentray_workers.cluster.attempts import Attempts
 from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.fair_shares import IN_FLIGHT
 from bentray_workers.cluster.task_pool import finished
+from bentray_workers.cluster.task_retries import Attempts
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 

@@ -13,10 +13,10 @@ from distributed.scheduler import NoValidWorkerError, NoWorkerError
 from bentray_kernels.task_graph import run
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph
-from bentray_workers.cluster.attempts import ResultsLostError
 from bentray_workers.cluster.dask_settings import NO_DASHBOARD, ours
 from bentray_workers.cluster.resources import OFFERED, THREADS
 from bentray_workers.cluster.task_pool import open_pool
+from bentray_workers.cluster.task_retries import ResultsLostError
 from bentray_workers.reconstruction import reconstruction_run
 
 # For every change tests/workers/cluster/test_pipelines.py kills a worker under the same limit of deaths.

@@ -3,9 +3,9 @@
 import pytest
 
 from bentray_workers.cluster import memory_cache
-from bentray_workers.cluster.attempts import marked
 from bentray_workers.cluster.capacities import USABLE, WARM_BYTES
 from bentray_workers.cluster.memory_cache import MemoryCache, set_memory_limit
+from bentray_workers.cluster.task_retries import marked
 
 MIB = 2**20
 

@@ -8,8 +8,8 @@ import pytest
 
 from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.wave import time_blocks
-from bentray_workers.cluster.attempts import ResultsLostError
 from bentray_workers.cluster.job_cancellation import JobEnded
+from bentray_workers.cluster.task_retries import ResultsLostError
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.files.dataset.record import record_of
 from bentray_workers.simulation import parts

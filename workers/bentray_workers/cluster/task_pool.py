@@ -11,10 +11,10 @@ from distributed import Client, Future, wait
 from bentray_kernels.task_graph import POLL_S, Pool, Task, TaskGraph, ThreadPool, run
 from bentray_kernels.tomography.result import Progress
 
-from .attempts import Attempts
 from .capacities import capacities_of
 from .fair_shares import Share, exclusive_share
 from .resources import RECONSTRUCTION
+from .task_retries import Attempts
 
 # Where a task may run: keyword arguments ``resources`` and ``workers`` of ``Client.submit``.
 Placement = Mapping[str, Any]

@@ -16,9 +16,9 @@ from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
 from bentray_kernels.sources import digest
 from bentray_kernels.wave.time_blocks import Poll
 
-from ..cluster.attempts import ResultsLostError
 from ..cluster.checkpoints import UNREADABLE
 from ..cluster.job_cancellation import JobEnded, check_job_active
+from ..cluster.task_retries import ResultsLostError
 from ..files.atomic import atomic_replace
 from ..files.npy_headers import PARSING
 from .cost import Timed, emitters_a_task

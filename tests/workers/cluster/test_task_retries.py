@@ -7,8 +7,8 @@ from distributed import KilledWorker
 from bentray_kernels.opencl import DeviceLostError
 from bentray_kernels.opencl.lost_device import cpu_only
 from bentray_kernels.task_graph import Task
-from bentray_workers.cluster import attempts
-from bentray_workers.cluster.attempts import MAX_DEATHS, Attempts, ResultsLostError, marked
+from bentray_workers.cluster import task_retries
+from bentray_workers.cluster.task_retries import MAX_DEATHS, Attempts, ResultsLostError, marked
 
 
 class Future(distributed.Future):
@@ -46,7 +46,7 @@ class Future(distributed.Future):
 class Client:
     def submit(self, task, *work, resources, priority, pure):
         assert task is marked
-        assert (resources, pure) == (attempts.RECONSTRUCTION, False)
+        assert (resources, pure) == (task_retries.RECONSTRUCTION, False)
         return Future(work)
 
 

@@ -1,4 +1,4 @@
-"""Retries: tasks on a cluster are submitted again when a worker dies, unless they kill their workers."""
+"""Retries of tasks of lost workers: submitted again when a worker dies, unless they kill their workers."""
 
 from __future__ import annotations
 
