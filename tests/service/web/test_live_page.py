@@ -158,3 +158,22 @@ def test_a_total_that_changes_changes_the_pace_and_the_bar_never_jumps(page, sha
     np.testing.assert_allclose(steps[41:98], (1 - shares[40]) * 2 / 120, atol=1e-9)
     assert (shares[-1], left[-1]) == (1.0, 0.0)
     np.testing.assert_allclose(left[20:40], np.arange(60, 40, -1), atol=1e-9)
+
+
+def test_a_misfit_that_falls_far_is_drawn_over_powers_of_ten(page, shared_service):
+    page.goto(shared_service.address)
+    texts, path = page.evaluate(
+        """async () => {
+          const { misfitCurve } = await import("/static/jobs/misfit_curve.js");
+          const place = document.createElement("div");
+          const row = (value, k) => ({ stage: 0, sweep: k + 1, residual_rms_s: value });
+          const history = [1e-6, 1e-7, 1e-8].map(row);
+          misfitCurve(place).show(history);
+          const texts = [...place.querySelectorAll("text")].map((one) => one.textContent);
+          return [texts, place.querySelector(".curve").getAttribute("d")];
+        }"""
+    )
+    assert {"10", "20", "50", "100", "1000"} <= set(texts)
+    heights = [float(point.split(" ")[1]) for point in path[1:].split("L")]
+    assert heights[1] - heights[0] == pytest.approx(heights[2] - heights[1], abs=0.02)
+    assert heights[1] - heights[0] > 50.0

@@ -316,6 +316,8 @@ def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, volume):
     page.get_by_text("Slice 4 of 0 to 7, x = -6 mm").wait_for()
     node, value, _ = node_below(page, 0.45, 0.4)
     assert value == values[(4, *node)]
+    expect(page.locator(".readout")).to_contain_text("x -6.00 mm · y ")
+    expect(page.locator(".readout")).to_contain_text(f"node 4, {node[0]}, {node[1]}")
     page.get_by_label("Three planes").check()
     expect(page.locator("canvas.plane")).to_have_count(3)
     # A click on the plane across z sets the slices of the two others.

@@ -49,7 +49,7 @@ def opened(path: Path, limits: Limits) -> Iterator[Reader]:
         elif start == SIGNATURE:
             found = f"an HDF5 file that is cut short or damaged ({size} bytes)"
         else:
-            found = f"a file that is not HDF5 (it begins with {start!r})"
+            found = f"a file that is not HDF5 (it begins with {repr(start)[1:]})"
         raise InvalidInput("file", found, accepted) from None
     try:
         yield Reader(file, limits)

@@ -109,7 +109,7 @@ def _kind(data: bytes) -> str:
     text = b"\0" not in data[: 2**16]
     if text and re.search(rb"^v[ \t]", data, re.MULTILINE):
         return "obj"
-    found = f"a file of another kind (it begins with {data[:8]!r})"
+    found = f"a file of another kind (it begins with {repr(data[:8])[1:]})"
     if not data:
         found = "an empty file"
     elif as_stl and not text:

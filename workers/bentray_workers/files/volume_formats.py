@@ -99,7 +99,7 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: VolumeMetadata, chec
             return read_nifti(unpacked, check)
     if start[344:348] == b"n+1\0" or start[4:8] == b"n+2\0":
         return read_nifti(file, check)
-    found = "an empty file" if not start else f"a file of another kind (it begins with {start[:8]!r})"
+    found = "an empty file" if not start else f"a file of another kind (it begins with {repr(start[:8])[1:]})"
     raise InvalidInput("file", found, ACCEPTED)
 
 

@@ -166,7 +166,8 @@ export function liveJob(root, first, onSuccess) {
   // What can be done about a failure.
   function advice({ type, field }) {
     if (type === "/problems/internal") return " Ask the operator of the service, who finds the entry in its log.";
-    if (job.kind !== "reconstruction") return "";
+    // Of a damaged scan the reason says it.
+    if (job.kind !== "reconstruction" || type === "/problems/stored-data-damaged") return "";
     return field ? " Change this and run it again." : " Run it again with fewer nodes, or examine the scan.";
   }
 

@@ -4,6 +4,9 @@ import { inNanoseconds } from "../parts/amounts.js";
 import { make } from "../parts/dom.js";
 import { residuals } from "./job_cards.js";
 
+// Largest over smallest misfit above which a linear axis would show a flat line.
+const STEEP = 20;
+
 const WAITING = "The misfit of the first iteration follows";
 
 // Whether several models are reconstructed side by side: then an iteration of a slice occurs more than once.
@@ -40,7 +43,8 @@ export function misfitCurve(place) {
       const stages = begins.length ? ` in ${begins.length + 1} stages` : "";
       const label = `Misfit of ${drawn} iterations${stages}: ${inNanoseconds(values[0])} to ${inNanoseconds(values.at(-1))}`;
       const curve = { x: values.map((_, k) => k + 1), y: values.map((value) => 1e9 * value) };
-      const picture = plot([curve], { across: "Iteration", up: "Misfit (ns)", label, whole: true });
+      const logarithmic = Math.min(...values) > 0 && Math.max(...values) > STEEP * Math.min(...values);
+      const picture = plot([curve], { across: "Iteration", up: "Misfit (ns)", label, whole: true, logarithmic });
       picture.dataset.points = drawn;
       hint.before(picture);
     },

@@ -2,13 +2,14 @@
 
 import { authorization } from "./key.js";
 
+// What was found in a field, or in a file as a whole.
+function foundIn({ field, found, accepted }) {
+  return `${field === "file" ? "Found" : `${field}: found`} ${found}; accepted: ${accepted}`;
+}
+
 export function inWords(problem) {
-  if (problem.errors && problem.errors.length > 1) {
-    return problem.errors.map((one) => `${one.field}: found ${one.found}; accepted: ${one.accepted}`).join(" · ");
-  }
-  if (problem.field && problem.accepted) {
-    return `${problem.title}. ${problem.field}: found ${problem.found}; accepted: ${problem.accepted}.`;
-  }
+  if (problem.errors && problem.errors.length > 1) return problem.errors.map(foundIn).join(" · ");
+  if (problem.field && problem.accepted) return `${problem.field === "file" ? "" : `${problem.title}. `}${foundIn(problem)}.`;
   return `${problem.title}: ${problem.detail}`;
 }
 

@@ -199,6 +199,10 @@ export function viewer(root, panes, state, keep) {
     const { axis } = at.tile;
     const { names: [across, up] } = shownPlane(at.tile);
     const reads = [`${across} ${x.toFixed(2)} mm`, `${up} ${y.toFixed(2)} mm`];
+    const field = fields[at.tile.number];
+    const k = AXES.indexOf(axis);
+    const slice = field.nearest(axis, state.cursor[k]);
+    if (field.dimension === 3 && !(field.uneven && axis === "z")) reads.splice(k, 0, `${axis} ${field.position(axis, slice).toFixed(2)} mm`);
     const { unit } = quantity();
     const readIn = (plane) => {
       const a = Math.round((x - plane.origin[0]) / plane.spacing[0]);
@@ -209,7 +213,7 @@ export function viewer(root, panes, state, keep) {
     const { node, value } = at.tile.image.at(x, y);
     if (panes.length === 1 || comparing()) {
       reads.push(`${shown(value, quantity())} ${unit}`);
-      if (node) reads.push(`node ${node.join(", ")}`);
+      if (node) reads.push(`node ${(field.dimension === 3 ? [...node.slice(0, k), slice, ...node.slice(k)] : node).join(", ")}`);
     } else {
       panes.forEach((one, number) => reads.push(`${one.title}: ${shown(readIn(planeOf(number, axis)), quantity())} ${unit}`));
     }
