@@ -35,6 +35,11 @@ SAID = "http://127.0.0.1:8000"
 ID = re.compile(r"\b(ds|job|vol|mesh|field|up)-([0-9a-z]{6,})\b")
 PATIENCE_S = 240.0
 BIGGEST_PICTURE = 300_000
+GREEK = re.compile(
+    r"\\(alpha|beta|gamma|delta|epsilon|eta|theta|kappa|lambda|mu|xi|rho|sigma|tau|phi|psi|omega|ell)\b"
+)
+# Without a unit: Landau's O, Euler's e, the imaginary unit and indices, the transpose.
+PLAIN = {"O", "e", "i", "r", "T"}
 
 
 @dataclass(frozen=True)
@@ -223,3 +228,25 @@ def test_pictures_are_shown_and_small() -> None:
     for picture in pictures:
         assert picture.stat().st_size < BIGGEST_PICTURE, picture.name
         assert picture.name in text, picture.name
+
+
+def symbols(text: str) -> set[str]:
+    """Letters of the formulas of a text, without indices and words."""
+    found: set[str] = set()
+    for block, line in re.findall(r"\$\$(.*?)\$\$|\$([^$\n]+)\$", text, re.DOTALL):
+        formula = re.sub(r"\\(?:text|mathrm|begin|end)\{[^}]*\}", " ", block or line)
+        formula = re.sub(r"_(?:\{[^{}]*\}|\\?\w)", "", formula)
+        found |= set(GREEK.findall(formula)) | set(
+            re.findall("[a-zA-Z]", re.sub(r"\\[a-zA-Z]+", " ", formula))
+        )
+    return found
+
+
+@pytest.mark.parametrize("page", sorted((DOCS / "mathematics").glob("*.md")), ids=lambda page: page.stem)
+def test_every_symbol_of_the_mathematics_has_a_unit(page: Path) -> None:
+    text = page.read_text()
+    begin = text.index("| symbol | meaning | unit |")
+    table, rest = text[begin:].split("\n\n", 1)
+    assert symbols(rest) - symbols(table) <= PLAIN
+    for row in table.splitlines()[2:]:
+        assert len([part for part in row.split("|") if part.strip()]) == 3, row
