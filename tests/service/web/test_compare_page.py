@@ -38,6 +38,20 @@ def test_both_images_have_one_range_and_one_cursor(page, both):
         expect(page.locator(".readout")).to_contain_text(f"{SECOND[node]:.2f} m/s")
 
 
+@pytest.mark.nightly
+def test_four_images_have_one_range(page, both, shared_service):
+    address, scan, work, monkeypatch, _ = shared_service
+    more = [finished(address, scan, work, monkeypatch, 3.0 * FIRST - one) for one in (3000.0, 2990.0)]
+    ready(page, ",".join([both, *more]))
+    expect(page.locator("canvas.plane")).to_have_count(4)
+    low, high = window_of(page)
+    assert low < FIRST.min() - 30.0
+    assert high > FIRST.max() + 30.0
+    node = node_below(page, 0.4, 0.35)[0]
+    for values in (FIRST, SECOND, 3.0 * FIRST - 3000.0, 3.0 * FIRST - 2990.0):
+        expect(page.locator(".readout")).to_contain_text(f"{values[node]:.2f} m/s")
+
+
 def test_the_difference_and_the_border_to_swipe(page, both):
     ready(page, both)
     page.get_by_role("button", name="Difference", exact=True).click()

@@ -115,6 +115,18 @@ def test_dragging_turns_the_view_and_full_quality_follows(ball):
     assert canvas.evaluate("canvas => canvas.toDataURL()") != before
     expect(page.get_by_label("Azimuth, degrees")).to_have_value("60")
     assert page.get_by_role("img", name="azimuth 60°, elevation 30°").count() == 1
+    # By a finger, and zoomed by two.
+    touch = page.context.new_cdp_session(page)
+
+    def touched(*moves):
+        for kind, places in zip(("touchStart", "touchMove", "touchEnd"), (*moves, []), strict=True):
+            fingers = [{"x": box["x"] + x, "y": box["y"] + 200, "id": k} for k, x in enumerate(places)]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers})
+
+    touched([200], [220])
+    expect(page.get_by_label("Azimuth, degrees")).to_have_value("50")
+    touched([180, 220], [160, 240])
+    expect(page.get_by_role("spinbutton", name="Zoom")).to_have_value("2")
 
 
 def test_the_view_is_turned_by_keyboard_and_kept_in_the_address(ball):

@@ -232,6 +232,41 @@ def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result,
     assert cells[2] == f"{contrast:.2f}"
 
 
+def test_dragging_sets_the_window_and_moves_the_image_and_two_fingers_zoom(page, result):
+    ready(page, result + "?window=1430,1570")
+    box = page.locator("canvas.plane").bounding_box()
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+
+    def drag(right, down):
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + right, y + down, steps=2)
+        page.mouse.up()
+
+    page.get_by_label("Window", exact=True).check()
+    drag(60, 0)
+    expect(page.get_by_label("from", exact=True)).not_to_have_value("1430")
+    half = 70.0 * np.exp(60 / 150)
+    np.testing.assert_allclose(window_of(page), [1500.0 - half, 1500.0 + half], atol=0.01)
+    drag(0, -30)
+    expect(page.get_by_label("to", exact=True)).not_to_have_value(f"{1500.0 + half:.6g}")
+    np.testing.assert_allclose(window_of(page), np.add([1500.0 - half, 1500.0 + half], 0.2 * half), atol=0.01)
+    page.get_by_label("Move", exact=True).check()
+    before = node_below(page, 0.5, 0.5)[2]
+    drag(60, 30)
+    after = node_below(page, 0.5, 0.5)[2]
+    scale = 60 / (before[0] - after[0])
+    assert scale > 0.0
+    assert (after[1] - before[1]) * scale == pytest.approx(30.0, abs=0.1)
+    touch = page.context.new_cdp_session(page)
+    for kind, apart in (("touchStart", 40), ("touchMove", 80), ("touchEnd", None)):
+        fingers = [{"x": x + sign * apart, "y": y, "id": sign} for sign in (0, 1)] if apart else []
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers})
+    page.wait_for_url(re.compile(r"view-z="))
+    left, right = (node_below(page, 0.5 + share, 0.5)[2][0] for share in (0.0, 0.1))
+    assert 0.1 * box["width"] / (right - left) == pytest.approx(2.0 * scale, rel=1e-3)
+
+
 def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_service):
     address, scan, work, monkeypatch, _ = shared_service
     # On a grid that has a node at each of the image.
@@ -398,7 +433,17 @@ def test_a_result_is_renamed(page, own_result):
 
 def test_provenance_is_told_in_words_and_copied_as_json(page, result):
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    rms = {"held_out_mean_s": 1e-9, "held_out_rms_s": 25e-9, "training_rms_s": 20e-9}
+    candidates = [
+        {"label": "bent rays", "chosen": True, "rejection": "", **rms},
+        {"label": "straight rays", "chosen": False, "rejection": "a larger error", **rms},
+    ]
+    choice = {"candidates": candidates, "reason": "Bent rays predict best."}
+    page.route("**/summary", lambda route: route.fulfill(json=route.fetch().json() | choice))
     ready(page, result)
+    table = page.get_by_role("region", name="Candidates of the automatic choice")
+    expect(table.locator("tbody tr").first).to_have_text("bent rays1 ns25 ns20 nschosen")
+    expect(table.locator("tbody tr").last).to_have_text("straight rays1 ns25 ns20 nsa larger error")
     box = page.locator(".provenance")
     job = httpx.get(result.replace("/#/jobs/", "/v1/jobs/")).json()
     volume = httpx.get(result.partition("/#/")[0] + job["links"]["volume"]).json()

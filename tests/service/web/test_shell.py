@@ -76,8 +76,10 @@ def test_unknown_addresses_are_named(page, shared_service):
     address = shared_service.address
     page.goto(f"{address}/#/nowhere")
     page.get_by_text("There is no page /nowhere").wait_for()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Not found")
     page.goto(f"{address}/#/scans/ds-none")
-    page.get_by_role("alert").get_by_text("ds-none").wait_for()
+    words = "There is no 'ds-none'. It has been deleted, or belongs to another tenant or project."
+    page.get_by_role("alert").get_by_text(words).wait_for()
     page.goto(f"{address}/#/jobs/job-none")
     page.get_by_role("alert").get_by_text("job-none").wait_for()
 

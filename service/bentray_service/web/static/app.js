@@ -30,10 +30,10 @@ function markMenu(entry) {
   }
 }
 
-function showFailure(root, words) {
+function showFailure(root, words, ...above) {
   const message = make("p", "error", words);
   message.setAttribute("role", "alert");
-  root.replaceChildren(message);
+  root.replaceChildren(...above, message);
 }
 
 async function openPage(first) {
@@ -66,7 +66,9 @@ async function openPage(first) {
   } catch (error) {
     if (mine !== visit) return;
     again ??= () => openPage(false);
-    showFailure(root, error.message);
+    const unknown = error.problem?.status === 404;
+    const words = unknown ? `There is no ${error.problem.found}. It has been deleted, or belongs to another tenant or project.` : error.message;
+    showFailure(root, words, make("h1", "", unknown || !found ? "Not found" : "The page could not be opened"));
   } finally {
     waiting.remove();
   }
