@@ -17,7 +17,8 @@ from typing import Any
 import httpx
 import numpy as np
 import trimesh
-from pictures import SAMPLE, _browser, _Service, _service, _stored
+from browser import browser
+from pictures import SAMPLE, _Service, _service, _stored
 
 from bentray_kernels.phantoms import TWO_HOLES, sampled
 from bentray_workers.files.dataset import write_dataset
@@ -138,7 +139,7 @@ def states(service: _Service) -> dict[str, State]:
 def main(folder: Path, names: list[str]) -> None:
     """Write the pictures of the named states, or of all."""
     folder.mkdir(parents=True, exist_ok=True)
-    with _service() as service, _browser(SIZES["laptop"]) as page:
+    with _service() as service, browser(SIZES["laptop"]) as page:
         page.set_default_timeout(PATIENCE_MS)
         for shown in ({"start": ("/", "No scan yet", stay)}, states(service)):
             photograph(page, service, {k: v for k, v in shown.items() if k in names or not names}, folder)
