@@ -16,7 +16,7 @@ import numpy as np
 import bentray
 
 scan = bentray.simulate(
-    waveform=True, elements=64, emissions=24, nodes=64, frequency_hz=3e5, side_m=0.06, snr=30.0
+    waveform=True, elements=64, emissions=16, nodes=64, frequency_hz=3e5, side_m=0.06, snr=30.0
 )
 scan.save("traces.h5")
 with h5py.File("traces.h5", "r+") as file:
