@@ -440,6 +440,13 @@ def test_provenance_is_told_in_words_and_copied_as_json(page, result):
     ]
     choice = {"candidates": candidates, "reason": "Bent rays predict best."}
     page.route("**/summary", lambda route: route.fulfill(json=route.fetch().json() | choice))
+
+    def with_rays(route):
+        record = route.fetch().json()
+        record["provenance"]["ray_numerics"] = '{"ray_width_m": 0.0026}'
+        route.fulfill(json=record)
+
+    page.route(re.compile("/v1/volumes/[^/]*$"), with_rays)
     ready(page, result)
     table = page.get_by_role("region", name="Candidates of the automatic choice")
     expect(table.locator("tbody tr").first).to_have_text("bent rays1 ns25 ns20 nschosen")
@@ -455,8 +462,11 @@ def test_provenance_is_told_in_words_and_copied_as_json(page, result):
     assert (rows["Speed bounds"], rows["SART: relaxation"]) == ("1300 to 1800 m/s", "0.1")
     assert rows["SART: smoothing of updates"] == "1 nodes"
     assert "{" not in box.inner_text()
+    box.get_by_text("Those of the rays before full waveforms").click()
+    expect(box.get_by_role("row", name="Width of rays")).to_have_text("Width of rays0.0026 m")
     box.get_by_role("button", name="Copy JSON").click()
     box.get_by_role("button", name="Copied").wait_for()
     copied = json.loads(page.evaluate("navigator.clipboard.readText()"))
     assert copied["settings"] == job["settings"]
     assert copied["provenance"] == volume["provenance"]
+    assert copied["ray_numerics"] == {"ray_width_m": 0.0026}

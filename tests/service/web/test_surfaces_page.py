@@ -104,6 +104,7 @@ def test_a_mesh_is_uploaded_and_its_field_looked_at(page, serve, tmp_path, monke
     page.once("dialog", lambda dialog: dialog.accept())
     page.get_by_role("button", name="Delete the mesh").click()
     expect(page.locator("#mesh")).to_have_text("No mesh uploaded yet")
+    expect(page.get_by_role("button", name="Delete the mesh")).to_be_hidden()
     (tmp_path / "notes.txt").write_text("only text")
     page.set_input_files("#mesh-file", tmp_path / "notes.txt")
     expect(page.locator("#mesh-error")).to_contain_text("PLY")

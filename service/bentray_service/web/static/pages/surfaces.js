@@ -72,7 +72,7 @@ const PAGE = `
         <div class="actions">
           <button id="make" type="submit" disabled>Build the geometry field</button>
           <button id="reset-view" type="button" class="quiet">Reset the view</button>
-          <button id="delete-mesh" type="button" class="quiet" disabled>Delete the mesh</button>
+          <button id="delete-mesh" type="button" class="quiet" hidden>Delete the mesh</button>
         </div>
       </form>
     </div>
@@ -193,7 +193,7 @@ export async function open(root, { id, query }) {
 
   function show(moving = false) {
     const mesh = meshes.get(at("mesh").value);
-    at("make").disabled = at("delete-mesh").disabled = !mesh;
+    at("make").disabled = at("delete-mesh").hidden = !mesh;
     if (!mesh) return;
     at("mesh-facts").textContent = factsOf(mesh);
     showObjects();

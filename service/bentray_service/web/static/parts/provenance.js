@@ -87,8 +87,8 @@ const fixed = (numerics) => Object.entries(numerics).map(([name, value]) => {
 
 // The provenance of a result in a section of its own.
 export function provenanceTable({ job, volume }) {
-  const { advice, numerics: stored, ...provenance } = volume.provenance;
-  const numerics = stored ? JSON.parse(stored) : null;
+  const { advice, numerics: stored, ray_numerics: ofRays, ...provenance } = volume.provenance;
+  const [numerics, rayNumerics] = [stored, ofRays].map((text) => (text ? JSON.parse(text) : null));
   const frequency = (hertz) => `${(1e-3 * Number(hertz)).toFixed(1)} kHz`;
   const said = Object.entries(provenance).filter(([name]) => !(name in SOFTWARE));
   const versions = Object.entries(SOFTWARE).filter(([name]) => name in provenance).map(([name, words]) => `${words} ${provenance[name]}`);
@@ -102,8 +102,10 @@ export function provenanceTable({ job, volume }) {
   const box = make("section", "panel provenance");
   const head = make("div", "section-head");
   const everything = { job: job.id, volume: volume.id, scan: job.dataset, finished: job.finished, settings: job.settings, numerics, provenance };
+  if (rayNumerics) everything.ray_numerics = rayNumerics;
   head.append(make("h2", "", "Provenance"), copyButton("Copy JSON", () => `${JSON.stringify(everything, null, 2)}\n`));
   box.append(head, pairs(rows), folded("Settings", pairs(settingRows(job.settings))));
   if (numerics) box.append(folded("Numerical parameters, chosen automatically", pairs(fixed(numerics))));
+  if (rayNumerics) box.append(folded("Those of the rays before full waveforms", pairs(fixed(rayNumerics))));
   return box;
 }
