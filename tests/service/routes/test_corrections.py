@@ -160,9 +160,9 @@ def dying(*_, **__):
     ("dies", "copies"),
     [
         (dies_while_it_writes, 0),
-        (dies_before_the_file_is_moved, 0),
+        pytest.param(dies_before_the_file_is_moved, 0, marks=pytest.mark.nightly),
         (dies_before_the_row, 0),
-        (dies_before_the_answer, 1),
+        pytest.param(dies_before_the_answer, 1, marks=pytest.mark.nightly),
     ],
 )
 def test_a_service_that_dies_leaves_the_scan_and_a_whole_copy_or_none(
