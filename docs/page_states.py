@@ -30,7 +30,7 @@ PATIENCE_MS = 60_000
 SCHEMES = ("light", "dark")
 MARKS = "profile=-75,0,75,0&ellipse=-12,12,18,44"
 SART = {"method": "sart", "nodes": 96}
-UNDER_WAY = {"method": "sart", "nodes": 128, "iterations": 400}
+UNDER_WAY = {"method": "sart", "nodes": 128, "iterations": 1000}
 
 # Address of a state, what is there once it is complete, and what is done before that.
 State = tuple[str, str, Callable[[Any], None]]
@@ -105,11 +105,12 @@ def states(service: _Service) -> dict[str, State]:
     mesh = _stored(service, "/v1/meshes?title=Torus", ring.export(file_type="ply"))
     asked = {"kind": "geometry-field", "mesh": mesh, "settings": {}}
     client.wait(httpx.post(f"{service.url}/v1/jobs", json=asked).raise_for_status().json()["id"])
-    running, queued = (client.submit(scan, UNDER_WAY | {"seed": seed}).id for seed in range(2))
-    cancelled = client.submit(scan, UNDER_WAY | {"seed": 3}).id
+    running, cancelled = (client.submit(scan, UNDER_WAY | {"seed": seed}).id for seed in range(2))
     client.cancel(cancelled)
     pair = ",".join(ways)
     return {
+        # First, since it ends.
+        "job-running": (f"/jobs/{running}", "Cancel", stay),
         "scans": ("/", "Breast phantom", stay),
         "scans-refused": ("/", "Breast phantom", refused),
         "scan": (f"/scans/{traced}", "Receiving element 0", stay),
@@ -117,8 +118,6 @@ def states(service: _Service) -> dict[str, State]:
         "scan-correction": (f"/scans/{wrong}", "Were times", corrected),
         "scan-correction-refused": (f"/scans/{wrong}", "Were times", correction_refused),
         "batch": ("/batch", "Breast phantom", stay),
-        "job-running": (f"/jobs/{running}", "Cancel", stay),
-        "job-queued": (f"/jobs/{queued}", "Cancel", stay),
         "job-cancelled": (f"/jobs/{cancelled}", "ancelled", stay),
         "job-failed": (f"/jobs/{failed}", "damaged", stay),
         "result": (f"/jobs/{ways[0]}?{MARKS}", "node ", stay),
@@ -141,13 +140,16 @@ def main(folder: Path, names: list[str]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with _service() as service, browser(SIZES["laptop"]) as page:
         page.set_default_timeout(PATIENCE_MS)
-        for shown in ({"start": ("/", "No scan yet", stay)}, states(service)):
-            photograph(page, service, {k: v for k, v in shown.items() if k in names or not names}, folder)
+        # Before there is anything.
+        photograph(page, service, {"start": ("/", "No scan yet", stay)}, names, folder)
+        photograph(page, service, states(service), names, folder)
 
 
-def photograph(page: Any, service: _Service, shown: dict[str, State], folder: Path) -> None:
-    """The pictures of some states."""
+def photograph(page: Any, service: _Service, shown: dict[str, State], names: list[str], folder: Path) -> None:
+    """The pictures of those of some states that are named, or of all."""
     for name, (address, text, act) in shown.items():
+        if names and name not in names:
+            continue
         for scheme in SCHEMES:
             page.emulate_media(color_scheme=scheme)
             for size, (width, height) in SIZES.items():
