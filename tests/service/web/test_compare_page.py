@@ -42,8 +42,12 @@ def test_both_images_have_one_range_and_one_cursor(page, both):
 def test_four_images_have_one_range(page, both, shared_service):
     address, scan, work, monkeypatch, _ = shared_service
     more = [finished(address, scan, work, monkeypatch, 3.0 * FIRST - one) for one in (3000.0, 2990.0)]
-    ready(page, ",".join([both, *more]))
+    ready(page, ",".join([both, *more]) + "?ellipse=-8,-15,0,-5")
     expect(page.locator("canvas.plane")).to_have_count(4)
+    expect(page.locator(".statistics tr").first.locator("th")).to_have_count(5)
+    page.set_viewport_size({"width": 360, "height": 740})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    page.set_viewport_size({"width": 1400, "height": 1100})
     low, high = window_of(page)
     assert low < FIRST.min() - 30.0
     assert high > FIRST.max() + 30.0

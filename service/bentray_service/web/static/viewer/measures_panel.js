@@ -111,7 +111,13 @@ export function measuresPanel(root, set) {
           head.scope = "row";
           row.append(head, ...cells.map((cell) => make(found.length > 1 && number === 0 ? "th" : "td", "", cell)));
         });
-        parts.region.result.replaceChildren(table);
+        // Four results are wider than a telephone.
+        const frame = make("div", "scroll");
+        frame.tabIndex = 0;
+        frame.setAttribute("role", "region");
+        frame.setAttribute("aria-label", "Statistics of the region");
+        frame.append(table);
+        parts.region.result.replaceChildren(frame);
         parts.region.save = () => save("region.csv", regionCsv(found, quantity, region));
       }
     },
