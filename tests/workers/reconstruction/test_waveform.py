@@ -15,7 +15,10 @@ from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.reference import reference_path
+from bentray_workers.images.truth_comparison import compare
 from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.simulation.simulation_run import simulate
+from bentray_workers.simulation.waves import WaveSimulationSettings
 
 from ...kernels.tomography.waveform.scans import error, scan, water
 from ..cluster.tearing import torn_runs
@@ -81,6 +84,19 @@ def test_waves_make_the_image_of_rays_better(expected):
     # There is none, nor do the wrong parts of the speed make much of it.
     assert 0.0 <= expected.attenuation.min() <= expected.attenuation.mean() < 0.5
     assert min(sweep.stage for sweep in waves) > max(sweep.stage for sweep in rays.history)
+
+
+@pytest.mark.nightly
+def test_an_object_that_nearly_fills_the_array_is_made_better_too(tmp_path):
+    """Its outermost nodes are nearer to the elements than any that a band of long waves changes."""
+    full = simulate(WaveSimulationSettings(2e5, 0.06, 48, 16, nodes=48, snr=30.0))
+    write_dataset(tmp_path / "full.h5", full)
+    rays, waves = (
+        reconstruction_run.reconstruct(None, tmp_path / "full.h5", Settings.of(method=method, nodes=48))
+        for method in ("auto", "waveform")
+    )
+    by_rays, by_waves = (compare(result, full.truth).rmse_mps for result in (rays, waves))
+    assert by_waves < 0.6 * by_rays
 
 
 def test_a_file_gives_the_bits_of_the_kernels(path, expected):

@@ -199,14 +199,12 @@ def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
     problem = scan.problem(number)
     if problem.water_correlation < MIN_WATER_CORRELATION:
         return None
-    speed, count = on_grid(image, problem), len(band_inversion.emitters(problem))
-    wavelet = None
-    if scan.settings().estimates_source:
-        wavelet = estimate_source(problem, speed, scan.settings().window_s)
+    start, count = on_grid(image, problem, scan.settings()), len(band_inversion.emitters(problem))
     grid = problem.band.spacing_m, problem.origin
     if problem.band.of == "speed":
-        return ActiveBand(band_inversion.begin(speed), *grid, count, None, wavelet)
-    return ActiveBand(band_inversion.begin(np.zeros_like(speed)), *grid, count, speed, wavelet)
+        return ActiveBand(band_inversion.begin(start.speed), *grid, count, None, start.wavelet)
+    lossless = band_inversion.begin(np.zeros_like(start.speed))
+    return ActiveBand(lossless, *grid, count, start.speed, start.wavelet)
 
 
 def evaluate_emitter(scan: WaveScan, number: int, model: Model, place: int, count: int = 1) -> EmitterMisfit:
@@ -223,10 +221,28 @@ def update_image(
     return band_inversion.step(scan.problem(number), scan.settings(), state, parts)
 
 
-def on_grid(image: Image, problem: WaveProblem) -> Floats:
-    """An image on the grid of a problem, (nx, ny), m/s; water outside the region."""
-    speed = resampled(image, problem.band.spacing_m, problem.origin, problem.region.shape)
-    return np.where(problem.region, speed, problem.water.speed)
+def on_grid(image: Image, problem: WaveProblem, settings: WaveSettings) -> Model:
+    """An image on the grid of a problem, with its source where that is estimated.
+
+    Nodes near the array, which no band changes, have the speed of the image or of the water, whichever
+    predicts held-out emitters better. Water in the place of an object that reaches there would cause wrong
+    speeds elsewhere, and the more the coarser the grid; but there the image of rays is least accurate.
+    """
+    low, high = settings.speed_bounds_mps
+    speed = np.clip(resampled(image, problem.band.spacing_m, problem.origin, problem.region.shape), low, high)
+    cleared = np.where(problem.region, speed, problem.water.speed)
+    candidates = [speed] if np.array_equal(speed, cleared) else [speed, cleared]
+    models = [Model(one, None, _source(one, problem, settings)) for one in candidates]
+    if len(models) == 1 or not problem.held.size:
+        return models[0]
+    # A task that starts a band has no device.
+    here = replace(settings, engine="compiled")
+    return min(models, key=lambda model: band_inversion.evaluate(problem, here, model, problem.held).held)
+
+
+def _source(speed: Floats, problem: WaveProblem, settings: WaveSettings) -> Floats | None:
+    """The source estimated anew with an image, (steps,); None: that of the problem."""
+    return estimate_source(problem, speed, settings.window_s) if settings.estimates_source else None
 
 
 def resampled(image: Image, spacing: float, origin: tuple[float, float], shape: tuple[int, ...]) -> Floats:

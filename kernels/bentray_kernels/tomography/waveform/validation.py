@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ...task_graph import Task
 from ..result import Iteration
-from .band_inversion import Model, evaluate
+from .band_inversion import evaluate
 from .inversion_state import Image
 from .refinement_graph import WaveScan, on_grid
 from .waveform_settings import WaveSettings
@@ -106,6 +104,6 @@ def validate_image(scan: WaveScan, image: Image) -> Validation:
     settings, problem = scan.settings(), scan.problem(0)
     if problem.water_correlation < MIN_VALID_CORRELATION or not problem.held.size:
         return Validation()
-    model = Model(np.clip(on_grid(image, problem), *settings.speed_bounds_mps))
+    model = on_grid(image, problem, settings)
     held = evaluate(problem, settings, model, problem.held).held / problem.held.size
     return Validation(held, 1.0 - problem.water_correlation)

@@ -27,6 +27,15 @@ def blob(x, y):
     )
 
 
+RIM_MPS = 1420.0
+
+
+def within_rim(x, y):
+    """Where ``scan(rim=True)`` has oil of ``RIM_MPS``: nearer to the elements than a band changes."""
+    depth = RADIUS - np.hypot(x, y)
+    return (depth > 0.0015) & (depth < 0.008)
+
+
 def lossy(x, y):
     """Attenuation of ``scan(loss=True)`` there, Np/m."""
     return 40.0 * np.exp(-((x**2 + (y - 0.005) ** 2) / 0.006**2))
@@ -38,7 +47,7 @@ def _traces(speed, loss, positions, emitter, wavelet, step):
 
 
 @functools.cache
-def scan(seed=0, noise=0.0, loss=False):
+def scan(seed=0, noise=0.0, loss=False, rim=False):
     """The dataset; every second element emits."""
     angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS + 0.1
     ring = RADIUS * np.column_stack((np.cos(angle), np.sin(angle)))
@@ -51,9 +60,10 @@ def scan(seed=0, noise=0.0, loss=False):
     wavelet = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
     emitters = np.arange(0, ELEMENTS, 2)
     positions = ring + SPACING * half
+    object_mps = np.where(within_rim(x, y), RIM_MPS, blob(x, y)) if rim else blob(x, y)
     both = [
         np.stack([_traces(speed, absorbed, positions, e, wavelet, step) for e in emitters])
-        for speed, absorbed in ((blob(x, y), lossy(x, y) if loss else None), (np.full_like(x, WATER), None))
+        for speed, absorbed in ((object_mps, lossy(x, y) if loss else None), (np.full_like(x, WATER), None))
     ]
     rng = np.random.default_rng(seed)
     noisy = [

@@ -18,7 +18,7 @@ ON_A_DEVICE = replace(SETTINGS, engine="opencl")
 @pytest.mark.parametrize("number", [1, 2])
 def test_misfits_of_all_emitters_are_those_of_compiled_code(number):
     problem = MemoryWaveScan(scan(), SETTINGS).problem(number)
-    speed = on_grid(water(), problem)
+    speed = on_grid(water(), problem, SETTINGS).speed
     model = Model(speed, None if problem.band.of == "speed" else np.full_like(speed, 10.0))
     some = emitters(problem)
     expected, found = (evaluate(problem, plan, model, some) for plan in (SETTINGS, ON_A_DEVICE))

@@ -39,29 +39,31 @@ def held(problem, speed, wavelet=None):
 
 def test_a_wrong_source_is_replaced_whatever_the_gains(truth, spoiled):
     right, wrong = spoiled
-    speed = on_grid(truth, right)
+    speed = on_grid(truth, right, SETTINGS).speed
     best = held(right, speed)
     assert held(wrong, speed) > best + 0.3
     assert held(wrong, speed, estimate_source(wrong, speed, SETTINGS.window_s)) < best + 0.01
 
 
 def test_a_band_begins_with_it_where_the_settings_say_so(truth, spoiled):
+    settings = replace(SETTINGS, estimates_source=True)
+
     class Scan:
         def settings(self):
-            return replace(SETTINGS, estimates_source=True)
+            return settings
 
         def problem(self, number):
             return spoiled[1]
 
     band = start_band(Scan(), 0, truth)
-    expected = estimate_source(spoiled[1], on_grid(truth, spoiled[1]), SETTINGS.window_s)
+    expected = estimate_source(spoiled[1], on_grid(truth, spoiled[1], settings).speed, settings.window_s)
     np.testing.assert_array_equal(band.model.wavelet, expected)
     assert band.model.attenuation is None
 
 
 def test_gains_of_traces_and_their_scale_change_no_source(truth, spoiled):
     right, _ = spoiled
-    speed = on_grid(truth, right)
+    speed = on_grid(truth, right, SETTINGS).speed
     gain = 1e-4 * right.gain * np.random.default_rng(0).uniform(0.2, 5.0, right.gain.shape)
     estimated, scaled = (
         estimate_source(problem, speed, SETTINGS.window_s) for problem in (right, replace(right, gain=gain))

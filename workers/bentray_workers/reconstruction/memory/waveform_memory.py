@@ -23,7 +23,7 @@ FLOOR_BYTES = 13 * 2**20 // 2
 # Of a band's grid, windows and spectra, which are small beside the arrays.
 START_BYTES = 2**20
 
-# Of the waves through the image that are compared, besides those of the start of a band.
+# Of the waves through an image that are compared, as at the start of a band with two rims.
 VALIDATION_BYTES = 2 * 2**20
 
 # Bytes per sample: simulated and recorded water shots, spectra and windows; traces, window and residuals of
@@ -94,7 +94,7 @@ def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -
         return {}
     plan = _scale(traces, width_m).bands(settings)
     (judge,) = validation_settings(WaveSettings(plan)).bands
-    sizes = {"validate_image": _band_bytes(traces, width_m, settings, judge)["start_band"] + VALIDATION_BYTES}
+    sizes = {"validate_image": _band_bytes(traces, width_m, settings, judge)["start_band"]}
     for band in plan if refines(settings) else ():
         for name, size in _band_bytes(traces, width_m, settings, band).items():
             sizes[name] = max(size, sizes.get(name, 0))
@@ -144,6 +144,7 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
     return {
         "start_band": base
         + START_BYTES
+        + VALIDATION_BYTES
         + 2 * traces.read_bytes
         + max(SAMPLER_BYTES * traces.samples * extent.steps, SHOTS * SHOT_BYTES * samples)
         + medium
