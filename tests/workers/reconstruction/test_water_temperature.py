@@ -38,7 +38,8 @@ SCANS = {
 
 
 @pytest.mark.parametrize(
-    "which", ["travel times", "water shot", pytest.param("no water shot", marks=pytest.mark.nightly)]
+    "which",
+    ["travel times", *(pytest.param(f"{one}water shot", marks=pytest.mark.nightly) for one in ("", "no "))],
 )
 @pytest.mark.parametrize("assumed", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_the_result_is_that_of_a_file_that_states_it(tmp_path, which, assumed):

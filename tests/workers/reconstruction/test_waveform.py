@@ -133,6 +133,7 @@ def test_stop_ends_it_among_the_waves(cluster, path):
     assert seen[-1].done < seen[-1].total
 
 
+@pytest.mark.nightly
 def test_slices_are_refined_by_themselves(cluster, tmp_path, expected):
     one = scan()
     other = scan(seed=1, noise=0.05)
@@ -148,7 +149,13 @@ def test_slices_are_refined_by_themselves(cluster, tmp_path, expected):
     assert {sweep.slice for sweep in result.history if sweep.band_hz} == {0, 1}
 
 
-@pytest.mark.parametrize("picked", [False, True], ids=["traces alone", "times and traces"])
+@pytest.mark.parametrize(
+    "picked",
+    [
+        pytest.param(False, marks=pytest.mark.nightly, id="traces alone"),
+        pytest.param(True, id="times and traces"),
+    ],
+)
 def test_without_a_water_shot_the_image_is_nearly_as_good(picked, tmp_path, expected):
     bare = replace(pick(scan()) if picked else scan(), waveform=Waveform(scan().waveform.object))
     write_dataset(tmp_path / "bare.h5", bare)

@@ -132,6 +132,7 @@ def test_touching_fans_are_rejected():
 
 
 @pytest.mark.real
+@pytest.mark.nightly
 def test_bunny():
     surface = bunny()
     found = parameterise(surface)
