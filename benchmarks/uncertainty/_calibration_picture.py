@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import erf
@@ -13,9 +12,7 @@ from bentray_workers.images.captions import LABELS
 from bentray_workers.images.maps import SPEED, UNCERTAINTY, draw_bar, draw_map, robust_limits
 
 from ..shared._small_png import figure_png
-
-if TYPE_CHECKING:
-    from .uncertainty import Judged
+from ._judged_image import Judged
 
 SHADOW, OTHER, CHOSEN = "#c1272d", "#1f5fa8", "#9aa7b5"
 

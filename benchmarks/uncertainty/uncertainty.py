@@ -6,7 +6,6 @@ import math
 import os
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,38 +25,14 @@ from bentray_service.cli.output.benchmark_row import Row
 
 from ._breast_scans import BreastScan, breast_scans
 from ._calibration_picture import calibration_picture
+from ._judged_image import DEVIATIONS, Judged, correlation, part_within, quantile
 
 Floats = NDArray[np.float64]
 
 # The factor of the deviations was chosen with the first half of the scans, so that nine tenths of their nodes
 # lie within two, and is judged on the others.
 SCANS, QUICK_SCANS = 20, 2
-DEVIATIONS, PART, CHOSEN_PART = 2.0, 0.85, 0.9
-
-
-@dataclass(frozen=True)
-class Judged:
-    """An image with its uncertainty, compared with the truth.
-
-    Attributes:
-        name: of the scan, with the chosen model.
-        result: the image.
-        error: (nodes,), m/s, of the nodes in the breast from the truth smoothed by the resolution width.
-        deviation: (nodes,), m/s, their standard deviations.
-        image_s, uncertainty_s: CPU time, s.
-    """
-
-    name: str
-    result: Reconstruction
-    error: Floats
-    deviation: Floats
-    image_s: float
-    uncertainty_s: float
-
-    @property
-    def within(self) -> float:
-        """Part of the nodes within ``DEVIATIONS``."""
-        return part_within([self], DEVIATIONS)
+PART, CHOSEN_PART = 0.85, 0.9
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
@@ -152,31 +127,10 @@ def seconds_of_uncertainty(dataset: Dataset, result: Reconstruction) -> float:
     return time.process_time() - begun
 
 
-def part_within(judged: Sequence[Judged], deviations: float) -> float:
-    """Part of all nodes whose error is at most so many deviations."""
-    return float(np.mean(np.concatenate([relative(one) for one in judged]) <= deviations))
-
-
-def quantile(judged: Sequence[Judged], part: float) -> float:
-    """The number of deviations within which that part of the nodes lies."""
-    return float(np.quantile(np.concatenate([relative(one) for one in judged]), part))
-
-
-def relative(judged: Judged) -> Floats:
-    """Absolute errors in deviations."""
-    return np.asarray(np.abs(judged.error) / judged.deviation)
-
-
 def constant_deviation(judged: Sequence[Judged]) -> float:
     """One deviation for all nodes with ``CHOSEN_PART`` of them within ``DEVIATIONS``, m/s."""
     errors = np.concatenate([np.abs(one.error) for one in judged])
     return float(np.quantile(errors, CHOSEN_PART)) / DEVIATIONS
-
-
-def correlation(judged: Judged) -> float:
-    """Spearman's rank correlation of absolute error and deviation."""
-    ranks = [np.argsort(np.argsort(values)) for values in (np.abs(judged.error), judged.deviation)]
-    return float(np.corrcoef(ranks)[0, 1])
 
 
 def rms(values: Floats) -> float:

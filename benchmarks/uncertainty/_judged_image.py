@@ -1,0 +1,62 @@
+"""An image with its uncertainty beside the truth: which part of the nodes lies within how many deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bentray_kernels.tomography import Reconstruction
+
+Floats = NDArray[np.float64]
+
+# Within so many standard deviations nodes are counted.
+DEVIATIONS = 2.0
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An image with its uncertainty, compared with the truth.
+
+    Attributes:
+        name: of the scan, with the chosen model.
+        result: the image.
+        error: (nodes,), m/s, of the nodes in the breast from the truth smoothed by the resolution width.
+        deviation: (nodes,), m/s, their standard deviations.
+        image_s, uncertainty_s: CPU time, s.
+    """
+
+    name: str
+    result: Reconstruction
+    error: Floats
+    deviation: Floats
+    image_s: float
+    uncertainty_s: float
+
+    @property
+    def within(self) -> float:
+        """Part of the nodes within ``DEVIATIONS``."""
+        return part_within([self], DEVIATIONS)
+
+
+def part_within(judged: Sequence[Judged], deviations: float) -> float:
+    """Part of all nodes whose error is at most so many deviations."""
+    return float(np.mean(np.concatenate([relative(one) for one in judged]) <= deviations))
+
+
+def quantile(judged: Sequence[Judged], part: float) -> float:
+    """The number of deviations within which that part of the nodes lies."""
+    return float(np.quantile(np.concatenate([relative(one) for one in judged]), part))
+
+
+def relative(judged: Judged) -> Floats:
+    """Absolute errors in deviations."""
+    return np.asarray(np.abs(judged.error) / judged.deviation)
+
+
+def correlation(judged: Judged) -> float:
+    """Spearman's rank correlation of absolute error and deviation."""
+    ranks = [np.argsort(np.argsort(values)) for values in (np.abs(judged.error), judged.deviation)]
+    return float(np.corrcoef(ranks)[0, 1])
