@@ -8,8 +8,8 @@ BIN := .venv/bin
 HOST ?= 127.0.0.1
 PORT ?= 8000
 NAME ?= reconstruction
-# Tests often wait for other processes, so two more than there are cores.
-PROCESSES ?= $(shell n=$$(nproc); echo $$((n < 3 ? n + 2 : 4)))
+# Tests often wait for other processes, so one more than there are cores.
+PROCESSES ?= $(shell n=$$(nproc); echo $$((n < 4 ? n + 1 : 4)))
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start hundreds of Python processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
