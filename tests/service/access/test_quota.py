@@ -2,7 +2,6 @@
 
 import gzip
 import io
-import time
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
@@ -15,11 +14,12 @@ from bentray_service.files.disk import bytes_in
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.tenants import LOCAL
 
+from ..tus_records import settled
+
 HDF5 = {"Content-Type": "application/x-hdf5"}
 BYTES = {"Content-Type": "application/octet-stream"}
 TUS = {"Tus-Resumable": "1.0.0"}
 QUOTA_BYTES = 2_000_000
-PATIENCE_S = 30.0
 
 
 def used(http):
@@ -37,16 +37,6 @@ def refused(answer):
     assert found["type"] == "/problems/quota-used-up"
     assert "BENTRAY_MAX_TENANT_BYTES" in found["accepted"]
     return found["found"]
-
-
-def settled(http, place):
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
-        record = http.get(place).json()
-        if record["state"] in ("done", "refused"):
-            return record
-        time.sleep(0.02)
-    raise AssertionError(record)
 
 
 def packed_zeros(count):

@@ -25,3 +25,8 @@ def rejecting_damage(
             raise
         reason = next(iter(str(error).splitlines()), "") or type(error).__name__
         raise InvalidInput(field, f"damaged data ({reason[:120]})", accepted) from None
+
+
+def first_bytes(data: bytes) -> str:
+    """The beginning of a file of another kind in words, for a message."""
+    return f"it begins with {repr(data[:8])[1:]}"

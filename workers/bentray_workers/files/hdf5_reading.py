@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .damage import rejecting_damage
+from .damage import first_bytes, rejecting_damage
 from .hdf5_checks import OTHER_TYPES, TYPES, Limits, check_storage
 
 __all__ = ["SIGNATURE", "Limits", "Reader", "opened", "printable", "rejecting_hdf5_damage"]
@@ -49,7 +49,7 @@ def opened(path: Path, limits: Limits) -> Iterator[Reader]:
         elif start == SIGNATURE:
             found = f"an HDF5 file that is cut short or damaged ({size} bytes)"
         else:
-            found = f"a file that is not HDF5 (it begins with {repr(start)[1:]})"
+            found = f"a file that is not HDF5 ({first_bytes(start)})"
         raise InvalidInput("file", found, accepted) from None
     try:
         yield Reader(file, limits)

@@ -19,7 +19,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.defects import SoundMesh, sound
 
-from .damage import rejecting_damage
+from .damage import first_bytes, rejecting_damage
 from .gltf_checks import check_gltf
 from .obj_checks import check_obj
 from .off_checks import HEADERS, check_off
@@ -109,7 +109,7 @@ def _kind(data: bytes) -> str:
     text = b"\0" not in data[: 2**16]
     if text and re.search(rb"^v[ \t]", data, re.MULTILINE):
         return "obj"
-    found = f"a file of another kind (it begins with {repr(data[:8])[1:]})"
+    found = f"a file of another kind ({first_bytes(data)})"
     if not data:
         found = "an empty file"
     elif as_stl and not text:

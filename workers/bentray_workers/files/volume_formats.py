@@ -13,7 +13,7 @@ import numpy as np
 from bentray_kernels.errors import InvalidInput
 
 from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared
-from .damage import rejecting_damage
+from .damage import first_bytes, rejecting_damage
 from .hdf5_reading import SIGNATURE, Limits, opened, printable
 from .nifti_reading import read_nifti
 from .npy_headers import PARSING
@@ -99,7 +99,7 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: VolumeMetadata, chec
             return read_nifti(unpacked, check)
     if start[344:348] == b"n+1\0" or start[4:8] == b"n+2\0":
         return read_nifti(file, check)
-    found = "an empty file" if not start else f"a file of another kind (it begins with {repr(start[:8])[1:]})"
+    found = "an empty file" if not start else f"a file of another kind ({first_bytes(start)})"
     raise InvalidInput("file", found, ACCEPTED)
 
 

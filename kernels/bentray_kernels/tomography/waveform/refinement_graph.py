@@ -199,7 +199,12 @@ def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
     problem = scan.problem(number)
     if problem.water_correlation < MIN_WATER_CORRELATION:
         return None
-    start, count = on_grid(image, problem, scan.settings()), len(band_inversion.emitters(problem))
+    count, models = len(band_inversion.emitters(problem)), starting_models(image, problem, scan.settings())
+    start = models[0]
+    if len(models) > 1 and problem.held.size:
+        # A task that starts a band has no device.
+        here = replace(scan.settings(), engine="compiled")
+        start = min(models, key=lambda model: held_out_misfit(problem, here, model))
     grid = problem.band.spacing_m, problem.origin
     if problem.band.of == "speed":
         return ActiveBand(band_inversion.begin(start.speed), *grid, count, None, start.wavelet)
@@ -221,23 +226,26 @@ def update_image(
     return band_inversion.step(scan.problem(number), scan.settings(), state, parts)
 
 
-def on_grid(image: Image, problem: WaveProblem, settings: WaveSettings) -> Model:
-    """An image on the grid of a problem, with its source where that is estimated.
+def starting_models(image: Image, problem: WaveProblem, settings: WaveSettings) -> list[Model]:
+    """An image on the grid of a problem: as it is, and with water in the nodes that no band changes.
 
-    Nodes near the array, which no band changes, have the speed of the image or of the water, whichever
-    predicts held-out emitters better. Water in the place of an object that reaches there would cause wrong
-    speeds elsewhere, and the more the coarser the grid; but there the image of rays is least accurate.
+    Those nodes are near the array. Water in the place of an object that reaches there would cause wrong
+    speeds elsewhere, and the more the coarser the grid; but there the image of rays is least accurate. So
+    held-out emitters decide. Each model has a source of its own where that is estimated.
+
+    Returns:
+        One model where both are the same.
     """
     low, high = settings.speed_bounds_mps
     speed = np.clip(resampled(image, problem.band.spacing_m, problem.origin, problem.region.shape), low, high)
     cleared = np.where(problem.region, speed, problem.water.speed)
-    candidates = [speed] if np.array_equal(speed, cleared) else [speed, cleared]
-    models = [Model(one, None, _source(one, problem, settings)) for one in candidates]
-    if len(models) == 1 or not problem.held.size:
-        return models[0]
-    # A task that starts a band has no device.
-    here = replace(settings, engine="compiled")
-    return min(models, key=lambda model: band_inversion.evaluate(problem, here, model, problem.held).held)
+    speeds = [speed] if np.array_equal(speed, cleared) else [speed, cleared]
+    return [Model(one, None, _source(one, problem, settings)) for one in speeds]
+
+
+def held_out_misfit(problem: WaveProblem, settings: WaveSettings, model: Model) -> float:
+    """Sum of the misfits of held-out emitters."""
+    return band_inversion.evaluate(problem, settings, model, problem.held).held
 
 
 def _source(speed: Floats, problem: WaveProblem, settings: WaveSettings) -> Floats | None:

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 from ...task_graph import Task
 from ..result import Iteration
-from .band_inversion import evaluate
 from .inversion_state import Image
-from .refinement_graph import WaveScan, on_grid
+from .refinement_graph import WaveScan, held_out_misfit, starting_models
 from .waveform_settings import WaveSettings
 
 # Number of the band of the continuation, from 1, around the centre of the pulse, where noise matters least.
@@ -104,6 +103,6 @@ def validate_image(scan: WaveScan, image: Image) -> Validation:
     settings, problem = scan.settings(), scan.problem(0)
     if problem.water_correlation < MIN_VALID_CORRELATION or not problem.held.size:
         return Validation()
-    model = on_grid(image, problem, settings)
-    held = evaluate(problem, settings, model, problem.held).held / problem.held.size
-    return Validation(held, 1.0 - problem.water_correlation)
+    models = starting_models(image, problem, settings)
+    held = min(held_out_misfit(problem, settings, model) for model in models)
+    return Validation(held / problem.held.size, 1.0 - problem.water_correlation)

@@ -7,7 +7,7 @@ import pytest
 
 from bentray_kernels.tomography.waveform.band_inversion import Model, emitters, evaluate
 from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
-from bentray_kernels.tomography.waveform.refinement_graph import on_grid
+from bentray_kernels.tomography.waveform.refinement_graph import starting_models
 
 from .scans import SETTINGS, error, refine, refined, scan, water
 
@@ -18,7 +18,7 @@ ON_A_DEVICE = replace(SETTINGS, engine="opencl")
 @pytest.mark.parametrize("number", [1, 2])
 def test_misfits_of_all_emitters_are_those_of_compiled_code(number):
     problem = MemoryWaveScan(scan(), SETTINGS).problem(number)
-    speed = on_grid(water(), problem, SETTINGS).speed
+    speed = starting_models(water(), problem, SETTINGS)[0].speed
     model = Model(speed, None if problem.band.of == "speed" else np.full_like(speed, 10.0))
     some = emitters(problem)
     expected, found = (evaluate(problem, plan, model, some) for plan in (SETTINGS, ON_A_DEVICE))

@@ -17,9 +17,10 @@ from sqlalchemy import update
 from bentray_service.ingest.upload_limits import UploadLimits
 from bentray_service.rows import schema
 
+from ...tus_records import settled
+
 TUS = {"Tus-Resumable": "1.0.0"}
 PIECE = {**TUS, "Content-Type": "application/offset+octet-stream"}
-PATIENCE_S = 30.0
 
 
 def metadata(**said):
@@ -39,16 +40,6 @@ def piece(http, place, offset, content, **headers):
 
 def offset(http, place):
     return int(http.head(place, headers=TUS).headers["upload-offset"])
-
-
-def settled(http, place):
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
-        record = http.get(place).json()
-        if record["state"] in ("done", "refused"):
-            return record
-        time.sleep(0.02)
-    raise AssertionError(record)
 
 
 def problem(answer, status):
