@@ -28,7 +28,6 @@ PICTURE = Path(__file__).parent / "pictures" / "notebook.png"
 BAR = re.compile(r'Reconstructing <progress value="(\d+)" max="(\d+)"')
 # Of each of the two pictures side by side, pixels.
 WIDTH = 800
-MAX_COLOURS = 256
 
 
 class Recorder(NotebookClient):
@@ -84,4 +83,4 @@ def _shot(page: Any, notebook: Any, first: int, last: int) -> Image.Image:
 if __name__ == "__main__":
     # As the documentation does: pages by their titles.
     notebook_titles.setup(None)
-    picture().quantize(MAX_COLOURS).save(PICTURE, optimize=True)
+    picture().save(PICTURE, optimize=True)
