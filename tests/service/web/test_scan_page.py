@@ -349,7 +349,10 @@ def test_name_notes_and_water_are_edited(page, own_traced, work):
     expect(page.get_by_role("heading", level=1)).to_have_text("Left, warm")
     page.get_by_role("button", name="Edit name").click()
     page.locator("#edit-form").get_by_label("Water temperature (°C)").fill("")
-    page.get_by_role("button", name="Save").click()
+    # The reloaded page has no facts at first, so their absence would not show that it has saved.
+    with page.expect_response(lambda answer: answer.request.method == "PATCH"):
+        page.get_by_role("button", name="Save").click()
+    expect(facts).to_contain_text("m/s")
     expect(facts).not_to_contain_text("stated on this page")
     assert traced("")["water_temperature_c"] is None
 
