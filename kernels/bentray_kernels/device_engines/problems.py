@@ -36,8 +36,6 @@ from ..refraction import (
 )
 from ..refraction.caster_opencl import on_the_device as caster_on_the_device
 from ..splines import Spline
-from ..splines.sampling_opencl import OpenCLSpline
-from ..splines.sampling_opencl import on_the_device as spline_on_the_device
 from ..tomography import Problem, Settings
 from ..tomography.grid_schedule import initial_slowness
 from ..tomography.reflection.delay_and_sum import Pixels, Signals, Sums, sum_echoes
@@ -54,7 +52,7 @@ from .engine import Engine, odd_pixels, relative, rms_difference
 WATER_MPS = 1500.0
 
 # Rows of the table, see ``engines``.
-ENGINES_COMPARED = 10
+ENGINES_COMPARED = 9
 
 # Of a node in a step in float32: two fields are read and one is written; the three factors of the medium are
 # the same for all emitters and remain in a cache.
@@ -83,7 +81,6 @@ def engines(quick: bool) -> Iterator[Engine]:
     yield gradients(60 if quick else 212, 100 if quick else 800, 2 if quick else 8)
     yield traces_in_space(20 if quick else 210, 32)
     yield sart(64 if quick else 128, 2 if quick else 8)
-    yield spline(10_000 if quick else 1_000_000)
     yield echoes(*((64, 16, 2) if quick else (256, 256, 16)))
     yield refraction(64 if quick else 512)
     yield field(64 if quick else 512)
@@ -288,27 +285,6 @@ def echoes(pixels: int, elements: int, emissions: int) -> Engine:
         relative,
         "of the largest",
         1e-3,
-    )
-
-
-def spline(points: int) -> Engine:
-    """Values and gradients of the cubic B-spline of a ball at scattered points."""
-    volume = Spline(ball())
-    places = np.random.default_rng(1).uniform(1.0, min(volume.shape) - 2.0, (points, 3))
-    there = spline_on_the_device(volume)
-    return Engine(
-        "spline",
-        f"cubic B-spline, {points:,} values and gradients",
-        lambda: np.column_stack(volume.value_and_gradient(places)),
-        (lambda: np.column_stack(there.value_and_gradient(places)))
-        if isinstance(there, OpenCLSpline)
-        else None,
-        float(points),
-        "points",
-        7.0 * 8.0 * points,
-        relative,
-        "of the largest",
-        1e-12,
     )
 
 
