@@ -102,7 +102,7 @@ def correct_dataset(
         "frequency_hz": frequency_hz,
     }
     place = f"/v1/datasets/{id_of(dataset)}/corrections"
-    response = yield RequestStep("POST", place, {"json": plain_numbers(given)})
+    response = yield RequestStep("POST", place, _once(plain_numbers(given)), repeatable=True)
     return DatasetRecord.model_validate_json(response.content)
 
 
@@ -280,7 +280,11 @@ def delete(connection: Connection, stored: StoredId) -> Flow[None]:
 
 
 def _start(request: dict[str, Any]) -> Flow[JobRecord]:
-    """Start a job with an idempotency key, so that retries start no second job."""
-    options = {"json": request, "headers": {"Idempotency-Key": str(uuid.uuid4())}}
-    response = yield RequestStep("POST", "/v1/jobs", options, repeatable=True)
+    """Start a job."""
+    response = yield RequestStep("POST", "/v1/jobs", _once(request), repeatable=True)
     return JobRecord.model_validate_json(response.content)
+
+
+def _once(request: dict[str, Any]) -> dict[str, Any]:
+    """A request with an idempotency key, so that retries make nothing a second time."""
+    return {"json": request, "headers": {"Idempotency-Key": str(uuid.uuid4())}}

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ..errors import KeyReused
 from ..files.tenant_files import TenantFiles
 from ..rows.digests import digest_of
+from ..rows.idempotency import RequestKey
 from ..rows.stored_tables import Datasets
 from ..rows.tenants import Tenant
 from ..rows.typed_rows import DatasetRow
@@ -21,6 +23,7 @@ def add_corrected(
     tenant: Tenant,
     scan: DatasetRow,
     correction: Mapping[str, Any],
+    request: RequestKey,
     new_id: str,
     datasets: Datasets,
     files: TenantFiles,
@@ -33,6 +36,7 @@ def add_corrected(
         tenant: owner of both.
         scan: stored; neither its row nor its file is changed, since its results were made of them.
         correction: arguments of ``Correction``.
+        request: an equal one that was faster keeps its copy, and there is no other.
         new_id: of the copy.
         datasets: the table.
         files: of the tenant; the file of ``scan`` is here.
@@ -40,6 +44,7 @@ def add_corrected(
         reserve: reserves storage, bytes, replacing an earlier reservation.
 
     Raises:
+        KeyReused: when the key was used with another request.
         InvalidInput, QuotaExceeded, StorageFull, StorageUnavailable: as ``make_canonical``.
     """
     given = {CORRECTION: dict(correction), "origin": scan["id"]}
@@ -52,4 +57,11 @@ def add_corrected(
         "water_temperature_c": scan["water_temperature_c"],
     }
     size, digest = path.stat().st_size, digest_of(path).sha256
-    return datasets.add(tenant, new_id, size=size, sha256=digest, summary=summary | own)
+    try:
+        made = datasets.add_once(tenant, new_id, request, size=size, sha256=digest, summary=summary | own)
+    except KeyReused:
+        files.remove([new_id])
+        raise
+    if made["id"] != new_id:
+        files.remove([new_id])
+    return made

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Request, Response, status
 from fastapi.openapi.models import Example
@@ -13,11 +13,13 @@ from bentray_workers.files.dataset.correct import Correction
 
 from ..ingest.canonical import IngestLimits
 from ..ingest.corrected_scan import add_corrected
+from ..rows.idempotency import RequestKey
 from ..rows.ids import new_id
+from ..rows.tenants import Tenant
 from ..rows.typed_rows import DatasetRow
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service
-from .bodies import SmallBody, accept_media_types
+from ..wiring import CallerTenant, Parts, Service
+from .bodies import IdempotencyKey, SmallBody, accept_media_types
 from .models.job_records import DatasetRecord, JobRecord
 from .models.name_changes import DatasetChanges, JobChanges, ScanCorrection
 from .record_conversion import dataset_record, job_record
@@ -68,7 +70,7 @@ def change_dataset(
     tags=["datasets"],
     status_code=status.HTTP_201_CREATED,
     dependencies=JSON,
-    responses=problems(400, 404, 413, 415, 422, 503, 507),
+    responses=problems(400, 404, 409, 413, 415, 422, 503, 507),
 )
 async def correct_dataset(
     dataset_id: str,
@@ -77,6 +79,7 @@ async def correct_dataset(
     response: Response,
     service: Service,
     tenant: CallerTenant,
+    idempotency_key: IdempotencyKey = None,
 ) -> DatasetRecord:
     """Make a corrected copy of a scan whose units, sampling rate or frequency were stated wrongly.
 
@@ -86,6 +89,19 @@ async def correct_dataset(
     given = correction.model_dump(exclude_none=True)
     # A correction that changes nothing is rejected before any work.
     Correction(**given)
+    key = RequestKey.of(idempotency_key, ["correction", dataset_id, given])
+    made = await run_in_threadpool(service.datasets.made_by, tenant, key)
+    if made is None:
+        made = await _corrected(dataset_id, given, key, request, service, tenant)
+    record = dataset_record(made)
+    response.headers["Location"] = record.links["self"]
+    return record
+
+
+async def _corrected(
+    dataset_id: str, given: dict[str, Any], key: RequestKey, request: Request, service: Parts, tenant: Tenant
+) -> DatasetRow:
+    """The row of a corrected copy, which is made in the ingest queue."""
     scan = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
     copy_id, settings, files = new_id("dataset"), service.settings, service.files.of(tenant)
     reserve = partial(service.quota.resize, tenant, copy_id)
@@ -93,13 +109,11 @@ async def correct_dataset(
 
     def work() -> DatasetRow:
         service.files.store.fetch(files.dataset(scan["id"]))
-        return add_corrected(tenant, scan, given, copy_id, service.datasets, files, limits, reserve)
+        return add_corrected(tenant, scan, given, key, copy_id, service.datasets, files, limits, reserve)
 
     with service.upload_limits(tenant):
         async with service.quota.reserved(tenant, copy_id, scan["bytes"]):
-            record = dataset_record(await run_in_turn(request, service.ingest_queue, tenant, work))
-    response.headers["Location"] = record.links["self"]
-    return record
+            return await run_in_turn(request, service.ingest_queue, tenant, work)
 
 
 @router.patch("/jobs/{job_id}", tags=["jobs"], dependencies=JSON, responses=REFUSALS)

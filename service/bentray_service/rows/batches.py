@@ -11,6 +11,7 @@ from sqlalchemy import Connection, insert, select
 
 from ..errors import JobFinished, UnknownId
 from .database import Database
+from .idempotency import RequestKey
 from .ids import checked, new_id
 from .job_states import change
 from .jobs import NewJob, Submission, insert_jobs
@@ -46,14 +47,14 @@ class Batches:
             KeyReused, QuotaExceeded, QueueFull, UnknownId: as for ``Jobs.add``.
         """
         called = [] if how.webhook is None else [how.webhook]
-        digest = how.digest_of([name, settings, [one.dataset_id for one in new], *called])
+        request = RequestKey.of(how.key, [name, settings, [one.dataset_id for one in new], *called])
         with self._database.write() as connection:
-            before = how.earlier(connection, batches, tenant, digest)
+            before = request.earlier(connection, batches, tenant)
             if before is None:
                 batch_id = new_id("batch")
                 row: Plain = {"id": batch_id, "tenant": tenant, "name": name, "settings": settings}
                 row |= {"size": len(new), "created": time.time(), "started_by": how.started_by[:200]}
-                row |= {"idempotency_key": how.key, "request_sha256": digest}
+                row |= request.columns()
                 connection.execute(insert(batches).values(**row))
                 insert_jobs(connection, tenant, new, how, batch_id)
             else:

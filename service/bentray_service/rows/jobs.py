@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -11,11 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import cast
 
-from sqlalchemy import Connection, Table, case, func, insert, or_, select
+from sqlalchemy import Connection, case, func, insert, or_, select
 from sqlalchemy.exc import IntegrityError
 
-from ..errors import JobFinished, KeyReused, QueueFull, UnknownId
+from ..errors import JobFinished, QueueFull, UnknownId
 from . import job_search, schema, usage
+from .idempotency import RequestKey
 from .ids import checked, new_id
 from .job_states import RUNNING, append_event, change
 from .projects import family_of
@@ -78,11 +77,11 @@ class Jobs(NamedTable[JobRow]):
         )
         how = Submission(None if reserve is None else reserve[1], most_queued, key, started_by, webhook)
         called = [] if webhook is None else [webhook]
-        digest = how.digest_of([kind, settings, dataset_id, volume_id, mesh_id, *called])
+        request = RequestKey.of(key, [kind, settings, dataset_id, volume_id, mesh_id, *called])
         with self._database.write() as connection:
-            before = how.earlier(connection, jobs, tenant, digest)
+            before = request.earlier(connection, jobs, tenant)
             if before is None:
-                job_id = insert_jobs(connection, tenant, [new], how, key=key, digest=digest)[0]
+                job_id = insert_jobs(connection, tenant, [new], how, request=request)[0]
             else:
                 job_id = before["id"]
         return self.get(tenant, job_id)
@@ -312,31 +311,6 @@ class Submission:
     started_by: str = ""
     webhook: str | None = None
 
-    @staticmethod
-    def digest_of(request: object) -> str:
-        """SHA-256 of a request, which an idempotency key belongs to."""
-        return hashlib.sha256(json.dumps(request, sort_keys=True).encode()).hexdigest()
-
-    def earlier(self, connection: Connection, table: Table, tenant: Tenant, digest: str) -> Plain | None:
-        """The row that an earlier request with this key inserted; concurrent requests with it wait.
-
-        Raises:
-            KeyReused: when it was another request.
-        """
-        if self.key is None:
-            return None
-        if connection.dialect.name != "sqlite":
-            # Write transactions of SQLite are serialised; this lock serialises those of PostgreSQL.
-            words = f"{tenant}/{self.key}".encode()
-            lock = int.from_bytes(hashlib.sha256(words).digest()[:8], signed=True)
-            connection.execute(select(func.pg_advisory_xact_lock(lock)))
-        mine = select(table).where(table.c.tenant == tenant, table.c.idempotency_key == self.key)
-        row = connection.execute(mine).mappings().one_or_none()
-        if row is not None and row["request_sha256"] != digest:
-            accepted = "a unique key for every request; this key was used with another request"
-            raise KeyReused("Idempotency-Key", repr(self.key), accepted)
-        return None if row is None else dict(row)
-
 
 def insert_jobs(
     connection: Connection,
@@ -344,8 +318,7 @@ def insert_jobs(
     new: Sequence[NewJob],
     how: Submission,
     batch_id: str | None = None,
-    key: str | None = None,
-    digest: str | None = None,
+    request: RequestKey | None = None,
 ) -> list[str]:
     """Insert queued jobs; returns their ids.
 
@@ -355,7 +328,7 @@ def insert_jobs(
         new: the jobs.
         how: limits and user.
         batch_id: of the batch that they belong to.
-        key, digest: idempotency key of the request, and its digest, if it is for one job.
+        request: its idempotency key, if it is for one job.
 
     Raises:
         QuotaExceeded, QueueFull, UnknownId: as for ``Jobs.add``; the transaction must be rolled back.
@@ -386,8 +359,7 @@ def insert_jobs(
                     settings=one.settings,
                     plan=one.plan,
                     tenant=tenant,
-                    idempotency_key=key,
-                    request_sha256=digest,
+                    **(request.columns() if request else {}),
                     started_by=how.started_by[:200],
                     webhook=how.webhook,
                     state="queued",

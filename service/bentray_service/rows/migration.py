@@ -193,6 +193,13 @@ def _to_11(connection: Connection) -> None:
     connection.execute(text("ALTER TABLE uploads ADD COLUMN multipart_id VARCHAR(1024)"))
 
 
+def _to_12(connection: Connection) -> None:
+    """Version 12: idempotency keys of corrected copies of scans."""
+    for column in ("idempotency_key VARCHAR(200)", "request_sha256 VARCHAR(64)"):
+        connection.execute(text(f"ALTER TABLE datasets ADD COLUMN {column}"))
+    connection.execute(text("CREATE UNIQUE INDEX datasets_by_key ON datasets (tenant, idempotency_key)"))
+
+
 def _count_stored_bytes(connection: Connection) -> None:
     """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
@@ -204,5 +211,5 @@ def _count_stored_bytes(connection: Connection) -> None:
 
 
 STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType(
-    {1: _to_2, 2: _to_3, 3: _to_4, 4: _to_5, 5: _to_6, 6: _to_7, 7: _to_8, 8: _to_9, 9: _to_10, 10: _to_11}
+    dict(enumerate((_to_2, _to_3, _to_4, _to_5, _to_6, _to_7, _to_8, _to_9, _to_10, _to_11, _to_12), start=1))
 )

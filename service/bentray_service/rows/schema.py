@@ -20,7 +20,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 11
+VERSION = 12
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -90,9 +90,13 @@ datasets = Table(
     Column("water_temperature_c", Float),
     # The simulation that created it; not a foreign key, since jobs reference datasets.
     Column("job_id", String(32)),
+    # Idempotency key of the correction that created it, and a digest of the request.
+    Column("idempotency_key", String(200)),
+    Column("request_sha256", String(64)),
     _tenant(),
     *named_columns(),
     Index("datasets_by_tenant", "tenant", "number"),
+    Index("datasets_by_key", "tenant", "idempotency_key", unique=True),
 )
 
 jobs = Table(

@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
-from sqlalchemy import Table, func, insert, select, update
+from sqlalchemy import Connection, Table, func, insert, select, update
 
 from ..errors import UnknownId
 from . import schema
 from .database import Database
+from .idempotency import RequestKey
 from .ids import checked
 from .job_search import contains
 from .schema import datasets, jobs, uploaded_volumes, volumes
@@ -78,17 +79,47 @@ class UploadedTable(TenantTable[Record]):
 
     def add(self, tenant: Tenant, name: str, *, size: int, sha256: str, summary: Plain) -> Record:
         """Insert a row; ``summary`` holds the columns that describe the content of the file."""
-        row = {"tenant": tenant, "id": name, "created": time.time(), "bytes": size, "sha256": sha256}
         with self._database.write() as connection:
-            connection.execute(insert(self.table).values(**row, **summary))
-            keep(connection, tenant, name, size)
+            self._insert(connection, tenant, name, size, sha256, summary)
         return self.get(tenant, name)
+
+    def _insert(
+        self, connection: Connection, tenant: Tenant, name: str, size: int, sha256: str, summary: Plain
+    ) -> None:
+        row = {"tenant": tenant, "id": name, "created": time.time(), "bytes": size, "sha256": sha256}
+        connection.execute(insert(self.table).values(**row, **summary))
+        keep(connection, tenant, name, size)
 
 
 class Datasets(UploadedTable[DatasetRow], NamedTable[DatasetRow]):
     """Scans, uploaded or simulated."""
 
     table, what = datasets, "dataset"
+
+    def made_by(self, tenant: Tenant, request: RequestKey) -> DatasetRow | None:
+        """The scan that an earlier request with the idempotency key of this one made.
+
+        Raises:
+            KeyReused: when it was another request.
+        """
+        if request.key is None:
+            return None
+        with self._database.write() as connection:
+            return cast(DatasetRow | None, request.earlier(connection, datasets, tenant))
+
+    def add_once(
+        self, tenant: Tenant, name: str, request: RequestKey, *, size: int, sha256: str, summary: Plain
+    ) -> DatasetRow:
+        """As ``add``, for a request; gives the row of an equal one that was faster, which has another id.
+
+        Raises:
+            KeyReused: as ``made_by``.
+        """
+        with self._database.write() as connection:
+            before = request.earlier(connection, datasets, tenant)
+            if before is None:
+                self._insert(connection, tenant, name, size, sha256, summary | request.columns())
+        return self.get(tenant, name) if before is None else cast(DatasetRow, before)
 
     def found(
         self, tenant: Tenant, limit: int, before: str | None = None, text: str | None = None

@@ -1,6 +1,8 @@
 """POST of /v1/datasets/{id}/corrections: a corrected copy; the scan and its results stay; refusals."""
 
 import hashlib
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import get_args
 
 import numpy as np
@@ -118,6 +120,49 @@ def test_the_quota_holds(start, scan, work):
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1 + statuses.count(201)
 
 
+def copies_of(http, here):
+    return [one for one in http.get("/v1/datasets").json()["datasets"] if one["links"]["self"] != here]
+
+
+def test_a_repeated_request_makes_no_second_copy(http, here, scan):
+    key = {"Idempotency-Key": "scan 7, first try"}
+    first, again = (http.post(f"{here}/corrections", json=WRONG, headers=key) for _ in range(2))
+    assert (first.status_code, again.status_code) == (201, 201)
+    assert again.json() == first.json()
+    assert again.headers["location"] == first.headers["location"]
+    assert [one["id"] for one in copies_of(http, here)] == [first.json()["id"]]
+    other = http.post(f"{here}/corrections", json={**WRONG, "frequency_hz": 5e5}, headers=key)
+    assert (other.status_code, other.json()["field"]) == (409, "Idempotency-Key")
+    # One that has been deleted is made again, and without a key each request makes its own.
+    http.delete(first.json()["links"]["self"])
+    for headers in (key, {}, {}):
+        assert http.post(f"{here}/corrections", json=WRONG, headers=headers).status_code == 201
+    assert len(copies_of(http, here)) == 3
+
+
+def test_equal_requests_at_once_make_one_copy(http, here, monkeypatch):
+    """Both have written their file before one of them has a row."""
+    both, plain = threading.Barrier(2), Datasets.add_once
+
+    def together(*given, **named):
+        both.wait(60.0)
+        return plain(*given, **named)
+
+    monkeypatch.setattr(Datasets, "add_once", together)
+    key = {"Idempotency-Key": "k"}
+    with ThreadPoolExecutor(2) as pool:
+        sent = [pool.submit(http.post, f"{here}/corrections", json=WRONG, headers=key) for _ in range(2)]
+        answers = [one.result() for one in sent]
+    assert [one.status_code for one in answers] == [201, 201]
+    (made,) = copies_of(http, here)
+    assert {one.json()["id"] for one in answers} == {made["id"]}
+    folder = http.app.state.parts.files.of(Tenant("local")).root
+    sizes = [path.stat().st_size for path in (folder / "datasets").iterdir()]
+    assert len(sizes) == 2
+    usage = http.app.state.parts.quota.of(Tenant("local"))
+    assert (usage.stored, usage.reserved) == (sum(sizes), 0)
+
+
 def test_another_tenant_corrects_nothing(http, scan):
     tokens = {}
     for tenant, scopes in (("local", ("read", "write")), ("other", ("read", "write")), ("reader", ("read",))):
@@ -145,7 +190,7 @@ def dies_before_the_file_is_moved(patch):
 
 
 def dies_before_the_row(patch):
-    patch.setattr(Datasets, "add", dying)
+    patch.setattr(Datasets, "add_once", dying)
 
 
 def dies_before_the_answer(patch):

@@ -53,7 +53,7 @@ INSERT INTO about VALUES (1, 0.0);
 DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
 
 
-@pytest.fixture(params=[1, 2, 3, 4, 5, 6, 7, 8, 9, 10])
+@pytest.fixture(params=[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11])
 def old(request, tmp_path):
     """A database as an older version left it, with a finished and a waiting job."""
     path = tmp_path / "old.sqlite"
@@ -177,10 +177,10 @@ def test_keys_hold_afterwards(old):
 
 def test_failed_migration_keeps_the_old_database(old, monkeypatch):
     def broken(connection):
-        migration._to_11(connection)
+        migration._to_12(connection)
         raise RuntimeError("the power went")
 
-    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 10: broken})
+    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 11: broken})
     with pytest.raises(RuntimeError, match="power"):
         open_database(old)
     monkeypatch.undo()
@@ -273,6 +273,9 @@ def test_postgres_changes_the_columns_in_place(monkeypatch):
         "deliveries",
         "webhook_secrets",
         "ALTER TABLE uploads ADD COLUMN multipart_id VARCHAR(1024)",
+        "ALTER TABLE datasets ADD COLUMN idempotency_key VARCHAR(200)",
+        "ALTER TABLE datasets ADD COLUMN request_sha256 VARCHAR(64)",
+        "CREATE UNIQUE INDEX datasets_by_key ON datasets (tenant, idempotency_key)",
     ]
     assert told.said[-1].startswith("UPDATE about SET version")
 

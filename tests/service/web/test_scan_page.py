@@ -57,8 +57,7 @@ def test_upload_start_watch(page, address, scan, work):
     assert work.calls[0][1].nodes == 32
     image = job.locator("img")
     image.scroll_into_view_if_needed()
-    expect(image).to_have_js_property("complete", True)
-    assert image.evaluate("image => image.naturalWidth") > 0
+    expect(image).not_to_have_js_property("naturalWidth", 0)
     assert page.get_by_text("Nothing has run yet").is_hidden()
 
 
@@ -375,12 +374,20 @@ def test_a_scan_in_wrong_units_is_corrected_as_the_page_proposes(page, address, 
     expect(form.get_by_role("alert")).to_contain_text("after the correction")
     form.get_by_label("Lengths in the original file").select_option("as they were read")
     form.get_by_label("Centre frequency (kHz)").fill("500")
+    # The answer is lost, and the user presses again.
+    page.route("**/corrections", lambda route: (route.fetch(), route.abort()))
+    form.get_by_role("button", name="Make a corrected copy").click()
+    expect(form.get_by_role("alert")).to_contain_text("does not answer")
+    page.unroute("**/corrections")
     form.get_by_role("button", name="Make a corrected copy").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("Sixteen elements, corrected")
     expect(page.locator("#scan-facts")).to_contain_text("500.0 kHz, stated in the file")
     expect(page.locator("#scan-notes")).to_contain_text("times in ms, read as us before")
     expect(page.locator("#proposed")).to_be_hidden()
-    assert wrong("")["notes"] == ""
+    scan = wrong("")
+    assert scan["notes"] == ""
+    found = httpx.get(f"{address}/v1/datasets", params={"text": scan["id"]}).json()["datasets"]
+    assert len(found) == 2, "the scan and one copy, whose notes name it"
 
 
 def test_without_a_water_shot_there_is_none_to_choose(page, address, tmp_path):

@@ -113,6 +113,7 @@ export function scanEditor(place, scan, onChange) {
 function corrector(scan) {
   const [form, button] = [at("correct-form"), at("correct")];
   const fields = form.elements;
+  let [sent, key] = ["", ""];
 
   function toggle(open) {
     form.hidden = !open;
@@ -134,9 +135,12 @@ function corrector(scan) {
     if (fields.frequency.value) correction.frequency_hz = 1e3 * fields.frequency.value;
     const submit = form.querySelector("[type=submit]");
     submit.disabled = true;
+    const body = JSON.stringify(correction);
+    // The same again, as after an answer that was lost, makes no second copy.
+    if (body !== sent) [sent, key] = [body, crypto.getRandomValues(new Uint32Array(4)).join("-")];
     try {
-      const headers = { "Content-Type": "application/json" };
-      const made = await request(`/v1/datasets/${scan.id}/corrections`, { method: "POST", headers, body: JSON.stringify(correction) });
+      const headers = { "Content-Type": "application/json", "Idempotency-Key": key };
+      const made = await request(`/v1/datasets/${scan.id}/corrections`, { method: "POST", headers, body });
       if (form.isConnected) go(`/scans/${made.id}`);
     } catch (error) {
       submit.disabled = false;
