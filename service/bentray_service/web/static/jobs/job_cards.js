@@ -234,7 +234,8 @@ export function showJobs(list, jobs, titleOf, onCancel) {
       cards.set(job.id, card);
     }
     if (card.signature !== signature) {
-      const focused = card.node.contains(document.activeElement) && document.activeElement.tagName === "BUTTON";
+      const nameOf = (control) => `${control.tagName} ${control.textContent}`;
+      const focused = card.node.lastChild?.contains(document.activeElement) ? nameOf(document.activeElement) : "";
       const fresh = facts(job, title, onCancel);
       for (const open of card.node.querySelectorAll("details[open]")) {
         const same = fresh.querySelector(`details.${open.className}`);
@@ -242,7 +243,8 @@ export function showJobs(list, jobs, titleOf, onCancel) {
       }
       if (card.state === job.state) card.node.lastChild.replaceWith(fresh);
       else card.node.replaceChildren(pictures(job, title), fresh);
-      if (focused) fresh.querySelector("button")?.focus();
+      const controls = [...fresh.querySelectorAll("a, button, summary")];
+      if (focused) (controls.find((one) => nameOf(one) === focused) ?? controls[0]).focus();
       card.signature = signature;
       card.state = job.state;
     }
