@@ -7,9 +7,11 @@ import os
 import secrets
 from collections import defaultdict
 from collections.abc import Generator, Iterator
+from functools import partial
 from pathlib import Path
 from typing import IO
 
+import httpx
 import pytest
 from hypothesis import HealthCheck, settings
 from matplotlib.figure import Figure
@@ -28,6 +30,10 @@ settings.register_profile(
     "nightly", deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "push"))
+
+# Requests of tests that state no time limit: the 5 s of httpx are short on a machine under load.
+for _method in ("get", "head", "post", "put", "patch", "delete", "stream"):
+    setattr(httpx, _method, partial(getattr(httpx, _method), timeout=60.0))
 
 TESTS = Path(__file__).parent
 

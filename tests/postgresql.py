@@ -6,12 +6,13 @@ import os
 import pwd
 import secrets
 import shutil
-import socket
 import subprocess
 import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
+
+from .free_ports import free_port
 
 START_S = 60.0
 SKIPPED = "PostgreSQL is not installed, so nothing here was tried with it: apt-get install postgresql"
@@ -24,12 +25,6 @@ def programs() -> Path | None:
     if on_path := shutil.which("initdb"):
         found.insert(0, Path(on_path).resolve().parent)
     return found[-1] if found else None
-
-
-def free_port() -> int:
-    """A port of loopback that nobody listens on."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 class Server:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import postgresql
+from ..free_ports import free_port
 from . import compose
 
 PATIENCE_S = 240.0
@@ -39,7 +40,7 @@ class Installation:
         subprocess.run([str(compose.ROOT / "deploy" / "secrets.sh"), str(folder)], check=True)
         owner = self.services["database"]["environment"]
         self.database = postgresql.Server(owner["POSTGRES_USER"], password.read_text(), owner["POSTGRES_DB"])
-        self.ports = {"scheduler": postgresql.free_port(), "service": postgresql.free_port()}
+        self.ports = {"scheduler": free_port(), "service": free_port()}
         self.key = (folder / "first-key").read_text()
         self.url = f"http://127.0.0.1:{self.ports['service']}"
         self._processes: dict[str, subprocess.Popen[bytes]] = {}

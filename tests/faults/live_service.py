@@ -16,6 +16,7 @@ from bentray_service.rows.database import open_database
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.tenants import Tenant
 
+from ..free_ports import free_port
 from .machine import PATIENCE_S, below, command_of, of_session
 
 # The first start on a machine compiles the kernels.
@@ -43,10 +44,11 @@ class LiveService:
         self._environment = {**given, "BENTRAY_DATA_DIR": str(self.data), **environment}
         self._workers = workers
         self.keys = {tenant: self._key(tenant) for tenant in tenants}
-        self.start(0)
+        # One that is still free when the service is started again.
+        self.start(free_port())
 
     def start(self, port: int) -> None:
-        """Start it on a port, any with 0, and wait until it listens."""
+        """Start it on a port, and wait until it listens."""
         command = self._command("serve", "--port", str(port), "--workers", str(self._workers), "--json")
         with self.log.open("ab") as log:
             self.process = subprocess.Popen(

@@ -14,14 +14,10 @@ from typing import Any
 
 import httpx
 
+from ..free_ports import free_port
+
 PATIENCE_S = 240.0
 ENDED = ("succeeded", "failed", "cancelled")
-
-
-def free_port() -> int:
-    """A port of loopback that nobody listens on."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 def wait_until(so: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
@@ -66,7 +62,7 @@ class Machine:
             "DASK_DISTRIBUTED__SCHEDULER__HTTP__ROUTES": "[]",
             **environment,
         }
-        self.http = httpx.Client(base_url=f"http://127.0.0.1:{self._service_port}", timeout=30.0)
+        self.http = httpx.Client(base_url=f"http://127.0.0.1:{self._service_port}", timeout=60.0)
         self.parts: dict[str, subprocess.Popen[bytes]] = {}
         for part in ("scheduler", "workers", "service"):
             self.start(part)
@@ -164,12 +160,12 @@ class Machine:
             process.terminate()
         for process in self.parts.values():
             try:
-                process.wait(30.0)
+                process.wait(60.0)
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
         # What watches a dead process ends after it.
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + 60.0
         while left := [pid for session in sessions for pid in of_session(session)]:
             assert time.monotonic() < deadline, [command_of(pid) for pid in left]
             time.sleep(0.1)

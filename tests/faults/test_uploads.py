@@ -3,7 +3,6 @@
 import hashlib
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -15,6 +14,8 @@ import numpy as np
 import pytest
 
 from bentray_service.client import Client
+
+from ..free_ports import free_port
 
 PATIENCE_S = 60.0
 TUS = {"Tus-Resumable": "1.0.0"}
@@ -44,9 +45,7 @@ class Service:
     """A service of its own process on a folder and a port that stay."""
 
     def __init__(self, folder):
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self._port = free.getsockname()[1]
+        self._port = free_port()
         self.url = f"http://127.0.0.1:{self._port}"
         self._environment = {**os.environ, "BENTRAY_DATA_DIR": str(folder)}
 

@@ -3,7 +3,6 @@
 import io
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -22,6 +21,8 @@ from bentray_service.rows.ids import new_id
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
+
+from ..free_ports import free_port
 
 
 def test_dataset_in_image_out(start, uploaded, submitted, until, work):
@@ -145,12 +146,10 @@ def test_a_killed_service_loses_no_job(tmp_path, scan, asked):
         "cluster = open_cluster(workers=1, processes=False)\n"
         "uvicorn.run(create_app(ServiceSettings(), cluster), port=int(sys.argv[1]), log_level='warning')\n"
     )
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     environment = {**os.environ, "BENTRAY_DATA_DIR": str(tmp_path / "data")}
     command = [sys.executable, "-c", program, str(port)]
-    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30) as http:
+    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60.0) as http:
         service = subprocess.Popen(command, env=environment)
         try:
             wait_for(lambda: http.get("/health/ready").is_success)

@@ -15,7 +15,7 @@ from bentray_service.rows.projects import Projects
 from bentray_service.rows.sessions import Sessions
 from bentray_service.rows.tenants import LOCAL
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 @pytest.fixture(autouse=True)
@@ -109,9 +109,9 @@ def test_a_download_is_broken_off(serve, keys, held, monkeypatch):
             coming = answer.iter_raw(65536)
             next(coming)
             keys.revoke(held[0].id)
-            time.sleep(0.5)
+            # Read more slowly than the service looks for keys that have ended.
             with pytest.raises(httpx.RemoteProtocolError):
-                list(coming)
+                [time.sleep(0.02) for _ in coming]
 
 
 def test_a_request_that_ended_is_not_watched(keys, held, tmp_path):

@@ -59,7 +59,7 @@ def ended(pid: int) -> bool:
 
 def gone(pid: int) -> bool:
     """Whether a process that was killed has ended; the kernel takes a moment."""
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60.0
     while not ended(pid) and time.monotonic() < deadline:
         time.sleep(0.01)
     return ended(pid)
@@ -118,7 +118,7 @@ def test_unresponsive_service_times_out(monkeypatch: pytest.MonkeyPatch, tmp_pat
 @pytest.mark.nightly
 def test_the_real_service_answers_and_stops(tmp_path: Path) -> None:
     with running_service(tmp_path / "data", tmp_path / "log") as url:
-        assert httpx.get(f"{url}/health/ready", timeout=30).json()["status"] == "ready"
+        assert httpx.get(f"{url}/health/ready", timeout=60.0).json()["status"] == "ready"
     with pytest.raises(httpx.TransportError):
         httpx.get(f"{url}/health/live", timeout=5)
     assert "Traceback" not in (tmp_path / "log").read_text()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -22,15 +21,11 @@ from bentray_service.healthcheck import check_worker
 from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
+from ...free_ports import free_port
 from ...listening import beyond_loopback, listening, pages
 
 PATIENCE_S = 240.0
 Process = subprocess.Popen[str]
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 def start_scheduler(port: int) -> Process:
@@ -114,8 +109,8 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
     family = psutil.Process(machine.worker.pid).children(recursive=True)
     assert family
     machine.worker.send_signal(signal.SIGTERM)
-    assert machine.worker.wait(30) == 0
-    psutil.wait_procs(family, timeout=10)
+    assert machine.worker.wait(60.0) == 0
+    psutil.wait_procs(family, timeout=60.0)
     assert [process for process in family if process.is_running()] == []
     assert (check_worker(machine.address) or "").endswith("none so far")
     assert machine.worker.stdout is not None

@@ -24,6 +24,7 @@ from bentray_service.client.retries import Retries
 from bentray_service.client.steps import DownloadStep, PauseStep, RequestStep
 from bentray_service.settings import ServiceSettings
 
+from ...free_ports import free_port
 from .cutting_proxy import cutting
 
 LOOK = RequestStep("GET", "/v1/jobs/job-1", repeatable=True)
@@ -225,7 +226,7 @@ def test_a_job_is_waited_for_while_its_service_is_started_again(
     told: list[str] = []
     with ThreadPoolExecutor(1) as pool:
         work.hold.clear()
-        with service(tmp_path / "data", 0, cluster) as port:
+        with service(tmp_path / "data", free_port(), cluster) as port:
             client = Client(f"http://127.0.0.1:{port}", poll_s=0.05, on_wait=told.append)
             job = client.submit(client.upload(scan()).id, {"nodes": 16, "iterations": 1}).id
             done = pool.submit(client.wait, job)

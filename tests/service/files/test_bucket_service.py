@@ -30,7 +30,7 @@ AWAY = (503, "/problems/storage-away", "10")
 
 def wait(happened):
     """Until something has happened."""
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 60.0
     while not happened():
         assert time.monotonic() < deadline
         time.sleep(0.02)

@@ -8,7 +8,7 @@ from bentray_service.ingest import fair_queue
 from bentray_service.ingest.fair_queue import FairQueue, readers_at_once
 from bentray_service.rows.tenants import Tenant
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 BUSY, SMALL, THIRD = Tenant("busy"), Tenant("small"), Tenant("third")
 
 

@@ -17,7 +17,7 @@ from bentray_service.rows.database import open_database
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 class Store(dict):

@@ -65,7 +65,7 @@ def test_it_can_be_deleted(spoiled):
 
 
 def test_a_download_goes_on_while_its_volume_is_deleted(serve):
-    with httpx.Client(base_url=serve(), timeout=30.0) as http:
+    with httpx.Client(base_url=serve(), timeout=60.0) as http:
         sent = packed(200)
         volume = http.post("/v1/volumes", content=sent, headers=STREAM).json()["id"]
         with http.stream("GET", f"/v1/volumes/{volume}/data") as answer:

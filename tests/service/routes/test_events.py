@@ -3,7 +3,7 @@
 import json
 import threading
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 
 import httpx
 import pytest
@@ -24,12 +24,24 @@ def parsed(text):
     return [dict(line.split(": ", 1) for line in block.split("\n")) for block in blocks]
 
 
+def once_watched(http, then, pause_s=0.0):
+    """Do something, in a thread, once the feed has read the job of a stream, and after a pause."""
+    watched = http.app.state.parts.feed._watched
+
+    def wait():
+        wait_until(lambda: any(one.row for one in tuple(watched.values())))
+        time.sleep(pause_s)
+        then()
+
+    threading.Thread(target=wait).start()
+
+
 def test_a_job_from_its_beginning_to_its_end(start, uploaded, submitted, until, work):
     http = start()
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
-    threading.Timer(0.3, work.hold.set).start()
+    once_watched(http, work.hold.set)
     answer = http.get(f"/v1/jobs/{job['id']}/events")
     assert answer.headers["content-type"].startswith("text/event-stream")
     assert answer.headers["cache-control"] == "no-store"
@@ -53,7 +65,8 @@ def test_it_ends_when_the_service_leaves(start, uploaded, submitted, until, work
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
-    threading.Timer(0.2, http.app.state.leaving.set).start()
+    # By then it has sent what it has read.
+    once_watched(http, http.app.state.leaving.set, 0.2)
     told = parsed(http.get(f"/v1/jobs/{job['id']}/events").text)
     assert [json.loads(one["data"])["state"] for one in told if one["event"] == "state"] == [
         "queued",
@@ -61,14 +74,15 @@ def test_it_ends_when_the_service_leaves(start, uploaded, submitted, until, work
     ]
 
 
-def test_heartbeats_are_sent(start, uploaded, submitted, until, work, monkeypatch):
+def test_heartbeats_are_sent(serve, uploaded, submitted, until, work, monkeypatch):
     monkeypatch.setattr(events, "SILENCE_SECONDS", 0.05)
-    http = start()
     work.hold.clear()
-    job = submitted(http, uploaded(http))
-    until(http, job["id"], "running")
-    threading.Timer(0.5, http.app.state.leaving.set).start()
-    assert ": keep-alive" in http.get(f"/v1/jobs/{job['id']}/events").text
+    with httpx.Client(base_url=serve(), timeout=60.0) as http:
+        job = submitted(http, uploaded(http))
+        until(http, job["id"], "running")
+        with http.stream("GET", f"/v1/jobs/{job['id']}/events") as answer:
+            assert ": keep-alive" in answer.iter_lines()
+        work.hold.set()
 
 
 @pytest.mark.parametrize("last", ["x", "-1", str(2**70)])
@@ -106,7 +120,7 @@ def test_event_streams_share_one_query(start, uploaded, submitted, until, work, 
     time.sleep(0.6)
     work.hold.set()
     for one in listeners:
-        one.join(20.0)
+        one.join(60.0)
     seconds = time.monotonic() - begun
     # Not one each: as many as one would need, and a few for those who came in between.
     assert len(looks) - before <= seconds / 0.05 + 5
@@ -119,7 +133,7 @@ def test_streams_are_bounded_for_a_tenant_and_in_all(serve, monkeypatch, uploade
     monkeypatch.setattr(feed, "OF_TENANT", 3)
     work.hold.clear()
     url = serve()
-    with httpx.Client(base_url=url, timeout=20.0) as http, ExitStack() as stack:
+    with httpx.Client(base_url=url, timeout=60.0) as http, ExitStack() as stack:
         job = submitted(http, uploaded(http))
         place = f"/v1/jobs/{job['id']}/events"
         streams = [stack.enter_context(http.stream("GET", place)) for _ in range(3)]
@@ -140,7 +154,7 @@ def opens(http, place):
 
 
 def wait_until(happened):
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 60.0
     while not happened():
         assert time.monotonic() < deadline
         time.sleep(0.02)
@@ -173,22 +187,42 @@ def changes_in(answer):
     return [json.loads(one["data"]) for one in parsed(answer.text)]
 
 
-def test_all_jobs_from_one_stream(start, uploaded, submitted, until, work):
+class Clock:
+    """In place of ``time`` for streams, which end when a test lets it go on."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def monotonic(self):
+        return self.now
+
+
+@contextmanager
+def all_events(http, monkeypatch):
+    """What a stream of all jobs tells in the block, and what the feed knows, which has read once before."""
+    clock, told, watched = Clock(), {}, http.app.state.parts.feed._tenants
+    with monkeypatch.context() as patch:
+        patch.setattr(events, "time", clock)
+        patch.setattr(events, "SILENCE_SECONDS", 0.05)
+        listener = threading.Thread(target=lambda: told.update(all=http.get("/v1/events?seconds=1")))
+        listener.start()
+        wait_until(lambda: LOCAL in watched and watched[LOCAL].newest is not None)
+        yield told, watched[LOCAL]
+        clock.now = 2.0
+        listener.join(60.0)
+
+
+def test_all_jobs_from_one_stream(start, uploaded, submitted, until, work, monkeypatch):
     http = start()
     work.hold.clear()
     dataset = uploaded(http)
     first, second = (submitted(http, dataset)["id"] for _ in range(2))
     until(http, first, "running")
-    told = {}
-    listener = threading.Thread(target=lambda: told.update(all=http.get("/v1/events?seconds=3")))
-    listener.start()
-    wait_until(lambda: http.app.state.parts.feed._tenants)
-    time.sleep(0.3)
-    third = submitted(http, dataset)["id"]
-    work.hold.set()
-    for job in (first, second, third):
-        until(http, job)
-    listener.join(20.0)
+    with all_events(http, monkeypatch) as (told, known):
+        third = submitted(http, dataset)["id"]
+        wait_until(lambda: third in known.unfinished())
+        work.hold.set()
+        wait_until(lambda: not known.unfinished())
     answer = told["all"]
     assert answer.headers["content-type"].startswith("text/event-stream")
     assert answer.headers["cache-control"] == "no-store"
@@ -207,17 +241,14 @@ def test_all_jobs_from_one_stream(start, uploaded, submitted, until, work):
 
 
 def test_a_job_between_two_queries_is_not_missed(start, uploaded, submitted, until, work, monkeypatch):
-    monkeypatch.setattr(feed, "INTERVAL_SECONDS", 2.0)
+    monkeypatch.setattr(feed, "INTERVAL_SECONDS", 1.0)
     http = start()
     dataset = uploaded(http)
-    told = {}
-    listener = threading.Thread(target=lambda: told.update(all=http.get("/v1/events?seconds=4")))
-    listener.start()
-    parts = http.app.state.parts
-    wait_until(lambda: any(one.newest is not None for one in parts.feed._tenants.values()))
-    job = submitted(http, dataset)["id"]
-    until(http, job)
-    listener.join(20.0)
+    with all_events(http, monkeypatch) as (told, known):
+        before = known.newest
+        job = submitted(http, dataset)["id"]
+        until(http, job)
+        wait_until(lambda: known.newest != before)
     assert changes_in(told["all"])[-1]["state"] == "succeeded"
 
 

@@ -12,7 +12,7 @@ import pytest
 from bentray_service.ingest.upload_limits import MAX_PER_TENANT
 
 CLIENTS = 100
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 TUS = {"Tus-Resumable": "1.0.0"}
 
 

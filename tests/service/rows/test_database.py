@@ -56,7 +56,7 @@ def test_a_reader_does_not_wait_for_a_writer(database):
         connection.execute(update(schema.about).values(probed=1.0))
         thread = threading.Thread(target=reader)
         thread.start()
-        assert read.wait(10)
+        assert read.wait(60.0)
     thread.join()
 
 

@@ -16,7 +16,7 @@ from bentray_service.web.connections import ConnectionLimits
 from bentray_service.web.listening import Listening
 from bentray_service.web.server import Server
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 @contextmanager

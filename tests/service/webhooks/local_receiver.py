@@ -35,7 +35,7 @@ class Receiver:
             def do_POST(self) -> None:
                 body = self.rfile.read(int(self.headers["Content-Length"]))
                 receiver.messages.append(({k.lower(): v for k, v in self.headers.items()}, body))
-                receiver.hold.wait(30.0)
+                receiver.hold.wait(60.0)
                 if receiver.drip:
                     while True:
                         self.wfile.write(b"H")

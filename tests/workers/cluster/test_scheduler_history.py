@@ -17,7 +17,7 @@ from bentray_workers.cluster.connection import Cluster, open_cluster
 TASKS = 20
 # Of an array that each task is given.
 VALUES = 10_000
-FORGET_S = 10.0
+FORGET_S = 60.0
 
 
 @pytest.fixture

@@ -50,7 +50,7 @@ def test_only_holders_of_a_certificate_are_served(folder: Path, tmp_path: Path) 
         address = running.scheduler_address
         assert address.startswith("tls://")
         with open_cluster(address, tls=folder) as ours:
-            assert ours.client.submit(sum, [1, 2]).result(timeout=20) == 3
+            assert ours.client.submit(sum, [1, 2]).result(timeout=60.0) == 3
         for tls in (strangers, None):
             with pytest.raises(InvalidInput, match="scheduler_address"):
                 open_cluster(address, tls=tls, connect_timeout_s=1.0)

@@ -100,7 +100,7 @@ def test_folder_deleted_during_a_task():
 def test_stop_does_not_wait_for_the_picker(cluster, path, monkeypatch):
     done = threading.Event()
     # The workers are threads of this process, so they meet what is put in place here.
-    monkeypatch.setattr(picking_graph, "apply", lambda *arguments: done.wait(30.0))
+    monkeypatch.setattr(picking_graph, "apply", lambda *arguments: done.wait(60.0))
     with pytest.raises(Cancelled):
         reconstruction_run.reconstruct(cluster.client, path, PLAN, stop=lambda: True)
     assert not done.is_set()

@@ -15,7 +15,7 @@ from bentray_service.routes.uploads.one_shot_uploads import run_in_turn
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 class Blockers:
