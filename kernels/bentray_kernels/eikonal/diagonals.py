@@ -12,7 +12,6 @@ so that they never need an update.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
+from ..crew import ALONE, Crew
 
 AnyFloats = NDArray[np.floating[Any]]
 
@@ -94,14 +94,53 @@ class Diagonals:
         return self.rows, self.width
 
     def store(
-        self, plain: Floats, into: Floats, flipped: bool, *, scale: float = 1.0, border: bool = True
+        self,
+        plain: Floats,
+        into: Floats,
+        flipped: bool,
+        *,
+        scale: float = 1.0,
+        border: bool = True,
+        crew: Crew = ALONE,
     ) -> None:
         """Copy a flat grid into its diagonals, times ``scale``; with its border, or without one."""
-        move(plain, into, self.shape, self.stored, flipped, scale, border, False)
+        self._move(plain, into, flipped, scale, border, False, crew)
 
-    def load(self, plain: Floats, source: Floats, flipped: bool, *, border: bool = True) -> None:
+    def load(
+        self, plain: Floats, source: Floats, flipped: bool, *, border: bool = True, crew: Crew = ALONE
+    ) -> None:
         """Copy the diagonals into a flat grid with or without its border."""
-        move(plain, source, self.shape, self.stored, flipped, 1.0, border, True)
+        self._move(plain, source, flipped, 1.0, border, True, crew)
+
+    def _move(
+        self,
+        plain: Floats,
+        diagonals: Floats,
+        flipped: bool,
+        scale: float,
+        border: bool,
+        back: bool,
+        crew: Crew,
+    ) -> None:
+        planes, nj, nk = self.shape
+        rim = 2 if border else 0
+        layer = (nj + rim) * (nk + rim)
+
+        def some(first: int, end: int) -> None:
+            part, shape = self._group(diagonals, first, end - rim)
+            move(plain[first * layer :], part, shape, self.stored, flipped, scale, border, back)
+
+        crew.share(some, planes + rim if planes else 1, 3)
+
+    def _group(self, diagonals: Floats, first: int, end: int) -> tuple[Floats, tuple[int, int, int]]:
+        """The planes ``first`` to ``end`` as a smaller grid.
+
+        It begins with a plane before them, where grids have one that is not copied.
+        """
+        planes, nj, nk = self.shape
+        if not planes:
+            return diagonals, self.shape
+        return diagonals[first * self.rows * self.width :], (end - first, nj, nk)
 
     def put(self, nodes: Ints, values: Floats, into: Floats, flipped: bool = False) -> None:
         """Set the values of flat padded ``nodes``, which are numbered without the flip."""
@@ -113,32 +152,39 @@ class Diagonals:
         _exchange(nodes, values, self.shape, self.stored, source, flipped, True)
         return values
 
-    def turn(
-        self, source: Floats, into: Floats, parts: int = 1, at_once: Callable[..., Iterable[Any]] = map
-    ) -> None:
-        """Copy the diagonals of a grid into those of the grid whose j is flipped.
+    def turn(self, source: Floats, into: Floats, crew: Crew = ALONE) -> None:
+        """Copy the diagonals of a grid into those of the grid whose j is flipped."""
+        crew.share(lambda first, end: self._turn(source, into, first, end), self._padded_planes, 3)
 
-        Args:
-            parts: groups of planes that are copied on their own; fewer where a group has less than three.
-            at_once: a ``map`` that copies them.
-        """
-        planes, nj, nk = self.shape
-        parts = min(parts, (planes + 2) // 3) if planes else 1
-        cuts = [(planes + 2) * part // parts for part in range(parts + 1)]
+    def turn_changed(self, source: Floats, into: Floats, changed: Columns, crew: Crew = ALONE) -> None:
+        """As ``turn`` where no other nodes than ``changed`` differ."""
+        plane = self.rows * self.width
 
         def some(first: int, end: int) -> None:
-            # A group is a smaller grid that begins a plane earlier: grids have one there that is not copied.
-            part = slice(first * self.rows * self.width, None)
-            turn(source[part], into[part], (end - first - 2, nj, nk) if planes else self.shape, self.stored)
+            # Copying single nodes costs more per node than copying tiles.
+            stored = slice(first + 1, end + 1) if self.shape[0] else slice(None)
+            begin = stored.start or 0
+            few = _turn_some(
+                source[begin * plane :],
+                into[begin * plane :],
+                changed.low[stored],
+                changed.high[stored],
+                self.shape,
+                self.stored,
+                (end - first) * plane // FEW,
+            )
+            if not few:
+                self._turn(source, into, first, end)
 
-        list(at_once(some, cuts[:-1], cuts[1:]))
+        crew.share(some, self._padded_planes, 3)
 
-    def turn_changed(self, source: Floats, into: Floats, changed: Columns) -> None:
-        """As ``turn`` where no other nodes than ``changed`` differ."""
-        # Copying single nodes costs more per node than copying tiles.
-        if _turn_some(source, into, changed.low, changed.high, self.shape, self.stored, self.size // FEW):
-            return
-        self.turn(source, into)
+    def _turn(self, source: Floats, into: Floats, first: int, end: int) -> None:
+        part, shape = self._group(source, first, end - 2)
+        turn(part, self._group(into, first, end - 2)[0], shape, self.stored)
+
+    @property
+    def _padded_planes(self) -> int:
+        return self.shape[0] + 2 if self.shape[0] else 1
 
     def no_columns(self) -> Columns:
         """An empty set of nodes."""
@@ -149,10 +195,15 @@ class Diagonals:
         """Add the neighbours of flat padded ``nodes``."""
         _surround(nodes, self.shape, into.low, into.high)
 
-    def flip(self, columns: Columns, into: Columns) -> None:
+    def flip(self, columns: Columns, into: Columns, crew: Crew = ALONE) -> None:
         """The same nodes, or more, in the grid whose j is flipped."""
         into.clear()
-        _flip(columns.low, columns.high, self.shape, into.low, into.high)
+
+        def some(first: int, end: int) -> None:
+            part = slice(first, end)
+            _flip(columns.low[part], columns.high[part], self.shape, into.low[part], into.high[part])
+
+        crew.share(some, self.planes, 1)
 
 
 @kernel

@@ -4,22 +4,22 @@ The nodes of a diagonal are independent of each other in a sweep, so whole vecto
 (see ``diagonals``). A node is updated only after a neighbour has received an earlier time (locking: Bak,
 McLaughlin & Renzi 2010); skipped updates would change nothing.
 
-In space several threads can share a sweep: as soon as some diagonals of a block of planes are done, the next
-block may follow on them. The result does not depend on the number of threads.
+In space several threads can share a solve. In a sweep, as soon as some diagonals of a block of planes are
+done, the next block may follow on them; the grids are filled and copied in groups of planes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats, Ints
 from ..atomics import add, wait_for
 from ..compiled import kernel
+from ..crew import ALONE, Crew, crew_of
 from ..errors import InvalidInput
 from ..float32 import higher, lower
 from .diagonals import FIRST, NONE, RUN, Columns, Diagonals, include
@@ -69,8 +69,9 @@ def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12, threads: in
         problem: the checked problem.
         tolerance: sweeps in all orders that lower no time by more than this part of a node's own
             crossing time end the iteration.
-        threads: that share each sweep of a 3-D grid; a 2-D grid is swept by one. From 2 on their number does
-            not change the result; that of 1 is equal up to the tolerance.
+        threads: that share a 3-D grid; a 2-D grid is swept by one. From 2 on their number does not change
+            the result; that of 1, in an order that reads the memory half as often, is equal up to the
+            tolerance.
 
     Returns:
         (nx, ny[, nz]), s; equal to first-order fast marching up to the tolerance.
@@ -97,9 +98,11 @@ def fast_sweeping_many(
         tolerance, threads: as for ``fast_sweeping``.
     """
     check_options(tolerance, threads)
-    sweeper = Sweeper(times.shape[1:], threads)
-    for problem, into in zip(problems, times, strict=True):
-        sweeper.solve(problem, tolerance, into)
+    shape = times.shape[1:]
+    with crew_of(threads if len(shape) == 3 else 1) as crew:
+        sweeper = Sweeper(shape, crew)
+        for problem, into in zip(problems, times, strict=True):
+            sweeper.solve(problem, tolerance, into)
 
 
 def check_options(tolerance: float, threads: int) -> None:
@@ -116,16 +119,18 @@ class Sweeper:
     A solve is ``start``, ``settle``, and as often as earlier times arrive ``lower`` and ``settle``.
     """
 
-    def __init__(self, shape: tuple[int, ...], threads: int = 1) -> None:
+    def __init__(self, shape: tuple[int, ...], crew: Crew = ALONE) -> None:
         self._grid = Diagonals.of(shape)
-        self._threads = threads if len(shape) == 3 else 1
+        self._crew = crew
         # One block: the allocator keeps freed blocks of this size, and returns smaller ones to the system.
         arrays = np.empty((5, self._grid.size))
-        arrays[:3].fill(-math.inf)
-        arrays[3:].fill(math.inf)
+        for number, array in enumerate(arrays):
+            crew.fill(array, -math.inf if number < 3 else math.inf)
         self._times = arrays[0], arrays[1]
         self._unknown = arrays[2]
-        self._grid.store(np.full(math.prod(n + 2 for n in shape), math.inf), self._unknown, False)
+        unknown = np.empty(math.prod(n + 2 for n in shape))
+        crew.fill(unknown, math.inf)
+        self._grid.store(unknown, self._unknown, False, crew=crew)
         self._crossings = arrays[3], arrays[4]
         # Nodes waiting for an update, in either grid, and nodes changed by the last sweeps.
         self._waiting = self._grid.no_columns(), self._grid.no_columns()
@@ -155,7 +160,7 @@ class Sweeper:
                 updated.
             times: of these nodes, s.
         """
-        np.copyto(self._times[0], self._unknown)
+        self._crew.copy(self._unknown, self._times[0])
         self._side, self._equal = 0, False
         for columns in (self._waiting[0], self._across[0]):
             columns.clear()
@@ -165,10 +170,10 @@ class Sweeper:
         """Go on from the present times with earlier ones of some nodes; as ``start``."""
         grid, side = self._grid, self._side
         if self._equal:
-            grid.turn_changed(self._times[side], self._times[1 - side], self._changed)
+            grid.turn_changed(self._times[side], self._times[1 - side], self._changed, self._crew)
         if side == 1:
-            grid.flip(self._waiting[1], self._waiting[0])
-            grid.flip(self._across[1], self._across[0])
+            grid.flip(self._waiting[1], self._waiting[0], self._crew)
+            grid.flip(self._across[1], self._across[0], self._crew)
         self._changed.clear()
         self._side = 0
         self._put(nodes, times)
@@ -181,15 +186,31 @@ class Sweeper:
             spacing: node spacing, m.
             tolerance: as for ``fast_sweeping``.
         """
-        if self._threads == 1:
-            self._alternate(slowness, spacing, tolerance, map)
-            return
-        with ThreadPoolExecutor(self._threads, "sweep") as pool:
-            self._alternate(slowness, spacing, tolerance, pool.map)
+        grid, crew = self._grid, self._crew
+        quiet = 0
+        while True:
+            side = self._side
+            here, there = self._times[side], self._times[1 - side]
+            waiting, across = self._waiting[side], self._across[side]
+            self._changed.clear()
+            crossing = self._crossing(side, slowness, spacing)
+            swept = Grid(here, crossing, waiting, across, self._changed, grid.shape, grid.stored)
+            quiet = 0 if self._sweep(swept, tolerance) else quiet + 1
+            if quiet == 2 or not (waiting.any() or across.any()):
+                return
+            if self._equal:
+                grid.turn_changed(here, there, self._changed, crew)
+            else:
+                grid.turn(here, there, crew)
+            self._equal = True
+            grid.flip(waiting, self._waiting[1 - side], crew)
+            grid.flip(across, self._across[1 - side], crew)
+            self._side = 1 - side
 
     def load(self, into: Floats, *, border: bool = False) -> None:
         """Write the times, s, into a C-ordered array (nx, ny[, nz]), or into a padded one with ``border``."""
-        self._grid.load(into.reshape(-1), self._times[self._side], self._side == 1, border=border)
+        times, flipped = self._times[self._side], self._side == 1
+        self._grid.load(into.reshape(-1), times, flipped, border=border, crew=self._crew)
 
     def take(self, nodes: Ints) -> Floats:
         """Times of flat padded ``nodes``, s."""
@@ -201,40 +222,15 @@ class Sweeper:
             self._grid.put(nodes, times, self._times[1], True)
         self._grid.include_neighbours(nodes, self._waiting[0])
 
-    def _alternate(
-        self, slowness: Floats, spacing: float, tolerance: float, at_once: Callable[..., Iterable[Any]]
-    ) -> None:
-        """Sweep the original and the flipped grid by turns."""
-        grid = self._grid
-        quiet = 0
-        while True:
-            side = self._side
-            here, there = self._times[side], self._times[1 - side]
-            waiting, across = self._waiting[side], self._across[side]
-            self._changed.clear()
-            crossing = self._crossing(side, slowness, spacing)
-            swept = Grid(here, crossing, waiting, across, self._changed, grid.shape, grid.stored)
-            moved = self._sweep(swept, tolerance, at_once)
-            quiet = 0 if moved else quiet + 1
-            if quiet == 2 or not (waiting.any() or across.any()):
-                return
-            if self._equal:
-                grid.turn_changed(here, there, self._changed)
-            else:
-                grid.turn(here, there, self._threads, at_once)
-            self._equal = True
-            grid.flip(waiting, self._waiting[1 - side])
-            grid.flip(across, self._across[1 - side])
-            self._side = 1 - side
-
-    def _sweep(self, grid: Grid, tolerance: float, at_once: Callable[..., Iterable[Any]]) -> int:
+    def _sweep(self, grid: Grid, tolerance: float) -> int:
         """Whether a sweep in all orders of one of the two grids lowered a time by more than the tolerance."""
+        threads, at_once = self._crew.threads, self._crew.at_once
         if not grid.shape[0]:
             return int(_sweep_2d(grid, tolerance))
-        if self._threads == 1:
+        if threads == 1:
             return int(_sweep_3d(grid, tolerance))
         counters = np.zeros(PROGRESS * (2 + len(ORDERS) * -(-grid.shape[0] // PLANES)), np.int64)
-        moved: int = max(at_once(lambda _: _share_sweeps(grid, tolerance, counters), range(self._threads)))
+        moved: int = max(at_once(lambda _: _share_sweeps(grid, tolerance, counters), range(threads)))
         return moved
 
     def _crossing(self, side: int, slowness: Floats, spacing: float) -> Floats:
@@ -245,9 +241,8 @@ class Sweeper:
             or stored[1] != spacing
             or not (stored[0] is slowness or np.array_equal(stored[0], slowness))
         ):
-            self._grid.store(
-                slowness.reshape(-1), self._crossings[side], side == 1, scale=spacing, border=False
-            )
+            plain, into = slowness.reshape(-1), self._crossings[side]
+            self._grid.store(plain, into, side == 1, scale=spacing, border=False, crew=self._crew)
         self._stored[side] = slowness, spacing
         crossing: Floats = self._crossings[side]
         return crossing

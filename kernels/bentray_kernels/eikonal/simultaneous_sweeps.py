@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from ..arrays import Floats
 from ..compiled import kernel
+from ..crew import crew_of
 from .diagonals import Columns, Diagonals
 from .fast_sweeping import Grid, check_options, update_diagonal
 from .problem import PointSource
@@ -62,13 +62,13 @@ def simultaneous_sweeps(problem: PointSource, *, tolerance: float = 1e-12, threa
         return int(_sweep_once(swept, tolerance, up, way))
 
     half = len(orders) // 2
-    with ThreadPoolExecutor(threads, "sweep") as pool:
-        while any(list(pool.map(sweep, range(len(orders))))):
+    with crew_of(threads) as crew:
+        while any(list(crew.at_once(sweep, range(len(orders))))):
             for side in (0, 1):
                 np.minimum.reduce(copies[side * half : (side + 1) * half], out=time[side])
-            grid.turn(time[1], copies[0], threads, pool.map)
+            grid.turn(time[1], copies[0], crew)
             np.minimum(time[0], copies[0], out=time[0])
-            grid.turn(time[0], time[1], threads, pool.map)
+            grid.turn(time[0], time[1], crew)
     times = np.empty(shape)
     grid.load(times.reshape(-1), time[0], False, border=False)
     return times
