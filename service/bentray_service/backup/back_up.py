@@ -23,14 +23,15 @@ from bentray_workers.files.atomic import sync, write_bytes
 from .. import __version__
 from ..errors import DatabaseUnavailable
 from ..files.data_folder import Files
+from ..files.digests import digest_of
 from ..files.disk import bytes_in, remove_path
 from ..files.open_store import open_store
 from ..files.private import private_files
 from ..files.store import Store
 from ..files.tenant_files import TenantFiles
 from ..rows import schema
+from ..rows.checksums import Digest
 from ..rows.database import Database, open_database
-from ..rows.digests import Digest, digest_of
 from ..rows.table_copies import copy_to_file, snapshot
 from ..rows.tenants import Tenant
 from ..settings import ServiceSettings

@@ -13,10 +13,10 @@ from operator import itemgetter
 from pathlib import Path
 
 from ..errors import Damaged, DatabaseFull, DatabaseUnavailable, Deleted
-from ..rows.checksums import Checksums
-from ..rows.digests import Digest, digest_of, stamp_of
+from ..rows.checksums import Checksums, Digest
 from ..rows.tenants import Tenant
 from ..rows.typed_rows import ChecksumRow
+from .digests import digest_of, stamp_of
 from .store import Store
 from .tenant_files import KEPT
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..errors import KeyReused
+from ..files.digests import digest_of
 from ..files.tenant_files import TenantFiles
-from ..rows.digests import digest_of
 from ..rows.idempotency import RequestKey
 from ..rows.stored_tables import Datasets
 from ..rows.tenants import Tenant

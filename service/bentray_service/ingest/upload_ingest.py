@@ -22,8 +22,8 @@ from bentray_kernels.errors import InvalidInput
 from ..access.quota import Quota
 from ..errors import StorageFull, StorageUnavailable, UnknownId
 from ..files.data_folder import Files
+from ..files.digests import digest_of
 from ..files.direct_uploads import DirectUploads
-from ..rows.digests import digest_of
 from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
 from ..rows.typed_rows import UploadRow

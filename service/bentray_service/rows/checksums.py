@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection
-from typing import cast
+from typing import NamedTuple, cast
 
 from sqlalchemy import Connection, delete, func, insert, select, update
 
 from .database import Database
-from .digests import Digest
 from .schema import checksums, datasets, geometry_fields, jobs, meshes, uploaded_volumes, volumes
 from .tenants import Tenant
 from .typed_rows import ChecksumRow, Plain
 
 # Tables whose rows have stored files; the file of a turntable belongs to its job.
 STORED = (datasets, uploaded_volumes, volumes, meshes, geometry_fields, jobs)
+
+
+class Digest(NamedTuple):
+    """The digest of a file, or of all files in a folder.
+
+    Attributes:
+        bytes: total size.
+        sha256: hexadecimal; for a folder, of the names and digests of its files.
+    """
+
+    bytes: int
+    sha256: str
 
 
 class Checksums:

@@ -4,19 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import NamedTuple
 
-
-class Digest(NamedTuple):
-    """The digest of a file, or of all files in a folder.
-
-    Attributes:
-        bytes: total size.
-        sha256: hexadecimal; for a folder, of the names and digests of its files.
-    """
-
-    bytes: int
-    sha256: str
+from ..rows.checksums import Digest
 
 
 def digest_of(path: Path) -> Digest:
