@@ -175,9 +175,10 @@ def next_candidates(
 ) -> tuple[dict[str, Any], ...]:
     """The candidates that can still be chosen, the cheap ones before the costly ones; empty at the end.
 
-    Bent SART without a lower misfit than straight SART ends the trials of bent rays. Otherwise the sharper
-    candidates are next, which were the best on every scan with times of the Eikonal equation; others only if
-    those are not clearly better than bent and straight rays.
+    Where bent SART has no lower misfit than straight SART, bent Gauss-Newton decides whether bent rays are
+    tried further: in water that is faster than a thick layer of fat, few iterations of SART do not find the
+    ways around it. Otherwise the sharper candidates are next, which were the best on every scan with times
+    of the Eikonal equation; others only if those are not clearly better than bent and straight rays.
 
     Args:
         trials: so far.
@@ -191,7 +192,11 @@ def next_candidates(
         if trials:
             straight, bent = (_trial_of(one, trials).held_out_rms_s for one in CHEAPEST)
             if bent >= straight:
-                rounds = (lines,)
+                decisive = next((t for t in trials if t.settings == OTHER_BENT[-1]), None)
+                further = decisive is not None and _rms(decisive) < CLEARLY * min(
+                    _rms(trial) for trial in trials if not _bent(trial)
+                )
+                rounds = (lines, OTHER_BENT[-1:], SHARPER if further else ())
             elif bent >= CLEARLY * straight:
                 rounds = (lines, SHARPER, OTHER_BENT)
             else:

@@ -231,7 +231,11 @@ def of(candidate, held_out_ns):
 
 @pytest.mark.parametrize(
     ("straight", "bent", "rounds"),
-    [(100, 101, [STRAIGHT_LINES]), (100, 80, [SHARPER]), (100, 95, [STRAIGHT_LINES, SHARPER])],
+    [
+        (100, 101, [STRAIGHT_LINES, OTHER_BENT[-1:]]),
+        (100, 80, [SHARPER]),
+        (100, 95, [STRAIGHT_LINES, SHARPER]),
+    ],
     ids=["bent rays are dropped", "straight rays are dropped", "undecided"],
 )
 def test_candidates_that_cannot_win_are_not_tried(straight, bent, rounds):
@@ -263,7 +267,20 @@ def test_the_first_candidates_are_the_cheapest_of_each_kind(known):
     )
     trials = [of(CHEAPEST[0], 100), of(CHEAPEST[1], 100)]
     # With a known frequency SART is the only method of straight rays.
-    assert next_candidates(trials, "curved", known_frequency=known) == (() if known else STRAIGHT_LINES)
+    lines = OTHER_BENT[-1:] if known else STRAIGHT_LINES
+    assert next_candidates(trials, "curved", known_frequency=known) == lines
+
+
+@pytest.mark.parametrize(("found", "rounds"), [(91, SHARPER), (93, ())])
+def test_bent_gauss_newton_decides_where_bent_sart_is_no_better_than_straight(found, rounds):
+    """As in water that is faster than a thick layer of fat."""
+    trials = [of(CHEAPEST[0], 100), of(CHEAPEST[1], 128), of(STRAIGHT_LINES[0], 100)]
+    assert next_candidates(trials, "curved", known_frequency=False) == OTHER_BENT[-1:]
+    trials.append(of(OTHER_BENT[-1], found))
+    assert next_candidates(trials, "curved", known_frequency=False) == rounds
+    trials += [of(one, 95) for one in rounds]
+    assert next_candidates(trials, "curved", known_frequency=False) == ()
+    assert choose(trials).settings["rays"] == ("curved" if rounds else "straight")
 
 
 def test_sharper_candidates_must_be_twice_as_clearly_better_than_straight_rays():
