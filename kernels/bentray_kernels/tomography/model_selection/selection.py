@@ -192,10 +192,8 @@ def next_candidates(
         if trials:
             straight, bent = (_trial_of(one, trials).held_out_rms_s for one in CHEAPEST)
             if bent >= straight:
-                decisive = next((t for t in trials if t.settings == OTHER_BENT[-1]), None)
-                further = decisive is not None and _rms(decisive) < CLEARLY * min(
-                    _rms(trial) for trial in trials if not _bent(trial)
-                )
+                lowest = min(_rms(trial) for trial in trials if not _bent(trial))
+                further = any(t.settings == OTHER_BENT[-1] and _rms(t) < lowest for t in trials)
                 rounds = (lines, OTHER_BENT[-1:], SHARPER if further else ())
             elif bent >= CLEARLY * straight:
                 rounds = (lines, SHARPER, OTHER_BENT)

@@ -23,6 +23,9 @@ STOPPED, PASSED = 0.3, 0.6
 # Length of its response, periods.
 RESPONSE_PERIODS = 8.0
 
+# The transmitted pulse is compared with that of the water shot so many periods before and after its maximum.
+PULSE_PERIODS = 3.0
+
 # The pulse ends where its envelope has fallen to this part of its maximum.
 PULSE_END = 0.1
 
@@ -69,19 +72,22 @@ def analytic(traces: Any, factor: int = 1) -> Float32s:
     return np.ascontiguousarray(np.stack((signals.real, signals.imag), axis=1))
 
 
-def high_pass(traces: Floats, rate_hz: float, frequency_hz: float) -> Floats:
+def high_pass(traces: Floats, rate_hz: float, frequency_hz: float, later_s: Floats | None = None) -> Floats:
     """Traces without frequencies far below the centre frequency; all others keep their phases.
 
     Args:
         traces: (n, samples).
         rate_hz: of the samples.
         frequency_hz: centre frequency.
+        later_s: (n,), delay of each trace, s; negative: earlier. None: none.
     """
     samples = traces.shape[1]
     more = math.ceil(RESPONSE_PERIODS * rate_hz / frequency_hz)
     length = scipy.fft.next_fast_len(samples + more, real=True)
     spectrum = scipy.fft.rfft(traces, length, axis=1)
     part = scipy.fft.rfftfreq(length, 1.0 / rate_hz) / frequency_hz
+    if later_s is not None:
+        spectrum *= np.exp(-2j * np.pi * frequency_hz * later_s[:, None] * part)
     spectrum *= 0.5 - 0.5 * np.cos(np.pi * np.clip((part - STOPPED) / (PASSED - STOPPED), 0.0, 1.0))
     return np.asarray(scipy.fft.irfft(spectrum, length, axis=1, overwrite_x=True)[:, :samples])
 
@@ -118,6 +124,31 @@ def measure_pulse(traces: Iterable[Any], expected_s: Floats, use: Flags, times_s
     if not delays:
         raise InvalidInput("waveform/object", "no trace with a pulse", "traces of transmitted waves")
     return Pulse(float(np.median(delays)), float(np.median(lengths)))
+
+
+def without_water_shot(
+    traces: Floats, water: Floats, arrival_s: Floats, window: Floats, times_s: Floats, period_s: float
+) -> Floats:
+    """Muted traces less what follows the transmitted pulse in the water shot too.
+
+    The shot of each pair is scaled by least squares to the transmitted pulse. Where the difference is not
+    weaker after the mute, as with noise alone or a pulse left behind the mute, the trace is kept as it is.
+
+    Args:
+        traces: (n, samples), filtered.
+        water: as ``traces``, filtered and delayed to the same arrivals.
+        arrival_s: (n,), of the maximum of the transmitted pulse, s.
+        window: as ``traces``, see ``echo_window``.
+        times_s: (samples,), s.
+        period_s: of the centre frequency, s.
+    """
+    near = np.abs(times_s[None, :] - arrival_s[:, None]) <= PULSE_PERIODS * period_s
+    product, square = (np.einsum("ij,ij,ij->i", near, one, water) for one in (traces, water))
+    scale = np.divide(product, square, out=np.zeros_like(square), where=square > 0.0)
+    muted = traces * window
+    less = muted - np.maximum(scale, 0.0)[:, None] * water * window
+    weaker = np.einsum("ij,ij->i", less, less) < np.einsum("ij,ij->i", muted, muted)
+    return np.where(weaker[:, None], less, muted)
 
 
 def echo_window(transmitted_s: Floats, pulse: Pulse, times_s: Floats, period_s: float) -> Floats:

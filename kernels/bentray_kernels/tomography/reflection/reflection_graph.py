@@ -16,7 +16,15 @@ from ...task_graph import Task
 from ..result import Iteration
 from .delay_and_sum import Signals, Sums, empty_sums, sum_echoes
 from .delay_and_sum_opencl import sum_echoes_opencl
-from .echoes import Pulse, analytic, echo_window, high_pass, measure_pulse, upsampling
+from .echoes import (
+    Pulse,
+    analytic,
+    echo_window,
+    high_pass,
+    measure_pulse,
+    upsampling,
+    without_water_shot,
+)
 from .element_times import ElementTimes, joined, solve_times, times_between
 from .reflection_plan import EchoScan, ReflectionPlan, emissions_per_task
 
@@ -243,6 +251,8 @@ def echo_signals(
 ) -> Signals:
     """Analytic signals of some emissions without the waves that were transmitted.
 
+    With a water shot also without the tails of these waves, see ``echoes.without_water_shot``.
+
     Args:
         dataset: the slice with its traces.
         plan: of the image.
@@ -254,18 +264,26 @@ def echo_signals(
     assert recorded is not None
     assert rate is not None
     at = _sample_times(dataset)
-    factor = upsampling(rate, plan.frequency_hz)
+    factor, period = upsampling(rate, plan.frequency_hz), 1.0 / plan.frequency_hz
     used = plan.used[emissions].copy()
     parts = np.zeros((len(emissions), len(plan.receivers), 2, factor * at.size), dtype=np.float32)
     for n, e in enumerate(emissions):
-        scale = np.full(len(plan.receivers), recorded.scale)
+        traces = recorded.scale * np.asarray(recorded.object[e], dtype=np.float64)
         if recorded.object_scale is not None:
-            scale = scale * recorded.object_scale[e]
-        traces = scale[:, None] * np.asarray(recorded.object[e], dtype=np.float64)
+            traces *= recorded.object_scale[e][:, None]
         used[n] &= np.isfinite(traces).all(axis=1)
         traces[~used[n]] = 0.0
         traces = high_pass(traces, rate, plan.frequency_hz)
-        traces *= echo_window(transmitted_s[n], pulse, at, 1.0 / plan.frequency_hz)
+        window = echo_window(transmitted_s[n], pulse, at, period)
+        if recorded.water is None:
+            traces *= window
+        else:
+            # Its size cancels in the least squares.
+            water = np.asarray(recorded.water[e], dtype=np.float64)
+            water[~(used[n] & np.isfinite(water).all(axis=1))] = 0.0
+            later = transmitted_s[n] - _water_times(plan, emissions[n : n + 1])[0]
+            water = high_pass(water, rate, plan.frequency_hz, later)
+            traces = without_water_shot(traces, water, transmitted_s[n] + pulse.delay_s, window, at, period)
         # The beginning of the window has made low frequencies again, of equal phase in all traces.
         parts[n] = analytic(high_pass(traces, rate, plan.frequency_hz), factor)
     # Beyond the record the nearest sample is read.

@@ -9,12 +9,18 @@ from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.reflection import reflection_plan
-from bentray_kernels.tomography.reflection.echoes import echo_window, measure_pulse
+from bentray_kernels.tomography.reflection.echoes import (
+    Pulse,
+    echo_window,
+    measure_pulse,
+    without_water_shot,
+)
+from bentray_kernels.tomography.reflection.element_times import solve_times, times_between
 from bentray_kernels.tomography.reflection.memory_echoes import MemoryEchoScan
-from bentray_kernels.tomography.reflection.reflection_graph import ReflectionGraph
+from bentray_kernels.tomography.reflection.reflection_graph import ReflectionGraph, echo_signals
 from bentray_kernels.tomography.reflection.reflection_plan import plan_reflection
 
-from .point_echoes import CENTRE_HZ, RADIUS, RATE_HZ, T0, WATER, ring, traces
+from .point_echoes import CENTRE_HZ, RADIUS, RATE_HZ, T0, WATER, pulse, ring, traces
 
 # An eighth of a wavelength.
 PIXEL = 3.75e-4
@@ -125,6 +131,49 @@ def test_slow_tails_of_transmitted_waves_leave_no_energy_in_the_image():
         assert away.flat[image.db.argmax()] <= PIXEL
         # Without the high pass it has -7 dB.
         assert image.db[away > 0.008].max() < -18.0
+
+
+def with_ringing(arrival_s, samples=400):
+    """Transmitted pulses that ring for long at the frequency of the echoes, (24, 24, samples)."""
+    late = T0 + np.arange(samples) / RATE_HZ - DELAY - arrival_s[..., None]
+    ringing = np.where(late > 0.0, late / 4e-6 * np.exp(1.0 - late / 4e-6), 0.0)
+    return 30.0 * pulse(late) + ringing * np.cos(2.0 * np.pi * CENTRE_HZ * late)
+
+
+@pytest.mark.parametrize("inner", [WATER, 1.2 * WATER, 0.9 * WATER])
+def test_ringing_after_the_pulse_is_taken_from_the_water_shot(inner):
+    """Also behind a fast object, whose pulses arrive before those in water."""
+    elements, corner, nodes = ring(), -1.1 * RADIUS, 41
+    line = np.linspace(corner, -corner, nodes)
+    speed = np.where(np.hypot(line[:, None], line[None]) < 0.015, inner, WATER)
+    spacing = line[1] - line[0]
+    direct = np.linalg.norm(elements[:, None] - elements[None], axis=-1) / WATER
+    arrival = times_between(solve_times(speed, spacing, elements - corner, None), spacing, elements - corner)
+    energy = []
+    for water in (None, 0.5 * with_ringing(direct)):
+        dataset = scan(waveform=Waveform(with_ringing(arrival).astype(np.float32), water))
+        plan = plan_reflection(dataset, SETTINGS, speed, None, spacing, (corner, corner))
+        signals = echo_signals(dataset, plan, Pulse(DELAY, 3.4e-6), arrival, np.arange(24))
+        energy.append(float((signals.parts**2).sum()))
+    assert energy[1] < 0.02 * energy[0]
+
+
+def test_a_water_shot_that_makes_a_trace_louder_is_not_used():
+    random = np.random.default_rng(1)
+    times = np.arange(400) / RATE_HZ
+    arrival = np.full(2, 30e-6)
+    window = np.broadcast_to((times > 38e-6).astype(float), (2, 400))
+    pulses = np.stack([pulse(times - 30e-6)] * 2)
+    noisy = pulses + 0.1 * random.standard_normal((2, 400))
+    # The second would leave a pulse of water behind the mute.
+    water = pulses + np.stack([0.1 * random.standard_normal(400), pulse(times - 42e-6)])
+    kept = without_water_shot(noisy, water, arrival, window, times, 1.0 / CENTRE_HZ)
+    assert np.array_equal(kept, noisy * window)
+    # Nor one without a pulse, or of the opposite sign.
+    for other in (np.zeros_like(water), -water):
+        assert np.array_equal(
+            without_water_shot(noisy, other, arrival, window, times, 1.0 / CENTRE_HZ), noisy * window
+        )
 
 
 def test_several_slices_are_stacked():

@@ -26,7 +26,7 @@ from bentray_workers.reconstruction.memory.reflection_memory import (
 RADIUS, WATER, CENTRE_HZ, RATE_HZ = 0.03, 1500.0, 1e6, 5e6
 
 
-def scan(elements, samples):
+def scan(elements, samples, water=False):
     turn = 2.0 * np.pi * np.arange(elements) / elements
     ring = RADIUS * np.column_stack((np.cos(turn), np.sin(turn)))
     traces = np.random.default_rng(1).standard_normal((elements, elements, samples)).astype(np.float32)
@@ -36,7 +36,7 @@ def scan(elements, samples):
         np.arange(elements),
         WATER,
         delta_tof_s=np.zeros((elements, elements)),
-        waveform=Waveform(traces),
+        waveform=Waveform(traces, traces if water else None),
         center_frequency_hz=CENTRE_HZ,
         sampling_rate_hz=RATE_HZ,
     )
@@ -54,16 +54,18 @@ def test_buffers_of_a_device_are_planned():
 
 
 @pytest.mark.parametrize(
-    ("elements", "samples", "changes"),
+    ("elements", "samples", "water", "changes"),
     [
-        (24, 1500, {}),
-        pytest.param(48, 300, {"gain": "attenuation", "nodes": 96}, marks=pytest.mark.nightly),
-        pytest.param(16, 200, {"pixel_m": 6e-5}, marks=pytest.mark.nightly),
+        (24, 1500, True, {}),
+        pytest.param(24, 1500, False, {}, marks=pytest.mark.nightly),
+        pytest.param(96, 1500, True, {}, marks=pytest.mark.nightly),
+        pytest.param(48, 300, False, {"gain": "attenuation", "nodes": 96}, marks=pytest.mark.nightly),
+        pytest.param(16, 200, False, {"pixel_m": 6e-5}, marks=pytest.mark.nightly),
     ],
 )
-def test_tasks_allocate_what_is_planned(elements, samples, changes):
+def test_tasks_allocate_what_is_planned(elements, samples, water, changes):
     settings = Settings.of(**{"method": "sart", "nodes": 48, "reflection": True, **changes})
-    dataset = scan(elements, samples)
+    dataset = scan(elements, samples, water)
     nodes = settings.grid_nodes
     corner = -1.1 * RADIUS
     speed = np.full((nodes, nodes), WATER)
@@ -87,7 +89,7 @@ def test_tasks_allocate_what_is_planned(elements, samples, changes):
         tasks += graph.after(task, result)
     assert set(taken) == set(planned)
     # Blocks of a file are not read here. The arguments and arrays of kernels are not traced, and planned too.
-    blocks = 2 * summary.echoes.read_bytes
+    blocks = 2 * (1 + water) * summary.echoes.read_bytes
     wrong = {
         name: (planned[name], peak)
         for name, peak in taken.items()
@@ -110,6 +112,18 @@ def test_planned_work_grows_with_the_scan(emissions, samples, slices):
     assert reflection_tasks(more, settings) >= reflection_tasks(summary, settings)
     assert reflection_bytes(wider, settings) > reflection_bytes(summary, settings)
     assert reflection_seconds(more, settings) == pytest.approx(2.0 * reflection_seconds(summary, settings))
+
+
+def test_a_water_shot_is_planned():
+    settings = Settings.of(method="sart", nodes=48, reflection=True)
+    without, with_it = (
+        reflection_task_bytes(DatasetCounts.of(scan(24, 500, water)).summary(settings), settings)
+        for water in (False, True)
+    )
+    dataset = scan(24, 500)
+    more = with_it.pop("sum_emissions") - without.pop("sum_emissions")
+    assert more > 2 * dataset.waveform.object.nbytes
+    assert with_it == without
 
 
 def test_nothing_is_planned_unless_it_is_requested():

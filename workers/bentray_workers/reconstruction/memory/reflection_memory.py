@@ -26,8 +26,9 @@ FLOOR_BYTES = 7 * MIB // 2
 SUMS_BYTES = 2 * 16
 
 # Bytes per sample of an upsampled signal while one emission is transformed: a complex spectrum, the complex
-# signal, its copy; and per recorded sample: traces and window in double precision.
-TRANSFORM_BYTES, TRACE_BYTES = 24, 48
+# signal, its copy; and per recorded sample: traces and window in double precision, and of a water shot its
+# traces, their spectrum and delays, and products of both.
+TRANSFORM_BYTES, TRACE_BYTES, WATER_BYTES = 24, 48, 56
 
 # Pairs of a core in a second, at one pixel.
 PAIRS_PER_S = 2.5e8
@@ -60,6 +61,8 @@ def reflection_task_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     times = 3 * elements * field
     image = 2 * REAL * nodes**2 + side**2
     reading = 2 * traces.read_bytes + traces.receivers * traces.samples * TRACE_BYTES
+    # Blocks of its file stay in memory beside those of the object.
+    water = 2 * traces.read_bytes + traces.receivers * traces.samples * WATER_BYTES
     there = 0
     if echo_engine(settings) == "opencl":
         # A processor as a device has its buffers in the memory of the worker.
@@ -81,6 +84,7 @@ def reflection_task_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         + image
         + SUMS_BYTES * side**2
         + reading
+        + (water if traces.water_shot else 0)
         + 8 * batch * signals
         + TRANSFORM_BYTES * signals
         + views
