@@ -6,6 +6,7 @@ import math
 import os
 import time
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from bentray_service.cli.output.benchmark_row import Row
 from ._breast_scans import BreastScan, breast_scans
 from ._calibration_picture import calibration_picture
 from ._judged_image import DEVIATIONS, Judged, correlation, part_within, quantile
+from .uncertainty_waveform import beside_truth, wave_scans
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +35,9 @@ Floats = NDArray[np.float64]
 # lie within two, and is judged on the others.
 SCANS, QUICK_SCANS = 20, 2
 PART, CHOSEN_PART = 0.85, 0.9
+
+# Waves whose times are picked.
+WAVE_SCANS, WAVE_HZ = 2, 3e5
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
@@ -94,6 +99,32 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         f"CPU time of {len(judged)} scans, {image:.0f} s for the images; load {os.getloadavg()[0]:.1f}",
     )
     context.save_picture("uncertainty.png", lambda: calibration_picture(judged, others))
+    if not context.quick:
+        yield picked_times(context)
+
+
+def picked_times(context: BenchmarkContext) -> Row:
+    """Nodes within two deviations of images from times that were picked from waves; they chose nothing."""
+    errors, deviations, parts = [], [], []
+    for number, scan in enumerate(wave_scans(WAVE_SCANS, context, WAVE_HZ)):
+        result = reconstruct(replace(scan, waveform=None), Settings.of(uncertainty=True, attenuation=False))
+        error, deviation = beside_truth(scan, result)
+        errors.append(error)
+        deviations.append(deviation)
+        rays = "bent" if result.settings.rays == "curved" else "straight"
+        parts.append(
+            f"{number}: {rays} {result.settings.method} {100.0 * np.mean(error <= 2 * deviation):.0f} %"
+        )
+    error, deviation = np.concatenate(errors), np.concatenate(deviations)
+    return Row(
+        "U1 picked wave times, nodes within two deviations",
+        float(np.mean(error <= DEVIATIONS * deviation)),
+        PART,
+        ">=",
+        "",
+        f"{len(parts)} scans at {1e-3 * WAVE_HZ:.0f} kHz, nodes in the breast; {'; '.join(parts)}; "
+        f"error {rms(error):.1f} m/s, deviations {rms(deviation):.1f} m/s",
+    )
 
 
 def judge(scan: BreastScan) -> Judged:

@@ -65,12 +65,12 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     )
 
 
-def wave_scans(count: int, context: BenchmarkContext) -> Iterator[Dataset]:
-    """Breasts in water by a finer simulator of another order, with noise."""
+def wave_scans(count: int, context: BenchmarkContext, centre_hz: float = CENTRE_HZ) -> Iterator[Dataset]:
+    """Breasts in water by a finer simulator of another order, with noise, picked."""
     for number in range(count):
         breast = detailed(np.random.default_rng((73, number)), WATER_MPS)
         size = RingScan(
-            SIDE_M, RADIUS_M, CENTRE_HZ, ELEMENTS, EMISSIONS, breast.speed_range(), WATER_MPS, None
+            SIDE_M, RADIUS_M, centre_hz, ELEMENTS, EMISSIONS, breast.speed_range(), WATER_MPS, None
         )
         speed = breast.speed(size.nodes, DETAILED_SIDE_M)
         shots = size.recorded({"object": speed, "water": np.full_like(speed, WATER_MPS)}, context.progress)
