@@ -27,6 +27,7 @@ from bentray_service.cli.output.benchmark_row import Row
 from ._breast_scans import BreastScan, breast_scans
 from ._calibration_picture import calibration_picture
 from ._judged_image import DEVIATIONS, Judged, correlation, part_within, quantile
+from ._small_volume import small_volume
 from .uncertainty_waveform import beside_truth, wave_scans
 
 Floats = NDArray[np.float64]
@@ -101,6 +102,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     context.save_picture("uncertainty.png", lambda: calibration_picture(judged, others))
     if not context.quick:
         yield picked_times(context)
+        yield small_volume(context, PART)
 
 
 def picked_times(context: BenchmarkContext) -> Row:
