@@ -120,6 +120,23 @@ def test_the_attenuation_is_in_decibels_per_centimetre(page, result):
     )
 
 
+def test_the_resolution_is_the_recovered_fraction(page, shared_service):
+    """With the same colours from nothing to all, whatever its values are."""
+    address, scan, work, monkeypatch, _ = shared_service
+    recovered = np.linspace(0.2, 0.9, SPEED.size).reshape(SPEED.shape)
+    job = finished(address, scan, work, monkeypatch, SPEED, recovery=recovered)
+    ready(page, f"{address}/#/jobs/{job}")
+    page.get_by_role("button", name="Resolution").click()
+    page.locator(".colour-bar").get_by_text("recovered fraction of a checkerboard").wait_for()
+    assert window_of(page) == [0.0, 1.0]
+    canvas = page.locator("canvas.plane")
+    for place in ((0.45, 0.3), (0.61, 0.55)):
+        node, value, _ = node_below(page, *place)
+        assert value == pytest.approx(recovered[node], rel=1e-6)
+        assert drawn(page, *place, canvas) == colour_of(recovered[node], 0.0, 1.0, "bone")
+        expect(page.locator(".readout")).to_contain_text(f"{recovered[node]:.3f}")
+
+
 def test_the_uncertainty_fades_what_is_not_known(page, shared_service):
     """Opaque without uncertainty, clear where two deviations reach half the range of the colours."""
     address, scan, work, monkeypatch, _ = shared_service
