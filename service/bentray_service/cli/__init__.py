@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Annotated
 
 import typer
@@ -32,7 +33,7 @@ from . import (
     worker,
 )
 from .options.repeated_words import RepeatedSpacing
-from .output.exit_codes import Commands
+from .output.exit_codes import INTERRUPTED, Commands
 from .output.terminal import show_warnings_on_one_line
 
 __all__ = ["app", "main"]
@@ -97,4 +98,10 @@ def _start(
 
 def main() -> None:
     """Run the command line of this process."""
-    app()
+    try:
+        app()
+    except SystemExit as end:
+        if end.code == INTERRUPTED:
+            # What is still running has nothing more to say.
+            logging.disable(logging.CRITICAL)
+        raise

@@ -7,8 +7,11 @@ import json
 import logging
 import os
 import socket
+import time
 from contextlib import suppress
 from pathlib import Path
+from threading import Thread
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -113,6 +116,8 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
     url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
 
     class Announcing(Server):
+        interrupted = False
+
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
             if self.started and as_json:
@@ -123,6 +128,14 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
                     settings, f"Bentray runs at {url} (data in {settings.data_dir}); stop it with Ctrl-C."
                 )
                 _announce(settings, _reachability(required=not made.state.parts.sign_in.open()))
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            super().handle_exit(sig, frame)
+            if not self.started:
+                self.interrupted = True
+                # Nobody waits for minutes of compilation, nor reads why its end let the start fail.
+                logging.disable(logging.CRITICAL)
+                Thread(target=_stop_starting, daemon=True).start()
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             made.state.leaving.set()
@@ -135,10 +148,21 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
     # Uvicorn exits when the application cannot start; the reason is raised below.
     with suppress(SystemExit), logs.configured(settings.log_format):
         server.run(sockets=[listening])
+    if server.interrupted:
+        raise KeyboardInterrupt
     if app.failure is not None:
         raise app.failure
     if not server.started:
         raise WorkFailed("the service could not start")
+
+
+def _stop_starting() -> None:
+    from bentray_workers.cluster.supervision import stop_starting
+
+    # Again and again, since a worker may only be about to be started.
+    while True:
+        stop_starting()
+        time.sleep(0.1)
 
 
 class _Starting:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -108,3 +110,30 @@ def test_a_nanny_without_a_process_is_lost_only_after_a_while(monkeypatch: pytes
     assert not losses.lost(nanny)
     nanny.status = Status.closed
     assert losses.lost(nanny)
+
+
+def blocks_interrupts(pid: int) -> bool:
+    """Whether a process is never told of Ctrl-C."""
+    (mask,) = re.findall(r"^SigBlk:\s*(\w+)", Path(f"/proc/{pid}/status").read_text(), re.M)
+    return bool(int(mask, 16) >> signal.SIGINT - 1 & 1)
+
+
+def test_a_start_that_compiles_for_long_is_given_up_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "slow.py").write_text("import time\ndef dask_setup(worker):\n    time.sleep(600)\n")
+    monkeypatch.setattr(providers, "PRELOAD", str(tmp_path / "slow.py"))
+    before = worker_pids()
+    with ThreadPoolExecutor(1) as pool:
+        started = pool.submit(open_cluster, workers=1, local_directory=tmp_path)
+        wait_until(lambda: worker_pids() - before)
+        assert all(map(blocks_interrupts, worker_pids() - before))
+
+        def given_up() -> bool:
+            supervision.stop_starting()
+            return started.done()
+
+        wait_until(given_up)
+        with pytest.raises(RuntimeError, match="failed to start"):
+            started.result()
+    wait_until(lambda: not worker_pids() - before)

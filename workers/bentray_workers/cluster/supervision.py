@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import signal
 import time
 from contextlib import suppress
 from typing import Any
+from weakref import WeakSet
 
 from distributed import LocalCluster
 from distributed.core import Status
@@ -46,7 +49,29 @@ class SupervisedCluster(LocalCluster):  # type: ignore[misc] # Dask has no types
     worker, or that Dask closed because its worker was missing for longer than ``lost-worker-timeout``.
     """
 
+    def __init__(self, **options: Any) -> None:
+        _starting.add(self)
+        try:
+            super().__init__(**options)
+        except BaseException:
+            # Ctrl-C, perhaps. Dask would close it at the end of this process, and fail.
+            self.kill_workers()
+            self.status = Status.closed
+            raise
+        finally:
+            _starting.discard(self)
+
+    def kill_workers(self) -> None:
+        """End the worker processes at once; a start that waits for them fails."""
+        for nanny in tuple(getattr(self, "_created", ())):
+            if nanny.process is not None and (pid := nanny.process.pid) is not None:
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+
     async def _start(self) -> None:
+        # Ctrl-C reaches every process of a terminal. This one ends its workers, which would print tracebacks.
+        # It is blocked in this thread, and in the threads and processes that are started from it.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         await super()._start()
         self._supervisor = asyncio.create_task(self._supervise())
 
@@ -78,3 +103,13 @@ class SupervisedCluster(LocalCluster):  # type: ignore[misc] # Dask has no types
                 log.warning("no worker could be started (%s); trying again in %g s", error, pause)
                 await asyncio.sleep(pause)
                 pause = min(2.0 * pause, LONGEST_PAUSE_S)
+
+
+# Clusters whose workers have not joined yet.
+_starting: WeakSet[SupervisedCluster] = WeakSet()
+
+
+def stop_starting() -> None:
+    """Let clusters that are being started in other threads fail now; compiling kernels takes minutes."""
+    for cluster in tuple(_starting):
+        cluster.kill_workers()

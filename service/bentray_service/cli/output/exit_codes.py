@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 WORK_FAILED = 1
 BAD_INPUT = 2
+INTERRUPTED = 130
 
 
 class WorkFailed(Exception):  # noqa: N818 - the command's ending, not a fault of the program
@@ -42,6 +43,8 @@ class Commands(TyperGroup):
             _end(f"out of memory: {str(error) or 'no details'}", WORK_FAILED)
         except OSError as error:
             _end(f"{error.filename or 'the system'}: {error.strerror or error}", WORK_FAILED)
+        if code == INTERRUPTED:
+            _end("interrupted", INTERRUPTED)
         sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -42,7 +42,7 @@ def ending(raised: BaseException | None) -> Result:
         (MemoryError("9 GiB"), 1, "bentray: out of memory: 9 GiB\n"),
         (MemoryError(), 1, "bentray: out of memory: no details\n"),
         (OSError("odd"), 1, "bentray: the system: odd\n"),
-        (KeyboardInterrupt(), 130, ""),
+        (KeyboardInterrupt(), 130, "bentray: interrupted\n"),
         (typer.Exit(3), 3, ""),
     ],
 )
