@@ -84,7 +84,9 @@ class ServiceSettings(BaseSettings):
         ge=GIB // 2,
         description="Address space of the ingest process for uploaded files, in bytes.",
     )
-    ingest_seconds: float = Field(120.0, gt=0, description="Time limit of this process, in seconds.")
+    ingest_seconds: float = Field(
+        120.0, gt=0, description="CPU time limit of this process, in seconds; four times as long in all."
+    )
     upload_patience_s: float = Field(
         60.0, gt=0, description="Time in which 64 KiB of a request body must arrive, in seconds."
     )

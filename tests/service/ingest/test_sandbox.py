@@ -58,7 +58,7 @@ def test_a_killed_reader_is_a_refused_file(program, scan, tmp_path):
 def test_a_reader_that_hangs_is_ended_with_its_children(program, scan, tmp_path):
     program("import os, time\nopen('pid', 'w').write(str(os.fork() or os.getpid()))\ntime.sleep(60)")
     with pytest.raises(InvalidInput, match="takes longer than 1 s"):
-        run(scan(), tmp_path, seconds=1.0)
+        run(scan(), tmp_path, seconds=0.25)
     status = Path("/proc", (tmp_path / "pid").read_text(), "stat")
     # Gone, or dead and not yet collected by the process that inherited it.
     assert not status.exists() or status.read_text().split()[2] == "Z"
