@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.tomography import Reconstruction
+from bentray_service.cli.output.benchmark_row import Row
 
 Floats = NDArray[np.float64]
 
@@ -44,6 +45,26 @@ class Judged:
 def part_within(judged: Sequence[Judged], deviations: float) -> float:
     """Part of all nodes whose error is at most so many deviations."""
     return float(np.mean(np.concatenate([relative(one) for one in judged]) <= deviations))
+
+
+def row_of(target: str, error: Floats, deviation: Floats, goal: float, about: str) -> Row:
+    """The row of the part of some nodes within ``DEVIATIONS``.
+
+    Args:
+        target: its name without what is counted.
+        error, deviation: (nodes,), absolute errors and standard deviations, m/s.
+        goal: at least this part.
+        about: the scans.
+    """
+    sizes = [np.sqrt(float((values**2).mean())) for values in (error, deviation)]
+    return Row(
+        f"{target}, nodes within two deviations",
+        float(np.mean(error <= DEVIATIONS * deviation)),
+        goal,
+        ">=",
+        "",
+        f"{about}; {error.size} nodes in the breast; error {sizes[0]:.1f} m/s, deviations {sizes[1]:.1f} m/s",
+    )
 
 
 def quantile(judged: Sequence[Judged], part: float) -> float:

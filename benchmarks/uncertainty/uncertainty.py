@@ -26,7 +26,7 @@ from bentray_service.cli.output.benchmark_row import Row
 
 from ._breast_scans import BreastScan, breast_scans
 from ._calibration_picture import calibration_picture
-from ._judged_image import DEVIATIONS, Judged, correlation, part_within, quantile
+from ._judged_image import DEVIATIONS, Judged, correlation, part_within, quantile, row_of
 from ._small_volume import small_volume
 from .uncertainty_waveform import beside_truth, wave_scans
 
@@ -114,19 +114,11 @@ def picked_times(context: BenchmarkContext) -> Row:
         errors.append(error)
         deviations.append(deviation)
         rays = "bent" if result.settings.rays == "curved" else "straight"
-        parts.append(
-            f"{number}: {rays} {result.settings.method} {100.0 * np.mean(error <= 2 * deviation):.0f} %"
-        )
+        within = 100.0 * np.mean(error <= DEVIATIONS * deviation)
+        parts.append(f"{number}: {rays} {result.settings.method} {within:.0f} %")
+    about = f"{len(parts)} scans at {1e-3 * WAVE_HZ:.0f} kHz; {'; '.join(parts)}"
     error, deviation = np.concatenate(errors), np.concatenate(deviations)
-    return Row(
-        "U1 picked wave times, nodes within two deviations",
-        float(np.mean(error <= DEVIATIONS * deviation)),
-        PART,
-        ">=",
-        "",
-        f"{len(parts)} scans at {1e-3 * WAVE_HZ:.0f} kHz, nodes in the breast; {'; '.join(parts)}; "
-        f"error {rms(error):.1f} m/s, deviations {rms(deviation):.1f} m/s",
-    )
+    return row_of("U1 picked wave times", error, deviation, PART, about)
 
 
 def judge(scan: BreastScan) -> Judged:

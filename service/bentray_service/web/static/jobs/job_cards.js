@@ -244,7 +244,7 @@ export function showJobs(list, jobs, titleOf, onCancel) {
       if (card.state === job.state) card.node.lastChild.replaceWith(fresh);
       else card.node.replaceChildren(pictures(job, title), fresh);
       const controls = [...fresh.querySelectorAll("a, button, summary")];
-      if (focused) (controls.find((one) => nameOf(one) === focused) ?? controls[0]).focus();
+      if (focused) (controls.find((one) => nameOf(one) === focused) ?? controls[0])?.focus();
       card.signature = signature;
       card.state = job.state;
     }
