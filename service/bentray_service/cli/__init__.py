@@ -41,6 +41,8 @@ __all__ = ["app", "main"]
 app = typer.Typer(
     name="bentray",
     cls=Commands,
+    # The tables of rich cut the names of options on a terminal of 80 columns.
+    rich_markup_mode=None,
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Refraction-corrected ultrasound computed tomography: sound speed, and attenuation (experimental).",

@@ -14,6 +14,7 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
+from .output.command_list import CommandList
 from .output.terminal import AsJson, print_json, print_lines, print_table, remark
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ SECONDS = {"h": 3600.0, "d": 86400.0, "w": 604800.0}
 LONGEST_NAME = 100
 
 keys = typer.Typer(
+    cls=CommandList,
+    rich_markup_mode=None,
     help="API keys: a key gives access to the data of its tenant. Keys are stored in the database of the "
     "service, which may be running; once a key exists, authentication is required.",
     no_args_is_help=True,

@@ -11,6 +11,7 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .keys import Data, opened_database, shown_time
+from .output.command_list import CommandList
 from .output.terminal import AsJson, print_json, print_lines, print_table
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 NOBODY = "none"
 
 projects = typer.Typer(
+    cls=CommandList,
+    rich_markup_mode=None,
     help="Projects inside a tenant: only members see the data of a project. Owners change them over REST, "
     "operators with these commands on the database of the service, which may be running.",
     no_args_is_help=True,

@@ -10,11 +10,14 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .keys import Data, opened_database
+from .output.command_list import CommandList
 from .output.terminal import AsJson, print_json, print_lines, print_table, remark
 
 COLUMNS = ("id", "tenant", "job", "state", "attempts", "created", "last")
 
 webhooks = typer.Typer(
+    cls=CommandList,
+    rich_markup_mode=None,
     help="Webhooks: addresses that the service calls when a job ends. Secrets and messages are stored in the "
     "database of the service, which may be running.",
     no_args_is_help=True,

@@ -31,13 +31,29 @@ def test_the_commands_of_the_design_are_there() -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_gives_an_example_that_parses(bentray: Callable[..., Result], command: str) -> None:
+def test_help_fits_a_narrow_terminal_and_gives_an_example_that_parses(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     words = command.split()
     said = bentray(*words, "--help")
     assert said.exit_code == 0
-    example = said.stdout.split("Example:")[1].split("\n\n")[0].split("╭")[0].split()
+    example = said.stdout.split("Example:")[1].split("\n\n")[0].split()
     assert example[: len(words) + 1] == ["bentray", *words]
     named()[command].make_context(command, list(example[len(words) + 1 :]))
+    options = [one for param in named()[command].params for one in (*param.opts, *param.secondary_opts)]
+    shown = said.stdout.replace(",", " ").split()
+    assert [one for one in options if one.startswith("-") and one not in shown] == []
+
+
+@pytest.mark.parametrize("group", ["", "keys", "projects", "webhooks"])
+def test_no_summary_of_a_command_is_cut(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, group: str
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    said = bentray(*group.split(), "--help").stdout
+    assert len(said.partition("\nCommands:")[2].split()) > 10
+    assert "..." not in said.partition("\nCommands:")[2]
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -47,7 +47,9 @@ def _option(name: str, field: Field[Any], hint: Any, choices: tuple[str, ...]) -
     elif get_args(kind):
         metavar = "LOW HIGH"
     elif RANGE in field.metadata:
-        text = f"{text} {field.metadata[RANGE].words.capitalize()}."
+        words = field.metadata[RANGE].words
+        # Not capitalize(), which turns °C and MHz into °c and mhz.
+        text = f"{text} {words[:1].upper()}{words[1:]}."
     return Option(flag, kind, default_of(field), text, metavar)
 
 

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from typing import Any, NoReturn
 
 import typer
-from typer.core import TyperGroup
+
+from .command_list import CommandList
 
 WORK_FAILED = 1
 BAD_INPUT = 2
@@ -19,7 +20,7 @@ class WorkFailed(Exception):  # noqa: N818 - the command's ending, not a fault o
     """The work failed although the input was valid; the message is for the user."""
 
 
-class Commands(TyperGroup):
+class Commands(CommandList):
     """The group of all commands; converts errors to one line on stderr and an exit code.
 
     Unexpected errors are shown with a traceback, with exit code 1.

@@ -150,3 +150,7 @@ def test_the_help_states_the_defaults_that_the_settings_have(command: str) -> No
             default = " ".join(map(str, default))
         assert parameters[name].show_default == option.default
         assert default is None or option.default == str(default), name
+
+
+def test_the_unit_of_a_range_keeps_its_letters() -> None:
+    assert "A number from 0 to 95 °C." in OPTIONS["water_temperature_c"].help
