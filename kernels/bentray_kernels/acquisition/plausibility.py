@@ -16,6 +16,10 @@ BULK_MPS = (300.0, 6_000.0)
 # A scan is plausible if at least this fraction of its pairs is: single picks may be arbitrarily wrong.
 MAX_PAIRS = 0.5
 
+# Differences within this fraction of the whole time through water are arrival times: as differences, they
+# would mean an object with less than 0.6 of the speed of the water.
+ARRIVALS = 0.3
+
 # Pairs nearer than this fraction of the array's width are ignored: picks of neighbours are often wrong.
 NEAR = 0.1
 
@@ -111,11 +115,14 @@ def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
             speed = distance / (offset + factor * time)
         return bool(np.mean((speed >= BULK_MPS[0]) & (speed <= BULK_MPS[1])) >= MAX_PAIRS)
 
+    middle = np.argsort(time)[time.size // 2]
+    value = f"{time[middle]:.4g} s between elements {distance[middle]:.3g} m apart, the median of all pairs"
+    if offset is in_water and np.mean(np.abs(time - in_water) <= ARRIVALS * in_water) >= MAX_PAIRS:
+        accepted = "arrival with the object minus arrival in water; these look like arrivals: write them to "
+        raise InvalidInput(place, value, f"{accepted}traveltime/tof_s")
     if plausible(1.0):
         return
     low, high = BULK_MPS
-    middle = np.argsort(time)[time.size // 2]
-    value = f"{time[middle]:.4g} s between elements {distance[middle]:.3g} m apart, as most pairs have"
     unit = next((unit for unit in TIMES if plausible(TIMES[unit])), "")
     hint = f"; these times look like {unit}: write s" if unit else ""
     plain = f"times in s of sound that runs at {low:g} to {high:g} m/s between them"

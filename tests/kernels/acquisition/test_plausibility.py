@@ -56,6 +56,21 @@ def test_times_in_another_unit(name, unit, factor):
     assert refusal.value.field == f"traveltime/{name}"
 
 
+@pytest.mark.parametrize("speed_mps", [1350.0, 1500.0, 1650.0])
+def test_arrival_times_in_place_of_differences(speed_mps):
+    scan = times_only(ring(), "delta_tof_s")
+    arrivals = scan.distance_m() / speed_mps
+    with pytest.raises(InvalidInput, match="look like arrivals: write them to traveltime/tof_s") as refusal:
+        check_plausible(replace(scan, delta_tof_s=arrivals))
+    assert refusal.value.field == DELTA
+
+
+@pytest.mark.parametrize("speed_mps", [1000.0, 1350.0, 2700.0])
+def test_differences_of_slow_and_fast_objects_are_taken(speed_mps):
+    scan = times_only(ring(), "delta_tof_s")
+    check_plausible(replace(scan, delta_tof_s=scan.distance_m() * (1.0 / speed_mps - 1.0 / 1500.0)))
+
+
 @pytest.mark.parametrize("time", [-1.0, 1e300, -1e300, 0.0, 5e-324, 1e-9])
 def test_rejects_implausible_times(time):
     with pytest.raises(InvalidInput, match=r"sound that runs at 300 to 6000 m/s"):
