@@ -78,5 +78,5 @@ def describe_assumption(temperature_c: float) -> str:
     return (
         f"The water temperature is not stated in the scan: {temperature_c:g} °C ({speed:.1f} m/s) is "
         f"assumed; one degree more raises every speed by {slope:.0f} m/s. State it by the setting "
-        "water_temperature_c, on the page of the scan, or by --temperature."
+        "water_temperature_c (--water-temperature), or on the page of the scan."
     )

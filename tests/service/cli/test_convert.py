@@ -73,7 +73,7 @@ def own_variables(path: Path) -> tuple[object, ...]:
 def test_own_variables_are_named_on_the_command_line(bentray: Callable[..., Result], tmp_path: Path) -> None:
     options = own_variables(tmp_path / "scan.mat")
     words = ("convert", tmp_path / "scan.mat", "-o", tmp_path / "scan.h5")
-    assert "own names, e.g. --map element_position=NAME" in bentray(*words).stderr
+    assert "own names of variables: --map element_position=NAME" in bentray(*words).stderr
     assert "write m, or state the unit: --unit mm" in bentray(*words, *options[:4]).stderr
     result = bentray(*words, *options, "--temperature", 24, "--frequency", 1e6)
     assert result.exit_code == 0, result.stderr

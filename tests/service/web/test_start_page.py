@@ -81,7 +81,8 @@ def test_errors_are_shown_as_text(page, address, tmp_path):
     page.goto(address)
     page.set_input_files("#scan-file", tmp_path / "notes.h5")
     alert = page.locator("#scan-error")
-    found = "Found a file that is not HDF5 (it begins with 'only tex'); accepted: a whole HDF5 file."
+    found = "Found a file that is not HDF5 (it begins with 'only tex'); accepted: a scan in HDF5, MATLAB "
+    found += "or NumPy (.npz), or a zip or folder of a documented format."
     expect(alert).to_contain_text(f"notes.h5 is not a scan that can be read. {found}")
     alert.get_by_role("link", name="Accepted formats").click()
     page.get_by_role("heading", name="Scans", exact=True).wait_for()

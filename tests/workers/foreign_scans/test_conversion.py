@@ -363,5 +363,5 @@ def test_rejects_unknown_formats(tmp_path):
     with pytest.raises(InvalidInput, match="a NumPy archive with the arrays something"):
         convert_dataset(tmp_path / "scan.npz", tmp_path / "canonical.h5")
     (tmp_path / "scan.txt").write_text("no scan")
-    with pytest.raises(InvalidInput, match="not HDF5"):
+    with pytest.raises(InvalidInput, match=r"not HDF5.*accepted: a scan in HDF5, MATLAB or NumPy"):
         convert_dataset(tmp_path / "scan.txt", tmp_path / "canonical.h5")

@@ -134,5 +134,5 @@ def test_a_measurement_without_geometry_or_with_another_water_is_named(tmp_path)
     with pytest.raises(InvalidInput, match="2 measurements"):
         convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5")
     (tmp_path / "none").mkdir()
-    with pytest.raises(InvalidInput, match="a folder with the arrays none"):
+    with pytest.raises(InvalidInput, match="a folder with the files none"):
         convert_dataset(tmp_path / "none", tmp_path / "canonical.h5")

@@ -141,8 +141,11 @@ def test_water_that_contradicts_the_file_is_rejected(tmp_path):
 def test_files_in_the_upload_format_state_everything_themselves(tmp_path):
     savemat(tmp_path / "scan", travel_times(), appendmat=False)
     converted(tmp_path)
-    with pytest.raises(InvalidInput, match="files in the upload format state their units"):
-        convert_dataset(tmp_path / "canonical.h5", tmp_path / "again.h5", given=ScanMetadata.of(unit=["mm"]))
+    given = ScanMetadata.of(unit=["mm"], temperature_c=21.0)
+    with pytest.raises(InvalidInput, match="files in the upload format state their units") as refused:
+        convert_dataset(tmp_path / "canonical.h5", tmp_path / "again.h5", given=given)
+    assert refused.value.field == "unit, temperature"
+    assert "--water-temperature" in refused.value.accepted
 
 
 def test_links_out_of_the_file_are_not_followed(tmp_path):

@@ -54,8 +54,11 @@ def convert_dataset(
             arrays, layout = _read(scan, given)
             return _write(arrays, layout, target, on_size)
         if given and scan.claims_upload_format():
-            accepted = "none: files in the upload format state their units, water and frequency"
-            raise InvalidInput("map, unit, temperature, speed or frequency", "given for this file", accepted)
+            accepted = (
+                "none: files in the upload format state their units, water and frequency; the setting "
+                "water_temperature_c (--water-temperature) replaces the water, bentray correct the others"
+            )
+            raise InvalidInput(given.words(), "given for this file", accepted)
     return copy_dataset(source, target, limits, on_size)
 
 

@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import h5py
+
 from bentray_kernels.errors import InvalidInput
 
-from ..files.damage import rejecting_damage
+from ..files.damage import first_bytes, rejecting_damage
 from ..files.dataset.format import FORMAT
 from ..files.hdf5_reading import SIGNATURE, Limits, Reader, opened
 from . import matlab5, npz
@@ -21,6 +23,9 @@ from .matlab73 import Matlab73
 # HDF5 may begin after a user block; that of MATLAB 7.3 has 512 bytes.
 USER_BLOCK = 512
 MATLAB73 = b"MATLAB 7.3 MAT-file"
+
+# Kinds of files that hold scans.
+SCANS = "a scan in HDF5, MATLAB or NumPy (.npz), or a zip or folder of a documented format"
 
 
 @dataclass(frozen=True)
@@ -106,7 +111,7 @@ def open_scan(path: Path, scratch: Path, limits: Limits | None = None) -> Iterat
         limits: of HDF5 files; None: the defaults of ``Limits``.
 
     Raises:
-        InvalidInput: for a damaged file.
+        InvalidInput: for a damaged file, and for one of another kind.
     """
     if path.is_dir():
         yield OpenScan(scratch, folder=path)
@@ -126,5 +131,8 @@ def open_scan(path: Path, scratch: Path, limits: Limits | None = None) -> Iterat
     elif start.startswith(SIGNATURE) or (start.startswith(MATLAB73) and start[USER_BLOCK:] == SIGNATURE):
         with opened(path, limits or Limits()) as reader:
             yield OpenScan(scratch, hdf5=reader, is_matlab=not start.startswith(SIGNATURE))
+    elif start and not h5py.is_hdf5(path):
+        raise InvalidInput("file", f"a file that is not HDF5 ({first_bytes(start)})", SCANS)
     else:
+        # Empty, or HDF5 after a user block of another program.
         yield OpenScan(scratch)

@@ -20,6 +20,13 @@ READERS: tuple[ScanReader, ...] = (
     layouts.NAMED,
 )
 
+# Names of arrays or files that an error repeats.
+SHOWN = 8
+ACCEPTED = (
+    "the names of a documented format of scans, or own names of variables: --map element_position=NAME "
+    "--map delta_tof=NAME (map in Python and REST)"
+)
+
 
 def reader_of(scan: OpenScan) -> ScanReader:
     """The reader of an open file.
@@ -30,12 +37,7 @@ def reader_of(scan: OpenScan) -> ScanReader:
     for reader in READERS:
         if reader.detect(scan):
             return reader
-    shown = ", ".join(sorted(filter(plain_name, scan.names or scan.members))[:8]) or "none"
-    kind = "a folder" if scan.arrays is None else scan.arrays.kind
-    raise InvalidInput(
-        "file",
-        f"{kind} with the arrays {shown}"[:160],
-        "delta_tof and element_positions; time, transducerPositionsXY and full_dataset; the names of the "
-        "upload format; another documented format; or own names, e.g. --map element_position=NAME --map "
-        "delta_tof=NAME",
-    )
+    names = sorted(filter(plain_name, scan.names or scan.members))
+    shown = ", ".join([*names[:SHOWN], *["…"][: len(names) > SHOWN]]) or "none"
+    kind = "a folder with the files" if scan.arrays is None else f"{scan.arrays.kind} with the arrays"
+    raise InvalidInput("file", f"{kind} {shown}", ACCEPTED)

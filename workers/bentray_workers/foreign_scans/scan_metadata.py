@@ -60,6 +60,12 @@ UNITS: Mapping[str, tuple[str, float]] = {
 VARIABLE = re.compile(r"[\w./ -]{1,200}")
 # Speeds of water that contradict each other differ by more.
 AGREED_MPS = 15.0
+# Options of numbers by their places in the upload format.
+NUMBERS = {
+    "water/temperature_c": "temperature",
+    "water/sound_speed_mps": "sound speed",
+    "acquisition/center_frequency_hz": "frequency",
+}
 POSITION = "geometry/element_position_m"
 INDICES = ("acquisition/tx", "acquisition/rx")
 
@@ -98,20 +104,19 @@ class ScanMetadata:
         Raises:
             InvalidInput: naming the option, its value and the accepted values.
         """
-        numbers = {
-            "water/temperature_c": temperature_c,
-            "water/sound_speed_mps": sound_speed_mps,
-            "acquisition/center_frequency_hz": frequency_hz,
-        }
-        for name, value, within in (
-            ("temperature", temperature_c, TEMPERATURE_C),
-            ("sound speed", sound_speed_mps, SPEED_MPS),
-            ("frequency", frequency_hz, FREQUENCY_HZ),
-        ):
-            if value is not None:
-                within.check(name, value)
-        stated = {place: float(value) for place, value in numbers.items() if value is not None}
+        numbers = dict(zip(NUMBERS, (temperature_c, sound_speed_mps, frequency_hz), strict=True))
+        stated = {place: value for place, value in numbers.items() if value is not None}
+        for place, within in zip(NUMBERS, (TEMPERATURE_C, SPEED_MPS, FREQUENCY_HZ), strict=True):
+            if place in stated:
+                within.check(NUMBERS[place], stated[place])
+        stated = {place: float(value) for place, value in stated.items()}
         return cls(_variables(map), _factors(unit), stated)
+
+    def words(self) -> str:
+        """The names of what is stated, for errors."""
+        named = {"map": self.variables, "unit": self.factors}
+        numbers = (NUMBERS[place] for place in self.numbers)
+        return ", ".join([*(name for name, values in named.items() if values), *numbers])
 
     def __bool__(self) -> bool:
         return bool(self.variables or self.factors or self.numbers)

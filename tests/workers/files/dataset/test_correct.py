@@ -156,6 +156,27 @@ def test_an_implausible_scan_is_refused_and_nothing_is_written(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["scan.h5"]
 
 
+@pytest.mark.parametrize(
+    ("changes", "option", "stated"),
+    [
+        ({"element_position_m": 1e3 * small().element_position_m}, "positions-in mm", {"positions_in": "mm"}),
+        (
+            {"delta_tof_s": 1e6 * small().delta_tof_s},
+            "times-in us",
+            {"times_in": "us", "sampling_rate_hz": 1e7},
+        ),
+    ],
+)
+def test_the_unit_for_which_a_file_is_refused_can_be_corrected(tmp_path, changes, option, stated):
+    wrong, right = tmp_path / "wrong.h5", tmp_path / "right.h5"
+    write_dataset(wrong, usual(**changes))
+    with pytest.raises(InvalidInput, match=f"bentray correct SCAN -o COPY --{option}"):
+        read_dataset(wrong)
+    correct_dataset(wrong, right, Correction(**stated))
+    (name,) = changes
+    np.testing.assert_allclose(getattr(read_dataset(right), name), getattr(small(), name), rtol=1e-12)
+
+
 def test_traces_are_copied_in_pieces(tmp_path, monkeypatch):
     dataset = small()
     traces = np.zeros((4, 8, 65536), np.int16)

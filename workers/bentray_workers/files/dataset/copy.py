@@ -24,7 +24,7 @@ def copy_dataset(
     target: Path,
     limits: Limits | None = None,
     on_size: Callable[[int], None] = lambda size: None,
-    change: Callable[[Dataset], Dataset] = lambda dataset: dataset,
+    change: Callable[[Dataset], Dataset] | None = None,
 ) -> Dataset:
     """Check a dataset file and write it again, with one piece of its traces in memory at a time.
 
@@ -33,7 +33,8 @@ def copy_dataset(
         target: replaced atomically.
         limits: of reading; None: the defaults of ``Limits``.
         on_size: called before writing with the largest size of ``target`` without headers, bytes.
-        change: returns the dataset to be written, with the same traces.
+        change: returns the dataset to be written, with the same traces, and checks its units, which are not
+            checked before.
 
     Returns:
         The dataset, with placeholders of the same shape and type for traces.
@@ -43,7 +44,9 @@ def copy_dataset(
         OSError: where the folder cannot be written to or the disk is full.
     """
     with opened(source, limits or Limits()) as reader:
-        dataset = change(dataset_of(reader, placeholder_traces))
+        dataset = dataset_of(reader, placeholder_traces, plausible=change is None)
+        if change is not None:
+            dataset = change(dataset)
         on_size(bytes_of(dataset))
 
         def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:

@@ -17,12 +17,13 @@ from bentray_kernels.acquisition import (
     speed_from_temperature,
     temperature_from_speed,
 )
-from bentray_kernels.acquisition.plausibility import check_plausible
+from bentray_kernels.acquisition.plausibility import ImplausibleUnit, check_plausible
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import COUNTED, OVER_NODES, OVER_PAIRS, check_size
 
 from ..hdf5_reading import Limits, Reader, opened
 from .format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
+from .units import POSITION_UNITS, TIME_UNITS
 
 NUMERIC = "iuf"
 # Arrays whose number of rows, pairs or nodes is checked before anything is read.
@@ -46,8 +47,16 @@ def read_dataset(path: Path, *, traces: bool = True, limits: Limits | None = Non
         return dataset_of(reader, _waveform if traces else None)
 
 
-def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) -> Dataset:
-    """The dataset in an open file; ``waveform`` reads its traces, if any. See ``read_dataset``."""
+def dataset_of(
+    reader: Reader, waveform: Callable[[Reader], Waveform] | None, *, plausible: bool = True
+) -> Dataset:
+    """The dataset in an open file, see ``read_dataset``.
+
+    Args:
+        reader: of the file.
+        waveform: reads the traces, if any.
+        plausible: false: times and lengths may be in other units, to be corrected.
+    """
     _check_format(reader)
     for place in SIZED:
         check_size(place, _shape(reader, place))
@@ -98,8 +107,23 @@ def dataset_of(reader: Reader, waveform: Callable[[Reader], Waveform] | None) ->
         truth=_truth(reader),
         **fields,
     )
-    check_plausible(dataset)
+    if plausible:
+        _check_plausible(dataset)
     return dataset
+
+
+def _check_plausible(dataset: Dataset) -> None:
+    """As ``check_plausible``; for a likely unit the error also states the command that corrects it."""
+    try:
+        check_plausible(dataset)
+    except ImplausibleUnit as error:
+        unit = error.unit.replace("µ", "u")
+        if unit not in (*TIME_UNITS, *POSITION_UNITS):
+            raise
+        option = f"--{'times' if unit in TIME_UNITS else 'positions'}-in {unit}"
+        hint = f", or correct a copy: bentray correct SCAN -o COPY {option}"
+        likely = error.accepted.removeprefix(error.plain)
+        raise ImplausibleUnit(error.field, error.value, error.plain, likely + hint, error.unit) from None
 
 
 def _shape(reader: Reader, place: str) -> tuple[int, ...]:
