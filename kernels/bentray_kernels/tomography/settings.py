@@ -26,13 +26,13 @@ FORBID = {"extra": "forbid"}
 
 @dataclass(frozen=True)
 class SartSettings:
-    """SART: the image is updated after each emitter (chapter 6)."""
+    """SART: the image is updated after each emitter (Li 2008, chapter 6)."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
     relaxation: float = setting(
         0.1,
-        "Relaxation factor λ of an update (chapter 6, equation 1).",
+        "Relaxation factor λ of an update (Li 2008, chapter 6, equation 1).",
         Range(0.0, 2.0, above=True, below=True),
         label="Relaxation factor λ",
     )
@@ -46,7 +46,7 @@ class SartSettings:
     speed_range_mps: tuple[float, float] | None = setting(
         None,
         "Lowest and highest speed known in the object, m/s. The image is stretched to this range before the "
-        "wave front is tracked (data-driven speed, chapter 6, equation 6).",
+        "wave front is tracked (data-driven speed, Li 2008, chapter 6, equation 6).",
         unset="the image as it is",
         label="Known speed range",
         unit="m/s",
@@ -66,7 +66,8 @@ class GaussNewtonSettings:
 
     penalty: Literal["total-variation", "laplacian", "tikhonov"] = setting(
         "total-variation",
-        "total-variation preserves edges, laplacian prefers smooth images, tikhonov images near the first.",
+        "total-variation preserves edges; laplacian prefers smooth images; tikhonov prefers images near the "
+        "initial one.",
         label="Penalty",
         words={"total-variation": "Total variation", "laplacian": "Laplacian", "tikhonov": "Tikhonov"},
     )
@@ -79,8 +80,9 @@ class GaussNewtonSettings:
     )
     edge_mps: float = setting(
         0.0,
-        "With total variation: differences between neighbouring nodes above this cost no more, m/s, for "
-        "objects of flat parts with sharp edges, as phantoms; 0: every difference costs.",
+        "For total-variation: difference of neighbouring nodes, m/s, above which the penalty stays constant; "
+        "for objects of flat parts with sharp edges, such as phantoms. 0: the penalty grows with every "
+        "difference.",
         Range(0.0, 1000.0, unit="m/s"),
         label="Edges above",
         unit="m/s",
@@ -125,15 +127,15 @@ class AttenuationSettings:
     )
     amplitudes: Literal["recorded", "ratio", "spectrum"] = setting(
         "recorded",
-        "recorded: amplitudes of the file; read from the traces, ratio: height of the first pulse relative "
-        "to water, or spectrum: loss of high frequencies relative to low ones.",
+        "recorded: amplitudes of the file; ratio: read from the traces, height of the first pulse relative "
+        "to water; spectrum: read from the traces, loss of high frequencies relative to low ones.",
         label="Amplitudes",
         words={"recorded": "Recorded", "ratio": "Pulse height", "spectrum": "Spectrum"},
     )
     attenuation_solver: Literal["penalised", "sart"] = setting(
         "penalised",
         "penalised: all rays at once, with the penalty_strength of gauss_newton; sart: one emitter after the "
-        "other with the settings of sart, without a penalty (chapter 6).",
+        "other with the settings of sart, without a penalty (Li 2008, chapter 6).",
         label="Solver",
         words={"penalised": "Penalised", "sart": "SART"},
     )
@@ -159,19 +161,20 @@ class ReflectionSettings:
 
     enabled: bool = setting(
         False,
-        "Also make a reflection image from the traces: echoes of all pairs, delayed by their travel times "
-        "along bent rays and summed; slices.",
+        "Also make a reflection image of each slice from the traces: echoes of all pairs, delayed by their "
+        "travel times along bent rays and summed.",
         label="Make a reflection image",
     )
     delays: Literal["reconstructed", "water"] = setting(
         "reconstructed",
-        "Travel times in the reconstructed speed, or, for comparison, in water.",
+        "reconstructed: travel times in the reconstructed speed; water: travel times in water, for "
+        "comparison.",
         label="Travel times in",
         words={"reconstructed": "Reconstructed speed", "water": "Water"},
     )
     pixel_m: float | None = setting(
         None,
-        "Distance of pixels, m; at most the wavelength, and at most 4096 pixels along a side.",
+        "Spacing of the pixels, m; at most the wavelength, and at most 4096 pixels along a side.",
         Range(1e-6, 1.0, unit="m"),
         unset="an eighth of the wavelength in water at the centre frequency, at most 2048 along a side",
         label="Distance of pixels",
@@ -187,13 +190,14 @@ class ReflectionSettings:
     )
     coherence_factor: bool = setting(
         True,
-        "Multiply by the coherence factor of the emissions, which lowers what does not focus.",
+        "Multiply by the coherence factor of the emissions, which suppresses echoes that do not focus.",
         label="Coherence factor",
     )
     gain: Literal["none", "spreading", "attenuation"] = setting(
         "none",
-        "Compensation of amplitudes on the way to a pixel and back: spreading, of cylindrical waves; "
-        "attenuation, that and the losses along the rays in the reconstructed attenuation.",
+        "Compensation of the amplitudes on the way to a pixel and back. none: no compensation; spreading: of "
+        "the spreading of cylindrical waves; attenuation: of the spreading, and of the losses along the rays "
+        "in the reconstructed attenuation.",
         label="Compensate",
         words={"none": "Nothing", "spreading": "Spreading", "attenuation": "Spreading and attenuation"},
     )
@@ -252,7 +256,7 @@ class Settings:
         "accurate",
     ] = setting(
         DEVIATION,
-        "Eikonal solver for curved rays. deviation: SART on slices; accurate replaces it elsewhere.",
+        "Eikonal solver for curved rays. deviation is for SART on slices; elsewhere accurate replaces it.",
         label="Eikonal solver",
     )
     decomposition: Literal["slices", "volume"] | None = setting(
@@ -315,9 +319,9 @@ class Settings:
     )
     device: Literal["auto", "cpu", "opencl"] = setting(
         "auto",
-        "Where SART of slices, full waveforms and reflection are computed. auto: on an OpenCL device where a "
-        "trial on this machine was faster; cpu: in compiled code; opencl: on a device, many slices or "
-        "emitters at a time. The images differ by rounding, and the result states which it was.",
+        "Where SART of slices, full waveforms and reflection are computed. auto: on an OpenCL device if it "
+        "was faster in a timing trial on this machine; cpu: in compiled code; opencl: on a device, many "
+        "slices or emitters at a time. The images differ by rounding; the result states which was used.",
         label="Compute on",
         words={"auto": "Automatic", "cpu": "Processor", "opencl": "OpenCL device"},
     )
@@ -330,8 +334,9 @@ class Settings:
     uncertainty: bool = setting(
         False,
         "Also estimate the standard deviation of the speed at each node, and the resolution width of the "
-        "image: from the misfit along bent rays and the differences of pairs measured both ways; of full "
-        "waveforms from two more inversions, each with half of the emitters, in about as much time again.",
+        "image. Images by rays: from the misfit along bent rays and the differences of pairs measured both "
+        "ways. Full waveforms: from two more inversions, each with half of the emitters, in about as much "
+        "time again.",
         label="Uncertainty",
     )
     minutes: float | None = setting(
