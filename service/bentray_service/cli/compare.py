@@ -91,7 +91,7 @@ def compare(
         ("PCC", _number(found["correlation"])),
         ("region", f"{found['region']}, {found['nodes']} nodes"),
     ]
-    print_table(f"{source.name}: {quantity} against {other.name}", ("figure", "value"), rows)
+    print_table(f"{result}: {quantity} against {truth}", ("figure", "value"), rows)
     columns = ("statistics", "size", "result", "truth", "contrast: result", "truth")
     shown = [(compared.region_choice, *compared.statistics())]
     shown += [(str(RoundRegion(*place)), *compared.statistics(*place)) for place in places]

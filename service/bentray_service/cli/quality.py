@@ -81,10 +81,14 @@ def quality(
     else:
         lines = [(f["check"], f["found"], _elements(f), f["action"]) for f in found.report["findings"]]
         title = f"{source.name}: {found.report['verdict']}"
-        print_table(title, ("check", "found", "elements", "done"), lines)
+        if lines:
+            print_table(title, ("check", "found", "elements", "done"), lines)
+        else:
+            print_lines([title])
+        checked = f"checked: {', '.join(found.report['checked'])}"
         usable = f"{found.report['usable_pairs']} of {found.report['pairs']} pairs usable"
         excluded = [f"not checked: {name}, {why}" for name, why in found.report["not_checked"].items()]
-        print_lines([usable, *excluded, *summary["outputs"].values()])
+        print_lines([checked, *excluded, usable, *summary["outputs"].values()])
     if found.picked is None:
         refused = next(f for f in found.report["findings"] if f["action"] == "refused")
         raise WorkFailed(f"{refused['check']}: {refused['found']}; accepted: {refused['accepted']}")

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 @with_settings_options
 def reconstruct(
     file: Annotated[Path, typer.Argument(help="Dataset file, or a scan of another program.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Output folder; an earlier result in it is replaced.")
+    ],
     options: SettingsOptions,
     scan_options: ScanOptions,
     workers: Annotated[

@@ -40,6 +40,10 @@ def reconstruct(
         settings: as in the table of settings, each by the last part of its name: ``rays="straight"``,
             ``iterations=8``, ``relaxation=0.2``, ``attenuation=False``.
 
+    Returns:
+        The result: ``speed`` (nx, ny[, nz]) in m/s and ``coverage`` in m; with amplitudes ``attenuation`` in
+        Np/m; and, by their settings, ``recovery``, ``uncertainty`` in m/s and ``reflection`` in dB.
+
     Raises:
         InvalidInput: naming the setting or the field of the scan, its value and what is accepted; for an
             unknown setting the one that is spelt most like it.

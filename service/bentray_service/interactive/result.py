@@ -462,8 +462,11 @@ def load(path: str | os.PathLike[str]) -> Result:
     Args:
         path: of the file, or of a folder with ``reconstruction.h5``.
 
+    Returns:
+        The result, with arrays (nx, ny[, nz]) in SI units; without the truth of a simulated scan.
+
     Raises:
-        InvalidInput: naming the first field that is missing or wrong.
+        InvalidInput: naming the first field that is missing or wrong, or for a scan.
     """
     from bentray_workers.files.volume_export import read_image
 
@@ -472,4 +475,11 @@ def load(path: str | os.PathLike[str]) -> Result:
     if not file.is_file():
         accepted = "a reconstruction.h5, its folder, or a volume of Bentray in HDF5"
         raise InvalidInput("file", f"{file} (no such file)", accepted)
-    return result_of(read_image(file), {"file": file.name})
+    try:
+        image = read_image(file)
+    except InvalidInput as error:
+        if "uct-transmission" not in error.value:
+            raise
+        accepted = "a result or a volume; this is a scan, for bentray.read or bentray reconstruct"
+        raise InvalidInput(error.field, error.value, accepted) from None
+    return result_of(image, {"file": file.name})

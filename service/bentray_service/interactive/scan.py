@@ -97,7 +97,9 @@ class Scan:
 
     def __repr__(self) -> str:
         *counts, (_, content) = self._counts()
-        words = ", ".join(f"{value} {name}" for name, value in counts)
+        words = ", ".join(
+            f"{value} {name.removesuffix('s') if value == '1' else name}" for name, value in counts
+        )
         return f"<bentray.Scan {self.name!r}: {words}; {content}>"
 
     def _repr_html_(self) -> str:

@@ -20,10 +20,15 @@ def simulate(
         phantom: ``table6``: 2-D breast (Li 2008, Table 6); ``table6-vertical``: its vertical slice;
             ``detailed``: 2-D with skin and glandular texture; ``table7``: 3-D breast (Li 2008, Table 7).
         progress: show a progress bar.
-        settings: ``nodes`` along a side of the truth (128), ``elements`` of the ring (256), ``coupling_mps``
-            (1500), ``snr``, ``seed``, ``attenuation`` (record amplitudes too), ``noise_s``; ``waveform``
-            (traces in place of times) with ``frequency_hz``, ``emissions`` and ``side_m``; of table7
-            ``slices``, ``array`` and ``three_d``.
+        settings: ``nodes`` along a side of the truth (128), ``elements`` of the ring (256), ``coupling_mps``,
+            the speed of the water (1500), ``snr``, a ratio of amplitudes (no noise), ``seed``,
+            ``attenuation`` (record amplitudes too), ``noise_s``, the standard deviation of the times, s;
+            ``waveform`` (traces in place of times) with ``frequency_hz`` of the pulse, ``emissions``, the
+            number of emitting elements, and ``side_m`` of the simulated square, m; of table7 ``slices``,
+            ``array`` and ``three_d``.
+
+    Returns:
+        The scan, with times or traces over (emitters, receivers) and the truth (nx, ny[, nz]), in SI units.
 
     Raises:
         InvalidInput: naming the setting, its value and what is accepted; for an unknown name the one that is

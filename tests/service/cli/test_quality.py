@@ -50,6 +50,18 @@ def test_a_refused_scan_fails_with_the_reason_and_leaves_its_report(
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["quality.json", "quality.png"]
 
 
+def test_a_scan_without_findings_is_told_what_was_checked(
+    bentray: Callable[..., Result], tmp_path: Path
+) -> None:
+    times = scan(elements=16)
+    write_dataset(tmp_path / "scan.h5", replace(times, waveform=None, delta_tof_s=np.zeros((16, 16))))
+    result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out")
+    assert result.exit_code == 0
+    first, second = result.stdout.splitlines()[:2]
+    assert first == "scan.h5: clean"
+    assert second.startswith("checked: time zero of the object scan, ")
+
+
 def test_an_unknown_picker_is_bad_input(bentray: Callable[..., Result], tmp_path: Path) -> None:
     write_dataset(tmp_path / "scan.h5", scan(elements=8))
     result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out", "--picker", "eye")

@@ -243,6 +243,12 @@ def test_what_cannot_be_saved_is_named(result: Result, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_scan_is_no_result_and_is_told_who_reads_it(tmp_path: Path) -> None:
+    bentray.simulate(elements=4, nodes=16, progress=False).save(tmp_path / "scan.h5")
+    with pytest.raises(bentray.InvalidInput, match=r"this is a scan, for bentray\.read"):
+        bentray.load(tmp_path / "scan.h5")
+
+
 def test_xarray_finds_a_place(result: Result) -> None:
     found = result.to_xarray()
     assert found.speed.dims == ("x", "y")

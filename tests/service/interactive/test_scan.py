@@ -84,7 +84,7 @@ def test_a_scan_is_saved_as_hdf5_only(simulated: bentray.Scan, tmp_path: Path) -
 
 def test_a_notebook_shows_a_scan(simulated: bentray.Scan) -> None:
     assert repr(simulated) == (
-        "<bentray.Scan 'table6': 24 elements, 24 emitters, 24 receivers, 1 slices; times and truth>"
+        "<bentray.Scan 'table6': 24 elements, 24 emitters, 24 receivers, 1 slice; times and truth>"
     )
     shown = simulated._repr_html_()
     for words in ("2-D breast phantom", "1375.0 m/s", "times and truth", "made by bentray simulate"):

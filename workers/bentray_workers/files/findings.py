@@ -40,7 +40,7 @@ class ScanFindings(NamedTuple):
     def words(self, *, stacked: bool) -> str:
         """Summary in one line; see ``finding.words``."""
         if not self.examined and not self.findings:
-            return "not examined, since the scan has travel times and no centre frequency"
+            return "travel times not examined, which needs a centre frequency; bentray quality checks them"
         return words(self.findings, stacked=stacked)
 
 

@@ -110,7 +110,7 @@ def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
         ("rays", found["settings"]["rays"]),
         ("method", found["settings"]["method"]),
         ("image", " by ".join(map(str, found["shape"])) + f" nodes of {found['spacing_m'][0] * 1e3:.3g} mm"),
-        ("speed", f"{low:.0f} to {high:.0f} m/s"),
+        ("speed", f"{low:.0f} to {high:.0f} m/s, in water of {found['water_speed_mps']:.1f} m/s"),
         ("time", f"{found['seconds']:.1f} s"),
     ]
     if found["residual_rms_s"] is not None:

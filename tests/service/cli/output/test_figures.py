@@ -102,6 +102,7 @@ def test_summary_shows_errors_and_region_only_with_a_truth() -> None:
     assert not {"rms error", "error region", "residual"} & set(without)
     with_truth = dict(summary(figures(image(disc() + 10.0), dataset(truth(disc())), 1.0)))
     assert with_truth["rms error"] == "10.0 m/s"
+    assert with_truth["speed"].endswith(" m/s, in water of 1500.0 m/s")
     assert with_truth["mean absolute error"] == "10.0 % of the range"
     assert with_truth["similarity"] == "SSIM 1.000, correlation 1.000"
     assert with_truth["error region"] == "the outline of what is not water in the truth"
