@@ -166,6 +166,15 @@ class Sweeper:
             columns.clear()
         self._put(nodes, times)
 
+    def resume(self, times: Floats) -> None:
+        """Begin with the times of all nodes, (nx, ny[, nz]), s, after sweeps that have ended."""
+        padded = np.full(tuple(n + 2 for n in times.shape), math.inf)
+        padded[(slice(1, -1),) * times.ndim] = times
+        self._grid.store(padded.ravel(), self._times[0], False, crew=self._crew)
+        self._side, self._equal = 0, False
+        for columns in (self._waiting[0], self._across[0]):
+            columns.clear()
+
     def lower(self, nodes: Ints, times: Floats) -> None:
         """Go on from the present times with earlier ones of some nodes; as ``start``."""
         grid, side = self._grid, self._side

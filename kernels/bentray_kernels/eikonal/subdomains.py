@@ -42,20 +42,26 @@ class Edges:
 class Block:
     """The times of one block of a grid, swept in place from one exchange of faces to the next."""
 
-    def __init__(self, slowness: Floats, spacing: float, seeds: Mapping[Place, float]) -> None:
+    def __init__(
+        self, slowness: Floats, spacing: float, seeds: Mapping[Place, float], times: Floats | None = None
+    ) -> None:
         """Begin a solve.
 
         Args:
             slowness: (nx, ny[, nz]) of the block, s/m.
             spacing: node spacing, m.
             seeds: times of nodes around the source, s, by their position in the block.
+            times: as ``slowness``, of the block after its last sweep, s; None: the seeds alone.
         """
         self._slowness = np.ascontiguousarray(slowness)
         self._spacing = spacing
         self._sweeper = Sweeper(slowness.shape)
         self._beyond = [_beyond(slowness.shape, side) for side in sides(slowness.ndim)]
         nodes = [np.ravel_multi_index(tuple(i + 1 for i in node), self._padded) for node in seeds]
-        self._sweeper.start(np.array(nodes, np.int64), np.array(list(seeds.values()), np.float64))
+        if times is None:
+            self._sweeper.start(np.array(nodes, np.int64), np.array(list(seeds.values()), np.float64))
+        else:
+            self._sweeper.resume(times)
 
     @property
     def nbytes(self) -> int:

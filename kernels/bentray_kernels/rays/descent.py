@@ -26,7 +26,10 @@ STEP = 1.0
 PARTS = 2
 
 # A ray this near its source, nodes, goes straight to it.
-ARRIVED = 1.0
+NEAR = 1.0
+
+# How a descent ends: at the source, outside the planes of a block, or without a downhill direction.
+ARRIVED, LEFT, CAUGHT = 0, 1, 2
 
 # Longest ray, in sums of the lengths of the grid's edges.
 LONGEST = 4
@@ -96,7 +99,13 @@ def _distance(a: Floats, b: Floats, axes: int) -> float:
 def empty_path(fan: Fan) -> tuple[Floats, Floats]:
     """Memory for one path of the fan, (most points, ndim), and for intermediate values, (3, ndim)."""
     axes = len(fan.shape)
-    return np.empty((int(LONGEST * sum(fan.shape) / STEP) + 16, axes)), np.empty((3, axes))
+    return np.empty((longest(fan.shape), axes)), np.empty((3, axes))
+
+
+@kernel(inline="always")
+def longest(shape: tuple[int, ...]) -> int:
+    """Points of a path at most, in a grid of this shape."""
+    return int(LONGEST * sum(shape) / STEP) + 16
 
 
 @kernel(inline="always")
@@ -108,7 +117,7 @@ def trace_ray(fan: Fan, k: int, step: float, path: Floats, scratch: Floats) -> i
     """
     if fan.curved:
         return trace_curved(fan, k, step, path, scratch)
-    return _trace_straight(fan, k, path)
+    return trace_straight(fan, k, path)
 
 
 @kernel(inline="always")
@@ -119,16 +128,36 @@ def trace_curved(fan: Fan, k: int, step: float, path: Floats, scratch: Floats) -
     downhill direction (a shock, a rough model). It is repeated from node to lower node, which always ends:
     a travel time has its only local minimum at the source.
     """
+    for axis in range(len(fan.shape)):
+        path[0, axis] = fan.receivers[k, axis]
+    count, end = descend(fan, step, len(path), path, scratch, -math.inf, math.inf)
+    if end != CAUGHT:
+        return count
+    return descend_nodes(fan, len(path), path, scratch[0], True, -math.inf, math.inf)[0]
+
+
+@kernel(inline="always")
+def descend(
+    fan: Fan, step: float, most: int, path: Floats, scratch: Floats, low: float, high: float
+) -> tuple[int, int]:
+    """Continue a ray from ``path[0]`` by Runge-Kutta steps as long as it stays in some planes of axis 0.
+
+    Args:
+        step: as for ``trace_ray``.
+        most: points of the path at most.
+        low, high: the ray ends with its first point outside [low, high), nodes.
+
+    Returns:
+        The number of points, and ``ARRIVED``, ``LEFT``, or ``CAUGHT`` without a direction or more points.
+    """
     axes = len(fan.shape)
     part, slope, middle = scratch[0], scratch[1], scratch[2]
-    for axis in range(axes):
-        path[0, axis] = fan.receivers[k, axis]
-    for count in range(1, len(path) - 1):
+    for count in range(1, most - 1):
         here = path[count - 1]
-        if _distance(here, fan.source, axes) <= max(ARRIVED, step):
+        if _distance(here, fan.source, axes) <= max(NEAR, step):
             for axis in range(axes):
                 path[count, axis] = fan.source[axis]
-            return count + 1
+            return count + 1, ARRIVED
         if not _direction(here, fan, part, slope):
             break
         for axis in range(axes):
@@ -137,51 +166,77 @@ def trace_curved(fan: Fan, k: int, step: float, path: Floats, scratch: Floats) -
             break
         for axis in range(axes):
             path[count, axis] = min(max(here[axis] + step * slope[axis], 0.0), fan.shape[axis] - 1.0)
-    return _trace_nodes(fan, path, scratch[0])
+        if not low <= path[count, 0] < high:
+            return count + 1, LEFT
+    return 0, CAUGHT
 
 
 @kernel(inline="always")
-def _trace_nodes(fan: Fan, path: Floats, part: Floats) -> int:
-    """From ``path[0]`` along the lowest neighbours to the source; returns the number of points."""
+def descend_nodes(
+    fan: Fan, most: int, path: Floats, part: Floats, at_receiver: bool, low: float, high: float
+) -> tuple[int, int]:
+    """As ``descend`` from node to lowest neighbour.
+
+    Args:
+        at_receiver: whether ``path[0]`` is a receiver; otherwise it is a node.
+
+    Returns:
+        The number of points, and ``ARRIVED`` or ``LEFT``.
+    """
     axes = len(fan.shape)
-    tof = fan.tof
     node = locate(path[0], fan, part)
-    best = node
-    for which in range(1 << axes):
-        neighbour, _ = corner(which, node, fan, part)
-        if tof[neighbour] < tof[best]:
-            best = neighbour
+    if at_receiver:
+        best = node
+        for which in range(1 << axes):
+            neighbour, _ = corner(which, node, fan, part)
+            if fan.tof[neighbour] < fan.tof[best]:
+                best = neighbour
+    else:
+        # Of a node on the last plane of an axis ``locate`` returns the cell before.
+        node = 0
+        for axis in range(axes):
+            node += int(path[0, axis]) * fan.strides[axis]
+        best = _lowest(fan, node, path[0])
     count = 1
-    neighbours = 3**axes
-    while count < len(path) - 1:
+    while count < most - 1 and (at_receiver or best != node):
+        at_receiver = False
         node = best
         rest = node
         for axis in range(axes):
             path[count, axis] = rest // fan.strides[axis]
             rest = rest % fan.strides[axis]
         count += 1
-        for which in range(neighbours):
-            code = which
-            neighbour = node
-            inside = True
-            for axis in range(axes):
-                shift = code % 3 - 1
-                code //= 3
-                i = path[count - 1, axis] + shift
-                if i < 0.0 or i > fan.shape[axis] - 1.0:
-                    inside = False
-                neighbour += shift * fan.strides[axis]
-            if inside and tof[neighbour] < tof[best]:
-                best = neighbour
-        if best == node:
-            break
+        if not low <= path[count - 1, 0] < high:
+            return count, LEFT
+        best = _lowest(fan, node, path[count - 1])
     for axis in range(axes):
         path[count, axis] = fan.source[axis]
-    return count + 1
+    return count + 1, ARRIVED
 
 
 @kernel(inline="always")
-def _trace_straight(fan: Fan, k: int, path: Floats) -> int:
+def _lowest(fan: Fan, node: int, place: Floats) -> int:
+    """The earliest of a node and its 3^ndim − 1 neighbours."""
+    axes = len(fan.shape)
+    best = node
+    for which in range(3**axes):
+        code = which
+        neighbour = node
+        inside = True
+        for axis in range(axes):
+            shift = code % 3 - 1
+            code //= 3
+            i = place[axis] + shift
+            if i < 0.0 or i > fan.shape[axis] - 1.0:
+                inside = False
+            neighbour += shift * fan.strides[axis]
+        if inside and fan.tof[neighbour] < fan.tof[best]:
+            best = neighbour
+    return best
+
+
+@kernel(inline="always")
+def trace_straight(fan: Fan, k: int, path: Floats) -> int:
     """As ``trace_ray`` in equal steps of at most ``STEP``."""
     axes = len(fan.shape)
     receiver, source = fan.receivers[k], fan.source

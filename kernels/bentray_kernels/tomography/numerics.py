@@ -57,6 +57,7 @@ class Numerics:
     reciprocity: bool = True
     guided_rounds: int = ranged(0, Range(0, 10))
     bands: int | None = ranged(None, Range(1, BANDS))
+    blocks: int = ranged(1, Range(1, 2048))
     emitters: int | None = ranged(None, Range(1, 4096))
 
     def __post_init__(self) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from . import pairs
 from .attenuation import EXPERIMENTAL
 from .decomposition import with_decomposition
 from .device_choice import ScanSize, needs_decision, with_device
+from .gauss_newton.gauss_newton_step import Iterate
 from .geometry_summary import geometry_summary
 from .grid_schedule import stages
 from .image_grid import automatic_nodes
@@ -40,6 +42,7 @@ from .reflection.memory_echoes import MemoryEchoScan
 from .reflection.reflection_plan import Echoes, check_reflection
 from .reflection.with_reflection import with_reflection
 from .result import Progress, Reconstruction, Trial
+from .sart.sart_step import State
 from .settings import Settings
 from .stage_graphs import Scan
 from .stopping import travel_time_noise
@@ -47,6 +50,20 @@ from .waveform.memory_scan import MemoryWaveScan
 from .waveform.refinement import Refinement, WaveScanOf
 from .waveform.refinement_graph import WaveScan
 from .waveform.waveform_settings import WaveSettings
+
+
+class FinishedGraph(TomographyGraph, Protocol):
+    """A graph that ends with an image."""
+
+    @property
+    def state(self) -> State | Iterate: ...
+
+    def value_of(self, evaluate: Callable[..., Any], /) -> Any:
+        """As ``ReconstructionGraph``."""
+
+
+# Makes the graph of a slice or volume, by its index.
+GraphOf = Callable[[Scan, int], FinishedGraph]
 
 
 def reconstruct(
@@ -117,6 +134,7 @@ def run_reconstruction(
     wave_scan_of: WaveScanOf,
     samples: int = 0,
     echoes: Echoes | None = None,
+    graph_of: GraphOf = ReconstructionGraph,
 ) -> Reconstruction:
     """Reconstruct a dataset by task graphs that the caller runs.
 
@@ -128,12 +146,13 @@ def run_reconstruction(
         wave_scan_of: the same as ``scan_of`` for the refinement of a slice.
         samples: of each trace of object and water; 0: none.
         echoes: the traces of the object; None without any.
+        graph_of: makes the graph of a slice or volume.
 
     Raises:
         InvalidInput: from the dataset or a setting that does not fit it, and errors of ``run_graphs``.
     """
     if not settings.reflection.enabled:
-        return _speed_of(dataset, settings, scan_of, run_graphs, wave_scan_of, samples)
+        return _speed_of(dataset, settings, scan_of, run_graphs, wave_scan_of, samples, graph_of)
     in_space = dataset.element_position_m.shape[1] == 3
     check_reflection(settings, traces=echoes is not None, in_space=in_space)
     assert echoes is not None
@@ -154,6 +173,7 @@ def _speed_of(
     run_graphs: Run,
     wave_scan_of: WaveScanOf,
     samples: int,
+    graph_of: GraphOf = ReconstructionGraph,
 ) -> Reconstruction:
     """As ``run_reconstruction``, without the reflection image."""
     requested = settings
@@ -168,7 +188,7 @@ def _speed_of(
     if settings.selects_model:
         settings, trials, before = select_model(dataset, settings, count // 2, scan_of, run_graphs, after)
     scan = scan_of(settings, "all")
-    graphs = [ReconstructionGraph(scan, index) for index in range(count)]
+    graphs = [graph_of(scan, index) for index in range(count)]
     run_graphs(graphs, before, after)
     rays = _assembled(dataset, settings, scan.problem(0), graphs, trials)
     summary = geometry_summary(dataset, requested, settings, scan.problem(count // 2))
@@ -245,7 +265,7 @@ def _assembled(
     dataset: Dataset,
     settings: Settings,
     first: Problem,
-    graphs: Sequence[ReconstructionGraph],
+    graphs: Sequence[FinishedGraph],
     trials: tuple[Trial, ...],
 ) -> Reconstruction:
     """The result of finished graphs: (nx, ny) for one slice, (nx, ny, nz) for several and for a volume."""
@@ -266,13 +286,15 @@ def _assembled(
         parts = [graph.value_of(evaluate) for graph in graphs]
         return None if any(part is None for part in parts) else image(parts)
 
+    # Read once: images in blocks are in files.
+    states = [graph.state for graph in graphs]
     losses = evaluated(solve_attenuation)
     spread = [graph.value_of(estimate_uncertainty) for graph in graphs]
     known = all(one is not None for one in spread)
     caution = {} if losses is None else {"attenuation": EXPERIMENTAL}
     return Reconstruction(
-        speed=image([1.0 / graph.state.slowness for graph in graphs]),
-        coverage=image([graph.state.coverage for graph in graphs]),
+        speed=image([1.0 / state.slowness for state in states]),
+        coverage=image([state.coverage for state in states]),
         spacing_m=spacing,
         origin_m=origin,
         water_speed_mps=dataset.water_speed_mps,
@@ -282,7 +304,7 @@ def _assembled(
         recovery=evaluated(check_resolution),
         uncertainty=image([one.deviation for one in spread]) if known else None,
         resolution_width_m=tuple(one.width_m for one in spread) if known else (),
-        residuals=np.sum([graph.state.residuals for graph in graphs], axis=0),
+        residuals=np.sum([state.residuals for state in states], axis=0),
         trials=trials,
         provenance={**provenance(), **recorded(settings.numerics), **caution},
     )

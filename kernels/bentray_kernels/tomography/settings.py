@@ -440,8 +440,13 @@ class Settings:
 
     @property
     def ray_eikonal(self) -> str:
-        """The method of ``bentray_kernels.eikonal`` where rays are traced one by one."""
-        return "accurate" if self.eikonal == DEVIATION else self.eikonal
+        """The method of ``bentray_kernels.eikonal`` where rays are traced one by one.
+
+        In blocks times are computed by fast sweeping: no other method has them.
+        """
+        if self.eikonal != DEVIATION:
+            return self.eikonal
+        return "accurate" if self.numerics.blocks == 1 else "fsm"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain nested values for JSON, without ``numerics``; ``from_stored`` reads them."""

@@ -44,6 +44,31 @@ def sart_engine(settings: Settings, dimensions: int) -> Engine:
     return "opencl" if settings.device == "opencl" and able else "compiled"
 
 
+def undivided_reason(settings: Settings, *, amplitudes: bool) -> str:
+    """Why a volume is not reconstructed in blocks of planes, in words; empty where it can be.
+
+    Args:
+        settings: of the volume.
+        amplitudes: whether the scan has them.
+    """
+    numerics = settings.numerics
+    changed = settings.sart.speed_range_mps is not None or numerics.front_smoothing_nodes > 0.0
+    staged = numerics.coarser_grids > 0 or (numerics.straight_iterations > 0 and settings.rays == "curved")
+    special = staged or numerics.axial_margin_nodes is not None or numerics.ray_gradient != "differences"
+    reasons = {
+        f"decomposition {settings.decomposition}": settings.decomposition != "volume",
+        f"method {settings.method}": settings.method != "sart",
+        f"eikonal {settings.eikonal}": settings.rays == "curved"
+        and settings.eikonal not in (DEVIATION, "fsm"),
+        "sart.speed_range_mps": changed,
+        "stages or margins": special,
+        "resolution_check": settings.resolution_check,
+        "uncertainty": settings.uncertainty,
+        "attenuation": settings.attenuation.enabled and amplitudes,
+    }
+    return next((reason for reason, holds in reasons.items() if holds), "")
+
+
 def wave_engine(settings: Settings) -> Engine:
     """What simulates full waveforms, for a refinement and for the validation of an image by ``auto``."""
     return "opencl" if settings.device == "opencl" and settings.selects_model else "compiled"

@@ -33,6 +33,8 @@ def plans():
                 settings = settings.changed(minutes=None)
             yield plan(summary(traces), settings, ())
     yield plan(summary(None), Settings.of(method="sart", nodes=64, device="opencl"), ())
+    volume = Settings.of(method="sart", nodes=64, decomposition="volume", attenuation=False, blocks=4)
+    yield plan(replace(summary(None), slices=8, height_m=0.05), volume, ())
     yield plan(replace(summary(TRACES), echoes=TRACES), Settings.of(method="sart", reflection=True), ())
 
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import fields, is_dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.reconstruction import MemoryScan
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph
+from bentray_workers.reconstruction.blocks.block_graph import BlockSartGraph
 
 
 def scan(elements: int, heights: int) -> Dataset:
@@ -58,15 +61,27 @@ def held(*things: Any) -> int:
 def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     """The most that a task of each name takes, over one slice or the volume."""
     scan = MemoryScan(dataset, settings, "all")
-    graph, found = ReconstructionGraph(scan, 0), {}
-    waiting = graph.first()
-    while waiting:
-        task = waiting.pop(0)
-        name = task.function.__name__
-        if (name, graph.state.sweep) not in found:
-            taken = peak(lambda task=task: task.function(*task.arguments)) - peak(lambda: None)
-            found[name, graph.state.sweep] = taken + held(dataset, scan.problem(0), task.arguments[1:])
-        waiting = graph.after(task, task.function(*task.arguments)) + waiting
+    with TemporaryDirectory() as folder:
+        blocks = settings.numerics.blocks > 1
+        graph = BlockSartGraph(scan, 0, Path(folder) / "blocks") if blocks else ReconstructionGraph(scan, 0)
+        # Tasks of blocks read files alone.
+        kept = 0 if blocks else held(dataset, scan.problem(0))
+        found: dict[tuple[str, int], int] = {}
+        waiting = graph.first()
+        # All emitters take the same in blocks.
+        while waiting and not (blocks and graph.done):
+            task = waiting.pop(0)
+            name = task.function.__name__
+            number = len(graph.history)
+            # Sweeps and rays of blocks differ from block to block.
+            if (name, number) not in found or blocks:
+                if blocks:
+                    # Sweeps of small blocks do not load all compiled code.
+                    task.function(*task.arguments)
+                taken = peak(lambda task=task: task.function(*task.arguments)) - peak(lambda: None)
+                taken += kept + held(task.arguments[1:])
+                found[name, number] = max(taken, found.get((name, number), 0))
+            waiting = graph.after(task, task.function(*task.arguments)) + waiting
     return {name: max(most for (one, _), most in found.items() if one == name) for name, _ in found}
 
 

@@ -48,8 +48,17 @@ def ring(elements, heights):
         ({"nodes": 96, "method": "gauss-newton"}, 144, 0),
         ({"nodes": 48, "method": "gauss-newton", "decomposition": "volume"}, 12, 8),
         ({"nodes": 64, "decomposition": "volume", "attenuation": False}, 12, 8),
+        ({"nodes": 128, "decomposition": "volume", "attenuation": False, "blocks": 3}, 24, 20),
     ],
-    ids=["sart 64", "sart 96", "gauss-newton 64", "gauss-newton 96", "gauss-newton volume", "sart volume"],
+    ids=[
+        "sart 64",
+        "sart 96",
+        "gauss-newton 64",
+        "gauss-newton 96",
+        "gauss-newton volume",
+        "sart volume",
+        "sart volume in blocks",
+    ],
 )
 def test_tasks_stay_within_the_planned_memory(asked, elements, heights):
     settings = {**asked, "iterations": 2}

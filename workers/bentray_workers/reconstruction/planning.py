@@ -21,7 +21,7 @@ from bentray_kernels.tomography.reflection.reflection_plan import check_reflecti
 from bentray_kernels.tomography.requirements import check_waveform
 from bentray_kernels.tomography.sart.device_slices import MEMORY_SHARE
 from bentray_kernels.tomography.settings import MIN_NODES, Settings
-from bentray_kernels.tomography.solver_choice import sart_engine
+from bentray_kernels.tomography.solver_choice import sart_engine, undivided_reason
 from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of, without_device
@@ -30,6 +30,8 @@ from ..cluster.task_words import task_in_words
 from ..files.dataset.counts import Summary
 from ..files.dataset.format import PAIR_ARRAYS
 from ..files.quantities import IMAGES
+from .blocks.block_choice import with_blocks
+from .memory.block_memory import block_files_bytes
 from .memory.picking_memory import picking_tasks
 from .memory.ray_memory import (
     call_bytes,
@@ -54,6 +56,9 @@ RECORD_BYTES = 64 * 2**10
 # Nodes crossed by rays in half a second of SART on a core of 2020; for the estimated number of tasks.
 NODES_IN_A_TASK = 1.5e7
 
+# Tasks about a block for each emitter: some sweeps, its rays, their back-projection, and the update.
+BLOCK_TASKS = 6
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -69,6 +74,7 @@ class Plan:
         field_bytes, rows_bytes, state_bytes: of a travel time; of all rays of an image; of the state between
             two tasks.
         stored_bytes: largest disk space of result and checkpoints.
+        blocks: of planes, into which a volume is cut because its arrays fit no worker; 1: whole.
         nodes: along each side of the image.
         methods: the method and rays, or the candidates of auto, in words.
         work_class, work_s, speed_known: see ``reconstruction_cost.ReconstructionCost``.
@@ -84,6 +90,7 @@ class Plan:
     rows_bytes: int
     state_bytes: int
     stored_bytes: int
+    blocks: int
     nodes: int
     methods: tuple[str, ...]
     work_class: str
@@ -125,6 +132,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     fitting = [one for one in capacities if lane in one.resources]
     if capacities and not fitting:
         raise without_device(settings)
+    settings = with_blocks(scan, settings, fitting)
     methods = [settings]
     if settings.selects_model:
         methods = [final_settings(settings, changes) for changes in CANDIDATES]
@@ -176,6 +184,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         max(rows_bytes(scan, method, rays_of(scan, method)) for method in methods),
         state_bytes(shape, settings),
         _stored_bytes(scan, settings, shape),
+        settings.numerics.blocks,
         settings.grid_nodes,
         _methods(settings),
         cost.work_class,
@@ -236,6 +245,8 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     parts = -(-emitters // BATCH)
     passes = settings.iterations * (settings.numerics.coarser_grids + 1)
     passes += settings.numerics.straight_iterations if settings.rays != "straight" else 0
+    if settings.numerics.blocks > 1:
+        return passes * emitters * BLOCK_TASKS * settings.numerics.blocks + 1
     if settings.method == "gauss-newton":
         each = passes * (parts + 1)
     else:
@@ -252,6 +263,7 @@ def _stored_bytes(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> 
     picked = len(PAIR_ARRAYS) * REAL * scan.pairs if scan.traces_bytes else 0
     each = len(IMAGES) * REAL * math.prod(shape) + KEPT * state_bytes(shape, settings) + RECORD_BYTES
     each += reflection_bytes(scan, settings)
+    each += block_files_bytes(shape) if settings.numerics.blocks > 1 else 0
     return problems * each + picked + _trials_bytes(scan, settings)
 
 
@@ -279,12 +291,29 @@ def _advice(scan: Summary, settings: Settings, limit: float) -> str:
         return max(call_bytes(scan, settings.changed(nodes=nodes, coarser_grids=0)).values()) <= limit
 
     if settings.selects_model or not fits(MIN_NODES):
-        return ""
+        return _blocks_advice(scan, settings)
     low, high = MIN_NODES, settings.grid_nodes
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if fits(middle) else (low, middle)
-    return f", such as nodes up to {low}, or a worker with more memory"
+    return f", such as nodes up to {low}, or a worker with more memory{_blocks_advice(scan, settings)}"
+
+
+def _blocks_advice(scan: Summary, settings: Settings) -> str:
+    """What keeps a volume from being computed in blocks, in words."""
+    reason = undivided_reason(settings, amplitudes=scan.amplitudes)
+    if settings.decomposition != "volume" or not reason:
+        return ""
+    return f"; method sart can compute a volume in blocks, but not with {reason}"
+
+
+def _in_blocks(settings: Settings) -> str:
+    """That a volume is cut into blocks, in words."""
+    blocks = settings.numerics.blocks
+    if blocks == 1:
+        return ""
+    solver = " with times by fast sweeping" if settings.rays == "curved" else ""
+    return f", in {blocks} blocks{solver}, since the arrays of the whole volume fit no worker"
 
 
 def _why(
@@ -305,6 +334,7 @@ def _why(
         "volume": lambda: (
             f"one volume of {emitters_of(scan, settings)} emitters"
             + (" one after the other (SART)" if settings.method == "sart" else " in parallel")
+            + _in_blocks(settings)
         ),
     }
     name, size = largest

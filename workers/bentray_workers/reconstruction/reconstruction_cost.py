@@ -89,6 +89,8 @@ def _class(scan: Summary, settings: Settings, waves: bool) -> str:
         parts.append("finite-frequency")
     if settings.reflection.enabled:
         parts.append("reflection")
+    if settings.numerics.blocks > 1:
+        parts.append("blocks")
     return " ".join(parts)
 
 

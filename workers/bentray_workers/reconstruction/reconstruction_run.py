@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import NamedTuple
@@ -19,7 +20,7 @@ from bentray_kernels.task_graph import Pool, run, run_resumable
 from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
 from bentray_kernels.tomography.guided_picking import same_picks
 from bentray_kernels.tomography.reconstruction import run_reconstruction
-from bentray_kernels.tomography.reconstruction_graph import TomographyGraph, progress_of
+from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph, TomographyGraph, progress_of
 from bentray_kernels.tomography.reflection.reflection_plan import Echoes
 
 from ..cluster.capacities import resources_for
@@ -34,6 +35,8 @@ from ..files.findings import ScanFindings, read_findings
 from ..files.reconstruction import write_reconstruction
 from ..files.reference import read_reference, reference_path
 from ..files.volume_export import FREQUENCY
+from .blocks.block_choice import settled_blocks
+from .blocks.block_graph import BLOCKS, BlockSartGraph
 from .device_of_job import settled
 from .file_scan import FileEchoScan, FileScan, FileWaveScan
 from .picking_graph import PickingFiles, PickingGraph, PickingGuide, PickingSource
@@ -80,6 +83,7 @@ def reconstruct(
     """
     with _folder(work_dir) as folder:
         settings = settled(client, folder, dataset_path, settings)
+        settings = settled_blocks(client, folder, dataset_path, settings)
         resources = RECONSTRUCTION if client is None else resources_for(client, settings)
         pool = open_pool(client, folder, share, placement=lambda: {"resources": resources}, threads=threads)
         checkpoints = Checkpoints(folder / CHECKPOINTS, on_saved or (lambda: None))
@@ -244,6 +248,9 @@ def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _Jo
         ),
         0 if bare else trace_samples(job.scan),
         _echoes(job, recorded, settings.water_temperature_c),
+        partial(BlockSartGraph, folder=job.folder / BLOCKS)
+        if settings.numerics.blocks > 1
+        else ReconstructionGraph,
     )
 
 

@@ -16,7 +16,7 @@ from ...rays.fan import Fan
 from ..problem import Problem
 from ..settings import Settings
 from ..solver_choice import solver_of
-from .emitter_pass import EmitterPass
+from .emitter_pass import TRUNCATE, EmitterPass
 
 # One update of slowness and coverage in place from some emitters; returns their residuals, s. The last
 # argument is the number of finished iterations.
@@ -67,7 +67,7 @@ def _compiled(problem: Problem, settings: Settings) -> Update:
     def update(slowness: Floats, coverage: Floats, emitters: Ints, iteration: int) -> Floats:
         residuals = []
         for emitter in emitters:
-            source, receivers, measured, _ = _valid_receivers(problem, int(emitter))
+            source, receivers, measured, _ = valid_receivers(problem, int(emitter))
             front = None
             if settings.rays == "curved":
                 front = slowness
@@ -95,7 +95,7 @@ def _traced(
     corrections, weights = np.zeros_like(slowness), np.zeros_like(slowness)
     residuals = []
     for emitter in emitters:
-        source, receivers, measured, slab = _valid_receivers(problem, int(emitter))
+        source, receivers, measured, slab = valid_receivers(problem, int(emitter))
         inside = np.ascontiguousarray(slowness[..., slab])
         tof = inside  # only the shape counts: straight rays need no travel time
         if settings.rays != "straight":
@@ -107,19 +107,45 @@ def _traced(
         corrections[..., slab] += correction.reshape(inside.shape)
         weights[..., slab] += weight.reshape(inside.shape)
         residuals.append(residual)
-    seen = weights > 0.0
-    update = np.zeros_like(slowness)
-    update[seen] = corrections[seen] / (weights[seen] * problem.spacing)
-    update[~problem.region] = 0.0
-    if settings.sart.smoothing_nodes > 0.0:
-        update = gaussian_filter(update, settings.sart.smoothing_nodes, mode="nearest")
-    updated = slowness + relaxation_of(settings, iteration) * update
-    slowness[problem.region] = np.clip(updated, *bounds_of(settings))[problem.region]
+    update = smoothed_update(corrections, weights, problem.region, problem.spacing, settings)
+    apply_update(slowness, update, problem.region, settings, iteration)
     coverage += weights * problem.spacing
     return np.concatenate(residuals)
 
 
-def _valid_receivers(problem: Problem, emitter: int) -> tuple[Floats, Floats, Floats, slice]:
+def smoothed_update(
+    corrections: Floats, weights: Floats, region: Flags, spacing: float, settings: Settings
+) -> Floats:
+    """The update of each node before relaxation, s/m (chapter 6, equation 1).
+
+    Args:
+        corrections, weights: Σ c·w (s) and Σ w (nodes of ray) of each node.
+        region: as these, nodes that may change.
+        spacing: m.
+        settings: ``sart.smoothing_nodes``.
+    """
+    seen = weights > 0.0
+    update = np.zeros_like(corrections)
+    update[seen] = corrections[seen] / (weights[seen] * spacing)
+    update[~region] = 0.0
+    if settings.sart.smoothing_nodes > 0.0:
+        deviation = settings.sart.smoothing_nodes
+        update = np.asarray(gaussian_filter(update, deviation, mode="nearest", truncate=TRUNCATE))
+    return update
+
+
+def smoothing_reach(settings: Settings) -> int:
+    """Nodes on either side of a node that the Gaussian of its update reads."""
+    return int(TRUNCATE * settings.sart.smoothing_nodes + 0.5)
+
+
+def apply_update(slowness: Floats, update: Floats, region: Flags, settings: Settings, iteration: int) -> None:
+    """Change the slowness in place, within its bounds; the arguments are as of ``smoothed_update``."""
+    updated = slowness + relaxation_of(settings, iteration) * update
+    slowness[region] = np.clip(updated, *bounds_of(settings))[region]
+
+
+def valid_receivers(problem: Problem, emitter: int) -> tuple[Floats, Floats, Floats, slice]:
     """An emitter and its receivers in its slab, m, the times measured, s, and the slab."""
     slab = problem.slab(emitter)
     delta = problem.delta_tof[emitter]

@@ -104,6 +104,11 @@ class PlanRecord(BaseModel):
     minutes: float | None = Field(
         None, description="Estimated time of a simulation on these workers, without other jobs."
     )
+    blocks: int | None = Field(
+        None,
+        description="Blocks of planes, into which a reconstructed volume is cut because its arrays fit no "
+        "worker; 1: it is whole.",
+    )
     nodes: int | None = Field(None, description="Nodes along each side of the image of a reconstruction.")
     methods: list[str] | None = Field(
         None, description="Method and rays of a reconstruction; with method auto, its candidates."

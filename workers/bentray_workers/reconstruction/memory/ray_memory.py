@@ -19,6 +19,7 @@ from bentray_kernels.tomography.uncertainty.ray_uncertainty import BATCHES
 
 from ...cluster.capacities import MIB, REAL
 from ...files.dataset.counts import Summary
+from .block_memory import block_task_parts
 from .picking_memory import emissions_per_task, finish_slice_bytes, picking_task_bytes
 
 # Overhead of Python in any task: half of it on 3.11 and 3.12, all of it on 3.13.
@@ -160,6 +161,9 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
         parts["update_gauss_newton"]["rays"] = math.ceil(held * parts["update_gauss_newton"]["rays"])
     elif sart_engine(settings, len(shape)) == "opencl":
         parts["update_sart_slices"] = _parts_together(scan, settings, data)
+    elif settings.numerics.blocks > 1:
+        divided = block_task_parts(shape, scan.receivers, settings)
+        parts |= {name: {"data": FLOOR_BYTES, **sizes} for name, sizes in divided.items()}
     elif solver_of(settings, len(shape)).compiled:
         parts["update_sart"] = {
             "data": data,

@@ -90,6 +90,7 @@ export function planTable({ plan }) {
     ["Decomposition", plan.decomposition], ["Tasks", plan.tasks], ["Workers", plan.workers],
     ["Memory of a task", `at most ${mebibytes(plan.largest_bytes)}`],
   ];
+  if (plan.blocks > 1) rows.push(["Blocks of the volume", plan.blocks]);
   if (plan.minutes) rows.push(["Estimated time", duration(60 * plan.minutes)]);
   return section("Plan", make("p", "", plan.why), pairs(rows));
 }

@@ -1,0 +1,126 @@
+"""SART in blocks: the image of the whole volume, the same bits on every pool, and after an interruption."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.task_graph import ThreadPool, run
+from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography import reconstruct as reconstruct_here
+from bentray_kernels.tomography.reconstruction import MemoryScan
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.reconstruction.blocks.block_graph import BLOCKS, BlockSartGraph
+
+from ....effort import effort
+from ...cluster.tearing import torn_runs
+
+ELEMENTS, HEIGHTS = 5, 2
+PLAN = Settings.of(method="sart", nodes=20, decomposition="volume", iterations=2, relaxation=0.5)
+WAYS = {
+    "curved": ({"iterations": effort(1, 2)}, 3),
+    "straight": ({"rays": "straight", "iterations": 1}, 3),
+    "several emitters an update, wide smoothing": ({"subset": 3, "smoothing_nodes": 2.5, "iterations": 1}, 4),
+    "many blocks": ({"iterations": 1}, effort(6, 20)),
+}
+
+
+@pytest.fixture
+def scan():
+    every, rng = np.arange(ELEMENTS), np.random.default_rng(3)
+    chord = np.sin(np.pi * (every[:, None] - every[None, :]) / ELEMENTS) ** 2
+    delta = -1e-6 * chord * rng.uniform(0.5, 3.0, (HEIGHTS, ELEMENTS, ELEMENTS))
+    delta[:, 1, 3] = np.nan
+    # Some emitters without data, for speed, also by reciprocity.
+    delta[0, 2:], delta[0, :, 2:] = np.nan, np.nan
+    return Dataset(
+        Ring(ELEMENTS, 0.08).positions(),
+        every,
+        every,
+        1500.0,
+        delta_tof_s=delta,
+        slice_z_m=0.01 * np.arange(HEIGHTS),
+    )
+
+
+@pytest.fixture
+def path(scan, tmp_path):
+    target = tmp_path / "scan.h5"
+    write_dataset(target, scan)
+    return target
+
+
+@pytest.mark.parametrize(("changes", "blocks"), WAYS.values(), ids=WAYS)
+def test_blocks_give_the_image_of_the_whole_volume(scan, path, changes, blocks):
+    settings = PLAN.changed(**changes)
+    expected = reconstruct_here(scan, settings.changed(eikonal="fsm"))
+    result = reconstruction_run.reconstruct(None, path, settings.changed(blocks=blocks))
+    assert np.ptp(result.speed) > 5.0, "the image has contrast"
+    assert np.allclose(result.speed, expected.speed, rtol=1e-12, atol=0.0)
+    assert np.allclose(result.coverage, expected.coverage, rtol=0.0, atol=1e-12)
+    assert np.array_equal(result.residuals, expected.residuals)
+    assert (result.spacing_m, result.origin_m) == (expected.spacing_m, expected.origin_m)
+    assert len(result.history) == len(expected.history) == settings.iterations
+    for mine, theirs in zip(result.history, expected.history, strict=True):
+        assert mine.residual_rms_s == pytest.approx(theirs.residual_rms_s, rel=1e-12)
+        assert (mine.sweep, mine.emitters) == (theirs.sweep, theirs.emitters)
+
+
+def test_bits_depend_neither_on_workers_nor_on_interruptions(cluster, path, tmp_path):
+    plan = PLAN.changed(blocks=2, iterations=effort(1, 2))
+    expected = reconstruction_run.reconstruct(None, path, plan, threads=effort(1, 3))
+
+    def go_on(tear):
+        return reconstruction_run.reconstruct(cluster.client, path, plan, tear, work_dir=tmp_path / "work")
+
+    result, reached = torn_runs(go_on, effort((30,), (25, 60, 9, 3, 40)))
+    assert reached[0] == 0
+    assert reached == sorted(reached)
+    assert reached[-1] > 0, "something was restored"
+    for name in ("speed", "coverage", "residuals"):
+        assert np.array_equal(getattr(result, name), getattr(expected, name)), name
+    assert result.history == expected.history
+    left = sorted(one.name for one in (tmp_path / "work" / BLOCKS).iterdir() if one.is_dir())
+    updates = 7 * plan.iterations
+    assert left == [f"state-{updates - 1:07d}", f"state-{updates:07d}"]
+
+
+def test_a_run_whose_files_are_gone_begins_again(scan, tmp_path):
+    plan = PLAN.changed(blocks=2, iterations=1)
+    graph = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)
+    run({"": graph}, ThreadPool(1))
+    reached = graph.checkpoint
+    again = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)
+    again.restore(reached)
+    assert again.done == again.total == 7
+    assert again.first() == []
+    assert np.array_equal(again.state.slowness, graph.state.slowness)
+    other = BlockSartGraph(MemoryScan(scan, plan.changed(blocks=3), "all"), 0, tmp_path / BLOCKS)
+    other.restore(reached)
+    shutil.rmtree(tmp_path / BLOCKS)
+    gone = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)
+    gone.restore(reached)
+    assert other.done == gone.done == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"method": "gauss-newton"}, "1, with method gauss-newton"),
+        ({"decomposition": "slices"}, "1, with decomposition slices"),
+        ({"eikonal": "hafmm"}, "1, with eikonal hafmm"),
+        ({"speed_range_mps": (1400.0, 1600.0)}, "speed_range"),
+        ({"axial_margin_nodes": 2}, "1, with stages or margins"),
+        ({"straight_iterations": 1}, "1, with stages or margins"),
+        ({"uncertainty": True}, "uncertainty"),
+        ({"resolution_check": True}, "resolution_check"),
+    ],
+)
+def test_what_has_no_blocks_is_refused(scan, tmp_path, changes, words):
+    plan = PLAN.changed(blocks=2, **changes)
+    with pytest.raises(InvalidInput, match=f"blocks: found 2.*{words}"):
+        BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)

@@ -1,0 +1,127 @@
+"""Rays handed from block to block are those of the whole grid, in smooth and in rough media."""
+
+import numpy as np
+import pytest
+
+from bentray_kernels import eikonal
+from bentray_kernels.rays.descent import CAUGHT
+from bentray_kernels.rays.sensitivity import sensitivities
+from bentray_workers.reconstruction.blocks.block_files import (
+    SLOWNESS,
+    BlockFiles,
+    file_name,
+    read_planes,
+    write_array,
+    write_first,
+)
+from bentray_workers.reconstruction.blocks.block_rays import RaysInBlocks, in_nodes
+from bentray_workers.reconstruction.blocks.block_tasks import (
+    back_project_in_block,
+    sum_names,
+    trace_rays_in_block,
+)
+
+from ....effort import effort
+
+SHAPE, SPACING = (19, 12, 9), 1.5e-3
+
+
+def traced(files, tof, receivers, source, *, curved):
+    """Rays through all blocks; also how many visits were made, and how many rays were caught."""
+    for block in range(files.blocks):
+        start, stop = files.bounds(block)
+        write_array(files.scratch(0) / file_name("tof", block), tof[start:stop])
+    at_source = in_nodes(source, SPACING, SHAPE)
+    rays = RaysInBlocks(files, in_nodes(receivers, SPACING, SHAPE), at_source, curved=curved, name="0")
+    visits, caught = 0, 0
+    while blocks := rays.next_blocks():
+        for block, some, mine, points in [(block, *rays.visit(block)) for block in blocks]:
+            versions = ["tof"] * files.blocks if curved else []
+            found = trace_rays_in_block(files, 0, block, SPACING, versions, at_source, some, points)
+            rays.visited(block, mine, points, found)
+            visits, caught = visits + 1, caught + int((found.ends == CAUGHT).sum())
+    return rays, visits, caught
+
+
+def whole_sums(files, rays, corrections):
+    """Σ c·w and Σ w of all nodes, from the sums of all blocks."""
+    total = np.zeros((2, *SHAPE))
+    for block, parts in rays.back_projected(corrections).items():
+        back_project_in_block(files, 0, block, parts, "sums")
+        planes = files.planes(block)
+        for number, name in enumerate(sum_names("sums")):
+            total[number, planes.low : planes.high] += read_planes(files.scratch(0) / file_name(name, block))
+    return total
+
+
+@pytest.mark.parametrize("kind", ["curved", "straight"])
+@pytest.mark.parametrize("contrast", [0.05, 0.9], ids=["smooth", "rough"])
+@pytest.mark.parametrize("blocks", effort([2, 7], [1, 2, 7, 19]))
+def test_rays_equal_those_of_the_whole_grid(tmp_path, kind, contrast, blocks):
+    found = []
+    chaotic = contrast > 0.5 and kind == "curved"
+    differences = []
+    for seed in range(effort(2, 10)):
+        rng = np.random.default_rng(seed)
+        speed = 1500.0 * rng.uniform(1.0 - contrast, 1.0 + contrast, SHAPE)
+        extent = SPACING * (np.array(SHAPE) - 1)
+        # Some on nodes, where two blocks meet, and on the faces of the grid.
+        places = rng.uniform(0.0, 1.0, (24, 3)) * extent
+        places[::3] = np.round(places[::3] / SPACING) * SPACING
+        places[::8, 0] = extent[0]
+        source, receivers = places[1], places
+        tof = eikonal.solve(speed, SPACING, source, "fsm")
+        expected = sensitivities(tof, SPACING, receivers, source, kind=kind)
+        files = BlockFiles(tmp_path / f"{seed}", SHAPE, blocks)
+        write_first(files, 1.0 / speed, np.ones(SHAPE, np.bool_))
+        files.begin(0)
+        rays, visits, caught = traced(files, tof, receivers, source, curved=kind == "curved")
+        predicted = expected @ (1.0 / speed).ravel()
+        differences += (np.abs(rays.predicted - predicted) / predicted.max()).tolist()
+        corrections = rng.uniform(-1.0, 1.0, len(receivers))
+        sums, weights = whole_sums(files, rays, corrections)
+        if not chaotic:
+            assert np.allclose(sums.ravel() * SPACING, corrections @ expected, rtol=0.0, atol=1e-13)
+            assert np.allclose(weights.ravel() * SPACING, expected.sum(axis=0), rtol=0.0, atol=1e-13)
+        assert weights.sum() == pytest.approx(rays.lengths.sum(), rel=1e-12)
+        assert sums.sum() == pytest.approx(corrections @ rays.lengths, rel=1e-9, abs=1e-9)
+        found.append((visits, caught))
+    # Rough media amplify rounding along some rays.
+    assert np.median(differences) < 1e-12
+    assert np.max(differences) < (1e-2 if chaotic else 1e-12)
+    if chaotic:
+        assert any(caught for _, caught in found), "some rays go from node to node"
+    if kind == "curved":
+        assert all(visits <= 3 * blocks + 4 for visits, _ in found), "each block is visited about once"
+
+
+def test_a_block_without_valid_rays_adds_nothing(tmp_path):
+    files = BlockFiles(tmp_path / "blocks", SHAPE, 3)
+    write_first(files, 1.0 / 1500.0, np.ones(SHAPE, np.bool_))
+    files.begin(0)
+    source = np.array([1.0, 1.0, 1.0]) * SPACING
+    tof = eikonal.solve(np.full(SHAPE, 1500.0), SPACING, source, "fsm")
+    rays, _, _ = traced(files, tof, np.array([source, 8.0 * source]), source, curved=True)
+    assert rays.lengths[0] == 0.0
+    sums, weights = whole_sums(files, rays, np.array([np.nan, np.nan]))
+    assert not sums.any()
+    assert not weights.any()
+
+
+def test_reads_the_state_of_every_block(tmp_path):
+    files = BlockFiles(tmp_path / "blocks", SHAPE, 5)
+    slowness = np.random.default_rng(1).uniform(size=SHAPE)
+    write_first(files, slowness, np.ones(SHAPE, np.bool_))
+    assert np.array_equal(files.read(files.state(0), SLOWNESS), slowness)
+    for low, high in ((0, 1), (3, 12), (18, 19), (4, 4)):
+        assert np.array_equal(files.read(files.state(0), SLOWNESS, low, high), slowness[low:high])
+    assert [files.block_of(x) for x in (0.0, 2.99, 3.0, 18.0)] == [0, 0, 1, 4]
+
+
+def test_a_short_file_is_rejected(tmp_path):
+    path = tmp_path / "array.npy"
+    write_array(path, np.ones((4, 5)))
+    path.write_bytes(path.read_bytes()[:-8])
+    assert read_planes(path, 0, 3).shape == (3, 5)
+    with pytest.raises(ValueError, match="shorter"):
+        read_planes(path)
