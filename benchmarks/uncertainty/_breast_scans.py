@@ -14,7 +14,7 @@ from bentray_kernels.phantoms import DETAILED_SIDE_M, DetailedBreast, EllipsePha
 from bentray_kernels.phantoms.detailed_breast import Anatomy
 from bentray_kernels.phantoms.ellipses import Ellipse
 
-RADIUS_M, NODES = 0.1, 96
+RADIUS_M, NODES, SEED = 0.1, 96, 71
 ELEMENTS, SNRS, WATERS_MPS = (64, 96, 128), (10.0, 30.0, 100.0), (1440.0, 1480.0, 1500.0, 1520.0)
 
 
@@ -33,14 +33,20 @@ class BreastScan:
     breast: DetailedBreast | EllipsePhantom
 
 
-def breast_scans(count: int) -> Iterator[BreastScan]:
+def breast_scans(count: int, seed: int = SEED, water_mps: float | None = None) -> Iterator[BreastScan]:
     """Scans of breasts of ellipses and of detailed ones by turns; the same on every run.
 
     Times are those of another Eikonal solver on a grid four times as fine, with white noise.
+
+    Args:
+        count: of the scans.
+        seed: another one for other breasts.
+        water_mps: speed of the water, m/s; None: drawn.
     """
     for number in range(count):
-        random = np.random.default_rng((71, number))
-        water = float(random.choice(WATERS_MPS))
+        random = np.random.default_rng((seed, number))
+        drawn = float(random.choice(WATERS_MPS))
+        water = drawn if water_mps is None else water_mps
         breast = detailed(random, water) if number % 2 else _of_ellipses(random, water)
         ring = Ring(ELEMENTS[number % len(ELEMENTS)], RADIUS_M)
         everyone = np.arange(ring.elements)

@@ -14,16 +14,11 @@ from bentray_workers.images.maps import SPEED, UNCERTAINTY, draw_bar, draw_map, 
 from ..shared._small_png import figure_png
 from ._judged_image import Judged
 
-SHADOW, OTHER, CHOSEN = "#c1272d", "#1f5fa8", "#9aa7b5"
+SHADOW, OTHER, CAUTION = "#c1272d", "#1f5fa8", "#9aa7b5"
 
 
-def calibration_picture(judged: Sequence[Judged], others: Sequence[Judged]) -> bytes:
-    """PNG of four panels.
-
-    Args:
-        judged: all scans.
-        others: those that chose nothing.
-    """
+def calibration_picture(judged: Sequence[Judged]) -> bytes:
+    """PNG of four panels: two of all scans, two of the last image."""
     with drawing():
         figure = new_figure(15.0, 3.9)
         curve, bars, image, spread = figure.subplots(1, 4)
@@ -31,7 +26,7 @@ def calibration_picture(judged: Sequence[Judged], others: Sequence[Judged]) -> b
         curve.plot(deviations, erf(deviations / np.sqrt(2.0)), color="#555555", dashes=(4, 2), label="normal")
         worst = min(judged, key=lambda one: one.within)
         for label, group, colour in (
-            ("scans that chose nothing", others, OTHER),
+            ("all scans", judged, OTHER),
             ("scan with the fewest", [worst], SHADOW),
         ):
             sizes = np.concatenate([np.abs(one.error) / one.deviation for one in group])
@@ -43,19 +38,19 @@ def calibration_picture(judged: Sequence[Judged], others: Sequence[Judged]) -> b
         curve.set_ylim(0.0, 1.0)
         curve.set_title("Calibration")
         curve.legend(loc="lower right", fontsize=8)
-        chosen = [one not in others for one in judged]
         colours = [
-            SHADOW if one is worst else CHOSEN if c else OTHER for one, c in zip(judged, chosen, strict=True)
+            SHADOW if one is worst else CAUTION if "uncertainty" in one.result.provenance else OTHER
+            for one in judged
         ]
         bars.bar(range(len(judged)), [100.0 * one.within for one in judged], color=colours)
         bars.axhline(85.0, color="#e08a00", linewidth=1.0)
-        bars.set_xlabel("scan (grey: chose the factor)")
+        bars.set_xlabel("scan (grey: with a caution)")
         bars.set_ylabel("nodes within two deviations (%)")
         bars.set_title("Each scan")
-        result = others[-1].result
+        result = judged[-1].result
         assert result.uncertainty is not None
         grid = result.spacing_m, result.origin_m
-        title = f"Speed of scan {others[-1].name.split(':')[0]}"
+        title = f"Speed of scan {judged[-1].name.split(':')[0]}"
         limits = robust_limits([result.speed])
         shown = draw_map(image, result.speed, *grid, limits, colormap=SPEED, title=title)
         draw_bar([shown], LABELS["speed"])

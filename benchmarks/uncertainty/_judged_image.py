@@ -67,11 +67,6 @@ def row_of(target: str, error: Floats, deviation: Floats, goal: float, about: st
     )
 
 
-def quantile(judged: Sequence[Judged], part: float) -> float:
-    """The number of deviations within which that part of the nodes lies."""
-    return float(np.quantile(np.concatenate([relative(one) for one in judged]), part))
-
-
 def relative(judged: Judged) -> Floats:
     """Absolute errors in deviations."""
     return np.asarray(np.abs(judged.error) / judged.deviation)

@@ -68,7 +68,7 @@ def _pack(value: Any, arrays: Arrays) -> Any:
         return {"array": len(arrays) - 1}
     if isinstance(value, tuple):
         return [_pack(part, arrays) for part in value]
-    if value is None or isinstance(value, bool | int | float):
+    if value is None or isinstance(value, bool | int | float | str):
         return value
     raise TypeError(f"{type(value).__name__} in a checkpoint")
 

@@ -292,6 +292,8 @@ def _assembled(
     spread = [graph.value_of(estimate_uncertainty) for graph in graphs]
     known = all(one is not None for one in spread)
     caution = {} if losses is None else {"attenuation": EXPERIMENTAL}
+    if known and any(one.caution for one in spread):
+        caution["uncertainty"] = _cautions([one.caution for one in spread])
     return Reconstruction(
         speed=image([1.0 / state.slowness for state in states]),
         coverage=image([state.coverage for state in states]),
@@ -308,6 +310,12 @@ def _assembled(
         trials=trials,
         provenance={**provenance(), **recorded(settings.numerics), **caution},
     )
+
+
+def _cautions(slices: Sequence[str]) -> str:
+    """The first caution about the uncertainty, and of how many slices there is one."""
+    found = [one for one in slices if one]
+    return found[0] if len(slices) == 1 else f"{found[0]} (One of {len(found)} of {len(slices)} slices.)"
 
 
 def provenance() -> dict[str, str]:

@@ -139,7 +139,7 @@ def _row(
     size = f"{1e6 * image.size:.4g} mm²" if dimensions == 2 else f"{1e9 * image.size:.4g} mm³"
     means = [f"{one.mean:.6g} ± {one.spread:.3g} {unit}" for one in (image, truth)]
     if image.uncertainty is not None:
-        means[0] += f" (uncertainty {image.uncertainty:.2g})"
+        means[0] += f", uncertain by {image.uncertainty:.2g}"
     contrasts = ["none" if one.contrast is None else f"{one.contrast:+.4g} {unit}" for one in (image, truth)]
     return (name, size, *means, *contrasts)
 

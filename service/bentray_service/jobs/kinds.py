@@ -242,7 +242,8 @@ def field_links(field_id: str) -> dict[str, str]:
 
 
 def _describe(result: Reconstruction) -> Plain:
-    notes = [*map(result.provenance.get, ("water", "geometry")), advice_of(result) if result.trials else None]
+    noted = map(result.provenance.get, ("water", "geometry", "uncertainty"))
+    notes = [*noted, advice_of(result) if result.trials else None]
     advice = " ".join(filter(None, notes))
     return {
         "axes": ",".join("xyz"[: result.speed.ndim]),

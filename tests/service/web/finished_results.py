@@ -29,9 +29,9 @@ def finished(
     work: FakeWork,
     monkeypatch: pytest.MonkeyPatch,
     speed: NDArray[np.float64],
-    **images: NDArray[np.float64],
+    **images: Any,
 ) -> str:
-    """The id of a job that made these images of the scan."""
+    """The id of a job that made these images, or other fields of a result, of the scan."""
     plain = type(work).__call__
 
     def made(self: FakeWork, *given: Any, **named: Any) -> Any:

@@ -126,6 +126,7 @@ def test_the_resolution_is_the_recovered_fraction(page, shared_service):
     recovered = np.linspace(0.2, 0.9, SPEED.size).reshape(SPEED.shape)
     job = finished(address, scan, work, monkeypatch, SPEED, recovery=recovered)
     ready(page, f"{address}/#/jobs/{job}")
+    expect(page.locator("#result-caution")).to_be_hidden()
     page.get_by_role("button", name="Resolution").click()
     page.locator(".colour-bar").get_by_text("recovered fraction of a checkerboard").wait_for()
     assert window_of(page) == [0.0, 1.0]
@@ -142,9 +143,12 @@ def test_the_uncertainty_fades_what_is_not_known(page, shared_service):
     address, scan, work, monkeypatch, _ = shared_service
     spread = np.zeros(SPEED.shape)
     spread[8:], spread[16:] = 14.0, 35.0
-    job = finished(address, scan, work, monkeypatch, SPEED, uncertainty=spread)
+    caution = "The standard deviations may be too small: <b>rays</b> gather."
+    provenance = {"uncertainty": caution}
+    job = finished(address, scan, work, monkeypatch, SPEED, uncertainty=spread, provenance=provenance)
     ready(page, f"{address}/#/jobs/{job}?window=1430,1570")
     expect(page.locator("#result-facts")).to_contain_text("resolution width 2.5 mm")
+    expect(page.locator("#result-caution")).to_have_text(caution)
     canvas = page.locator("canvas.plane")
 
     def alpha(share_x):
@@ -304,11 +308,13 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
         file["truth/sound_speed_mps"] = 1500.0 + 0.1 * x**2 + 0.05 * (y - 3.0) ** 2
         file["truth"].attrs.update(spacing_m=1e-3, origin_m=[-0.02, -0.03])
 
-    job = finished(address, lambda: scan(with_truth), work, monkeypatch, SPEED)
+    spread = np.linspace(1.0, 9.0, SPEED.size).reshape(SPEED.shape)
+    job = finished(address, lambda: scan(with_truth), work, monkeypatch, SPEED, uncertainty=spread)
     place = (-4.0, -12.0, 4.0, 2.0)
     ready(page, f"{address}/#/jobs/{job}?ellipse={','.join(map(str, place))}")
     table = page.locator(".statistics")
     expect(table.locator("tr").first).to_have_text("ResultTruth")
+    expect(table).to_contain_text("Uncertainty of the mean (m/s)")
     rows = {
         one.locator("th").inner_text(): one.locator("td").all_inner_texts()
         for one in table.locator("tr:has(td)").all()
@@ -320,11 +326,15 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
         assert float(rows["Mean (m/s)"][column]) == pytest.approx(inside.mean(), abs=0.006)
         contrast = float(rows["Contrast to surroundings (m/s)"][column])
         assert contrast == pytest.approx(inside.mean() - beside.mean(), abs=0.006)
+    of_mean, of_truth = rows["Uncertainty of the mean (m/s)"]
+    assert float(of_mean) == pytest.approx(spread[away <= 1.0].mean(), abs=0.006)
+    assert of_truth == "\N{EN DASH}"
     with page.expect_download() as download:
         page.locator(".measure.region").get_by_role("button", name="Save as CSV").click()
     head, *lines = table_of(download)
     assert [line[0] for line in lines] == ["Result", "Truth"]
     assert float(lines[1][head.index("contrast")]) == pytest.approx(contrast, abs=0.006)
+    assert [line[head.index("uncertainty")] != "" for line in lines] == [True, False]
     # Of the speed alone.
     page.get_by_role("button", name="Coverage").click()
     expect(table.locator("td").first).to_have_text("1.0000")

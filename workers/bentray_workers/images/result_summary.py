@@ -21,6 +21,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
     Returns:
         ``quantities``: those in the file, and ``truth`` if the scan has one on comparable axes;
         ``resolution_width_m``: of each slice, or one, m; empty without uncertainty;
+        ``uncertainty_caution``: why the standard deviations may be too small; empty without a reason;
         ``grids``: shape, spacing and origin of quantities whose grid is not that of the speed;
         ``candidates``: the models that were compared, the chosen one first, each with ``label``,
         ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s``,
@@ -57,12 +58,14 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
                 "correlation": _number(found.correlation),
                 "mean_mps": found.image_statistics.mean,
                 "spread_mps": found.image_statistics.spread,
+                "uncertainty_mps": found.image_statistics.uncertainty,
                 "true_mean_mps": found.true_statistics.mean,
                 "true_spread_mps": found.true_statistics.spread,
             }
     return {
         "quantities": quantities,
         "resolution_width_m": list(own.resolution_width_m),
+        "uncertainty_caution": own.provenance.get("uncertainty", ""),
         "grids": {
             name: {
                 "shape": list(image.values.shape),

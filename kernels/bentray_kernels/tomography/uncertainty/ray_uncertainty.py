@@ -15,23 +15,20 @@ from ..gauss_newton.gauss_newton_step import trace_rays
 from ..gauss_newton.linearisation import Rows, ray_density
 from ..problem import Problem
 from ..settings import Settings
+from .model_errors import ModelErrors
 from .posterior import Posterior
 from .probe_product import LANES
 
 # Solves of ``LANES`` probes each. The first probe is the mean; 15 samples give a standard deviation to 18 %,
 # which an average over ``AVERAGED_NODES`` improves.
 BATCHES = 2
-AVERAGED_NODES = 1.5
+AVERAGED_NODES = 0.75
 
 # Correlation of the prior, as a part of the side of the image: the size of a lobe of tissue in a breast. The
 # prior's deviation at a node is ``PRIOR`` times the contrast of the image within that distance, at least
 # ``PRIOR_FLOOR`` of the mean contrast and ``PRIOR_FLOOR_MPS``. Half or twice any of these changes the
 # deviations by less than a fifth.
 CORRELATION, PRIOR, PRIOR_FLOOR, PRIOR_FLOOR_MPS = 0.026, 1.5, 0.15, 2.0
-
-# For errors of the model and of the linearisation, which are not noise: with this factor nine tenths of the
-# nodes of ten simulated scans lay within two deviations; ``bentray bench uncertainty`` judges it on others.
-INFLATION = 1.6
 
 # Widths that the truth may be smoothed by, nodes.
 WIDTHS = (0.0, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0)
@@ -46,10 +43,12 @@ class Uncertainty:
             0 at nodes that are kept as water.
         width_m: standard deviation, m, of the Gaussian for which the smoothed truth is expected to be
             nearest to the image.
+        caution: a sentence if the deviations may be too small; else empty.
     """
 
     deviation: Floats
     width_m: float
+    caution: str = ""
 
 
 def trace_probed_rays(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
@@ -73,9 +72,9 @@ def ray_uncertainty(
     """Uncertainty of an image from the linearised problem at that image.
 
     The noise of a travel time is the misfit of the image, which includes errors of the model, but not less
-    than pairs measured both ways differ. The deviation has two parts: the spread of the posterior, smoothed
-    like the truth; and what the posterior's mean would still change, because an image that was stopped early,
-    penalised, or made along straight rays is not the mean.
+    than pairs measured both ways differ. The deviation has three parts: the spread of the posterior, smoothed
+    like the truth; what the posterior's mean would still change, because an image that was stopped early,
+    penalised, or made along straight rays is not the mean; and errors of the model, see ``model_errors``.
 
     Args:
         problem: with each pair once.
@@ -93,12 +92,13 @@ def ray_uncertainty(
     # Exact times of an image without error have no noise: a hundredth of a nanosecond is none.
     noise = max(huber.clipped_rms(residual, limit), problem.noise_s, 1e-11)
     weights = [_huber_weights(part.residual, limit) / noise**2 for part in parts]
+    density = ray_density(problem, parts)
     posterior = Posterior(
         parts,
         weights,
         np.where(region, _prior(problem, slowness), 0.0),
         CORRELATION * (max(region.shape) - 1),
-        max(problem.mean_in_region(ray_density(problem, parts)), 1e-300),
+        max(problem.mean_in_region(density), 1e-300),
         width_in_nodes(problem, settings),
     )
     random = np.random.default_rng((settings.seed, index))
@@ -119,8 +119,11 @@ def ray_uncertainty(
         (_squares(speed, mean, samples, width) for width in WIDTHS),
         key=lambda found: float(found[0][region].sum()),
     )
-    deviation = np.sqrt(gaussian_filter(squares, AVERAGED_NODES, mode="nearest"))
-    return Uncertainty(np.where(region, INFLATION * deviation, 0.0), width * spacing)
+    crossing = spacing / problem.water_speed
+    errors_of_model = ModelErrors.of(speed, region, density, problem.noise_s, noise, crossing)
+    squares = gaussian_filter(errors_of_model.added_to(squares), AVERAGED_NODES, mode="nearest")
+    deviation = np.where(region, np.sqrt(squares), 0.0)
+    return Uncertainty(deviation, width * spacing, errors_of_model.caution)
 
 
 def _huber_weights(residual: Floats, limit: float) -> Floats:

@@ -159,13 +159,14 @@ class Refinement:
             pairs_of = zip(images, losses, strict=True)
             attenuation = stacked([replace(image, speed=loss) for image, loss in pairs_of])
         caution = {} if attenuation is None else {"attenuation": EXPERIMENTAL}
+        # The uncertainty of the rays does not belong to this image.
+        of_both = {name: text for name, text in rays.provenance.items() if name != "uncertainty"}
         return replace(
             rays,
             speed=stacked(images),
             coverage=stacked(_slices(rays, rays.coverage)),
             attenuation=attenuation,
             recovery=of_rays(rays.recovery),
-            # Those of the rays do not belong to this image.
             uncertainty=None,
             resolution_width_m=(),
             spacing_m=(finest.spacing, finest.spacing, *rays.spacing_m[2:]),
@@ -174,7 +175,7 @@ class Refinement:
             history=progress_of(graphs[-1:]).history,
             residuals=None,
             provenance={
-                **rays.provenance,
+                **of_both,
                 "ray_numerics": rays.provenance["numerics"],
                 **recorded(self._settings.numerics),
                 "waveform": _summary(rays, self._plan, graphs),

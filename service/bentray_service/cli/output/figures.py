@@ -32,9 +32,9 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         settings, residual history, speed range, time and provenance; ``residual_within_s``: quantiles of the
         absolute residuals of the last iteration by percentage; ``recovery_mean``: mean of the resolution
         check inside the array; ``uncertainty_rms_mps``: root mean square of the standard deviations inside
-        the array; ``resolution_width_m``: of each slice, or one; ``trials`` and ``reason``: candidate models
-        and choice of ``auto``; ``candidates``: rows of their table. Missing values are None, missing widths,
-        trials and reasons are empty.
+        the array; ``uncertainty_caution``: why they may be too small; ``resolution_width_m``: of each slice,
+        or one; ``trials`` and ``reason``: candidate models and choice of ``auto``; ``candidates``: rows of
+        their table. Missing values are None, missing cautions, widths, trials and reasons are empty.
     """
     return {
         "seconds": round(seconds, 3),
@@ -53,6 +53,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         "history": [asdict(sweep) for sweep in result.history],
         "recovery_mean": _recovery_mean(result),
         "uncertainty_rms_mps": _uncertainty_rms(result),
+        "uncertainty_caution": result.provenance.get("uncertainty", ""),
         "resolution_width_m": list(result.resolution_width_m),
         "reason": advice_of(result),
         "candidates": trial_table(result.trials),

@@ -36,6 +36,9 @@ class TruthErrors(BaseModel):
     correlation: float | None = Field(None, description="Pearson's correlation coefficient.")
     mean_mps: float | None = Field(None, description="Mean speed of the image in the region, m/s.")
     spread_mps: float | None = Field(None, description="Its standard deviation there, m/s.")
+    uncertainty_mps: float | None = Field(
+        None, description="Uncertainty of this mean, m/s; null without uncertainty."
+    )
     true_mean_mps: float | None = Field(None, description="Mean of the true speed, m/s.")
     true_spread_mps: float | None = Field(None, description="Its standard deviation, m/s.")
 
@@ -57,6 +60,9 @@ class SummaryRecord(BaseModel):
     resolution_width_m: list[float] = Field(
         description="Standard deviation, m, of the Gaussian that smooths the truth like the image: one for "
         "each slice, or one of a slice or volume; the uncertainty refers to it. Empty without uncertainty."
+    )
+    uncertainty_caution: str = Field(
+        description="Why the standard deviations may be too small, in a sentence; empty without a reason."
     )
     grids: dict[str, GridRecord] = Field(
         description="Grids of quantities that are not on the grid of the volume, such as reflection."

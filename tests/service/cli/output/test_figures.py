@@ -133,6 +133,9 @@ def test_summary_shows_the_uncertainty_inside_the_array() -> None:
     assert found["resolution_width_m"] == [0.0016, 0.002, 0.0031]
     assert dict(summary(found))["uncertainty"] == "6.0 m/s rms, at a resolution width of 2.0 mm"
     assert "uncertainty" not in dict(summary(figures(image(speed), dataset(None), 1.0)))
+    assert found["uncertainty_caution"] == ""
+    doubted = replace(result, provenance={"uncertainty": "too small"})
+    assert figures(doubted, dataset(None), 1.0)["uncertainty_caution"] == "too small"
 
 
 def test_summary_shows_residuals_resolution_and_candidates() -> None:

@@ -6,7 +6,7 @@ import { make } from "./dom.js";
 const SOFTWARE = { bentray: "Bentray", python: "Python", numpy: "NumPy", numba: "Numba", scipy: "SciPy" };
 const SAID = {
   water: "Water", pulse: "Pulse", quality: "Quality of the scan", geometry: "Geometry", waveform: "Full waveform", attenuation: "Attenuation",
-  reflection: "Reflection",
+  reflection: "Reflection", uncertainty: "Uncertainty",
   frequency_hz: "Centre frequency", amplitudes: "Amplitudes",
 };
 // What a parameter of no value means: the automatic decision, unless stated here.

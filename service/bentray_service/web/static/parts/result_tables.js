@@ -79,6 +79,7 @@ export function truthTable({ truth }) {
     ["SSIM", number(truth.ssim, 3)],
     ["PCC", number(truth.correlation, 3)],
     ["Mean ± spread", speed(truth.mean_mps, truth.spread_mps)],
+    ...(truth.uncertainty_mps === null ? [] : [["Uncertainty of the mean", `${number(truth.uncertainty_mps, 1)} m/s`]]),
     ["True mean ± spread", speed(truth.true_mean_mps, truth.true_spread_mps)],
   ]));
 }

@@ -24,14 +24,14 @@ export function profileCsv(curves, { unit }) {
 }
 
 export function regionCsv(found, { unit }, region) {
-  const head = ["image", "quantity_unit", "shape", "x0_mm", "y0_mm", "x1_mm", "y1_mm", "nodes", "area_mm2", "mean", "standard_deviation", "minimum", "maximum", "contrast"];
+  const head = ["image", "quantity_unit", "shape", "x0_mm", "y0_mm", "x1_mm", "y1_mm", "nodes", "area_mm2", "mean", "standard_deviation", "minimum", "maximum", "contrast", "uncertainty"];
   const rows = found.map(({ title, statistics: s }) => [
-    quoted(title), quoted(unit), region.shape, ...region.place, s.nodes, s.area, s.mean, s.deviation, s.minimum, s.maximum, s.contrast,
+    quoted(title), quoted(unit), region.shape, ...region.place, s.nodes, s.area, s.mean, s.deviation, s.minimum, s.maximum, s.contrast, s.uncertainty ?? "",
   ]);
   return lines([head, ...rows]);
 }
 
-// set: { setProfile(place), setRegion(region) }. Returns { show(curves, state, quantity, beside) }.
+// set: { setProfile(place), setRegion(region) }. Returns { show(curves, state, quantity, beside, deviations) }.
 export function measuresPanel(root, set) {
   const parts = {};
   for (const [name, title] of [["profile", "Profile"], ["region", "Region"]]) {
@@ -78,8 +78,8 @@ export function measuresPanel(root, set) {
   }
 
   return {
-    // beside: images whose region is measured, too, such as the truth.
-    show(curves, { profile, region }, quantity, beside = []) {
+    // beside: images whose region is measured, too, such as the truth. deviations: of the nodes of the first image, or null.
+    show(curves, { profile, region }, quantity, beside = [], deviations = null) {
       fill(parts.profile, profile);
       fill(parts.region, region?.place);
       const unit = quantity.unit ? ` (${quantity.unit})` : "";
@@ -96,10 +96,14 @@ export function measuresPanel(root, set) {
         parts.region.shape = region.shape;
         const named = beside.length ? curves.map((one) => ({ ...one, title: "Result" })) : curves;
         const found = [...named, ...beside].map((one) => ({ title: one.title, statistics: regionOf(one.plane, region.shape, region.place) }));
+        // As if the errors of all nodes were the same: see kernels/…/tomography/regions.py.
+        if (deviations) found[0].statistics.uncertainty = regionOf(deviations, region.shape, region.place).mean;
         const table = make("table", "statistics");
+        const uncertain = found.map(({ statistics: s }) => (s.uncertainty === undefined ? "–" : shown(s.uncertainty, quantity)));
         const rows = [
           ["", found.map((one) => one.title)],
           [`Mean${unit}`, found.map((one) => shown(one.statistics.mean, quantity))],
+          ...(deviations ? [[`Uncertainty of the mean${unit}`, uncertain]] : []),
           [`Standard deviation${unit}`, found.map((one) => shown(one.statistics.deviation, quantity))],
           [`Contrast to surroundings${unit}`, found.map((one) => shown(one.statistics.contrast, quantity))],
           ["Area (mm²)", found.map((one) => one.statistics.area.toFixed(2))],

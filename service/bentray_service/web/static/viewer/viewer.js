@@ -24,8 +24,8 @@ export function viewer(root, panes, state, keep) {
   let fields = [];
   // Of the uncertainty of the only pane, while it fades the image.
   let spread = null;
-  // The true image of the only pane, read for the first region.
-  let truth = null;
+  // Truth and uncertainty of the only pane, read for the first region.
+  const besides = {};
   let tiles = [];
   let automatic = [0, 1];
   let hover = null;
@@ -244,18 +244,22 @@ export function viewer(root, panes, state, keep) {
       ...(tile.other ? [{ title: panes[tile.other].title, plane: planeOf(tile.other, tile.axis) }] : []),
     ]);
     if (curves.length && chosen[0].other) curves[0].title = panes[0].title;
-    if (curves.length) measures.show(curves, state, quantity(), trueOnes());
+    if (!curves.length) return;
+    const trueOne = besideRegion("truth");
+    const beside = trueOne ? [{ title: QUANTITIES.truth.title, plane: trueOne }] : [];
+    measures.show(curves, state, quantity(), beside, besideRegion("uncertainty"));
   }
 
-  // The truth beside a region of the speed; read once, and then drawn.
-  function trueOnes() {
-    if (!state.region || state.quantity !== "speed" || panes.length > 1 || !panes[0].stored.includes("truth")) return [];
-    truth ??= panes[0].values.field("truth").then((field) => {
-      truth = field;
+  // A stored quantity beside a region of the speed, at the shown plane; read once, and then drawn. Null before that.
+  function besideRegion(name) {
+    if (!state.region || state.quantity !== "speed" || panes.length > 1 || !panes[0].stored.includes(name)) return null;
+    const { axis } = state;
+    besides[name] ??= panes[0].values.field(name).then((field) => {
+      besides[name] = field;
       refresh();
     }, () => {});
-    if (!truth.nearest) return [];
-    return [{ title: QUANTITIES.truth.title, plane: truth.plane(state.axis, truth.nearest(state.axis, state.cursor[AXES.indexOf(state.axis)])) }];
+    const field = besides[name];
+    return field.nearest ? field.plane(axis, field.nearest(axis, state.cursor[AXES.indexOf(axis)])) : null;
   }
 
   function change(part) {

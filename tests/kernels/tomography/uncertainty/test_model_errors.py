@@ -1,0 +1,66 @@
+"""Errors of the model grow with guided rays and misfit above the noise, and call an image into question."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from bentray_kernels.tomography.uncertainty.model_errors import ModelErrors
+
+NODES, WATER, CROSSING_S = 48, 1500.0, 1.6e-6
+X, Y = np.meshgrid(*(np.linspace(-1.0, 1.0, NODES),) * 2, indexing="ij")
+REGION = np.hypot(X, Y) < 0.9
+SKIN = np.abs(np.hypot(X, Y) - 0.6) < 0.03
+SPEED = np.where(SKIN, WATER + 60.0, WATER)
+EVEN, GATHERED = np.where(REGION, 5.0, 0.0), np.where(SKIN, 15.0, np.where(REGION, 5.0, 0.0))
+
+
+def errors(density=EVEN, noise_s=5e-8, misfit_s=5e-8):
+    return ModelErrors.of(SPEED, REGION, density, noise_s, misfit_s, CROSSING_S)
+
+
+def test_noise_through_even_rays_adds_almost_nothing():
+    plain = errors()
+    assert plain.unexplained == 0.0
+    assert plain.guided < 0.05
+    assert plain.added_to(np.full(SPEED.shape, 9.0))[REGION].mean() == pytest.approx(9.0, rel=0.2)
+    assert plain.caution == ""
+
+
+def test_a_layer_that_guides_rays_is_uncertain_by_its_contrast():
+    guided = errors(GATHERED)
+    assert guided.guided > 0.5
+    added = np.sqrt(guided.added_to(np.zeros(SPEED.shape)))
+    far = REGION & (np.hypot(X, Y) < 0.2)
+    # Of about 50 m/s of contrast, and not where there is none.
+    assert 15.0 < added[SKIN].mean() < 40.0
+    assert added[far].mean() < 2.0
+    assert "thin fast layer" in guided.caution
+    assert "misfit" not in guided.caution
+
+
+def test_rays_that_gather_where_the_image_is_flat_are_no_layer():
+    flat = ModelErrors.of(np.full(SPEED.shape, WATER), REGION, GATHERED, 5e-8, 5e-8, CROSSING_S)
+    assert flat.guided == 0.0
+
+
+def test_a_misfit_above_the_noise_enlarges_all_of_it():
+    squares = np.full(SPEED.shape, 9.0)
+    sizes = [errors(misfit_s=one * 5e-8).added_to(squares) for one in (1.0, 1.5, 3.0, 30.0)]
+    for less, more in pairwise(sizes):
+        assert (more > less).all()
+    flat = REGION & (np.hypot(X, Y) < 0.2)
+    assert sizes[-1][flat].mean() == pytest.approx(2.5 * 9.0, rel=0.05)
+
+
+def test_a_misfit_is_called_into_question_if_it_is_above_the_noise_and_above_errors_of_the_grid():
+    assert "leave a misfit of 200 ns, 4.0 times the noise" in errors(misfit_s=2e-7).caution
+    assert errors(misfit_s=2e-7, noise_s=1.5e-7).caution == ""
+    assert errors(misfit_s=2e-8, noise_s=2e-9).caution == ""
+
+
+def test_without_pairs_measured_both_ways_a_misfit_is_no_evidence():
+    """It may be noise; the deviations are those of a misfit that is not."""
+    unknown = errors(noise_s=0.0, misfit_s=2e-7)
+    assert unknown.unexplained == 1.0
+    assert unknown.caution == ""
