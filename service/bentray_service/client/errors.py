@@ -44,7 +44,8 @@ class NoAnswer(ClientError):  # noqa: N818 - names what happened, to whoever tri
 def no_answer(url: str, error: httpx.TransportError) -> NoAnswer:
     """The error for a failed connection."""
     refused = isinstance(error, httpx.ConnectError | httpx.ConnectTimeout)
-    return NoAnswer(f"no answer from {url}: {error}", sent=not refused)
+    hint = "; bentray serve starts a service" if isinstance(error, httpx.ConnectError) else ""
+    return NoAnswer(f"no answer from {url}: {error}{hint}", sent=not refused)
 
 
 def from_problem(problem: Problem | None) -> ClientError:

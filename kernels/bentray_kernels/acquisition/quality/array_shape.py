@@ -11,6 +11,7 @@ from ...errors import InvalidInput
 from ..angular_coverage import angular_coverage
 from ..dataset import Dataset
 from ..reference import chord_offset
+from .contradictions import CYCLES
 from .elements import CLOCK, DISPLACED
 from .finding import Finding
 from .shadow import SCATTERER
@@ -50,7 +51,7 @@ def find_limited_angle(dataset: Dataset) -> list[Finding]:
 
 
 def inapplicable(dataset: Dataset, checked: Iterable[str]) -> dict[str, str]:
-    """Reasons why some checks do not apply to an array, by their names.
+    """Reasons why some checks do not apply to a scan or its array, by their names.
 
     Args:
         dataset: the scan.
@@ -64,4 +65,6 @@ def inapplicable(dataset: Dataset, checked: Iterable[str]) -> dict[str, str]:
         reasons |= {"element positions": both, "reciprocity": both}
     if (chord_offset(dataset) >= OUTSIDE).sum() < MIN_PAIRS:
         reasons[OBJECT] = "too few paths pass far from the middle of the array"
+    if dataset.center_frequency_hz is None:
+        reasons[CYCLES] = "the scan states no centre frequency"
     return {name: reasons[name] for name in checked if name in reasons}

@@ -11,6 +11,7 @@ from ..dataset import Dataset
 from ..picking.consistency import OUTLYING, outliers, unreciprocal
 from .finding import Finding
 
+CYCLES = "cycle jumps"
 # A departure counts as a cycle jump within this distance of whole periods.
 NEAR_A_CYCLE = 0.25
 
@@ -37,7 +38,7 @@ def find_contradictions(dataset: Dataset, delta: Floats) -> list[Finding]:
     differ = unreciprocal(dataset, np.where(outlying, np.nan, delta), skip)
     allowed = f"within {1e9 * skip:.0f} ns"
     return [
-        *_left_out("cycle jumps", cycles, departure, "whole periods from their neighbours", allowed),
+        *_left_out(CYCLES, cycles, departure, "whole periods from their neighbours", allowed),
         *_left_out("outliers", outlying & ~cycles, departure, "far from the median of neighbours", allowed),
         *_left_out("reciprocity", differ, departure, "that differ from their reciprocal pair", allowed),
     ]

@@ -178,3 +178,11 @@ def test_rejects_an_empty_scan(fill, shape):
     examined = examine(some)
     assert examined.picked is None
     assert examined.report.refusal.accepted
+
+
+@pytest.mark.parametrize("frequency_hz", [FREQUENCY_HZ, None])
+def test_cycle_jumps_are_checked_only_where_the_period_is_known(frequency_hz) -> None:
+    times = replace(clean(), delta_tof_s=sought(), waveform=None, center_frequency_hz=frequency_hz)
+    report = examine(times).report
+    assert ("cycle jumps" in report.checked) == (frequency_hz is not None)
+    assert ("cycle jumps" in report.not_checked) == (frequency_hz is None)
