@@ -177,7 +177,7 @@ class ReflectionSettings:
         "Spacing of the pixels, m; at most the wavelength, and at most 4096 pixels along a side.",
         Range(1e-6, 1.0, unit="m"),
         unset="an eighth of the wavelength in water at the centre frequency, at most 2048 along a side",
-        label="Distance of pixels",
+        label="Pixel spacing",
         unit="m",
     )
     pair_angle_deg: float = setting(

@@ -87,9 +87,10 @@ def submit(
     With --batch, reconstruct a folder of scans with one progress: on the service, or with --scheduler on a
     Dask cluster without one. Scans with a valid result for the same file and settings are skipped, so an
     interrupted batch can be repeated. Other scans continue after a failure; then the exit code is 1.
-    Example: bentray submit --batch scans --out results
 
     Example:  bentray submit scan.h5 --url http://127.0.0.1:8000 -o result
+
+    Example:  bentray submit --batch scans -o results
     """
     if (file is None) == (batch is None):
         raise InvalidInput(

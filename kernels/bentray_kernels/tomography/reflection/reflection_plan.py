@@ -164,7 +164,7 @@ def plan_reflection(
 
 
 def pixel_size(requested_m: float | None, extent_m: float, wavelength_m: float) -> float:
-    """Distance of pixels, m: as requested, or an eighth of the wavelength, or so that there are ``SIDE``.
+    """Pixel spacing, m: as requested, or an eighth of the wavelength, or so that there are ``SIDE``.
 
     Raises:
         InvalidInput: for a requested distance above the wavelength, or that gives more than ``MAX_SIDE``.

@@ -32,7 +32,7 @@ const NAMES = {
   sart: "SART", gauss_newton: "Gauss–Newton", roi: "Only the region of interest", eikonal: "Eikonal solver", side_m: "Side of the image",
   minutes: "Time budget of full waveform (minutes)", examine: "Scan is checked first", enabled: "Reconstructed", attenuation_solver: "Solver",
   nodes: "Nodes per side", smoothing_nodes: "Smoothing of updates", edge_mps: "Edges above",
-  pixel_m: "Distance of pixels", pair_angle_deg: "Largest angle of a pair", delays: "Travel times in", gain: "Compensated",
+  pixel_m: "Pixel spacing", pair_angle_deg: "Largest angle of a pair", delays: "Travel times in", gain: "Compensated",
 };
 
 // "speed_bounds_mps" is "Speed bounds" and the unit m/s.
