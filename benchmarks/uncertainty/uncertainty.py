@@ -34,7 +34,7 @@ SCANS, QUICK_SCANS = 20, 2
 PART, CHOSEN_PART = 0.85, 0.9
 
 # Other breasts, all in water that is slower than skin and glands and hardly faster than fat.
-SLOW_SCANS, SLOW_SEED, SLOW_MPS = 6, 83, 1440.0
+SLOW_SCANS, SLOW_SEED, SLOW_MPS = 6, 89, 1440.0
 
 # Waves whose times are picked.
 WAVE_SCANS, WAVE_HZ = 2, 3e5
@@ -130,7 +130,11 @@ def slow_water(context: BenchmarkContext) -> Iterable[Row]:
         context.progress(number, SLOW_SCANS, scan.name)
         judged.append(judge(scan))
     least = min(judged, key=lambda one: one.within)
-    each = "; ".join(f"{one.name}: {100.0 * one.within:.0f} %" for one in judged)
+    told = ["uncertainty" in one.result.provenance for one in judged]
+    each = "; ".join(
+        f"{one.name}{', with a caution' if doubted else ''}: {100.0 * one.within:.0f} %"
+        for one, doubted in zip(judged, told, strict=True)
+    )
     correlations = [correlation(one) for one in judged]
     yield Row(
         f"U1 water of {SLOW_MPS:.0f} m/s, nodes within two deviations, the scan with the fewest",
@@ -140,8 +144,7 @@ def slow_water(context: BenchmarkContext) -> Iterable[Row]:
         "",
         f"{len(judged)} other breasts; error {rms(least.error):.1f} m/s, "
         f"deviations {rms(least.deviation):.1f} m/s; {each}; rank correlation of deviation and error "
-        f"at least {min(correlations):.2f}; cautions: "
-        f"{sum('uncertainty' in one.result.provenance for one in judged)}",
+        f"at least {min(correlations):.2f}",
     )
 
 

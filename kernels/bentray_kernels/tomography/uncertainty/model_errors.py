@@ -13,17 +13,22 @@ from ...arrays import Flags, Floats
 # what lies behind it too slow. And where the misfit is above the noise, the rays of a region share what the
 # model lacks, and its errors do not average out as noise does. ``CONTRAST`` is the part of the square of the
 # contrast to the surroundings that may be wrong in layers that guide rays, or of a misfit that is not noise;
-# of such a misfit the variance of the posterior grows by ``POSTERIOR``. Chosen with 24 simulated scans for
-# the highest likelihood of their errors; ``bentray bench uncertainty`` judges them on others.
-CONTRAST, POSTERIOR = 0.4, 1.5
+# ``BEHIND`` the part of its mean over the image that such layers leave everywhere; and for such a misfit the
+# variance of the posterior grows by ``POSTERIOR``. Chosen with 25 simulated scans for the highest likelihood
+# of their errors; ``bentray bench uncertainty`` judges them on others.
+CONTRAST, BEHIND, POSTERIOR = 0.4, 0.1, 1.5
 
 # Surroundings of a node: a Gaussian of this part of the side of the image, over twice the size of a lobe of
 # tissue. Rays are counted within ``RAYS_NODES``.
 SURROUNDINGS, RAYS_NODES = 0.063, 0.75
 
 # Above these an image is called into question: misfit over noise; misfit in crossing times of a node, below
-# which there are errors of the grid; contrast where rays gather over all contrast. Chosen with these scans.
-MISFIT_OVER_NOISE, MISFIT_CROSSING, GUIDED = 1.9, 0.05, 0.5
+# which there are errors of the grid; contrast where rays gather over all contrast; and how much slower than
+# the water a tenth of the object is, relative to the water. Chosen with the same scans and one of Table 6.
+MISFIT_OVER_NOISE, MISFIT_CROSSING, GUIDED, SLOWER = 1.9, 0.05, 0.5, 0.055
+
+# Nodes whose speed differs from that of water by less than this part of it are no object.
+WATER_PART = 0.005
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,8 @@ class ModelErrors:
         contrast: as the image, m/s: difference of each node to its surroundings.
         guided: root mean square of contrast times relative excess of rays, over that of contrast: about 0
             without layers that guide rays.
+        mean_square: of the contrast over the nodes that may change, (m/s)².
+        slower: relative to the speed of water, of the slowest tenth of the object; at least 0.
         unexplained: from 0 to 1, square of the part of the misfit's variance that is not noise.
         noise_s: standard deviation of the times, s; 0 if it is not known.
         misfit_s: root mean square of the misfit, s, at least ``noise_s``.
@@ -41,7 +48,9 @@ class ModelErrors:
     """
 
     contrast: Floats
+    mean_square: float
     guided: float
+    slower: float
     unexplained: float
     noise_s: float
     misfit_s: float
@@ -55,7 +64,8 @@ class ModelErrors:
         density: Floats,
         noise_s: float,
         misfit_s: float,
-        crossing_s: float,
+        spacing: float,
+        water_mps: float,
     ) -> ModelErrors:
         """Errors of an image.
 
@@ -63,24 +73,31 @@ class ModelErrors:
             speed: (nx, ny[, nz]), m/s.
             region: nodes that may change, at least one.
             density: nodes of ray through each node.
-            noise_s, misfit_s, crossing_s: see the attributes.
+            noise_s, misfit_s: see the attributes.
+            spacing: of the nodes, m.
+            water_mps: speed of the water, m/s.
         """
         contrast = speed - _around(speed, SURROUNDINGS * (max(speed.shape) - 1))
         square = float((contrast[region] ** 2).mean())
         gathered = float(((contrast * _excess(density, region))[region] ** 2).mean())
+        slowness = 1.0 - speed[region] / water_mps
+        of_object = slowness[np.abs(slowness) > WATER_PART]
         return cls(
             contrast,
+            square,
             float(np.sqrt(gathered / square)) if square > 0.0 else 0.0,
+            max(float(np.quantile(of_object, 0.9)), 0.0) if of_object.size else 0.0,
             (1.0 - (noise_s / misfit_s) ** 2) ** 2,
             noise_s,
             misfit_s,
-            crossing_s,
+            spacing / water_mps,
         )
 
     def added_to(self, squares: Floats) -> Floats:
         """Expected squares of the errors, (m/s)², from those of the posterior."""
         wrong = CONTRAST * (self.guided + self.unexplained) * self.contrast**2
-        return np.asarray((1.0 + POSTERIOR * self.unexplained) * squares + wrong)
+        behind = BEHIND * self.guided * self.mean_square
+        return np.asarray((1.0 + POSTERIOR * self.unexplained) * squares + wrong + behind)
 
     @property
     def caution(self) -> str:
@@ -96,6 +113,11 @@ class ModelErrors:
             reasons.append(
                 "first arrivals follow a thin fast layer, which the image shows too fast and too thick, and "
                 "what lies behind it too slow"
+            )
+        if self.slower >= SLOWER:
+            reasons.append(
+                f"a tenth of the object is slower than the water by {100.0 * self.slower:.1f} % or more, so "
+                "that first arrivals may go around it and tell nothing about it"
             )
         if not reasons:
             return ""

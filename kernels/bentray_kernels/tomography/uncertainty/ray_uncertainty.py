@@ -119,8 +119,9 @@ def ray_uncertainty(
         (_squares(speed, mean, samples, width) for width in WIDTHS),
         key=lambda found: float(found[0][region].sum()),
     )
-    crossing = spacing / problem.water_speed
-    errors_of_model = ModelErrors.of(speed, region, density, problem.noise_s, noise, crossing)
+    errors_of_model = ModelErrors.of(
+        speed, region, density, problem.noise_s, noise, spacing, problem.water_speed
+    )
     squares = gaussian_filter(errors_of_model.added_to(squares), AVERAGED_NODES, mode="nearest")
     deviation = np.where(region, np.sqrt(squares), 0.0)
     return Uncertainty(deviation, width * spacing, errors_of_model.caution)

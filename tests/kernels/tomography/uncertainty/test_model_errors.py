@@ -7,7 +7,7 @@ import pytest
 
 from bentray_kernels.tomography.uncertainty.model_errors import ModelErrors
 
-NODES, WATER, CROSSING_S = 48, 1500.0, 1.6e-6
+NODES, WATER, SPACING_M = 48, 1500.0, 2.4e-3
 X, Y = np.meshgrid(*(np.linspace(-1.0, 1.0, NODES),) * 2, indexing="ij")
 REGION = np.hypot(X, Y) < 0.9
 SKIN = np.abs(np.hypot(X, Y) - 0.6) < 0.03
@@ -15,8 +15,8 @@ SPEED = np.where(SKIN, WATER + 60.0, WATER)
 EVEN, GATHERED = np.where(REGION, 5.0, 0.0), np.where(SKIN, 15.0, np.where(REGION, 5.0, 0.0))
 
 
-def errors(density=EVEN, noise_s=5e-8, misfit_s=5e-8):
-    return ModelErrors.of(SPEED, REGION, density, noise_s, misfit_s, CROSSING_S)
+def errors(density=EVEN, noise_s=5e-8, misfit_s=5e-8, speed=SPEED):
+    return ModelErrors.of(speed, REGION, density, noise_s, misfit_s, SPACING_M, WATER)
 
 
 def test_noise_through_even_rays_adds_almost_nothing():
@@ -32,16 +32,19 @@ def test_a_layer_that_guides_rays_is_uncertain_by_its_contrast():
     assert guided.guided > 0.5
     added = np.sqrt(guided.added_to(np.zeros(SPEED.shape)))
     far = REGION & (np.hypot(X, Y) < 0.2)
-    # Of about 50 m/s of contrast, and not where there is none.
+    # Of about 50 m/s of contrast; behind it, a part of the mean.
     assert 15.0 < added[SKIN].mean() < 40.0
-    assert added[far].mean() < 2.0
+    mean_square = (guided.contrast[REGION] ** 2).mean()
+    assert added[far].mean() == pytest.approx(np.sqrt(0.1 * guided.guided * mean_square), rel=0.1)
     assert "thin fast layer" in guided.caution
     assert "misfit" not in guided.caution
 
 
 def test_rays_that_gather_where_the_image_is_flat_are_no_layer():
-    flat = ModelErrors.of(np.full(SPEED.shape, WATER), REGION, GATHERED, 5e-8, 5e-8, CROSSING_S)
+    flat = errors(GATHERED, speed=np.full(SPEED.shape, WATER))
     assert flat.guided == 0.0
+    assert flat.slower == 0.0
+    assert flat.added_to(np.zeros(SPEED.shape)).max() == 0.0
 
 
 def test_a_misfit_above_the_noise_enlarges_all_of_it():
@@ -57,6 +60,19 @@ def test_a_misfit_is_called_into_question_if_it_is_above_the_noise_and_above_err
     assert "leave a misfit of 200 ns, 4.0 times the noise" in errors(misfit_s=2e-7).caution
     assert errors(misfit_s=2e-7, noise_s=1.5e-7).caution == ""
     assert errors(misfit_s=2e-8, noise_s=2e-9).caution == ""
+
+
+def test_an_object_that_is_much_slower_than_the_water_may_be_in_a_shadow():
+    """Its size does not count, nor the water around it, nor a thin layer that is slower still."""
+    for radius in (0.3, 0.6):
+        inside = np.hypot(X, Y) < radius
+        slow = np.where(inside, 1400.0, WATER)
+        assert "slower than the water by 6.7 %" in errors(speed=slow).caution
+        assert errors(speed=np.where(inside, 1440.0, WATER)).caution == ""
+        assert errors(speed=np.where(inside, 1600.0, WATER)).caution == ""
+        slow[inside & (Y > 0.0)] = 1440.0
+        slow[inside & (np.abs(X) > 0.02)] = 1440.0
+        assert errors(speed=slow).caution == ""
 
 
 def test_without_pairs_measured_both_ways_a_misfit_is_no_evidence():
