@@ -64,8 +64,8 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     with TemporaryDirectory() as folder:
         blocks = settings.numerics.blocks > 1
         graph = BlockSartGraph(scan, 0, Path(folder) / "blocks") if blocks else ReconstructionGraph(scan, 0)
-        # Tasks of blocks read files alone.
-        kept = 0 if blocks else held(dataset, scan.problem(0))
+        # Tasks of blocks read files alone; a problem keeps what its tasks have computed.
+        kept = () if blocks else (dataset, scan.problem(0))
         found: dict[tuple[str, int], int] = {}
         waiting = graph.first()
         # All emitters take the same in blocks.
@@ -79,7 +79,7 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
                     # Sweeps of small blocks do not load all compiled code.
                     task.function(*task.arguments)
                 taken = peak(lambda task=task: task.function(*task.arguments)) - peak(lambda: None)
-                taken += kept + held(task.arguments[1:])
+                taken += held(*kept, task.arguments[1:])
                 found[name, number] = max(taken, found.get((name, number), 0))
             waiting = graph.after(task, task.function(*task.arguments)) + waiting
     return {name: max(most for (one, _), most in found.items() if one == name) for name, _ in found}

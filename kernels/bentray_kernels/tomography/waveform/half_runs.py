@@ -10,8 +10,9 @@ from scipy.ndimage import gaussian_filter
 
 from ...arrays import Floats
 from ..result import Iteration
+from .grid_change import resampled
 from .inversion_state import BandEnd, Image
-from .refinement_graph import RefinementGraph, resampled
+from .refinement_graph import RefinementGraph
 from .waveform_settings import Band, WaveSettings
 
 # Bands of the speed that are inverted again, the last ones: together they cost about as much as the image.

@@ -28,6 +28,25 @@ class Image:
 
 
 @dataclass(frozen=True)
+class Curvature:
+    """Pairs of changes of a finished band, see ``lbfgs``.
+
+    Attributes:
+        steps: (pairs, nx, ny), changes of the image, m/s, oldest first.
+        changes: (pairs, nx, ny), changes of the gradient, s/m.
+        spacing: of the nodes, m.
+        origin: position of node 0, m.
+        high_hz: upper corner of the band, Hz.
+    """
+
+    steps: Floats
+    changes: Floats
+    spacing: float
+    origin: tuple[float, float]
+    high_hz: float
+
+
+@dataclass(frozen=True)
 class BandEnd:
     """Result of a band.
 
@@ -35,11 +54,13 @@ class BandEnd:
         image: the image.
         skipped: whether the held-out misfit ended the band, or an earlier band so that this one was skipped.
         history: a record for each evaluated image; empty for a skipped band.
+        curvature: of the misfit by the speed, until the next band has begun.
     """
 
     image: Image
     skipped: bool
     history: tuple[Evaluation, ...]
+    curvature: Curvature | None = None
 
     @property
     def held(self) -> float:

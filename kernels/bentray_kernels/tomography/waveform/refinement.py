@@ -19,8 +19,9 @@ from ..result import Reconstruction
 from ..settings import Settings
 from . import half_runs
 from .automatic_settings import scale_of, wave_settings
+from .grid_change import resampled
 from .inversion_state import BandEnd, Image
-from .refinement_graph import RefinementGraph, WaveScan, resampled
+from .refinement_graph import RefinementGraph, WaveScan
 from .validation import ValidationGraph, evaluations, validation_settings
 from .waveform_cost import advice
 from .waveform_settings import WaveSettings

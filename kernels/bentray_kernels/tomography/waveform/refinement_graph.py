@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 
 from ...arrays import Floats
 from ...task_graph import Task
@@ -16,7 +15,8 @@ from ...wave.simulation import Unknown
 from ..result import Iteration
 from . import band_inversion
 from .band_inversion import EmitterMisfit, InversionState, Model
-from .inversion_state import ActiveBand, BandEnd, Image, RefinementCheckpoint
+from .grid_change import resampled, resampled_pairs
+from .inversion_state import ActiveBand, BandEnd, Curvature, Image, RefinementCheckpoint
 from .iterations import iteration_records
 from .source_estimation import estimate_source
 from .waveform_problem import WaveProblem
@@ -142,7 +142,8 @@ class RefinementGraph:
         if self.over:
             return []
         if self._band is None:
-            return [Task(start_band, (self._scan, self.number, self.image))]
+            curvature = self.ends[-1].curvature if self.ends else None
+            return [Task(start_band, (self._scan, self.number, self.image, curvature))]
         model, number = self._band.model, self._emitters_of_a_task
         return [
             Task(evaluate_emitter, (self._scan, self.number, model, place, number), keep_on_worker=True)
@@ -153,6 +154,8 @@ class RefinementGraph:
         """As ``task_graph.TaskGraph``."""
         if task.function is start_band:
             self._band = result
+            if self.ends:
+                self.ends = (*self.ends[:-1], replace(self.ends[-1], curvature=None))
             if result is None:
                 self.ends = (*self.ends, BandEnd(self.image, skipped=False, history=()))
             return self.first()
@@ -167,9 +170,12 @@ class RefinementGraph:
         self._misfits = {}
         self._band = replace(self._band, state=result)
         if result.done:
-            image = self._after_band(Image(result.image, self._band.spacing, self._band.origin))
-            # The pairs of changes of a finished band are not kept.
-            self.ends = (*self.ends, BandEnd(image, result.skipped, result.history))
+            grid = self._band.spacing, self._band.origin
+            image, curvature = self._after_band(Image(result.image, *grid)), None
+            if self._of == "speed" and len(result.steps):
+                high_hz = self._scan.settings().bands[self.number].high_hz
+                curvature = Curvature(result.steps, result.changes, *grid, high_hz)
+            self.ends = (*self.ends, BandEnd(image, result.skipped, result.history, curvature))
             self._band = None
             # Further bands of the speed would skip more cycles or fit more noise.
             while result.skipped and not self.over and self._of == "speed":
@@ -194,8 +200,17 @@ class RefinementGraph:
         return replace(speed, attenuation=attenuation)
 
 
-def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
-    """Task: the initial state of a band; None if it is skipped, see ``MIN_WATER_CORRELATION``."""
+def start_band(
+    scan: WaveScan, number: int, image: Image, curvature: Curvature | None = None
+) -> ActiveBand | None:
+    """Task: the initial state of a band; None if it is skipped, see ``MIN_WATER_CORRELATION``.
+
+    Args:
+        scan: of the refinement.
+        number: of the band, from 0.
+        image: to begin with.
+        curvature: of the misfit in the band before, if that was one of the speed too.
+    """
     problem = scan.problem(number)
     if problem.water_correlation < MIN_WATER_CORRELATION:
         return None
@@ -207,7 +222,11 @@ def start_band(scan: WaveScan, number: int, image: Image) -> ActiveBand | None:
         start = min(models, key=lambda model: held_out_misfit(problem, here, model))
     grid = problem.band.spacing_m, problem.origin
     if problem.band.of == "speed":
-        return ActiveBand(band_inversion.begin(start.speed), *grid, count, None, start.wavelet)
+        state = band_inversion.begin(start.speed)
+        if curvature is not None:
+            steps, changes = resampled_pairs(curvature, problem.band.high_hz, *grid, problem.region)
+            state = replace(state, steps=steps, changes=changes)
+        return ActiveBand(state, *grid, count, None, start.wavelet)
     lossless = band_inversion.begin(np.zeros_like(start.speed))
     return ActiveBand(lossless, *grid, count, start.speed, start.wavelet)
 
@@ -251,15 +270,3 @@ def held_out_misfit(problem: WaveProblem, settings: WaveSettings, model: Model) 
 def _source(speed: Floats, problem: WaveProblem, settings: WaveSettings) -> Floats | None:
     """The source estimated anew with an image, (steps,); None: that of the problem."""
     return estimate_source(problem, speed, settings.window_s) if settings.estimates_source else None
-
-
-def resampled(image: Image, spacing: float, origin: tuple[float, float], shape: tuple[int, ...]) -> Floats:
-    """An image on another grid, (nx, ny), m/s; extrapolated by its outermost nodes."""
-    lines = [
-        (origin[axis] + spacing * np.arange(nodes) - image.origin[axis]) / image.spacing
-        for axis, nodes in enumerate(shape)
-    ]
-    places = np.meshgrid(*lines, indexing="ij")
-    # Cubic, because linear interpolation blurs at every change of grid; cubic may overshoot.
-    speed = map_coordinates(image.speed, places, order=3, mode="nearest")
-    return np.asarray(np.clip(speed, image.speed.min(), image.speed.max()))

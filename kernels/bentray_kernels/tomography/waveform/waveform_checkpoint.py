@@ -7,13 +7,14 @@ from types import MappingProxyType
 
 from .. import checkpoint
 from .band_inversion import Evaluation, InversionState
-from .inversion_state import ActiveBand, BandEnd, Image, RefinementCheckpoint
+from .inversion_state import ActiveBand, BandEnd, Curvature, Image, RefinementCheckpoint
 from .validation import Validation, ValidationCheckpoint
 
 RECORDS = (
     RefinementCheckpoint,
     BandEnd,
     ActiveBand,
+    Curvature,
     Image,
     InversionState,
     Evaluation,

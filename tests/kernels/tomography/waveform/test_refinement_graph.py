@@ -125,6 +125,26 @@ def test_state_of_a_step_holds_no_problem():
     assert np.array_equal(graph.image.speed, refined().image.speed)
 
 
+def test_a_band_begins_with_the_curvature_of_the_band_before():
+    graph = begun()
+    tasks, curvatures, begun_with = graph.first(), [], []
+    while tasks:
+        task = tasks.pop(0)
+        if task.function is start_band:
+            curvatures.append(task.arguments[3])
+        result = task.function(*task.arguments)
+        tasks = graph.after(task, result) + tasks
+        if task.function is start_band:
+            begun_with.append(len(result.state.steps))
+            # A checkpoint has the pairs once.
+            assert all(end.curvature is None for end in graph.ends)
+    assert curvatures[0] is None
+    assert begun_with[0] == 0
+    assert begun_with[1] == len(curvatures[1].steps) == SETTINGS.bands[0].iterations
+    # The attenuation is another unknown.
+    assert begun_with[2] == 0
+
+
 def test_after_a_stop_bands_of_the_speed_are_left_out_and_the_loss_is_not():
     graph = begun()
     (task,) = graph.first()

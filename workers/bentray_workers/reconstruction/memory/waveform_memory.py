@@ -148,7 +148,8 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
         + 2 * traces.read_bytes
         + max(SAMPLER_BYTES * traces.samples * extent.steps, SHOTS * SHOT_BYTES * samples)
         + medium
-        + 12 * image,
+        # With the L-BFGS pairs of the band before, on its grid and on this one.
+        + (12 + 4 * WaveSettings((band,)).memory) * image,
         "evaluate_emitter": base + in_flight + LOOK_BYTES * samples + medium + 4 * image,
         # The results of all emitters, and the L-BFGS pairs before and after.
         # Threads of compiled code keep the memory of the stored fields, see ``adjoint``.
