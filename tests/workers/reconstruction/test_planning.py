@@ -74,6 +74,9 @@ def test_tasks_stay_within_the_planned_memory(asked, elements, heights):
     measured = json.loads(done.stdout)
     told = plan(ring(elements, heights), Settings.of(**{"method": "sart", **settings}), []).call_bytes
     assert set(told) == set(measured)
+    # What freed arrays leave in a worker is not measured here.
+    parts = ray_task_parts(ring(elements, heights), Settings.of(**{"method": "sart", **settings}))
+    told = {name: size - parts[name].get("freed arrays", 0) for name, size in told.items()}
     # Of the smallest calls a few pages more or less that a fork happens to touch are a third.
     wrong = {
         name: (told[name], taken)

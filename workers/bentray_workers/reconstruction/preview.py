@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from bentray_kernels.arrays import Floats
 from bentray_kernels.tomography.checkpoint import unpack
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionCheckpoint
+from bentray_kernels.tomography.sart.block_checkpoint import BlockCheckpoint
 from bentray_kernels.tomography.waveform.inversion_state import RefinementCheckpoint
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
 from ..cluster.checkpoints import UNREADABLE
 from ..files.npy_headers import PARSING
+from .blocks.block_files import BLOCKS, SLOWNESS, BlockFiles
 
 # Nodes along a side; of more, every n-th is taken.
 MAX_NODES = 256
@@ -85,11 +87,17 @@ def _read(path: Path) -> dict[str, Any] | None:
             content = json.loads(bytes(npy.read_array(member, allow_pickle=False)))
         # Numbers in the place of the arrays.
         numbers = cast("list[NDArray[Any]]", range(len(archive.namelist()) - 1))
-        place = _place(unpack(content["state"], numbers, TYPES))
+        checkpoint = unpack(content["state"], numbers, TYPES)
+        place = _place(checkpoint)
         if place is None:
             return None
-        with archive.open(f"{place.array}.npy") as member:
-            image, every = _middle_plane(member)
+        if not isinstance(checkpoint, BlockCheckpoint):
+            with archive.open(f"{place.array}.npy") as member:
+                image, every = _middle_plane(member)
+    if isinstance(checkpoint, BlockCheckpoint):
+        # They are parsed by their own reader, one at a time too.
+        files = BlockFiles(path.parent.parent / BLOCKS, (checkpoint.nodes,), checkpoint.blocks)
+        image, every = files.middle_plane(files.state(checkpoint.updates), SLOWNESS, MAX_NODES)
     speed = 1.0 / image if place.slowness else image
     return {
         "shape": list(speed.shape),
@@ -108,6 +116,9 @@ def _place(checkpoint: Any) -> _Place | None:
         state = checkpoint.state
         grid = checkpoint.spacing, checkpoint.origin
         return _Place(cast(int, state.slowness), True, checkpoint.stage, state.sweep, *grid)
+    if isinstance(checkpoint, BlockCheckpoint) and checkpoint.updates:
+        # Its images are in files of their own.
+        return _Place(0, True, 0, checkpoint.state.sweep, checkpoint.spacing, checkpoint.origin)
     if isinstance(checkpoint, RefinementCheckpoint):
         band, ends = checkpoint.band, checkpoint.ends
         if band is not None and band.frozen is None:

@@ -36,7 +36,8 @@ from ..files.reconstruction import write_reconstruction
 from ..files.reference import read_reference, reference_path
 from ..files.volume_export import FREQUENCY
 from .blocks.block_choice import settled_blocks
-from .blocks.block_graph import BLOCKS, BlockSartGraph
+from .blocks.block_files import BLOCKS
+from .blocks.block_graph import BlockSartGraph
 from .device_of_job import settled
 from .file_scan import FileEchoScan, FileScan, FileWaveScan
 from .picking_graph import PickingFiles, PickingGraph, PickingGuide, PickingSource

@@ -1,5 +1,6 @@
 """SART in blocks: the image of the whole volume, the same bits on every pool, and after an interruption."""
 
+import base64
 import shutil
 
 import numpy as np
@@ -14,7 +15,9 @@ from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_kernels.tomography.reconstruction import MemoryScan
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction import reconstruction_run
-from bentray_workers.reconstruction.blocks.block_graph import BLOCKS, BlockSartGraph
+from bentray_workers.reconstruction.blocks.block_files import BLOCKS
+from bentray_workers.reconstruction.blocks.block_graph import BlockSartGraph
+from bentray_workers.reconstruction.preview import checkpoint_image
 
 from ....effort import effort
 from ...cluster.tearing import torn_runs
@@ -24,7 +27,7 @@ PLAN = Settings.of(method="sart", nodes=20, decomposition="volume", iterations=2
 WAYS = {
     "curved": ({"iterations": effort(1, 2)}, 3),
     "straight": ({"rays": "straight", "iterations": 1}, 3),
-    "several emitters an update, wide smoothing": ({"subset": 3, "smoothing_nodes": 2.5, "iterations": 1}, 4),
+    "several emitters an update, wide smoothing": ({"subset": 3, "smoothing_nodes": 2.5, "iterations": 2}, 4),
     "many blocks": ({"iterations": 1}, effort(6, 20)),
 }
 
@@ -89,6 +92,22 @@ def test_bits_depend_neither_on_workers_nor_on_interruptions(cluster, path, tmp_
     assert left == [f"state-{updates - 1:07d}", f"state-{updates:07d}"]
 
 
+def test_the_order_of_results_does_not_matter(scan, tmp_path):
+    plan = PLAN.changed(blocks=4, iterations=1)
+    found = []
+    for turn in (1, -1):
+        graph = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / f"{turn}")
+        tasks = graph.first()
+        while tasks:
+            results = [(task, task.function(*task.arguments)) for task in tasks]
+            following = [graph.after(*one) for one in results[::turn]]
+            assert not any(following[:-1]), "the next round begins when all results are there"
+            tasks = following[-1]
+        found.append(graph.state)
+    assert np.array_equal(found[0].slowness, found[1].slowness)
+    assert found[0].history == found[1].history
+
+
 def test_a_run_whose_files_are_gone_begins_again(scan, tmp_path):
     plan = PLAN.changed(blocks=2, iterations=1)
     graph = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)
@@ -105,6 +124,25 @@ def test_a_run_whose_files_are_gone_begins_again(scan, tmp_path):
     gone = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)
     gone.restore(reached)
     assert other.done == gone.done == 0
+
+
+def test_an_unfinished_volume_has_a_preview(path, tmp_path, monkeypatch):
+    monkeypatch.setattr("bentray_workers.reconstruction.preview.MAX_NODES", 7)
+    work = tmp_path / "work"
+    seen = []
+
+    def look():
+        seen.append(checkpoint_image(work / reconstruction_run.CHECKPOINTS))
+
+    plan = PLAN.changed(blocks=3, iterations=1)
+    result = reconstruction_run.reconstruct(None, path, plan, work_dir=work, on_saved=look)
+    assert seen[0] is None, "before the first update there is no image"
+    last = seen[-1]
+    assert (last["every"], last["shape"], last["iteration"]) == (3, [7, 7], 1)
+    speed = np.frombuffer(base64.b64decode(last["speed"]), "<f4").reshape(7, 7)
+    assert np.allclose(speed, result.speed[::3, ::3, result.speed.shape[2] // 2], rtol=1e-6, atol=0.0)
+    assert last["spacing_m"] == pytest.approx([3 * result.spacing_m[0]] * 2)
+    assert last["origin_m"] == list(result.origin_m[:2])
 
 
 @pytest.mark.parametrize(

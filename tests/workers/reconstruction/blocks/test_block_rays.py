@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels import eikonal
-from bentray_kernels.rays.descent import CAUGHT
+from bentray_kernels.rays.descent import ARRIVED, CAUGHT, LEFT
 from bentray_kernels.rays.sensitivity import sensitivities
 from bentray_workers.reconstruction.blocks.block_files import (
     SLOWNESS,
@@ -16,6 +16,7 @@ from bentray_workers.reconstruction.blocks.block_files import (
 )
 from bentray_workers.reconstruction.blocks.block_rays import RaysInBlocks, in_nodes
 from bentray_workers.reconstruction.blocks.block_tasks import (
+    TracedParts,
     back_project_in_block,
     sum_names,
     trace_rays_in_block,
@@ -93,6 +94,35 @@ def test_rays_equal_those_of_the_whole_grid(tmp_path, kind, contrast, blocks):
         assert any(caught for _, caught in found), "some rays go from node to node"
     if kind == "curved":
         assert all(visits <= 3 * blocks + 4 for visits, _ in found), "each block is visited about once"
+
+
+def test_a_caught_ray_begins_again_and_its_first_parts_count_nothing(tmp_path):
+    files = BlockFiles(tmp_path, SHAPE, 3)
+    receivers = np.array([[17.0, 5.0, 5.0], [14.0, 5.0, 5.0]])
+    rays = RaysInBlocks(files, receivers, np.array([1.0, 5.0, 5.0]), curved=True, name="0")
+    assert rays.next_blocks() == [2]
+    some, mine, points = rays.visit(2)
+    assert some.counts.tolist() == [1, 1]
+    reached, starts = np.array([[7.0, 5.0, 5.0]] * 2), np.array([0, 11, 19])
+    left = TracedParts(starts, np.array([LEFT, LEFT]), reached, np.array([1.0, 2.0]), np.array([10.0, 7.0]))
+    rays.visited(2, mine, points, left)
+    assert rays.next_blocks() == [1]
+    some, mine, points = rays.visit(1)
+    assert some.counts.tolist() == [11, 8]
+    ends, ended = np.array([CAUGHT, ARRIVED]), np.array([[0.0] * 3, [1.0, 5.0, 5.0]])
+    rays.visited(
+        1, mine, points, TracedParts(np.array([0, 0, 7]), ends, ended, np.array([0.0, 3.0]), np.ones(2))
+    )
+    assert rays.predicted.tolist() == [0.0, 5.0]
+    assert rays.lengths.tolist() == [0.0, 8.0]
+    assert rays.next_blocks() == [2], "at its receiver"
+    some, mine, _ = rays.visit(2)
+    assert (mine.tolist(), some.counts.tolist(), some.by_nodes.tolist()) == ([0], [1], [True])
+    assert np.array_equal(some.places, receivers[:1])
+    first, second = rays.back_projected(np.array([0.5, 0.25]))[2][0], rays.back_projected(np.ones(2))[1][0]
+    assert np.isnan(first.corrections[0])
+    assert first.corrections[1] == 0.25
+    assert np.isnan(second.corrections[0])
 
 
 def test_a_block_without_valid_rays_adds_nothing(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import secrets
 import shutil
@@ -19,6 +20,9 @@ from bentray_kernels.rays.block_tracing import BlockPlanes
 from ...files.atomic import atomic_replace
 from ...files.npy_headers import PARSING
 
+# Folder of the files in that of the job.
+BLOCKS = "blocks"
+
 # Names of the state after each update, and of the nodes that may change.
 SLOWNESS, COVERAGE, REGION = "slowness", "coverage", "region"
 
@@ -30,7 +34,7 @@ class BlockFiles(NamedTuple):
 
     Attributes:
         folder: every worker can read and write it.
-        shape: (nx, ny, nz) of the volume.
+        shape: (nx, ny, nz) of the volume, or (nx,) where only planes are read.
         blocks: their number.
     """
 
@@ -99,6 +103,24 @@ class BlockFiles(NamedTuple):
                 path = folder / file_name(own, block)
                 planes[first - low : last - low] = read_planes(path, first - start, last - start)
         return planes
+
+    def middle_plane(self, folder: Path, name: str, most: int) -> tuple[Floats, int]:
+        """The plane across z in its middle, every n-th node along x and y, and n.
+
+        Args:
+            folder, name: as for ``read``.
+            most: nodes along x and y.
+        """
+        rows, every = [], 1
+        for block in range(self.blocks):
+            start, stop = self.bounds(block)
+            path = folder / file_name(name, block)
+            if not block:
+                every = math.ceil(max(self.shape[0], *read_planes(path, 0, 1).shape[1:2]) / most)
+            for plane in range(start + -start % every, stop, every):
+                one = read_planes(path, plane - start, plane - start + 1)[0]
+                rows.append(one[::every, one.shape[1] // 2])
+        return np.array(rows), every
 
 
 def file_name(name: str, block: int) -> str:

@@ -30,9 +30,6 @@ from .block_tasks import (
     update_block,
 )
 
-# Folder of the files of blocks in that of the job.
-BLOCKS = "blocks"
-
 # Tasks that can run at the same time, then their results in the same order.
 Rounds = Generator[list[Task], list[Any], None]
 

@@ -9,7 +9,11 @@ from bentray_kernels.rays.block_tracing import ABOVE, BELOW, GUARD
 from bentray_kernels.tomography.sart.sart_update import smoothing_reach
 from bentray_kernels.tomography.settings import Settings
 
-from ...cluster.capacities import REAL
+from ...cluster.capacities import MIB, REAL
+
+# Freed arrays of up to 32 MiB remain with the process (glibc), those of rays and updates beside the sweeps: a
+# worker took up to 1.8 times the memory of its largest task, see ``bentray bench volume_in_blocks``.
+KEPT_ARRAYS, KEPT_ARRAY_BYTES = 8, 32 * MIB
 
 # Arrays of the nodes of a block beside the five of the sweeps: slowness and times, and their copies.
 SWEEP_ARRAYS = 4
@@ -52,7 +56,8 @@ def block_task_parts(shape: tuple[int, ...], receivers: int, settings: Settings)
     if settings.rays == "curved":
         swept: int = 5 * REAL * Diagonals.of((own, *shape[1:])).size
         parts["sweep_block"] = {"a block": SWEEP_ARRAYS * REAL * own * plane, "sweeps": swept}
-    return parts
+    kept = KEPT_ARRAYS * min(KEPT_ARRAY_BYTES, REAL * near * plane)
+    return {name: {**sizes, "freed arrays": kept} for name, sizes in parts.items()}
 
 
 def block_files_bytes(shape: tuple[int, ...]) -> int:
