@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-CHROMIUM = Path("/usr/bin/chromium")
+# Of the packages chromium-headless-shell and chromium.
+PROGRAMS = Path("/usr/bin/chromium-headless-shell"), Path("/usr/bin/chromium")
 # Of a page: the machine may compile kernels first.
 PATIENCE_MS = 600_000.0
 
@@ -18,7 +19,8 @@ def browser(size: tuple[int, int]) -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        program = next((path for path in PROGRAMS if path.exists()), PROGRAMS[0])
+        started = playwright.chromium.launch(executable_path=str(program), args=["--no-sandbox"])
         page = started.new_page(viewport={"width": size[0], "height": size[1]})
         page.set_default_timeout(PATIENCE_MS)
         yield page
