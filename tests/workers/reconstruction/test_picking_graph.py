@@ -215,7 +215,7 @@ def test_waves_are_refined_from_channels_put_back(tmp_path, monkeypatch):
     """As far as the problem of the first band; from there on only that counts."""
     problems = []
 
-    def begun(dataset, settings, scan_of, drive, waves_of, samples, echoes):
+    def begun(dataset, settings, scan_of, drive, waves_of, samples, echoes, graph_of):
         problems.append(waves_of(SETTINGS, 0).problem(0))
         raise Cancelled
 
