@@ -23,7 +23,7 @@ from .access.quota import Quota
 from .access.sign_in import SignIn
 from .compute import Cluster, Compute
 from .files.checked_store import CheckedStore
-from .files.data_folder import Files, lock
+from .files.data_folder import Files, installation_of, lock
 from .files.deletion import Deletion
 from .files.open_store import open_store
 from .files.orphans import Orphans
@@ -179,7 +179,7 @@ def _open(
     stack.enter_context(private_files())
     files = Files(settings.data_dir)
     files.prepare()
-    stack.enter_context(lock(files.root))
+    locked = stack.enter_context(lock(files.root))
     files.check_restored()
     files.give_to_local()
     files.drop_leftovers()
@@ -215,7 +215,7 @@ def _open(
                 tls=settings.tls_dir,
             )
         )
-    queue, compute = Queue(database), Compute(cluster, store.fetch)
+    queue, compute = Queue(database, installation_of(locked)), Compute(cluster, store.fetch)
     runner = Runner(
         queue,
         files,
@@ -223,8 +223,6 @@ def _open(
         settings.jobs_at_once,
         settings.tenants_at_once,
         settings.min_free_bytes,
-        # The lock on the data folder excludes other services from its SQLite database.
-        alone=settings.database_url is None,
     )
     runner.start()
     stack.callback(runner.stop)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import fcntl
 import logging
+import re
+import secrets
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import IO
@@ -114,7 +116,7 @@ def lock(root: Path) -> IO[bytes]:
     Raises:
         InvalidInput: when another service uses the folder.
     """
-    handle = (root / "service.lock").open("ab")
+    handle = (root / "service.lock").open("a+b")
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
@@ -123,3 +125,18 @@ def lock(root: Path) -> IO[bytes]:
             "data_dir", f"{root}, in use by another service", "a separate folder for every service"
         ) from error
     return handle
+
+
+def installation_of(locked: IO[bytes]) -> str:
+    """The id of a locked data folder, 16 hexadecimal digits; written into the lock file at the first start.
+
+    Only one process at a time has it, so whatever an earlier one has left under this id belongs to nobody.
+    """
+    locked.seek(0)
+    text = locked.read(17).decode(errors="replace")
+    if re.fullmatch("[0-9a-f]{16}", text):
+        return text
+    locked.truncate(0)
+    locked.write(secrets.token_hex(8).encode())
+    locked.flush()
+    return installation_of(locked)

@@ -75,19 +75,15 @@ class Runner:
         at_once: int,
         tenants: int,
         min_free_bytes: int,
-        *,
-        alone: bool,
     ) -> None:
         """Args:
         at_once: maximum number of running jobs.
         tenants: the same including one job of each tenant without another.
-        alone: whether no other service uses the database; see ``Queue.recover``.
         """
         self._queue = queue
         self._files = files
         self._compute = compute
         self._min_free_bytes = min_free_bytes
-        self._alone = alone
         self._at_once = at_once
         self._most = max(at_once, tenants)
         self._shares = Shares()
@@ -108,7 +104,7 @@ class Runner:
 
     def _recover(self) -> None:
         crashed = CRASHED.model_dump(exclude_none=True)
-        again = self._queue.recover(crashed, alone=self._alone, held=self._held())
+        again = self._queue.recover(crashed, held=self._held())
         if again:
             log.warning("%d jobs of a dead service are queued again", again)
             self.notify()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import secrets
-import socket
 import time
 from collections.abc import Collection
 from typing import Any, cast
@@ -31,9 +29,15 @@ class Queue:
     lease no longer changes the job.
     """
 
-    def __init__(self, database: Database) -> None:
+    def __init__(self, database: Database, installation: str | None = None) -> None:
+        """Args:
+        database: with the jobs.
+        installation: the id of the data folder that this process has locked (``installation_of``). Leases of
+            the same id belong to dead processes and are taken over at once. None: leases must expire.
+        """
         self._database = database
-        self._owner = f"{socket.gethostname()[:40]}-{os.getpid()}-{secrets.token_hex(4)}"
+        self._prefix = f"{installation or secrets.token_hex(8)}-"
+        self._owner = self._prefix + secrets.token_hex(4)
 
     def state(self, job_id: str) -> str:
         """The state of one job."""
@@ -95,16 +99,10 @@ class Queue:
             if job_id is None:
                 return None
             now = time.time()
-            fresh: Plain = {
-                "done": 0,
-                "total": 0,
-                "phase": None,
-                "history": [],
-                "attempts": jobs.c.attempts + 1,
-                "started": now,
-            }
+            # The progress of an earlier attempt stays until the first report: jobs resume from checkpoints.
+            begun: Plain = {"attempts": jobs.c.attempts + 1, "started": now}
             lease: Plain = {"lease_owner": self._owner, "lease_until": now + LEASE_S}
-            change(connection, job_id, ("queued",), "running", self._owner, **fresh, **lease)
+            change(connection, job_id, ("queued",), "running", self._owner, **begun, **lease)
             claimed = select(jobs).where(jobs.c.id == job_id)
             return cast(JobRow, dict(connection.execute(claimed).mappings().one()))
 
@@ -199,14 +197,13 @@ class Queue:
             connection, job_id, before, after, note, held, **values, lease_owner=None, lease_until=None
         )
 
-    def recover(self, crashed: Plain, *, alone: bool, held: Collection[str] = ()) -> int:
+    def recover(self, crashed: Plain, *, held: Collection[str] = ()) -> int:
         """Take over jobs of dead services: running jobs are queued again, cancelling jobs end.
 
         A job whose service died ``MAX_ATTEMPTS`` times without progress fails with ``crashed``.
 
         Args:
             crashed: the problem.
-            alone: whether no other service uses this database; otherwise only expired leases are taken over.
             held: the jobs that run in this service; its other jobs were claimed over a broken connection.
 
         Returns:
@@ -214,8 +211,8 @@ class Queue:
         """
         now, again = time.time(), 0
         dead: ColumnElement[bool] = func.coalesce(jobs.c.lease_until, 0.0) < now
-        if alone:
-            dead = or_(dead, jobs.c.lease_owner.is_distinct_from(self._owner))
+        predecessor = jobs.c.lease_owner.startswith(self._prefix, autoescape=True)
+        dead = or_(dead, and_(predecessor, jobs.c.lease_owner != self._owner))
         dead = and_(dead, jobs.c.id.not_in(held))
         left = select(jobs).where(jobs.c.state.in_(RUNNING), dead).with_for_update(skip_locked=True)
         free: Plain = {"lease_owner": None, "lease_until": None}

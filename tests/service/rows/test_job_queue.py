@@ -90,15 +90,16 @@ def test_release_is_no_attempt(jobs, queue, dataset):
     queue.release(job["id"], "a reason")
     row = jobs.get(LOCAL, job["id"])
     assert (row["state"], row["attempts"], row["started"]) == ("queued", 0, None)
-    assert queue.claim()["done"] == 0
+    again = queue.claim()
+    assert (again["done"], again["total"]) == (3, 9), "it resumes from its checkpoint"
 
 
 def test_a_job_that_kills_the_service_is_given_up(database, jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     ends = []
     for _ in range(3):
-        Queue(database).claim()
-        queue.recover(PROBLEM, alone=True)
+        Queue(database, "folder").claim()
+        Queue(database, "folder").recover(PROBLEM)
         ends.append(queue.state(job["id"]))
     assert ends == ["queued", "queued", "failed"]
 
@@ -106,10 +107,10 @@ def test_a_job_that_kills_the_service_is_given_up(database, jobs, queue, dataset
 def test_job_with_progress_is_retried(database, jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     for _ in range(8):
-        dying = Queue(database)
+        dying = Queue(database, "folder")
         assert dying.claim()["id"] == job["id"]
         dying.reset_attempts(job["id"])
-        assert queue.recover(PROBLEM, alone=True) == 1
+        assert Queue(database, "folder").recover(PROBLEM) == 1
     assert jobs.get(LOCAL, job["id"])["attempts"] == 1
     assert [event["state"] for event in jobs.events(LOCAL, job["id"])] == [
         "queued",
@@ -117,18 +118,29 @@ def test_job_with_progress_is_retried(database, jobs, queue, dataset):
     ]
 
 
+def test_a_service_takes_over_the_jobs_of_its_data_folder_at_once_and_no_others(database, jobs, dataset):
+    made = {name: jobs.add(LOCAL, "reconstruction", {}, dataset)["id"] for name in ("one", "one_", "other")}
+    for name in made:
+        Queue(database, name).claim()
+    again = Queue(database, "one")
+    assert again.recover(PROBLEM) == 1
+    assert [again.state(job) for job in made.values()] == ["queued", "running", "running"]
+    assert again.claim()["id"] == made["one"]
+    assert again.recover(PROBLEM) == 0, "its own job is at work"
+
+
 def test_second_service_claims_only_expired_jobs(database, jobs, queue, dataset, monkeypatch):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     other = Queue(database)
     other.claim()
-    assert queue.recover(PROBLEM, alone=False) == 0
+    assert queue.recover(PROBLEM) == 0
     later = time.time() + LEASE_S + 1.0
     monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later)
     other.renew([job["id"]])
-    assert queue.recover(PROBLEM, alone=False) == 0
+    assert queue.recover(PROBLEM) == 0
     monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later + LEASE_S + 1.0)
-    assert other.recover(PROBLEM, alone=False, held=[job["id"]]) == 0, "its own job is at work"
-    assert queue.recover(PROBLEM, alone=False) == 1
+    assert other.recover(PROBLEM, held=[job["id"]]) == 0, "its own job is at work"
+    assert queue.recover(PROBLEM) == 1
     assert queue.claim()["id"] == job["id"]
     # The first one wakes up and has lost its job.
     assert other.held_state(job["id"]) is None
@@ -145,10 +157,10 @@ def test_lost_claim_is_reclaimed(jobs, queue, dataset, monkeypatch):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     queue.claim()
     queue.renew([])
-    assert queue.recover(PROBLEM, alone=True) == 0, "it may be on its way"
+    assert queue.recover(PROBLEM) == 0, "it may be on its way"
     later = time.time() + LEASE_S + 1.0
     monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later)
-    assert queue.recover(PROBLEM, alone=True) == 1
+    assert queue.recover(PROBLEM) == 1
     assert queue.claim()["id"] == job["id"]
 
 
