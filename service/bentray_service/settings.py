@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -13,6 +15,25 @@ from sqlalchemy.exc import ArgumentError
 from bentray_kernels.errors import InvalidInput
 
 GIB = 1024**3
+PREFIX = "BENTRAY_"
+
+# Read by other parts of Bentray: kernels, worker, client, image.
+OF_OTHER_PARTS = {
+    f"{PREFIX}{name}"
+    for name in (
+        *("DEVICE", "OPENCL_DEVICE", "PYTHON"),
+        *("WORKER_MEMORY", "KEY", "PROJECT", "COMPILED", "DOCUMENTATION"),
+    )
+}
+# Read by docker-compose.yml, which passes its whole .env to the service.
+OF_COMPOSE = {
+    f"{PREFIX}{name}"
+    for name in (
+        *("PUBLISH", "WORKER_CONTAINER_MEMORY", "FIRST_KEY_SECRET", "DATABASE_PASSWORD_SECRET"),
+        *(f"{part}_CPUS" for part in ("SERVICE", "SCHEDULER", "WORKER", "DATABASE")),
+        *(f"{part}_MEMORY" for part in ("SERVICE", "SCHEDULER", "DATABASE")),
+    )
+}
 
 
 class ServiceSettings(BaseSettings):
@@ -22,7 +43,7 @@ class ServiceSettings(BaseSettings):
     usual name in Dask.
     """
 
-    model_config = SettingsConfigDict(env_prefix="BENTRAY_", frozen=True)
+    model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True)
 
     data_dir: Path = Field(
         Path("bentray-data"), description="Folder of the datasets, volumes and the database."
@@ -204,9 +225,30 @@ class ServiceSettings(BaseSettings):
             first = error.errors()[0]
             name = str(first["loc"][0]).upper()
             if not name.startswith("DASK_"):
-                name = f"BENTRAY_{name}"
+                name = f"{PREFIX}{name}"
             accepted = first["msg"].removeprefix("Input should be ")
             raise InvalidInput(name, repr(first["input"]), accepted) from None
+
+    @classmethod
+    def unused_variables(cls, environment: Mapping[str, str], options: Mapping[str, str]) -> Iterator[str]:
+        """A sentence for each variable that has no effect: of no setting, or overridden by an option.
+
+        Args:
+            environment: all variables; case does not count, as for ``load``.
+            options: the options given, by the name of their setting: option and value, as ``--port 8000``.
+        """
+        settings = {f"{PREFIX}{name.upper()}": name for name in cls.model_fields}
+        for variable in sorted(name for name in environment if name.upper().startswith(PREFIX)):
+            name = variable.upper()
+            if name in settings:
+                option = options.get(settings[name])
+                if option is not None and environment[variable] != option.partition(" ")[2]:
+                    yield f"{variable} has no effect: {option} is given and overrides it."
+            elif name not in OF_OTHER_PARTS | OF_COMPOSE:
+                known = [one.removeprefix(PREFIX) for one in (*settings, *OF_OTHER_PARTS)]
+                nearest = get_close_matches(name.removeprefix(PREFIX), known, 1)
+                hint = f"; the nearest is {PREFIX}{nearest[0]}" if nearest else ""
+                yield f"{variable} has no effect: no such setting{hint}."
 
     @property
     def database(self) -> str:

@@ -102,7 +102,7 @@ class Installation:
         if part == "database":
             words = [str(self.database.folder_of_programs / words[0]), *words[1:]]
             words += ["--host=127.0.0.1", f"--port={self.database.port}"]
-        elif words[-1] == "bentray_service.healthcheck":
+        elif part == "service":
             words.append(self.url)
         return subprocess.run(words, env=environment, capture_output=True, check=False).returncode == 0
 
@@ -130,7 +130,7 @@ class Installation:
         asked = self.services[part]["environment"]
         return {
             **{name: os.environ[name] for name in needed if name in os.environ},
-            **{name: self.mapped(str(value)) for name, value in asked.items()},
+            **{name: self.mapped(str(value)) for name, value in asked.items() if value is not None},
             "NUMBA_NUM_THREADS": "1",
         }
 

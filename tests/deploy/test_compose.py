@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -15,13 +16,16 @@ import yaml
 
 from bentray_service.cli import app
 from bentray_service.rows.api_key import ApiKey
-from bentray_service.settings import ServiceSettings
+from bentray_service.settings import OF_COMPOSE, OF_OTHER_PARTS, ServiceSettings
 from bentray_workers.cluster.dask_settings import SETTINGS
 
 from . import compose
 
 DEPLOY = compose.ROOT / "deploy"
 OURS = ("scheduler", "worker", "service")
+FIELDS = {f"BENTRAY_{name.upper()}" for name in ServiceSettings.model_fields} - {
+    "BENTRAY_DASK_SCHEDULER_ADDRESS"
+} | {"DASK_SCHEDULER_ADDRESS"}
 
 
 @pytest.fixture(scope="module")
@@ -88,12 +92,13 @@ def test_every_part_is_locked_down_and_limited(file: dict[str, Any]) -> None:
         assert part["healthcheck"]["test"][0] == "CMD", name
         assert part["restart"] == "unless-stopped", name
         assert "privileged" not in part, name
-    assert file["services"]["service"]["healthcheck"]["test"] == [
-        "CMD",
-        "python",
-        "-m",
-        "bentray_service.healthcheck",
-    ]
+        assert part["logging"]["options"].keys() == {"max-size", "max-file"}, name
+    for name in OURS:
+        # One that hangs is restarted, without anything that only some engines have.
+        test = file["services"][name]["healthcheck"]["test"]
+        assert test[:5] == ["CMD", "python", "-m", "bentray_service.healthcheck", "--restart-after"]
+        assert "init" not in file["services"][name]
+    assert file["services"]["service"]["healthcheck"]["test"][6:] == [], "liveness, not readiness"
 
 
 def test_images_are_pinned_and_ours_runs_as_an_ordinary_user(file: dict[str, Any]) -> None:
@@ -132,9 +137,37 @@ def test_no_password_is_in_the_file_and_git_ignores_where_it_is(file: dict[str, 
 
 def test_every_variable_and_setting_is_known(file: dict[str, Any]) -> None:
     told = (DEPLOY / "README.md").read_text()
-    assert [name for name in sorted(compose.variables()) if f"`{name}`" not in told] == []
-    fields = {f"BENTRAY_{name.upper()}" for name in ServiceSettings.model_fields} | {"DASK_SCHEDULER_ADDRESS"}
-    assert set(file["services"]["service"]["environment"]) <= fields
+    assert [name for name in sorted(compose.variables() - FIELDS) if f"`{name}`" not in told] == []
+    assert set(file["services"]["service"]["environment"]) <= FIELDS
+    assert compose.variables() - FIELDS - OF_OTHER_PARTS == OF_COMPOSE
+
+
+def test_every_setting_in_dotenv_reaches_the_service(file: dict[str, Any], tmp_path: Path) -> None:
+    service = file["services"]["service"]
+    assert service["env_file"] == [{"path": ".env", "required": False}]
+    # Variables of the file override those of .env, so each must take its value from there.
+    fixed = {name: value for name, value in service["environment"].items() if value is not None}
+    assert set(fixed) <= compose.variables()
+    # What options of the command fix is said at the start.
+    assert service["command"] == [
+        "bentray",
+        "serve",
+        "--host",
+        "0.0.0.0",
+        "--port",
+        "8000",
+        "--data",
+        "/data",
+    ]
+    words = client()
+    if words is None:
+        pytest.skip("no compose client here, so .env was not read by one: apt-get install docker-compose")
+    shutil.copy(compose.FILE, tmp_path)
+    (tmp_path / ".env").write_text("".join(f"{name}=here\n" for name in sorted(FIELDS)))
+    command = [*words, "config", "--format", "json"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    reached = json.loads(done.stdout)["services"]["service"]["environment"]
+    assert {name: reached.get(name) for name in FIELDS} == dict.fromkeys(FIELDS, "here")
 
 
 def test_the_scheduler_runs_under_our_settings_of_dask(file: dict[str, Any]) -> None:
@@ -186,3 +219,34 @@ def test_compiled_kernels_are_copied_once_to_the_numba_cache(tmp_path: Path) -> 
         assert done.stdout == "the command, as it is\n"
         assert (cache / "folder" / "kernel.nbc").read_text() == content
         (cache / "folder" / "kernel.nbc").write_text("compiled since")
+
+
+@pytest.mark.parametrize(
+    ("version", "memory", "said"),
+    [
+        ("2.24.0", 16e9, []),
+        ("v2.23.3", 16e9, ["docker compose 2.23.3; 2.24 or later reads .env for the service"]),
+        ("", 16e9, ["no docker compose; install its plugin, 2.24 or later"]),
+        ("5.0.1", 4e9, ["4000 MB of memory; a service with one worker needs 8 GB"]),
+    ],
+)
+def test_the_check_says_what_a_machine_lacks(
+    tmp_path: Path, version: str, memory: float, said: list[str]
+) -> None:
+    docker = tmp_path / "docker"
+    docker.write_text(
+        f'#!/bin/sh\ncase "$*" in *version*) echo {version};; *format*) echo {memory:.0f};; esac\n'
+    )
+    docker.chmod(0o755)
+    subprocess.run([str(DEPLOY / "secrets.sh"), str(tmp_path)], check=True)
+    environment = {
+        **os.environ,
+        "PATH": f"{tmp_path}:{os.environ['PATH']}",
+        "BENTRAY_FIRST_KEY_SECRET": str(tmp_path / "first-key"),
+        "BENTRAY_DATABASE_PASSWORD_SECRET": str(tmp_path / "database-password"),
+    }
+    done = subprocess.run(
+        [str(DEPLOY / "check.sh")], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == bool(said)
+    assert [line.removeprefix("check.sh: ")[: len(said[0])] for line in done.stderr.splitlines()] == said

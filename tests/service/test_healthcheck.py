@@ -2,16 +2,25 @@
 
 import fcntl
 import os
+import signal
 import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+from contextlib import suppress
 
 import pytest
 
-from bentray_service.healthcheck import check, check_scheduler, check_worker, main
+from bentray_service import healthcheck
+from bentray_service.healthcheck import (
+    check_alive,
+    check_ready,
+    check_scheduler,
+    check_worker,
+    main,
+)
 from bentray_workers.cluster import heartbeat
 
 
@@ -23,17 +32,71 @@ def wait_for(heard):
     return heard
 
 
-def test_ready_service_passes(serve):
-    assert check(serve()) is None
-
-
-def test_failure_reason_is_shown(serve, cluster):
+def test_a_service_without_workers_is_alive_and_not_ready(serve, cluster):
+    url = serve()
+    assert (check_alive(url), check_ready(url)) == (None, None)
     cluster.workers = 0
-    assert "workers" in check(serve())
+    assert check_alive(url) is None
+    assert "workers" in check_ready(url)
 
 
 def test_unreachable_service_is_reported():
-    assert "no answer from a service at http://127.0.0.1:9" in check("http://127.0.0.1:9")
+    assert "no answer from a service at http://127.0.0.1:9" in check_alive("http://127.0.0.1:9")
+
+
+@pytest.fixture
+def container(monkeypatch, tmp_path):
+    """Kills in a made-up container; process 7 is its command, 9 a child of that, 30 is this check."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    for process, (name, parent) in {
+        1: ("tini", 0),
+        7: ("python", 1),
+        9: ("python", 7),
+        30: ("sh", 0),
+    }.items():
+        folder = tmp_path / "proc" / str(process)
+        folder.mkdir(parents=True)
+        (folder / "comm").write_text(f"{name}\n")
+        (folder / "stat").write_text(f"{process} ({name} x) S {parent} {'0 ' * 17}{500 + process} 0")
+    killed = []
+    monkeypatch.setattr(os, "kill", lambda process, number: killed.append((process, number)))
+    monkeypatch.setattr(healthcheck, "PROCESSES", tmp_path / "proc")
+    return killed
+
+
+def test_the_last_of_several_failures_in_a_row_ends_the_container(container, monkeypatch, tmp_path):
+    answers = []
+    monkeypatch.setitem(healthcheck.CHECKS, ("http",), lambda _url: answers.pop(0))
+
+    def checked(*given):
+        for one in given:
+            answers.append(one)
+            with suppress(SystemExit):
+                main(["--restart-after", "2"])
+        return len(container)
+
+    assert checked("x", "x", "x") == 0, "it has not started yet"
+    assert checked(None, "x", None, "x") == 0
+    assert checked("x") == 1
+    assert container == [(7, signal.SIGKILL)]
+    # In a folder that the container which follows has too.
+    (tmp_path / "proc/1/stat").write_text("1 (tini) S 0 " + "0 " * 17 + "900 0")
+    assert checked("x", "x", "x") == 1
+    # Elsewhere nothing is killed.
+    (tmp_path / "proc/1/comm").write_text("systemd\n")
+    assert checked(None, "x", "x", "x") == 1
+
+
+def test_a_worker_whose_scheduler_is_away_waits_for_it(container, monkeypatch):
+    away = [None, "x"]
+    monkeypatch.setitem(healthcheck.CHECKS, ("tcp", "worker"), lambda _address: away[0])
+    monkeypatch.setattr(healthcheck, "check_scheduler", lambda _address: away[1])
+    main(["--restart-after", "1", "tcp://scheduler:8786", "worker"])
+    for scheduler, killed in (("x", 0), (None, 1)):
+        away = ["x", scheduler]
+        with pytest.raises(SystemExit):
+            main(["--restart-after", "1", "tcp://scheduler:8786", "worker"])
+        assert len(container) == killed
 
 
 @pytest.fixture
@@ -108,6 +171,7 @@ def test_it_loads_the_standard_library_alone():
         (["http://127.0.0.1:9"], "no answer from a service"),
         (["ftp://x"], 2),
         (["tcp://127.0.0.1:9", "service"], 2),
+        (["--restart-after", "often"], 2),
     ],
 )
 def test_how_it_ends(words, code):

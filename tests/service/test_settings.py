@@ -29,6 +29,29 @@ def test_explicit_settings_take_precedence(monkeypatch):
     assert ServiceSettings.load(data_dir=Path("x")).data_dir == Path("x")
 
 
+@pytest.mark.parametrize(
+    ("variable", "value", "said"),
+    [
+        (
+            "BENTRAY_MAX_TENANT_BYTE",
+            "9",
+            "no such setting; the nearest is BENTRAY_MAX_TENANT_BYTES.",
+        ),
+        ("BENTRAY_OPENID_ISSUER", "x", "no such setting; the nearest is BENTRAY_OIDC_ISSUER."),
+        ("bentray_zzz", "x", "no such setting."),
+        ("BENTRAY_PORT", "9000", "--port 8000 is given and overrides it."),
+        ("BENTRAY_PORT", "8000", None),
+        ("bentray_keep_days", "9", None),
+        ("BENTRAY_DEVICE", "cpu", None),
+        ("BENTRAY_PUBLISH", "0.0.0.0:80", None),
+        ("DASK_SCHEDULER_ADDRESS", "x", None),
+    ],
+)
+def test_a_variable_without_effect_is_named(variable, value, said):
+    found = list(ServiceSettings.unused_variables({variable: value, "PATH": "/bin"}, {"port": "--port 8000"}))
+    assert found == ([f"{variable} has no effect: {said}"] if said else [])
+
+
 @pytest.mark.parametrize(("name", "value"), [("BENTRAY_PORT", "http"), ("BENTRAY_MAX_UPLOAD_BYTES", "-1")])
 def test_a_wrong_value_names_its_variable(monkeypatch, name, value):
     monkeypatch.setenv(name, value)

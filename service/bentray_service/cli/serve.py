@@ -76,9 +76,11 @@ def serve(
         name = error.field.removeprefix("BENTRAY_").lower()
         field = OPTIONS[name] if name in given else error.field
         raise InvalidInput(field, error.value, error.accepted) from error
+    shown = {name: f"{OPTIONS[name]} {value}" for name, value in given.items()}
+    unused = list(ServiceSettings.unused_variables(os.environ, shown))
     listening = _listen(settings.host, settings.port)
     try:
-        _run(settings, listening, as_json)
+        _run(settings, listening, unused, as_json)
     finally:
         listening.close()
 
@@ -106,7 +108,7 @@ def _listen(host: str, port: int) -> socket.socket:
     return listening
 
 
-def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> None:
+def _run(settings: ServiceSettings, listening: socket.socket, unused: list[str], as_json: bool) -> None:
     from .. import logs
     from ..app import create_app
     from ..malloc_arenas import limit_arenas
@@ -147,6 +149,8 @@ def _run(settings: ServiceSettings, listening: socket.socket, as_json: bool) -> 
     server = Announcing(app, settings)
     # Uvicorn exits when the application cannot start; the reason is raised below.
     with suppress(SystemExit), logs.configured(settings.log_format):
+        for words in unused:
+            _announce(settings, words)
         server.run(sockets=[listening])
     if server.interrupted:
         raise KeyboardInterrupt
