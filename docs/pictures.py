@@ -29,6 +29,7 @@ from bentray_kernels import eikonal, rays
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.phantoms import TABLE6_SIDE_M, TWO_HOLES, sampled, table6
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
+from bentray_kernels.tomography.comparison import compare
 from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
 from bentray_workers.files.dataset import write_dataset
@@ -38,7 +39,6 @@ from bentray_workers.images.captions import LABELS, NAMES
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map
 from bentray_workers.images.report import COLORMAPS
 from bentray_workers.images.slice import usual_limits
-from bentray_workers.images.truth_comparison import compare
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 
@@ -202,7 +202,7 @@ def overview() -> Image.Image:
     straight, bent = (reconstruct(scan, settings) for settings in ways)
     panels = [("Phantom", scan.truth.sound_speed_mps)]
     panels += [
-        (f"{name}: {compare(made, scan.truth, scan.roi).rmse_mps:.1f} m/s rms", made.speed)
+        (f"{name}: {compare(made, scan.truth, scan.roi).rms:.1f} m/s rms", made.speed)
         for name, made in (("Straight rays", straight), ("Bent rays", bent))
     ]
     figure, axes = plt.subplots(3, 1, figsize=(4.4, 8.8), layout="constrained", sharex=True)

@@ -14,11 +14,11 @@ from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
 from bentray_kernels.arrays import Floats, Ints
 from bentray_kernels.phantoms import Ellipsoid, Part, VolumePhantom
 from bentray_kernels.tomography import Problem, Reconstruction, Settings, reconstruct
+from bentray_kernels.tomography.comparison import on_grid
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import CONSTANTS, WATER_ALONE, Row
 from bentray_workers.images.canvas import drawing, new_figure
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
-from bentray_workers.images.truth_on_grid import on_grid
 
 from ..shared._baselines import Compared, Images
 from ..shared._image_error import ImageError

@@ -8,6 +8,7 @@ from typing import Any
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_kernels.tomography.comparison import compare
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import (
     BEST_CONSTANT,
@@ -17,7 +18,6 @@ from bentray_service.cli.output.benchmark_row import (
     Row,
 )
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.images.truth_comparison import compare
 from bentray_workers.reconstruction import reconstruction_run
 
 from ..any_scan._images_beside_truth import images_beside_truth
@@ -129,8 +129,8 @@ def _compared(name: str, scan: Dataset, runs: _Runs, solver: str) -> Iterator[Ro
             detail + f"load {os.getloadavg()[0]:.1f}",
             baselines=compared.baselines,
             figures={
-                "RMSE": found.rmse_mps,
-                "MAE": found.mean_absolute_error_mps,
+                "RMSE": found.rms,
+                "MAE": found.mean_absolute,
                 "SSIM": found.ssim,
                 "PCC": found.correlation,
                 "seconds": made.seconds,

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, mean_absolute_error, rmse
-from bentray_workers.images.truth_comparison import compare
-from bentray_workers.images.truth_on_grid import on_grid
+from bentray_kernels.tomography.comparison import compare, on_grid
 
 Quantity = Literal["speed", "attenuation"]
 Norm = Literal["rms", "mean absolute"]
@@ -72,8 +71,8 @@ def object_error(dataset: Dataset, *, relative: bool = False) -> ErrorOn:
     def error_on(image: Reconstruction) -> ImageError:
         assert dataset.truth is not None
         found = compare(image, dataset.truth, dataset.roi)
-        low, high = found.true_range_mps
-        return ImageError(found.true_speed_mps, found.region, high - low if relative else 1.0)
+        low, high = found.range
+        return ImageError(found.other, found.region, high - low if relative else 1.0)
 
     return error_on
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_kernels.tomography.comparison import compare
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.images.truth_comparison import compare
 from bentray_workers.reconstruction import reconstruction_run
 
 
@@ -39,4 +39,4 @@ def reconstruct_on_workers(dataset: Dataset, settings: Settings, context: Benchm
             cluster.client, path, settings, lambda now: context.progress(now.done, now.total, settings.method)
         )
         seconds = time.perf_counter() - begun
-    return Made(result, compare(result, dataset.truth, dataset.roi).rmse_mps, seconds)
+    return Made(result, compare(result, dataset.truth, dataset.roi).rms, seconds)

@@ -26,7 +26,7 @@ from docs.from_code import scoreboard
 
 from bentray_kernels.errors import InvalidInput
 
-from ..workers.images.squares import image
+from ..kernels.tomography.comparison.squares import image
 
 
 def disc(nodes: int, speed: float) -> np.ndarray:

@@ -11,16 +11,16 @@ from .settings import (
 )
 
 if TYPE_CHECKING:
-    from .errors_against_truth import correlation, mean_absolute_error, rmse, structural_similarity
+    from .comparison import correlation, mean_absolute_error, rmse, structural_similarity
     from .problem import Problem
     from .reconstruction import reconstruct
-    from .regions import RegionStatistics, RoundRegion, region_statistics
+    from .regions import RegionStatistics, RoundRegion, region_statistics, round_nodes
     from .result import RESIDUAL_EDGES_S, Iteration, Progress, Reconstruction, Trial
 else:
     MODULES = {
-        "errors_against_truth": ("correlation", "mean_absolute_error", "rmse", "structural_similarity"),
+        "comparison": ("correlation", "mean_absolute_error", "rmse", "structural_similarity"),
         "problem": ("Problem",),
-        "regions": ("RegionStatistics", "RoundRegion", "region_statistics"),
+        "regions": ("RegionStatistics", "RoundRegion", "region_statistics", "round_nodes"),
         "reconstruction": ("reconstruct",),
         "result": ("RESIDUAL_EDGES_S", "Progress", "Reconstruction", "Iteration", "Trial"),
     }
@@ -58,5 +58,6 @@ __all__ = [
     "reconstruct",
     "region_statistics",
     "rmse",
+    "round_nodes",
     "structural_similarity",
 ]

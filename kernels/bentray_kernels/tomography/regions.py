@@ -73,6 +73,27 @@ class RoundRegion:
         return f"({place}) mm, radius {1e3 * self.radius_m:g} mm"
 
 
+def round_nodes(
+    centre_m: Sequence[float] | None,
+    radius_m: float | None,
+    shape: Sequence[int],
+    spacing_m: Sequence[float],
+    origin_m: Sequence[float],
+) -> tuple[Bools, Bools] | None:
+    """Nodes of a disc or ball and of its surroundings; None without one.
+
+    Raises:
+        InvalidInput: naming ``centre_m`` or ``radius_m``, also if only one of them is given.
+    """
+    if centre_m is None and radius_m is None:
+        return None
+    if centre_m is None or radius_m is None:
+        missing = "centre_m" if centre_m is None else "radius_m"
+        raise InvalidInput(missing, "none", "both centre_m and radius_m, or neither")
+    region = RoundRegion(tuple(float(x) for x in centre_m), float(radius_m))
+    return region.nodes(shape, spacing_m, origin_m)
+
+
 @dataclass(frozen=True)
 class RegionStatistics:
     """The values of an image in a region.

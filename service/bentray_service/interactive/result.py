@@ -22,6 +22,7 @@ from bentray_kernels.tomography import (
     Settings,
     Trial,
     region_statistics,
+    round_nodes,
 )
 from bentray_workers.files.export.optional_library import import_optional
 from bentray_workers.files.quantities import QUANTITIES
@@ -219,8 +220,6 @@ class Result:
         Raises:
             InvalidInput: naming the argument, also for a disc without a node.
         """
-        from .comparison import round_nodes
-
         image, (spacing, origin) = self._of(quantity), self._grid(quantity)
         nodes = round_nodes(centre_m, radius_m, image.shape, spacing, origin)
         assert nodes is not None
@@ -365,35 +364,44 @@ class Result:
         draw_quantity(axes, name, images, self._grid(name), cut, limits, unit=self.units[name], title=title)
 
     def _compared(self, other: Result, quantity: str) -> Comparison:
-        from .comparison import Comparison, at_nodes
+        from bentray_kernels.tomography.comparison import at_nodes
+
+        from .comparison import Comparison
 
         image, theirs = np.asarray(self._of(quantity), np.float64), other._of(quantity)
         if image.ndim != theirs.ndim:
             found = f"{theirs.ndim} dimensions beside {image.ndim}"
             raise InvalidInput("other", found, "a result of as many dimensions")
         nodes, grid = self._grid(quantity), other._grid(quantity)
-        even = np.isfinite(nodes).all() and np.isfinite(grid).all()
-        if not even and (image.shape != theirs.shape or not np.array_equal(grid, nodes, equal_nan=True)):
+        same = image.shape == theirs.shape and np.array_equal(grid, nodes, equal_nan=True)
+        if not (same or (np.isfinite(nodes).all() and np.isfinite(grid).all())):
             found = "slices at uneven heights on another grid"
             raise InvalidInput("other", found, "a result on the same nodes, or of evenly spaced slices")
-        there = at_nodes(theirs, grid, image.shape, nodes)
+
+        def here(values: NDArray[Any]) -> Floats:
+            return np.asarray(values, np.float64) if same else at_nodes(values, grid, image.shape, nodes)
+
+        there = here(theirs)
         region, choice = np.isfinite(there) & np.isfinite(image), "nodes of both images"
         coverage = "" if quantity == "reflection" else "coverage"
         crossed = [one.values.get(coverage) for one in (self, other)]
         if crossed[0] is not None and crossed[1] is not None:
-            both = (crossed[0] > 0.0) & (at_nodes(crossed[1], grid, image.shape, nodes) > 0.0)
+            both = (crossed[0] > 0.0) & (here(crossed[1]) > 0.0)
             if (region & both).any():
                 region, choice = region & both, "nodes that rays of both images cross"
         if not region.any():
             raise InvalidInput("other", "an image without a common node", "one that overlaps with this one")
-        names = ("this image", "the other")
-        unit = self.units[quantity]
-        deviation = self._uncertainty(quantity)
-        return Comparison(names, quantity, unit, image, there, region, choice, *nodes, deviation)
+        names, unit, deviation = (
+            ("this image", "the other"),
+            self.units[quantity],
+            self._uncertainty(quantity),
+        )
+        return Comparison(
+            image, there, region, choice, *nodes, deviation, names=names, quantity=quantity, unit=unit
+        )
 
     def _against_truth(self, truth: Truth, roi: Bools | None, quantity: str) -> Comparison:
-        from bentray_workers.images.truth_comparison import NotComparable, compare
-        from bentray_workers.images.truth_on_grid import on_grid
+        from bentray_kernels.tomography.comparison import NotComparable, compare, on_grid
 
         from .comparison import Comparison
 
@@ -403,18 +411,23 @@ class Result:
             accepted = "one of " + ", ".join(name for name in known if name in self.values)
             raise InvalidInput("quantity", repr(quantity), accepted)
         try:
-            found = compare(self._reconstruction(), truth, roi)
-            true = found.true_speed_mps
+            compared = compare(self._reconstruction(), truth, roi)
+            true = compared.other
             if quantity != "speed":
                 true = on_grid(known[quantity], truth, self._reconstruction())
         except NotComparable as reason:
             raise InvalidInput("truth", str(reason), "a truth on the axes of the image") from None
-        nodes = (self.spacing_m, self.origin_m)
-        image = np.asarray(self._of(quantity), np.float64)
-        names = ("reconstruction", "truth")
-        unit, deviation = self.units[quantity], self._uncertainty(quantity)
         return Comparison(
-            names, quantity, unit, image, true, found.region, found.region_choice, *nodes, deviation
+            np.asarray(self._of(quantity), np.float64),
+            true,
+            compared.region,
+            compared.region_choice,
+            self.spacing_m,
+            self.origin_m,
+            self._uncertainty(quantity),
+            names=("reconstruction", "truth"),
+            quantity=quantity,
+            unit=self.units[quantity],
         )
 
 

@@ -7,8 +7,8 @@ import pytest
 from matplotlib.contour import ContourSet
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.comparison import compare
 from bentray_workers.images.comparison import comparison_png
-from bentray_workers.images.truth_comparison import compare
 
 from ..files.reconstructions import made, truth
 from .pixels import pixels
@@ -31,7 +31,7 @@ def test_titles_show_the_errors_of_compare(undrawn):
     for given in (None, roi):
         comparison_png(known, two(), given)
         for name, result in two().items():
-            assert f"{name.capitalize()}: {compare(result, known, given)}" in undrawn.words()
+            assert f"{name.capitalize()}: {compare(result, known, given).caption()}" in undrawn.words()
         choice = compare(made(), known, given).region_choice
         assert f"Errors in: {choice}" in undrawn.words()
 

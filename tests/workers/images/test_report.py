@@ -9,9 +9,9 @@ import pytest
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Iteration, Reconstruction, Trial
+from bentray_kernels.tomography.comparison import compare
 from bentray_kernels.tomography.model_selection.selection import explain_trials
 from bentray_workers.images.report import report_png
-from bentray_workers.images.truth_comparison import compare
 
 from ..files.reconstructions import SPACING_M, made, truth
 from .pixels import pixels
@@ -53,7 +53,7 @@ def test_report_without_a_truth(undrawn, change, shown):
 def test_with_a_truth_it_also_shows_difference_and_profile(undrawn, change):
     result = replace(made(), **change)
     report_png(result, truth())
-    known = f"Difference: {compare(result, truth())}"
+    known = f"Difference: {compare(result, truth()).caption()}"
     assert panels(undrawn)[:4] == ["Reconstruction", "Truth", known, "Along y = 1.0 mm"]
     report_png(result)
     plain = panels(undrawn)
@@ -102,9 +102,9 @@ def test_the_errors_in_the_title_are_those_of_compare_with_their_region(undrawn)
     for roi in (None, corner):
         report_png(result, known, roi)
         found = compare(result, known, roi)
-        assert f"Difference: {found}" in panels(undrawn)
+        assert f"Difference: {found.caption()}" in panels(undrawn)
         assert any(found.region_choice in words for words in undrawn.words())
-    assert str(compare(result, known, corner)) != str(compare(result, known))
+    assert compare(result, known, corner).caption() != compare(result, known).caption()
 
 
 def test_reconstruction_and_truth_share_a_colour_bar(undrawn):
@@ -147,8 +147,8 @@ def test_the_errors_of_a_volume_are_those_of_all_its_slices(undrawn):
     speed[..., 0] += 50.0
     result = replace(volume(), speed=speed)
     report_png(result, solid)
-    assert f"Difference: {compare(result, solid)}" in panels(undrawn)
-    assert compare(result, solid).rmse_mps > 20.0
+    assert f"Difference: {compare(result, solid).caption()}" in panels(undrawn)
+    assert compare(result, solid).rms > 20.0
 
 
 @pytest.mark.parametrize("empty", [True, False])

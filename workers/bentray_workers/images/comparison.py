@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
+from bentray_kernels.tomography.comparison import Comparison, NotComparable, compare
 
 from .canvas import drawing, new_figure, to_png
 from .captions import LABELS, slice_caption
 from .curves import draw_history
 from .cut import cut, slice_index
 from .maps import DIFFERENCE, SPEED, Limits, draw_bar, draw_map, robust_limits, symmetric_limits
-from .truth_comparison import Comparison, NotComparable, compare
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -42,10 +42,8 @@ def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Boo
     if not results:
         raise InvalidInput("results", "none", "at least one reconstruction")
     comparisons = {name: _compare(name, result, truth, roi) for name, result in results.items()}
-    limits = robust_limits([one.true_speed_mps[one.region] for one in comparisons.values()])
-    spread = symmetric_limits(
-        [(results[name].speed - one.true_speed_mps)[one.region] for name, one in comparisons.items()]
-    )
+    limits = robust_limits([one.other[one.region] for one in comparisons.values()])
+    spread = symmetric_limits([one.difference[one.region] for one in comparisons.values()])
     first, compared = next(iter(results.values())), next(iter(comparisons.values()))
     with drawing():
         columns = 1 + len(results)
@@ -54,14 +52,17 @@ def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Boo
         figure.suptitle(water + slice_caption(first, slice_index(first)))
         figure.supxlabel(f"Errors in: {compared.region_choice}", fontsize=8, color="#666666")
         top, bottom = figure.subplots(2, columns)
-        phantom = _panel(top[0], first, compared, compared.true_speed_mps, limits, SPEED, "Phantom")
+        phantom = _panel(top[0], first, compared, compared.other, limits, SPEED, "Phantom")
         speeds, differences = [phantom], []
         draw_history(bottom[0], {name: result.history for name, result in results.items()})
         for upper, lower, (name, result) in zip(top[1:], bottom[1:], results.items(), strict=True):
             one, shown = comparisons[name], name.capitalize()
-            off = result.speed - one.true_speed_mps
-            speeds.append(_panel(upper, result, one, result.speed, limits, SPEED, f"{shown}: {one}"))
-            differences.append(_panel(lower, result, one, off, spread, DIFFERENCE, f"{shown} minus phantom"))
+            speeds.append(
+                _panel(upper, result, one, result.speed, limits, SPEED, f"{shown}: {one.caption()}")
+            )
+            differences.append(
+                _panel(lower, result, one, one.difference, spread, DIFFERENCE, f"{shown} minus phantom")
+            )
         draw_bar(speeds, LABELS["speed"])
         draw_bar(differences, "difference (m/s)")
         return to_png(figure)

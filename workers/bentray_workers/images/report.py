@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
+from bentray_kernels.tomography.comparison import Comparison, NotComparable, compare
 from bentray_kernels.tomography.model_selection.selection import advice_of
 
 from .canvas import drawing, new_figure, to_png
@@ -35,7 +36,6 @@ from .maps import (
     symmetric_limits,
 )
 from .residuals import draw_residuals
-from .truth_comparison import Comparison, NotComparable, compare
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -104,7 +104,7 @@ def _with_truth(result: Reconstruction, truth: Truth, why: str, k: int) -> bytes
 
 
 def _compared(result: Reconstruction, comparison: Comparison, k: int) -> bytes:
-    speed, true_speed = cut(result.speed, k), cut(comparison.true_speed_mps, k)
+    speed, true_speed = cut(result.speed, k), cut(comparison.other, k)
     region = cut(comparison.region, k)
     grid = (result.spacing_m, result.origin_m)
     difference = speed - true_speed
@@ -120,7 +120,7 @@ def _compared(result: Reconstruction, comparison: Comparison, k: int) -> bytes:
         draw_bar(maps, LABELS["speed"])
         axes = next(panels)
         spread = symmetric_limits([difference[within]])
-        title = f"Difference: {comparison}"
+        title = f"Difference: {comparison.caption()}"
         shown = draw_map(axes, difference, *grid, spread, colormap=DIFFERENCE, title=title, outline=region)
         draw_bar([shown], "reconstruction minus truth (m/s)")
         axes.set_xlabel(f"x (mm)\nerrors in: {comparison.region_choice}")

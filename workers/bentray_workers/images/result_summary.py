@@ -34,9 +34,8 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         InvalidInput: naming the field of a file.
     """
     # Loaded only where it runs.
+    from bentray_kernels.tomography.comparison import NotComparable, compare
     from bentray_kernels.tomography.model_selection.selection import advice_of, label, rejection
-
-    from .truth_comparison import NotComparable, compare
 
     own, dataset = read_reconstruction(volume), read_dataset(scan, traces=False)
     held = {name: image for name in QUANTITIES if (image := own.image(name)) is not None}
@@ -49,18 +48,19 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
             errors = {"region": f"not compared: {reason}", "nodes": 0}
         else:
             quantities.append("truth")
+            here, true = found.statistics()
             errors = {
                 "region": found.region_choice,
                 "nodes": int(found.region.sum()),
-                "rmse_mps": found.rmse_mps,
-                "mean_absolute_error_mps": found.mean_absolute_error_mps,
+                "rmse_mps": found.rms,
+                "mean_absolute_error_mps": found.mean_absolute,
                 "ssim": _number(found.ssim),
                 "correlation": _number(found.correlation),
-                "mean_mps": found.image_statistics.mean,
-                "spread_mps": found.image_statistics.spread,
-                "uncertainty_mps": found.image_statistics.uncertainty,
-                "true_mean_mps": found.true_statistics.mean,
-                "true_spread_mps": found.true_statistics.spread,
+                "mean_mps": here.mean,
+                "spread_mps": here.spread,
+                "uncertainty_mps": here.uncertainty,
+                "true_mean_mps": true.mean,
+                "true_spread_mps": true.spread,
             }
     return {
         "quantities": quantities,

@@ -26,7 +26,7 @@ def export_truth(volume: Path, *, scan: Path, target: Path, name: str) -> None:
         OSError: where the folder cannot be written to or the disk is full.
     """
     # Loaded only where it runs.
-    from .truth_on_grid import NotComparable, on_grid
+    from bentray_kernels.tomography.comparison import NotComparable, on_grid
 
     if name not in SINGLE:
         raise InvalidInput("format", f"{name!r} of the truth", ", ".join(SINGLE))

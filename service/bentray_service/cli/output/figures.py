@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition.dataset import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import NOTHING_FOUND
 from bentray_kernels.tomography import Reconstruction
+from bentray_kernels.tomography.comparison import NotComparable, compare
 from bentray_kernels.tomography.model_selection.selection import advice_of, trial_table
 from bentray_workers.images.residuals import within
-from bentray_workers.images.truth_comparison import NotComparable, compare
 
 # Percentages for the quantiles of the residuals.
 SHARES = (50, 90, 99)
@@ -73,16 +73,13 @@ def errors(result: Reconstruction, truth: Truth, roi: NDArray[np.bool_] | None =
     return {
         "region": comparison.region_choice,
         "region_nodes": int(comparison.region.sum()),
-        "true_range_mps": list(comparison.true_range_mps),
-        "mean_absolute_error_of_range": comparison.mean_absolute_error_of_range,
-        "mean_absolute_error_mps": comparison.mean_absolute_error_mps,
-        "rmse_mps": comparison.rmse_mps,
+        "true_range_mps": list(comparison.range),
+        "mean_absolute_error_of_range": comparison.mean_absolute_of_range,
+        "mean_absolute_error_mps": comparison.mean_absolute,
+        "rmse_mps": comparison.rms,
         "ssim": comparison.ssim,
         "correlation": comparison.correlation,
-        "statistics": {
-            "image": asdict(comparison.image_statistics),
-            "truth": asdict(comparison.true_statistics),
-        },
+        "statistics": dict(zip(("image", "truth"), map(asdict, comparison.statistics()), strict=True)),
         "registration": "none",
         "axes": truth.axes,
     }

@@ -19,7 +19,7 @@ from bentray_service.cli.output.figures import errors, figures, summary
 from bentray_workers.images.comparison import comparison_png
 from bentray_workers.images.report import report_png
 
-from ....workers.images.squares import WATER, disc, image, truth
+from ....kernels.tomography.comparison.squares import WATER, disc, image, truth
 
 
 def test_the_errors_are_those_of_compare_as_plain_values() -> None:

@@ -9,9 +9,24 @@ import pytest
 
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.tomography import Reconstruction
-from bentray_workers.images.truth_on_grid import NotComparable, on_grid
+from bentray_kernels.tomography.comparison import NotComparable, on_grid
 
-from ..files.reconstructions import SPACING_M, made, truth
+from .squares import STEP, WATER, disc, image
+from .squares import truth as of_speed
+
+SPACING_M = 2e-3
+
+
+def truth(axes: str = "x,y") -> Truth:
+    return replace(of_speed(disc()), axes=axes)
+
+
+def made(slices: int | None = None) -> Reconstruction:
+    """An image of the nodes of the truth; slices are at uneven heights."""
+    if slices is None:
+        return image(disc())
+    solid = image(np.full((24, 24, slices), WATER), (0.0,) * 3)
+    return replace(solid, spacing_m=(STEP, STEP, np.nan))
 
 
 def speed_on_grid(known: Truth, result: Reconstruction) -> np.ndarray:
@@ -25,7 +40,7 @@ def test_on_the_same_grid_the_truth_is_itself():
 def test_a_ramp_is_read_between_its_nodes_and_missing_beyond_them():
     x, y = np.meshgrid(np.linspace(-0.01, 0.01, 7), np.linspace(-0.02, 0.02, 9), indexing="ij")
     ramp = Truth(1500.0 + 1e3 * x - 2e3 * y, (0.02 / 6, 0.005), (-0.01, -0.02))
-    result = made()
+    result = replace(image(np.full((24, 24), WATER), (-0.023, -0.023)), spacing_m=(SPACING_M, SPACING_M))
     place = result.origin_m[0] + SPACING_M * np.arange(24)
     expected = 1500.0 + 1e3 * place[:, None] - 2e3 * place[None, :]
     inside = (np.abs(place) <= 0.01)[:, None] & (np.abs(place) <= 0.02)[None, :]

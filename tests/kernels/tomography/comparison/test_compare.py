@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_workers.images.truth_comparison import NotComparable, compare
+from bentray_kernels.tomography.comparison import NotComparable, compare
 
 from .squares import WATER, disc, image, truth
 
@@ -18,9 +18,9 @@ from .squares import WATER, disc, image, truth
 @given(st.floats(-40.0, 40.0))
 def test_a_constant_error_is_read_as_it_is(offset: float) -> None:
     found = compare(image(disc() + offset), truth(disc()))
-    assert found.rmse_mps == pytest.approx(abs(offset), abs=1e-9)
-    assert found.mean_absolute_error_of_range == pytest.approx(abs(offset) / 100.0, abs=1e-9)
-    assert found.true_range_mps == (1450.0, 1550.0)
+    assert found.rms == pytest.approx(abs(offset), abs=1e-9)
+    assert found.mean_absolute_of_range == pytest.approx(abs(offset) / 100.0, abs=1e-9)
+    assert found.range == (1450.0, 1550.0)
     assert found.region.sum() == 81
 
 
@@ -29,17 +29,18 @@ def test_statistics_have_the_uncertainty_of_the_nodes_in_the_region() -> None:
     found = compare(
         replace(image(disc() + 2.0), uncertainty=known, resolution_width_m=(3e-3,)), truth(disc())
     )
-    assert found.image_statistics.uncertainty == pytest.approx(4.0)
-    assert found.true_statistics.uncertainty is None
-    assert found.image_statistics.mean - found.true_statistics.mean == pytest.approx(2.0)
-    assert found.mean_absolute_error_mps == pytest.approx(2.0)
+    image_there, true_there = found.statistics()
+    assert image_there.uncertainty == pytest.approx(4.0)
+    assert true_there.uncertainty is None
+    assert image_there.mean - true_there.mean == pytest.approx(2.0)
+    assert found.mean_absolute == pytest.approx(2.0)
     assert found.correlation == pytest.approx(1.0)
 
 
 def test_errors_in_the_water_do_not_count() -> None:
     speed = disc()
     speed[0, 0] += 500.0
-    assert compare(image(speed), truth(disc())).rmse_mps == 0.0
+    assert compare(image(speed), truth(disc())).rms == 0.0
 
 
 def test_the_outline_holds_what_it_encloses_in_each_slice() -> None:
@@ -58,9 +59,9 @@ def test_the_region_of_the_file_is_used_and_named() -> None:
     found = compare(image(disc() + 3.0), truth(disc()), roi)
     assert found.region_choice == "mask/roi of the file"
     assert found.region.sum() == 4
-    assert found.mean_absolute_error_of_range is None, "water alone has no range to divide by"
-    assert found.rmse_mps == pytest.approx(3.0)
-    assert str(found) == "3.0 m/s rms"
+    assert found.mean_absolute_of_range is None, "water alone has no range to divide by"
+    assert found.rms == pytest.approx(3.0)
+    assert found.caption() == "3.0 m/s rms"
 
 
 def test_a_region_wider_than_the_outline_brings_in_what_equals_the_water() -> None:
@@ -69,10 +70,10 @@ def test_a_region_wider_than_the_outline_brings_in_what_equals_the_water() -> No
     roi[2:15, 2:15] = True
     speed = disc()
     speed[2, 2:15] += 30.0
-    assert compare(image(speed), truth(disc())).rmse_mps == 0.0
+    assert compare(image(speed), truth(disc())).rms == 0.0
     wide = compare(image(speed), truth(disc()), roi)
-    assert wide.rmse_mps == pytest.approx(30.0 / math.sqrt(13.0))
-    assert str(wide) == f"{100 * 0.3 / 13:.1f} % of range, {30 / math.sqrt(13):.1f} m/s rms"
+    assert wide.rms == pytest.approx(30.0 / math.sqrt(13.0))
+    assert wide.caption() == f"{100 * 0.3 / 13:.1f} % of range, {30 / math.sqrt(13):.1f} m/s rms"
 
 
 @pytest.mark.parametrize("roi", [np.zeros((17, 17), bool), np.ones((3, 3), bool)])
@@ -88,14 +89,14 @@ def test_a_truth_that_is_water_throughout_is_compared_everywhere() -> None:
 
 
 def test_x_and_y_are_not_exchanged() -> None:
-    assert compare(image(disc().T), truth(disc())).rmse_mps > 10.0
-    assert compare(image(disc()), replace(truth(disc().T), axes="y,x")).rmse_mps == 0.0
+    assert compare(image(disc().T), truth(disc())).rms > 10.0
+    assert compare(image(disc()), replace(truth(disc().T), axes="y,x")).rms == 0.0
 
 
 def test_several_slices_are_compared_with_a_solid_truth() -> None:
     solid = np.stack([disc(), np.full((17, 17), WATER), disc()[::-1]], axis=-1)
-    assert compare(image(solid + 2.0, (0.0,) * 3), truth(solid)).rmse_mps == pytest.approx(2.0)
-    assert compare(image(solid[..., ::-1], (0.0,) * 3), truth(solid)).rmse_mps > 10.0
+    assert compare(image(solid + 2.0, (0.0,) * 3), truth(solid)).rms == pytest.approx(2.0)
+    assert compare(image(solid[..., ::-1], (0.0,) * 3), truth(solid)).rms > 10.0
 
 
 def test_truth_outside_the_image_is_not_comparable() -> None:
