@@ -1,5 +1,5 @@
 #!/bin/sh
-# Create the database password and the first API key once, in deploy/secrets/ (ignored by git).
+# Create the database password, the first API key and the password of Grafana once, in deploy/secrets/ (ignored by git).
 set -eu
 folder=${1:-$(dirname "$0")/secrets}
 # The mode of the folder excludes other users. In the containers two users read the files, so the files are readable.
@@ -20,4 +20,5 @@ keep() {
 }
 
 keep database-password "$(random 32)"
+keep grafana-password "$(random 16)"
 keep first-key "bentray_$(random 6)_$(random 20)"

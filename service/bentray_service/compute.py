@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 from bentray_kernels.tomography.settings import Settings
 from bentray_workers.cluster.capacities import WorkerCapacity, capacities_of, probed_capacities
+from bentray_workers.cluster.connected import connected_workers
+from bentray_workers.cluster.scheduler_load import SchedulerLoad, load_of
 from bentray_workers.cluster.worker_health import WorkerHealth, health_of
 from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.files.dataset.summary import counts_in
@@ -51,6 +54,9 @@ class Compute:
         """
         self._cluster = cluster
         self._fetch = fetch
+        self._changing = threading.Lock()
+        self._addresses: set[str] = set()
+        self._lost = 0
 
     @property
     def client(self) -> Any:
@@ -70,6 +76,25 @@ class Compute:
             return health_of(self.client)
         except (OSError, TimeoutError):
             return ()
+
+    def lost_workers(self) -> int:
+        """Workers that have left since the first call: a worker that restarts has a new address."""
+        with self._changing:
+            try:
+                present = set(connected_workers(self.client))
+            except (OSError, TimeoutError):
+                # Without a scheduler nothing is known about them.
+                return self._lost
+            self._lost += len(self._addresses - present)
+            self._addresses = present
+            return self._lost
+
+    def scheduler_load(self) -> SchedulerLoad | None:
+        """The load of the scheduler; None if it does not answer."""
+        try:
+            return load_of(self.client)
+        except (OSError, TimeoutError):
+            return None
 
     def plan(self, counts: dict[str, Any] | None, path: Path, settings: Settings) -> dict[str, Any]:
         """Plan the reconstruction of a dataset on the connected workers.

@@ -1,7 +1,7 @@
 """Prometheus metrics of requests, jobs, workers, stored files, threads and the process.
 
 Names start with ``bentray_`` and end with the unit in the plural (``_seconds``, ``_bytes``), counters with
-``_total``. No label has values that clients can choose.
+``_total``. No label has values that clients can choose, and each has few: of tenants, those that use most.
 """
 
 from __future__ import annotations
@@ -9,8 +9,10 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cryptography import x509
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
@@ -19,7 +21,9 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from .backup.archive import newest_backup
+from .rows import usage
 from .rows.checksums import Checksums
+from .rows.keys import Keys
 from .rows.schema import STATES
 
 if TYPE_CHECKING:
@@ -29,6 +33,8 @@ if TYPE_CHECKING:
 BUCKETS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
 
 UNMATCHED = "unmatched"
+# Tenants with labels of their own.
+TENANTS = 20
 
 
 class Metrics:
@@ -120,7 +126,8 @@ class _ServiceCollector(Collector):
     def collect(self) -> Iterator[Metric]:
         parts = self._parts
         yield from self._from_database()
-        yield _gauge("bentray_workers", "Connected Dask workers.", parts.compute.workers())
+        yield from self._from_cluster()
+        yield from parts.runner.metrics.collect()
         up = float(parts.files.store.fault() is None)
         yield _gauge("bentray_storage_up", "Whether the store is available.", up)
         disk, least = shutil.disk_usage(parts.files.root), parts.settings.min_free_bytes
@@ -142,15 +149,82 @@ class _ServiceCollector(Collector):
                 "bentray_backup_timestamp_seconds", "End of the newest backup, since 1970 UTC.", newest
             )
 
+    def _from_cluster(self) -> Iterator[Metric]:
+        """The metrics of scheduler and workers; workers are added up, since there may be hundreds."""
+        compute = self._parts.compute
+        workers = compute.health()
+        memory = [(one.memory_bytes or 0, one.memory_limit_bytes) for one in workers]
+        yield from _gauges(
+            ("bentray_workers", "Connected Dask workers.", len(workers)),
+            ("bentray_workers_memory_bytes", "Memory of all workers.", sum(used for used, _ in memory)),
+            ("bentray_workers_memory_limit_bytes", "Its limit.", sum(limit for _, limit in memory)),
+            (
+                "bentray_workers_fullest_ratio",
+                "Memory of the worker that is nearest to its limit, as a part of it.",
+                max((used / limit for used, limit in memory if limit), default=0.0),
+            ),
+            ("bentray_workers_threads", "Threads that run tasks.", sum(one.threads or 0 for one in workers)),
+            ("bentray_workers_running_tasks", "Running tasks.", sum(one.running_tasks for one in workers)),
+            ("bentray_workers_paused", "Workers without free memory.", sum(one.paused for one in workers)),
+        )
+        lost = CounterMetricFamily("bentray_workers_lost_total", "Workers that left, also to be restarted.")
+        lost.add_metric([], compute.lost_workers())
+        yield lost
+        load = compute.scheduler_load()
+        yield _gauge("bentray_scheduler_up", "Whether the scheduler answers.", float(load is not None))
+        if load is not None:
+            yield from _gauges(
+                ("bentray_scheduler_tasks", "Tasks that the scheduler holds.", load.tasks),
+                ("bentray_scheduler_waiting_tasks", "Tasks that no worker can run now.", load.waiting_tasks),
+                ("bentray_scheduler_memory_bytes", "Memory of its process.", load.memory_bytes),
+            )
+        folder = self._parts.settings.tls_dir
+        if folder is not None and (end := _end_of(folder / "certificate.pem")) is not None:
+            yield _gauge(
+                "bentray_certificate_expiry_timestamp_seconds",
+                "End of the certificate of scheduler and workers, since 1970 UTC.",
+                end,
+            )
+
     def _from_database(self) -> Iterator[Metric]:
-        """The metrics of stored jobs and files."""
+        """The metrics of stored jobs, files, tenants and keys."""
         parts = self._parts
+        in_use, most = parts.database.connections()
+        yield _gauge("bentray_database_connections", "Connections to the database in use.", in_use)
+        yield _gauge("bentray_database_connections_limit", "Maximum number of these.", most)
         try:
             counts, oldest = parts.queue.load()
             damaged = Checksums(parts.database).count_damaged()
             sent = parts.deliveries.counts()
+            queues = parts.queue.longest(TENANTS)
+            expiry = Keys(parts.database).next_expiry()
+            with parts.database.read() as connection:
+                sizes = usage.largest(connection, TENANTS)
         except SQLAlchemyError:
             return
+        stored = GaugeMetricFamily(
+            "bentray_tenant_used_bytes",
+            f"Bytes stored and reserved by the {TENANTS} tenants that use most, with their projects.",
+            labels=["tenant"],
+        )
+        for tenant, size in sizes.items():
+            stored.add_metric([tenant], size)
+        yield stored
+        yield _gauge("bentray_tenant_quota_bytes", "Quota of each tenant.", parts.settings.max_tenant_bytes)
+        unfinished = GaugeMetricFamily(
+            "bentray_tenant_jobs",
+            f"Unfinished jobs by state, of the {TENANTS} tenants that have most.",
+            labels=["tenant", "state"],
+        )
+        for (tenant, state), number in queues.items():
+            unfinished.add_metric([tenant, state], number)
+        yield unfinished
+        if expiry is not None:
+            yield _gauge(
+                "bentray_keys_next_expiry_timestamp_seconds",
+                "When the next key expires, since 1970 UTC.",
+                expiry,
+            )
         waiting = GaugeMetricFamily("bentray_jobs", "Jobs by state.", labels=["state"])
         for state in STATES:
             waiting.add_metric([state], counts.get(state, 0))
@@ -179,5 +253,18 @@ class _Sentences(Collector):
             yield one
 
 
+def _end_of(certificate: Path) -> float | None:
+    """The end of the validity of a certificate, s since 1970; None if it cannot be read."""
+    try:
+        return x509.load_pem_x509_certificate(certificate.read_bytes()).not_valid_after_utc.timestamp()
+    except (OSError, ValueError):
+        return None
+
+
 def _gauge(name: str, words: str, value: float) -> GaugeMetricFamily:
     return GaugeMetricFamily(name, words, value=value)
+
+
+def _gauges(*described: tuple[str, str, float]) -> Iterator[GaugeMetricFamily]:
+    for one in described:
+        yield _gauge(*one)

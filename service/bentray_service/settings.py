@@ -29,9 +29,10 @@ OF_OTHER_PARTS = {
 OF_COMPOSE = {
     f"{PREFIX}{name}"
     for name in (
-        *("PUBLISH", "WORKER_CONTAINER_MEMORY", "FIRST_KEY_SECRET", "DATABASE_PASSWORD_SECRET"),
-        *(f"{part}_CPUS" for part in ("SERVICE", "SCHEDULER", "WORKER", "DATABASE")),
-        *(f"{part}_MEMORY" for part in ("SERVICE", "SCHEDULER", "DATABASE")),
+        *("PUBLISH", "GRAFANA_PUBLISH", "WORKER_CONTAINER_MEMORY"),
+        *(f"{part}_CPUS" for part in ("SERVICE", "SCHEDULER", "WORKER", "DATABASE", "MONITORING")),
+        *(f"{part}_MEMORY" for part in ("SERVICE", "SCHEDULER", "DATABASE", "MONITORING")),
+        *(f"{name}_SECRET" for name in ("FIRST_KEY", "DATABASE_PASSWORD", "METRICS_KEY", "GRAFANA_PASSWORD")),
     )
 }
 

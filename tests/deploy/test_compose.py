@@ -73,12 +73,18 @@ def test_tls_encrypts_every_connection_and_changes_nothing_else(file: dict[str, 
 
 def test_only_the_service_is_published_and_on_loopback(file: dict[str, Any]) -> None:
     published = {name: part["ports"] for name, part in file["services"].items() if "ports" in part}
-    assert published == {"service": ["127.0.0.1:8000:8000"]}
+    assert published == {"service": ["127.0.0.1:8000:8000"], "grafana": ["127.0.0.1:3000:3000"]}
     internal = {name for name, network in file["networks"].items() if network.get("internal")}
-    for name in ("scheduler", "worker", "database"):
+    for name in ("scheduler", "worker", "database", "prometheus"):
         assert set(file["services"][name]["networks"]) <= internal
         assert "network_mode" not in file["services"][name]
-    assert not set(file["services"]["worker"]["networks"]) & set(file["services"]["database"]["networks"])
+    for name, others in {
+        "worker": ["database", "prometheus"],
+        "prometheus": ["database", "scheduler"],
+    }.items():
+        for other in others:
+            networks = [set(file["services"][part]["networks"]) for part in (name, other)]
+            assert not networks[0] & networks[1]
 
 
 def test_every_part_is_locked_down_and_limited(file: dict[str, Any]) -> None:
@@ -104,7 +110,7 @@ def test_every_part_is_locked_down_and_limited(file: dict[str, Any]) -> None:
 def test_images_are_pinned_and_ours_runs_as_an_ordinary_user(file: dict[str, Any]) -> None:
     text = (DEPLOY / "Dockerfile").read_text()
     images = [part["image"] for part in file["services"].values()] + re.findall(r"^FROM (\S+)", text, re.M)
-    assert all(re.search(r":\d+\.\d+[.\w-]*$", image) for image in images), images
+    assert all(re.search(r":v?\d+\.\d+[.\w-]*$", image) for image in images), images
     assert re.search(r"^FROM python:3\.11\.\d+-slim", text, re.M)
     assert re.findall(r"^USER (\S+)", text, re.M)[-1] == "bentray"
     assert file["services"]["database"]["user"] != "root"
@@ -114,6 +120,24 @@ def test_images_are_pinned_and_ours_runs_as_an_ordinary_user(file: dict[str, Any
             name = name.replace("buil[d]", "build/docs")
             assert (compose.ROOT / name).exists() or name == "build/docs"
             assert f"!{name}" in (DEPLOY / "Dockerfile.dockerignore").read_text().split()
+
+
+def test_monitoring_is_optional_and_finds_what_it_needs(file: dict[str, Any]) -> None:
+    prometheus, grafana = file["services"]["prometheus"], file["services"]["grafana"]
+    assert prometheus["profiles"] == grafana["profiles"] == ["monitoring"]
+    scrape = yaml.safe_load((DEPLOY / "prometheus/prometheus.yml").read_text())["scrape_configs"][0]
+    assert scrape["authorization"]["credentials_file"] == f"/run/secrets/{prometheus['secrets'][0]}"
+    assert scrape["static_configs"] == [{"targets": ["service:8000"]}]
+    assert set(prometheus["networks"]) & set(file["services"]["service"]["networks"])
+    # Everything that Grafana reads is mounted where the other file expects it.
+    mounts = {words.split(":")[1]: words.split(":")[0] for words in grafana["volumes"]}
+    for inside, here in mounts.items():
+        assert inside == "/var/lib/grafana" or (compose.ROOT / here).exists()
+    provisioned = compose.ROOT / mounts["/etc/grafana/provisioning"]
+    (source,) = yaml.safe_load((provisioned / "datasources/prometheus.yml").read_text())["datasources"]
+    assert source["url"] == "http://prometheus:9090"
+    (provider,) = yaml.safe_load((provisioned / "dashboards/bentray.yml").read_text())["providers"]
+    assert f"{provider['options']['path']}/dashboard.json" in mounts
 
 
 def test_numba_can_write_its_cache(file: dict[str, Any]) -> None:
@@ -127,7 +151,8 @@ def test_no_password_is_in_the_file_and_git_ignores_where_it_is(file: dict[str, 
     text = compose.FILE.read_text()
     assert not re.search(r"postgresql\+psycopg://\w+:", text)
     assert "POSTGRES_PASSWORD:" not in text
-    assert set(file["secrets"]) == {"database-password", "first-key"}
+    assert set(file["secrets"]) == {"database-password", "first-key", "metrics-key", "grafana-password"}
+    assert "GF_SECURITY_ADMIN_PASSWORD:" not in text
     for secret in file["secrets"].values():
         path = secret["file"].removeprefix("./")
         ignored = subprocess.run(["git", "check-ignore", "-q", path], cwd=compose.ROOT, check=False)

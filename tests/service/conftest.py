@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -97,6 +98,12 @@ class FakeCluster:
     def scheduler_info(self, n_workers: int) -> dict[str, Any]:
         one = {"memory_limit": self.memory_bytes, "resources": {"recon": 1, "render": 1}}
         return {"workers": {str(k): one for k in range(self.workers)}}
+
+    scheduler = SimpleNamespace(run_function=None)
+
+    def sync(self, *_given: Any, **_how: Any) -> dict[str, Any]:
+        """The scheduler answers with its load."""
+        return {"status": "OK", "result": {"tasks": 0, "waiting_tasks": 0, "memory_bytes": 1}}
 
     def close(self) -> None:
         self.closed = True

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,9 @@ import yaml
 from prometheus_client.parser import text_string_to_metric_families
 
 from bentray_service.backup.back_up import back_up
+from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.tenants import LOCAL
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"
@@ -44,6 +48,13 @@ HEALTHY = {
     'bentray_webhooks{state="failed"}': "3x170",
     "bentray_process_open_fds": "90x170",
     "bentray_process_max_fds": "1024x170",
+    "bentray_workers_lost_total": "0x170",
+    'bentray_tenant_used_bytes{tenant="clinic"}': "5e9x170",
+    "bentray_tenant_quota_bytes": "100e9x170",
+    "bentray_database_connections": "2x170",
+    "bentray_database_connections_limit": "15x170",
+    "bentray_keys_next_expiry_timestamp_seconds": "9e9x170",
+    "bentray_certificate_expiry_timestamp_seconds": "9e9x170",
 }
 SLOW = 'bentray_http_request_duration_seconds_bucket{method="GET",route="/",le="1.0"}'
 FAILED = 'bentray_http_requests_total{method="GET",route="/",status="500"}'
@@ -73,6 +84,11 @@ ILL = {
     "BentrayNoBackup": {"bentray_backup_timestamp_seconds": "stale _x50"},
     "BentrayWebhooksFail": {'bentray_webhooks{state="failed"}': "4x50"},
     "BentrayFilesOpen": {"bentray_process_open_fds": "900x50"},
+    "BentrayWorkersRestart": {"bentray_workers_lost_total": "0+1x50"},
+    "BentrayTenantFull": {'bentray_tenant_used_bytes{tenant="clinic"}': "95e9x50"},
+    "BentrayDatabaseBusy": {"bentray_database_connections": "15x50"},
+    "BentrayKeyExpires": {"bentray_keys_next_expiry_timestamp_seconds": "6e5x50"},
+    "BentrayCertificateExpires": {"bentray_certificate_expiry_timestamp_seconds": "1e6x50"},
 }
 
 
@@ -97,16 +113,37 @@ def selectors():
     ]
 
 
-def test_every_metric_and_label_of_alarms_and_dashboard_exists(start, work, uploaded, tmp_path):
+def test_every_metric_and_label_of_alarms_and_dashboard_exists(
+    start, work, uploaded, submitted, until, tmp_path, monkeypatch
+):
+    subprocess.run([str(DEPLOY / "certificates.sh"), str(tmp_path / "tls")], check=True, capture_output=True)
+    monkeypatch.setenv("BENTRAY_TLS_DIR", str(tmp_path / "tls"))
     http = start()
-    uploaded(http)
-    http.get("/health/live")
-    back_up(http.app.state.parts.settings, tmp_path / "backup")
+    dataset = uploaded(http)
+    until(http, submitted(http, dataset)["id"])
+    work.hold.clear()
+    submitted(http, dataset)
+    parts, token = http.app.state.parts, ApiKey.new()
+    back_up(parts.settings, tmp_path / "backup")
+    Keys(parts.database).add(token, LOCAL, "metrics", ["metrics"], time.time() + 99.0)
+    http.headers["Authorization"] = f"Bearer {token.shown()}"
     there = exported(http) | ITS_OWN
+    work.hold.set()
     assert len(selectors()) > 30
     for name, labels in selectors():
         assert name in there
-        assert labels <= there[name], f"{name} has no label {labels - there[name]}"
+        # Prometheus adds the instance.
+        assert labels - {"instance"} <= there[name], f"{name} has no label {labels - there[name]}"
+
+
+def test_the_dashboard_shows_the_chosen_services_alone():
+    dashboard = json.loads((DEPLOY / "grafana/dashboard.json").read_text())
+    variables = {one["name"]: one for one in dashboard["templating"]["list"]}
+    assert variables["instance"]["query"]["query"] == 'label_values(up{job="bentray"}, instance)'
+    for panel in dashboard["panels"]:
+        for target in panel["targets"]:
+            for _, labels in SELECTOR.findall(target["expr"]):
+                assert 'instance=~"$instance"' in labels, target["expr"]
 
 
 def test_every_alarm_has_its_entry_in_the_runbook():

@@ -1,9 +1,20 @@
 """Metrics: named by one rule, counted by the route's own words, and true."""
 
 import re
+import subprocess
+import time
+from pathlib import Path
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
+from sqlalchemy import text
+
+from bentray_service.metrics import TENANTS
+from bentray_service.rows import usage
+from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import Keys
+from bentray_service.rows.projects import Projects
+from bentray_service.rows.tenants import LOCAL, Tenant
 
 NAME = re.compile(r"bentray_[a-z]+(_[a-z]+)*")
 
@@ -72,9 +83,72 @@ def test_the_queue(http, uploaded, submitted, until, work, cluster):
     assert value(http, "bentray_jobs", state="succeeded") == 3
     assert value(http, "bentray_jobs_oldest_queued_seconds") == 0.0
     assert value(http, "bentray_workers") == 1
+    cluster.workers = 3
+    assert value(http, "bentray_workers_lost_total") == 0
     cluster.workers = 0
     assert value(http, "bentray_workers") == 0
+    assert value(http, "bentray_workers_lost_total") == 3
     assert value(http, "bentray_disk_free_bytes") > 0
+
+
+def test_an_operator_sees_who_waits_what_repeats_and_how_long_it_takes(
+    http, uploaded, submitted, until, work
+):
+    dataset = uploaded(http)
+    work.hold.clear()
+    jobs = [submitted(http, dataset)["id"] for _ in range(3)]
+    until(http, jobs[0], "running")
+    assert value(http, "bentray_tenant_jobs", tenant="local", state="queued") == 1
+    assert (
+        0
+        < value(http, "bentray_tenant_used_bytes", tenant="local")
+        < value(http, "bentray_tenant_quota_bytes")
+    )
+    work.hold.set()
+    for job in jobs:
+        until(http, job)
+    ended = {"kind": "reconstruction", "state": "succeeded"}
+    assert value(http, "bentray_job_duration_seconds_count", **ended) == 3
+    assert value(http, "bentray_tenant_jobs", tenant="local", state="queued") == 0
+    parts = http.app.state.parts
+    parts.queue.load()
+    assert 1 <= value(http, "bentray_database_connections_limit") <= 32
+    with parts.database.read() as connection:
+        connection.execute(text("SELECT 1"))
+        assert value(http, "bentray_database_connections") == 1
+    assert value(http, "bentray_keys_next_expiry_timestamp_seconds") == 0, "no key expires"
+    for number, expires in enumerate((9e9, 8e9, 1.0, None)):
+        Keys(parts.database).add(ApiKey.new(), LOCAL, f"key {number}", ["metrics"], expires)
+    token = ApiKey.new()
+    Keys(parts.database).add(token, LOCAL, "metrics", ["metrics"])
+    http.headers["Authorization"] = f"Bearer {token.shown()}"
+    assert value(http, "bentray_keys_next_expiry_timestamp_seconds") == 8e9
+
+
+def test_only_the_tenants_that_use_most_have_labels(http):
+    parts = http.app.state.parts
+    with parts.database.write() as connection:
+        for number in range(TENANTS + 5):
+            usage.store(connection, Tenant(f"tenant-{number:02d}"), "x", 100 + number)
+    found = [s.labels["tenant"] for s in read(http)["bentray_tenant_used_bytes"].samples]
+    assert found == [f"tenant-{number:02d}" for number in range(TENANTS + 4, 4, -1)]
+
+
+def test_the_bytes_of_a_project_are_those_of_its_tenant(http):
+    parts = http.app.state.parts
+    project = Projects(parts.database).add(LOCAL, "Trial", None)["id"]
+    with parts.database.write() as connection:
+        usage.store(connection, Tenant(project), "x", 7)
+        usage.store(connection, LOCAL, "x", 5)
+    assert value(http, "bentray_tenant_used_bytes", tenant="local") == 12
+
+
+def test_the_end_of_the_certificates(start, work, monkeypatch, tmp_path):
+    script = Path(__file__).parents[2] / "deploy/certificates.sh"
+    subprocess.run([str(script), str(tmp_path), "30"], check=True, capture_output=True)
+    monkeypatch.setenv("BENTRAY_TLS_DIR", str(tmp_path))
+    end = value(start(), "bentray_certificate_expiry_timestamp_seconds")
+    assert end == pytest.approx(time.time() + 30 * 86400, abs=60.0)
 
 
 def test_metrics_without_the_database(http, monkeypatch):

@@ -6,6 +6,7 @@ import errno
 import logging
 import shutil
 import threading
+import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError
 from contextlib import suppress
@@ -31,6 +32,7 @@ from ..rows.job_queue import LEASE_S, Queue
 from ..rows.schema import ENDED
 from ..rows.typed_rows import JobRow
 from .failures import CRASHED, explain
+from .job_metrics import JobMetrics
 from .kind import JobRun, Kind
 from .kinds import KINDS
 from .reporter import Reporter
@@ -65,6 +67,9 @@ class Runner:
 
     A thread only controls its job; the cluster, shared by all jobs, does the computation. Jobs wait while
     less than ``min_free_bytes`` of disk space is free, or the store is unavailable.
+
+    Attributes:
+        metrics: durations and retries of jobs.
     """
 
     def __init__(
@@ -80,6 +85,7 @@ class Runner:
         at_once: maximum number of running jobs.
         tenants: the same including one job of each tenant without another.
         """
+        self.metrics = JobMetrics()
         self._queue = queue
         self._files = files
         self._compute = compute
@@ -107,6 +113,7 @@ class Runner:
         again = self._queue.recover(crashed, held=self._held())
         if again:
             log.warning("%d jobs of a dead service are queued again", again)
+            self.metrics.count_retries("service", again)
             self.notify()
 
     def _held(self) -> tuple[str, ...]:
@@ -217,6 +224,7 @@ class Runner:
         except Cancelled:
             if not reporter.lost:
                 self._settle(job_id, lambda: self._stopped(job_id, files, reporter))
+                self._count_end(job)
         except (*UNAVAILABLE, DatabaseUnavailable, StorageUnavailable) as error:
             kinds = (
                 (DatabaseUnavailable, "database"),
@@ -226,15 +234,30 @@ class Runner:
             away = next(name for kind, name in kinds if isinstance(error, kind))
             reason = f"no answer from the {away}; the job continues when available"
             self._put_back(job_id, reason, error)
+            self.metrics.count_retries(away)
             self._leaving.wait(IDLE_SECONDS)
         except Exception as error:
             if isinstance(error, OSError) and error.errno in FULL and not self._has_room():
                 self._put_back(job_id, "the disk is full; the job continues once there is space", error)
+                self.metrics.count_retries("disk")
                 return
             problem = explain(job_id, error).model_dump(exclude_none=True)
             self._settle(job_id, lambda: self._failed(job_id, files, reporter, problem))
+            self._count_end(job)
         else:
             self._settle(job_id, lambda: self._succeeded(job_id, files, reporter, kind, result, target))
+            self._count_end(job)
+
+    def _count_end(self, job: JobRow) -> None:
+        """Count a job in the metrics in the state that was stored; it may have been queued again."""
+        try:
+            state = self._queue.state(job["id"])
+        except (SQLAlchemyError, DatabaseUnavailable):
+            return
+        if state in ENDED:
+            self.metrics.observe_end(job["kind"], state, time.time() - (job["started"] or time.time()))
+        else:
+            self.metrics.count_retries("service")
 
     def _put_back(self, job_id: str, reason: str, error: BaseException) -> None:
         """Queue a job again for a reason outside of the job."""

@@ -12,6 +12,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Engine, Select, create_engine, event, exc, insert, inspect, select, update
 from sqlalchemy.engine import make_url
+from sqlalchemy.pool import QueuePool
 
 from bentray_kernels.errors import InvalidInput
 
@@ -80,6 +81,15 @@ class Database:
         """The rows of a query, in a transaction of its own."""
         with self.read() as connection:
             return [dict(row) for row in connection.execute(query).mappings()]
+
+    def connections(self) -> tuple[int, int]:
+        """Connections in use now, and their maximum."""
+        pool = self._writer.pool
+        if not isinstance(pool, QueuePool):
+            return 0, 1
+        # No public attribute has the overflow that was asked for.
+        overflow = 0 if self._writer.dialect.name == "sqlite" else MORE_CONNECTIONS
+        return pool.checkedout(), pool.size() + overflow
 
     def probe(self) -> None:
         """Write one number to verify that writing works; any error is raised."""

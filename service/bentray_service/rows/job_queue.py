@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, Connection, and_, case, func, insert, or_,
 from . import schema, usage
 from .database import Database
 from .job_states import RUNNING, change
-from .schema import ENDED, jobs, volumes
+from .schema import ENDED, jobs, projects, volumes
 from .tenants import Tenant
 from .typed_rows import JobRow, Plain
 
@@ -68,6 +68,20 @@ class Queue:
                 before = found[name]
                 found[name] = before[0] + int(own), before[1] + int(everyone)
         return found
+
+    def longest(self, most: int) -> dict[tuple[Tenant, str], int]:
+        """Unfinished jobs by tenant, with its projects, and state; of the tenants with most."""
+        owner = func.coalesce(projects.c.tenant, jobs.c.tenant).label("owner")
+        joined = jobs.outerjoin(projects, projects.c.id == jobs.c.tenant)
+        query = select(owner, jobs.c.state, func.count()).select_from(joined)
+        query = query.where(jobs.c.state.not_in(ENDED)).group_by(owner, jobs.c.state)
+        with self._database.read() as connection:
+            rows = [(Tenant(tenant), str(state), int(n)) for tenant, state, n in connection.execute(query)]
+        totals: dict[Tenant, int] = {}
+        for tenant, _, number in rows:
+            totals[tenant] = totals.get(tenant, 0) + number
+        kept = sorted(totals, key=lambda tenant: (-totals[tenant], tenant))[:most]
+        return {(tenant, state): number for tenant, state, number in rows if tenant in kept}
 
     def unfinished(self) -> set[str]:
         """The ids of all jobs that have not ended."""

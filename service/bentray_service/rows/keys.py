@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from typing import cast
 
-from sqlalchemy import insert, or_, select, update
+from sqlalchemy import func, insert, or_, select, update
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
@@ -74,6 +74,13 @@ class Keys:
         )
         with self._database.read() as connection:
             return list(connection.execute(query).scalars())
+
+    def next_expiry(self) -> float | None:
+        """When the next valid key expires, s since 1970; None if none does."""
+        valid = keys.c.revoked.is_(None), keys.c.expires > time.time()
+        with self._database.read() as connection:
+            expiry = connection.execute(select(func.min(keys.c.expires)).where(*valid)).scalar_one()
+        return None if expiry is None else float(expiry)
 
     def all(self, tenant: Tenant | None = None) -> list[KeyRow]:
         """All keys, or those of one tenant, oldest first."""

@@ -11,7 +11,7 @@ from sqlalchemy import ColumnElement, Connection, delete, func, insert, not_, or
 
 from ..errors import QuotaExceeded
 from .projects import family_of
-from .schema import storage
+from .schema import projects, storage
 from .tenants import Tenant
 
 
@@ -46,6 +46,16 @@ def usage_of(connection: Connection, tenant: Tenant, besides: str = "") -> Usage
     query = select(storage.c.reserved, func.sum(storage.c.bytes)).where(*mine).group_by(storage.c.reserved)
     sizes = {bool(reserved): int(size) for reserved, size in connection.execute(query)}
     return Usage(sizes.get(False, 0), sizes.get(True, 0))
+
+
+def largest(connection: Connection, most: int) -> dict[Tenant, int]:
+    """Bytes stored and reserved by the tenants that use most, with their projects."""
+    owner = func.coalesce(projects.c.tenant, storage.c.tenant).label("owner")
+    joined = storage.outerjoin(projects, projects.c.id == storage.c.tenant)
+    size = func.sum(storage.c.bytes)
+    query = select(owner, size).select_from(joined).where(_counted()).group_by(owner)
+    rows = connection.execute(query.order_by(size.desc(), owner).limit(most))
+    return {Tenant(tenant): int(total) for tenant, total in rows}
 
 
 def reserve(

@@ -1,9 +1,11 @@
 """Health of workers: memory, threads and load of each, without addresses."""
 
+import time
 from dataclasses import asdict
 
 import pytest
 
+from bentray_workers.cluster.scheduler_load import load_of
 from bentray_workers.cluster.worker_health import health_of
 
 
@@ -26,6 +28,16 @@ def test_embedded_workers_report_themselves(cluster):
     found = health_of(cluster.client)
     assert len(found) == 2
     assert all(one.threads >= 1 and one.memory_bytes > 0 and not one.paused for one in found)
+
+
+def test_the_scheduler_reports_its_load(cluster):
+    future = cluster.client.submit(abs, -1, resources={"no such resource": 1})
+    deadline = time.monotonic() + 20.0
+    while (load := load_of(cluster.client)).waiting_tasks != 1:
+        assert time.monotonic() < deadline
+    assert load.tasks >= 1
+    assert load.memory_bytes > 1e6
+    future.cancel()
 
 
 def test_a_worker_in_full():
