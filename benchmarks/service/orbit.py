@@ -97,7 +97,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         folder = Path(name)
         with (
             running_service(folder / "data", folder / "log") as url,
-            httpx.Client(base_url=url, timeout=120.0) as http,
+            httpx.Client(base_url=url, timeout=120.0, trust_env=False) as http,
         ):
             volume = stored_volume(http, QUICK_NODES if context.quick else NODES)
             mesh, picture = stored_field(http, context.quick)

@@ -25,6 +25,7 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import NotAuthenticated, ProviderUnavailable
 from ..settings import ServiceSettings
 from ..web.addresses import names_loopback
+from ..web.outbound import Transport, certificates, proxy_for, through_proxy
 
 log = logging.getLogger("bentray.access")
 
@@ -61,7 +62,7 @@ class Provider:
         """Nothing is read from the provider yet, so that the service starts without it.
 
         Raises:
-            InvalidInput: for an invalid or a missing setting.
+            InvalidInput: for an invalid or a missing setting, a proxy or certificates that cannot be used.
         """
         assert settings.oidc_issuer is not None
         self.issuer = settings.oidc_issuer
@@ -72,8 +73,10 @@ class Provider:
         self._client_id = settings.oidc_client_id
         self._secret = _secret(settings)
         self._scope = settings.oidc_scope
-        # One for all: the certificates of authorities are read once.
-        self._http = httpx.Client(timeout=PATIENCE_S)
+        # A proxy or certificates that cannot be used end the start of the service, not the first sign-in.
+        proxy_for(httpx.URL(self.issuer))
+        certificates()
+        self._http = httpx.Client(timeout=PATIENCE_S, transport=Transport())
         self._lock = threading.Lock()
         self._read_at = self._keys_at = -FRESH_S
         self._document: dict[str, Any] = {}
@@ -234,7 +237,10 @@ class Provider:
                     body += piece
                     if len(body) > MAX_BYTES:
                         raise ProviderUnavailable(f"an answer of more than {MAX_BYTES} bytes")
-        except (httpx.HTTPError, httpx.InvalidURL) as error:
+        except (httpx.HTTPError, httpx.InvalidURL, InvalidInput) as error:
+            # For the operator: users do not see proxies.
+            proxy = through_proxy(error.request.url) if isinstance(error, httpx.TransportError) else ""
+            log.warning("no answer from %s%s: %s", address, proxy, error)
             raise ProviderUnavailable(f"no answer ({type(error).__name__})") from error
         if answer.status_code >= httpx.codes.INTERNAL_SERVER_ERROR:
             raise ProviderUnavailable(f"status {answer.status_code}")

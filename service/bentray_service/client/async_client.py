@@ -9,6 +9,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar, Unpack
 import anyio
 import httpx
 
+from ..web.outbound import AsyncTransport
 from . import batches as batch_flows
 from . import flows, lists, pictures
 from . import projects as project_flows
@@ -36,9 +37,9 @@ class AsyncClient(Connection):
 
     def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
         super().__init__(url, key, **options)
-        self._http = httpx.AsyncClient(**self._options, transport=httpx.AsyncHTTPTransport(retries=2))
+        self._http = httpx.AsyncClient(**self._options, transport=AsyncTransport(retries=2))
         # For addresses of the bucket, which must not see the key.
-        self._bucket = httpx.AsyncClient(timeout=self._options["timeout"])
+        self._bucket = httpx.AsyncClient(timeout=self._options["timeout"], transport=AsyncTransport())
 
     async def __aenter__(self) -> Self:
         return self

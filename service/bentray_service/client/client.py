@@ -9,6 +9,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar, Unpack
 
 import httpx
 
+from ..web.outbound import Transport
 from . import batches as batch_flows
 from . import flows, lists, pictures
 from . import projects as project_flows
@@ -34,9 +35,9 @@ class Client(Connection):
 
     def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
         super().__init__(url, key, **options)
-        self._http = httpx.Client(**self._options, transport=httpx.HTTPTransport(retries=2))
+        self._http = httpx.Client(**self._options, transport=Transport(retries=2))
         # For addresses of the bucket, which must not see the key.
-        self._bucket = httpx.Client(timeout=self._options["timeout"])
+        self._bucket = httpx.Client(timeout=self._options["timeout"], transport=Transport())
 
     def __enter__(self) -> Self:
         return self

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import httpx
 
+from ..web.outbound import through_proxy
 from ..web.problem import Problem
 
 
@@ -44,8 +45,13 @@ class NoAnswer(ClientError):  # noqa: N818 - names what happened, to whoever tri
 def no_answer(url: str, error: httpx.TransportError) -> NoAnswer:
     """The error for a failed connection."""
     refused = isinstance(error, httpx.ConnectError | httpx.ConnectTimeout)
-    hint = "; bentray serve starts a service" if isinstance(error, httpx.ConnectError) else ""
-    return NoAnswer(f"no answer from {url}: {error}{hint}", sent=not refused)
+    proxy = through_proxy(error.request.url)
+    hint = ""
+    if "CERTIFICATE_VERIFY_FAILED" in str(error):
+        hint = "; SSL_CERT_FILE names a file with the certificate of your own authority"
+    elif isinstance(error, httpx.ConnectError) and not proxy:
+        hint = "; bentray serve starts a service"
+    return NoAnswer(f"no answer from {url}{proxy}: {error}{hint}", sent=not refused)
 
 
 def from_problem(problem: Problem | None) -> ClientError:
@@ -61,7 +67,11 @@ def from_response(response: httpx.Response) -> ClientError:
     if response.headers.get("content-type", "").startswith("application/problem+json"):
         error = from_problem(Problem.model_validate_json(response.content))
     else:
-        words = f"{response.url} answered {response.status_code}, but not as a Bentray service"
+        proxy = through_proxy(response.url)
+        if proxy and response.status_code >= httpx.codes.INTERNAL_SERVER_ERROR:
+            # Of the proxy: the service itself may not exist.
+            return NoAnswer(f"no answer from {response.url}{proxy}: status {response.status_code}")
+        words = f"{response.url} answered {response.status_code}{proxy}, but not as a Bentray service"
         error = ClientError(words, response.status_code)
     wait = response.headers.get("retry-after", "")
     if wait.isdecimal():

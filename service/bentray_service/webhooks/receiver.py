@@ -2,26 +2,29 @@
 
 A service that calls addresses of its clients must not reach what only it can reach. Therefore a host name is
 resolved once, its addresses are checked, and the connection is made to the checked address; redirects are not
-followed, and proxies of the environment are not used.
+followed. Proxies of the environment are not used: a proxy resolves the name again, perhaps differently.
 """
 
 from __future__ import annotations
 
 import http.client
 import ipaddress
+import logging
 import socket
 import ssl
 import threading
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from functools import cache
 from typing import Any, NamedTuple
 from urllib.parse import SplitResult, urlsplit
 
 from bentray_kernels.errors import InvalidInput
 
 from ..web.addresses import Network, within
+from ..web.outbound import certificates, proxy_variable
+
+log = logging.getLogger("bentray.webhooks")
 
 LONGEST_URL = 2000
 # Time limits of the connection, and of the whole exchange, s.
@@ -97,6 +100,10 @@ def post(url: str, headers: Mapping[str, str], body: bytes, permitted: Sequence[
             error = "not accepted by the receiver"
     except InvalidInput as refused:
         error = f"found {refused.value}; accepted: {refused.accepted}"
+        if refused.field != "webhook":
+            # The path of a file of certificates is for the operator alone.
+            log.warning("no webhook can be sent with TLS: %s", refused)
+            error = f"no answer: this service cannot use its {refused.field}"
     except TimeoutError:
         error = f"no answer within {EXCHANGE_S:g} s"
     except ssl.SSLCertVerificationError as failed:
@@ -105,6 +112,8 @@ def post(url: str, headers: Mapping[str, str], body: bytes, permitted: Sequence[
         expired = time.monotonic() - begun >= EXCHANGE_S
         reason = getattr(failed, "strerror", None) or type(failed).__name__
         error = f"no answer within {EXCHANGE_S:g} s" if expired else f"no answer: {reason}"
+        if variable := proxy_variable(urlsplit(url).scheme):
+            error += f" (webhooks do not use {variable})"
     return Outcome(status, error, round(time.monotonic() - begun, 3))
 
 
@@ -181,7 +190,7 @@ class _Pinned(http.client.HTTPConnection):
         self.sock.settimeout(CONNECT_S)
         self.sock.connect(self._address)
         if self._secure:
-            self.sock = _tls().wrap_socket(self.sock, server_hostname=self.host)
+            self.sock = certificates().wrap_socket(self.sock, server_hostname=self.host)
         self.sock.settimeout(EXCHANGE_S)
 
     def abort(self) -> None:
@@ -189,8 +198,3 @@ class _Pinned(http.client.HTTPConnection):
         if self.sock is not None:
             with suppress(OSError):
                 self.sock.shutdown(socket.SHUT_RDWR)
-
-
-@cache
-def _tls() -> ssl.SSLContext:
-    return ssl.create_default_context()

@@ -173,7 +173,7 @@ def test_certificates_are_checked_for_the_name(monkeypatch, tmp_path):
         ("other.example", trusting, "the certificate is not valid: Hostname mismatch"),
         ("hook.example", ssl.create_default_context(), "the certificate is not valid: self-signed"),
     ):
-        monkeypatch.setattr(module, "_tls", lambda context=context: context)
+        monkeypatch.setattr(module, "certificates", lambda context=context: context)
         with monkeypatch.context() as names:
             resolving(names, ["127.0.0.1"])
             outcome = post(f"https://{name}:{receiver.port}/", {}, b"{}", LOOPBACK)
