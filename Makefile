@@ -68,9 +68,9 @@ release: docs ## build wheel, sdist, bill of materials and checksums into dist/
 
 lock: ## update the lock files (needs uv on the PATH)
 	@command -v uv >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
-	$(call compile,requirements.lock,--extra build --extra export --extra postgres --extra s3 pyproject.toml)
-	$(call compile,requirements-dev.lock,--extra build --extra export --extra postgres --extra s3 --extra test --extra lint -c requirements.lock pyproject.toml)
-	$(call compile,requirements-docs.lock,--extra build --extra export --extra postgres --extra s3 --extra docs -c requirements-dev.lock pyproject.toml)
+	$(call compile,requirements.lock,--extra build --extra export --extra postgres pyproject.toml)
+	$(call compile,requirements-dev.lock,--extra build --extra export --extra postgres --extra test --extra lint -c requirements.lock pyproject.toml)
+	$(call compile,requirements-docs.lock,--extra build --extra export --extra postgres --extra docs -c requirements-dev.lock pyproject.toml)
 	$(call compile,requirements-generator.lock,--group generator)
 
 clean: ## remove build outputs, caches and .venv

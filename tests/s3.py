@@ -9,11 +9,10 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import httpx
 import pytest
 from moto.moto_server.werkzeug_app import DomainDispatcherApplication, create_backend_app
 from werkzeug.serving import make_server
-
-from bentray_service.files.bucket import Bucket
 
 SECRET = "a-secret-that-no-log-shows"
 
@@ -50,8 +49,7 @@ class Server:
         monkeypatch.setenv("AWS_DEFAULT_REGION", "us-east-1")
         self.away.clear()
         name = f"test-{secrets.token_hex(6)}"
-        # Through the client that the tests use: it takes a second to make one.
-        Bucket(f"s3://{name}")._call("create_bucket")
+        httpx.put(f"http://127.0.0.1:{self.port}/{name}").raise_for_status()
         return f"s3://{name}/scans"
 
     def close(self) -> None:

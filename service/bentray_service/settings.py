@@ -75,8 +75,8 @@ class ServiceSettings(BaseSettings):
     )
     storage_url: str | None = Field(
         None,
-        pattern=r"^s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9!_.*'()-]+)*/?$",
-        description="s3://bucket/prefix to store the files; default: data_dir.",
+        pattern=r"^(s3|gs|az)://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9!_.*'()-]+)*/?$",
+        description="s3://bucket/prefix (or gs://, az://) to store the files; default: data_dir.",
     )
     storage_public_endpoint: str | None = Field(
         None,

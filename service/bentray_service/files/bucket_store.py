@@ -17,6 +17,7 @@ from .bucket import Bucket
 from .cache import Cache
 from .direct_uploads import DirectUploads
 from .packing import metadata_of, packed, unpack
+from .store import Store
 from .tenant_files import KEPT
 
 log = logging.getLogger("bentray.storage")
@@ -30,8 +31,8 @@ FORGOTTEN_S = 86400.0
 LEFT_S = 3600.0
 
 
-class BucketStore:
-    """Keeps each item as one object whose key is its path in the data folder; see :class:`Store`.
+class BucketStore(Store):
+    """Keeps each item as one object whose key is its path in the data folder.
 
     A cached file is always valid, since names are never reused for other content. Downloads are verified
     against the SHA-256 in the metadata of the object.
@@ -47,7 +48,8 @@ class BucketStore:
         """
         self._root = root
         self._bucket = bucket
-        self.direct_uploads = DirectUploads(bucket)
+        # A PUT to Azure needs a header beside the address.
+        self.direct_uploads = None if bucket.url.startswith("az:") else DirectUploads(bucket)
         self._mark = mark
         self._known = known
         self._cache = Cache(root, cache_bytes)

@@ -23,7 +23,7 @@ from .tenant_files import KEPT
 log = logging.getLogger("bentray.storage")
 
 
-class CheckedStore:
+class CheckedStore(Store):
     """Stores a checksum with each publication, and verifies it at the first use in this process.
 
     A file with another size or modification time is verified again. Damage found by ``bentray verify`` is

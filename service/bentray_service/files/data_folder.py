@@ -15,7 +15,6 @@ from bentray_workers.files.atomic import sync
 
 from ..rows.tenants import LOCAL, Tenant, checked_tenant
 from .disk import remove_path
-from .local_store import LocalStore
 from .private import close_to_others
 from .store import Store
 from .tenant_files import KINDS, TenantFiles
@@ -38,7 +37,7 @@ class Files:
 
     def __init__(self, data_dir: Path, store: Store | None = None) -> None:
         self.root = data_dir.resolve()
-        self.store = store or LocalStore()
+        self.store = store or Store()
         self._tenants = self.root / "tenants"
         self.scratch = self.root / "scratch"
         self.audit = self.root / "audit"

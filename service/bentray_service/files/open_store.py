@@ -10,7 +10,8 @@ from ..errors import StorageUnavailable
 from ..rows.database import Database
 from ..rows.database_id import mark_of
 from ..rows.live_ids import LiveIds
-from .local_store import LocalStore
+from .bucket import Bucket
+from .bucket_store import MARK, BucketStore
 from .store import Store
 
 FIELD = "BENTRAY_STORAGE_URL"
@@ -22,26 +23,20 @@ def open_store(
     """Open the store of a service.
 
     Args:
-        url: ``s3://bucket/prefix``; None for the data folder.
+        url: ``s3://bucket/prefix``, or ``gs://`` or ``az://``; None for the data folder.
         root: the data folder.
         database: with the rows of the stored items.
         cache_bytes: see ``BucketStore``.
         public_endpoint: see ``Bucket``.
 
     Raises:
-        InvalidInput: when the bucket is not readable and writable, belongs to another database, or the
-            packages for S3 are not installed.
+        InvalidInput: when the bucket is not readable and writable, or belongs to another database.
     """
     if url is None:
-        return LocalStore()
+        return Store()
+    mark = mark_of(database)
     try:
-        from .bucket import Bucket
-        from .bucket_store import MARK, BucketStore
-    except ImportError as error:
-        found = f"{url}, without the module {error.name}"
-        raise InvalidInput(FIELD, found, "an address, with bentray[s3] installed") from error
-    bucket, mark = Bucket(url, public_endpoint), mark_of(database)
-    try:
+        bucket = Bucket(url, public_endpoint)
         metadata = bucket.metadata(MARK)
         if metadata is None and next(bucket.listed(), None) is not None:
             raise InvalidInput(FIELD, f"{url}, which contains other objects", "an unused prefix")

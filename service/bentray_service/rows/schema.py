@@ -323,7 +323,7 @@ uploads = Table(
     # Metadata for the ingest process, and as sent by the client.
     Column("given", JSON, nullable=False),
     Column("metadata", String(4000), nullable=False),
-    # Id of an upload to the bucket in parts; null for data that is sent to the service.
+    # DIRECT for an upload to the bucket; null for data that is sent to the service.
     Column("multipart_id", String(1024)),
     # receiving, reading, done, or refused with the problem.
     Column("state", String(16), nullable=False),

@@ -20,6 +20,8 @@ from .typed_rows import Plain, UploadRow
 MAX_INCOMPLETE = 100
 # Suggested time before the next attempt, s.
 AGAIN_S = 60.0
+# In place of an id, for uploads to the bucket.
+DIRECT = "parts"
 
 
 class Uploads(TenantTable[UploadRow]):
@@ -78,10 +80,10 @@ class Uploads(TenantTable[UploadRow]):
             )
         return self.get(tenant, upload_id)
 
-    def set_multipart(self, row: UploadRow, multipart_id: str) -> UploadRow:
-        """Note the id in the bucket of an upload that goes there."""
-        self._change(row["id"], multipart_id=multipart_id)
-        return {**row, "multipart_id": multipart_id}
+    def set_direct(self, row: UploadRow) -> UploadRow:
+        """Note that the parts of an upload go to the bucket."""
+        self._change(row["id"], multipart_id=DIRECT)
+        return {**row, "multipart_id": DIRECT}
 
     def unread(self) -> list[UploadRow]:
         """Complete uploads of all tenants that wait for ingestion, oldest first."""

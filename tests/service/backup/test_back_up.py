@@ -18,7 +18,7 @@ from bentray_service.backup.back_up import back_up
 from bentray_service.backup.restore import restore
 from bentray_service.files.checked_store import CheckedStore
 from bentray_service.files.data_folder import Files
-from bentray_service.files.local_store import LocalStore
+from bentray_service.files.store import Store
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.database import open_database
@@ -97,7 +97,7 @@ def stored(tmp_path):
 def store_scans(settings):
     root = settings.data_dir
     with closing(open_stored(settings)) as database:
-        files = Files(root, CheckedStore(LocalStore(), root, Checksums(database)))
+        files = Files(root, CheckedStore(Store(), root, Checksums(database)))
         for tenant in TENANTS:
             for size in (1, 2):
                 path = files.of(tenant).dataset(new_id("dataset"))

@@ -12,7 +12,7 @@ from typer.testing import Result
 
 from bentray_service.files.checked_store import CheckedStore
 from bentray_service.files.data_folder import Files
-from bentray_service.files.local_store import LocalStore
+from bentray_service.files.store import Store
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id
@@ -28,7 +28,7 @@ SUMMARY |= {"slices": 1, "has_traces": False, "has_travel_times": True, "has_tru
 def stored(tmp_path: Path) -> tuple[Path, Path, Path]:
     """A file with a checksum, one from before there were any, and one without a row."""
     with closing(open_database(f"sqlite:///{tmp_path / 'bentray.sqlite'}")) as database:
-        files = Files(tmp_path, CheckedStore(LocalStore(), tmp_path, Checksums(database)))
+        files = Files(tmp_path, CheckedStore(Store(), tmp_path, Checksums(database)))
         files.prepare()
         paths = [files.of(LOCAL).dataset(new_id("dataset")) for _ in range(3)]
         for path in paths:

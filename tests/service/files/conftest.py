@@ -25,6 +25,6 @@ def s3_server() -> Iterator[s3.Server]:
 @pytest.fixture
 def bucket_url(s3_server: s3.Server, monkeypatch: pytest.MonkeyPatch) -> str:
     """The address of an empty bucket; it is asked once each time, and always anew whether it is there."""
-    monkeypatch.setattr(bucket, "TRIES", {"total_max_attempts": 1})
+    monkeypatch.setattr(bucket, "RETRIES", 0)
     monkeypatch.setattr(bucket_store, "FRESH_S", 0.0)
     return s3_server.new_bucket(monkeypatch)

@@ -94,7 +94,6 @@ class TestBucketStore(StoreSuite):
 
     def test_a_large_file_goes_and_comes_in_parts(self, files, monkeypatch, s3_server):
         monkeypatch.setattr(bucket_module, "PART_BYTES", 5 * 2**20)
-        files.store._bucket._s3.default_block_size = 5 * 2**20
         content = secrets.token_bytes(12 * 2**20)
         s3_server.asked.clear()
         path = self.file(files, content)

@@ -8,7 +8,7 @@ from sqlalchemy import insert
 from bentray_service.errors import Damaged, Deleted
 from bentray_service.files.checked_store import CheckedStore
 from bentray_service.files.data_folder import Files
-from bentray_service.files.local_store import LocalStore
+from bentray_service.files.store import Store
 from bentray_service.files.open_store import open_store
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.database import open_database
@@ -33,7 +33,7 @@ def opened(tmp_path, rows):
     """Open the data folder as a new process does."""
 
     def go():
-        files = Files(tmp_path / "data", CheckedStore(LocalStore(), tmp_path / "data", rows))
+        files = Files(tmp_path / "data", CheckedStore(Store(), tmp_path / "data", rows))
         files.prepare()
         return files
 

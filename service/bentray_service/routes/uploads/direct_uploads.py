@@ -53,7 +53,7 @@ def create_direct_upload(
     tenant: CallerTenant,
 ) -> DirectUploadRecord:
     """Create an upload; send its parts to the addresses of `parts`, then `complete` it."""
-    direct = _direct(service)
+    _direct(service)
     said = {**upload.metadata, "kind": upload.kind}
     header = ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
     what, given = read_metadata(header)
@@ -64,11 +64,7 @@ def create_direct_upload(
     service.upload_limits.check_begin(tenant)
     keep_s, most_bytes = service.settings.upload_keep_s, service.quota.most_bytes
     row = service.uploads.add(tenant, what, upload.length, given, header, keep_s, most_bytes)
-    try:
-        row = service.uploads.set_multipart(row, direct.begin(row["id"]))
-    except BaseException:
-        service.uploads.remove(row["id"])
-        raise
+    row = service.uploads.set_direct(row)
     record = _record(row)
     response.headers["Location"] = record.links["self"]
     return record
@@ -118,7 +114,6 @@ def complete_direct_upload(upload_id: str, service: Service, tenant: CallerTenan
             if found != part_sizes(row["length"]):
                 accepted = f"{len(part_sizes(row['length']))} parts, {row['length']} bytes in total"
                 raise WrongOffset("parts", f"{len(found)} parts, {sum(found)} bytes", accepted)
-            direct.complete(row)
             # The mark of this service, which ingests it.
             service.files.of(tenant).upload(upload_id).touch()
             service.uploads.mark_complete(upload_id)

@@ -7,7 +7,7 @@ from bentray_service.files.data_folder import Files
 from .store_suite import StoreSuite
 
 
-class TestLocalStore(StoreSuite):
+class TestStore(StoreSuite):
     @pytest.fixture
     def files(self, tmp_path):
         files = Files(tmp_path)
