@@ -18,9 +18,7 @@ pytestmark = pytest.mark.nightly
 CORRECTION = {"frequency_hz": 500000}
 # Code that ends the service where it comes by.
 KILL = "import os, signal\ndef killed(*_, **__):\n    os.kill(os.getpid(), signal.SIGKILL)\n"
-FILE_IS_MOVED = (
-    f"{KILL}from bentray_service.files.store import Store\nStore.publish = killed\n"
-)
+FILE_IS_MOVED = f"{KILL}from bentray_service.files.store import Store\nStore.publish = killed\n"
 ROW_IS_DUE = f"{KILL}from bentray_service.rows.stored_tables import Datasets\nDatasets.add = killed\n"
 ANSWER_IS_DUE = f"{KILL}from bentray_service.routes import names\nnames.dataset_record = killed\n"
 # Prints the peak of the memory of a correction, KiB; that of ``getrusage`` is at least that of the parent.

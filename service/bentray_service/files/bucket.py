@@ -1,9 +1,11 @@
-"""Objects under one prefix of a bucket (S3, Google, Azure) by obstore; errors become ``StorageUnavailable``."""
+"""Objects under one prefix of a bucket by obstore; errors become ``StorageUnavailable``."""
 
 from __future__ import annotations
 
+import configparser
 import errno
 import logging
+import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,6 +31,15 @@ ANSWER_S = 10.0
 CONNECT_S = 3.0
 RETRIES = 2
 
+# Settings in the files of AWS: name of the variable that takes precedence.
+AWS_SETTINGS = {
+    "aws_access_key_id": "AWS_ACCESS_KEY_ID",
+    "aws_secret_access_key": "AWS_SECRET_ACCESS_KEY",
+    "aws_session_token": "AWS_SESSION_TOKEN",
+    "region": "AWS_DEFAULT_REGION",
+    "endpoint_url": "AWS_ENDPOINT_URL",
+}
+
 
 @dataclass(frozen=True)
 class BucketObject:
@@ -40,7 +51,11 @@ class BucketObject:
 
 
 class Bucket:
-    """A bucket; keys are relative to the prefix. Credentials come from the usual variables of its provider."""
+    """A bucket; keys are relative to the prefix.
+
+    Credentials come from the variables of its provider; those of S3 also from the files of AWS
+    (``AWS_SHARED_CREDENTIALS_FILE``, ``AWS_CONFIG_FILE``, ``AWS_PROFILE``), or from the machine's role.
+    """
 
     def __init__(self, url: str, public_endpoint: str | None = None) -> None:
         """Args:
@@ -53,18 +68,27 @@ class Bucket:
         """
         self.url = url.rstrip("/")
         with self._watched():
-            self._store = _client(self.url, ANSWER_S)
-            self._transfers = _client(self.url, TRANSFER_S)
+            known = _aws_files() if self.url.startswith("s3:") else {}
+            self._store = _client(self.url, ANSWER_S, **known)
+            self._transfers = _client(self.url, TRANSFER_S, **known)
             # The host is signed, too, so that addresses cannot be rewritten afterwards.
-            other = {} if public_endpoint is None else {"endpoint": public_endpoint}
-            self._signing: Any = _client(self.url, ANSWER_S, **other)
+            if public_endpoint is not None:
+                known["endpoint_url"] = public_endpoint
+            self._signing: Any = _client(self.url, ANSWER_S, **known)
 
     def put(self, path: Path, key: str, metadata: Mapping[str, str]) -> None:
         """Upload a file with metadata; the object is complete or absent."""
         part = max(PART_BYTES, -(-path.stat().st_size // MAX_PARTS))
-        how = {"chunk_size": part, "max_concurrency": PARTS_AT_ONCE, "attributes": dict(metadata)}
+        attributes = dict(metadata)
         with self._watched():
-            obstore.put(self._transfers, key, path, **how)
+            obstore.put(
+                self._transfers,
+                key,
+                path,
+                attributes=attributes,
+                chunk_size=part,
+                max_concurrency=PARTS_AT_ONCE,
+            )
 
     def get(self, key: str, path: Path, mode: str = "wb") -> None:
         """Download an object; after an error the file may be incomplete.
@@ -126,7 +150,7 @@ class Bucket:
 
     @contextmanager
     def _watched(self, *, may_miss: bool = False) -> Iterator[None]:
-        """Turn errors into ``StorageUnavailable``; with ``may_miss`` a missing object is ``FileNotFoundError``."""
+        """Turn errors into ``StorageUnavailable``; with ``may_miss`` not a missing object."""
         try:
             yield
         except (BaseError, OSError, ValueError) as error:
@@ -140,8 +164,23 @@ class Bucket:
             raise StorageUnavailable(f"error of the bucket ({type(error).__name__})") from error
 
 
+def _aws_files() -> dict[str, str]:
+    """Settings of the profile in the files of AWS, without those that a variable states."""
+    profile = os.environ.get("AWS_PROFILE", "default")
+    known: dict[str, str] = {}
+    for name, file in (("AWS_SHARED_CREDENTIALS_FILE", "credentials"), ("AWS_CONFIG_FILE", "config")):
+        parser = configparser.RawConfigParser()
+        parser.read(os.environ.get(name, Path("~/.aws", file).expanduser()))
+        for section in (profile, f"profile {profile}"):
+            known |= dict(parser[section]) if parser.has_section(section) else {}
+    stated = {name for name, variable in AWS_SETTINGS.items() if variable in os.environ}
+    return {name: known[name] for name in AWS_SETTINGS.keys() & known.keys() - stated}
+
+
 def _client(url: str, seconds: float, **more: str) -> ObjectStore:
-    return from_url(
+    # Which settings there are depends on the provider in the address.
+    made: Any = from_url
+    store: ObjectStore = made(
         url,
         client_options={
             "allow_http": True,
@@ -151,3 +190,4 @@ def _client(url: str, seconds: float, **more: str) -> ObjectStore:
         retry_config={"max_retries": RETRIES, "retry_timeout": timedelta(seconds=ANSWER_S)},
         **more,
     )
+    return store

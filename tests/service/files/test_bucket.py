@@ -57,3 +57,17 @@ def test_unresponsive_bucket_times_out(bucket_url, s3_server, monkeypatch):
     finally:
         s3_server.silent.clear()
     assert bucket.metadata("a") is None
+
+
+def test_credentials_come_from_a_file_too(bucket_url, monkeypatch, tmp_path):
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.delenv(name)
+    secret = tmp_path / "credentials"
+    secret.write_text(
+        "[default]\naws_access_key_id = wrong\n[lab]\naws_access_key_id = named\naws_secret_access_key = s\n"
+    )
+    monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(secret))
+    monkeypatch.setenv("AWS_PROFILE", "lab")
+    bucket = Bucket(bucket_url)
+    bucket.put_metadata("a", {})
+    assert "named" in bucket.put_url("a", 60)
