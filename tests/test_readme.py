@@ -69,6 +69,8 @@ def test_readme_requirements_match_the_tests() -> None:
     programs = {words[0].removeprefix(".venv/bin/").split("=")[0] for _, words in shell_lines()}
     ours = {
         "bentray",
+        "chmod",
+        "deploy/check.sh",
         "deploy/secrets.sh",
         "deploy/certificates.sh",
         "DASK_SCHEDULER_ADDRESS",

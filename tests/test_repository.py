@@ -15,8 +15,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = {"bentray_kernels": "kernels", "bentray_workers": "workers", "bentray_service": "service"}
 LOCKS = {
-    "requirements.lock": ("build", "export", "postgres", "s3"),
-    "requirements-dev.lock": ("build", "export", "postgres", "s3", "test", "lint"),
+    "requirements.lock": ("build", "export", "postgres"),
+    "requirements-dev.lock": ("build", "export", "postgres", "test", "lint"),
 }
 
 # Folders of one machine, and hosts of package indexes; spelt so that this file does not contain them.
