@@ -61,6 +61,7 @@ from .routes import (
     volumes,
 )
 from .routes.uploads import direct_uploads, tus
+from .rows.accounts import Accounts
 from .rows.ages import ExpiryMarks
 from .rows.batches import Batches
 from .rows.checksums import Checksums
@@ -201,8 +202,8 @@ def _open(
     orphans.begin()
     quota = Quota(database, settings.max_tenant_bytes)
     quota.begin(files, alone=settings.database_url is None)
-    tenant_projects = Projects(database)
-    access_control = SignIn(settings, Keys(database), Sessions(database), tenant_projects)
+    tenant_projects, accounts = Projects(database), Accounts(database)
+    access_control = SignIn(settings, Keys(database), Sessions(database), tenant_projects, accounts)
     stack.callback(access_control.close)
     if cluster is None:
         cluster = stack.enter_context(
@@ -218,6 +219,7 @@ def _open(
     queue, compute = Queue(database, installation_of(locked)), Compute(cluster, store.fetch)
     runner = Runner(
         queue,
+        accounts,
         files,
         compute,
         settings.jobs_at_once,
@@ -233,11 +235,19 @@ def _open(
         "mesh": Meshes(database),
     }
     limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, files.scratch)
-    ingest_queue = FairQueue(readers_at_once(settings.ingest_memory_bytes))
+    ingest_queue = FairQueue(readers_at_once(settings.ingest_memory_bytes), accounts)
     ingest_queue.start()
     stack.callback(ingest_queue.stop)
     upload_ingest = UploadIngest(
-        pieces, files, stores, limits, settings.upload_keep_s, ingest_queue, quota, store.direct_uploads
+        pieces,
+        files,
+        stores,
+        limits,
+        settings.upload_keep_s,
+        ingest_queue,
+        accounts,
+        quota,
+        store.direct_uploads,
     )
     upload_ingest.start()
     stack.callback(upload_ingest.stop)
@@ -259,7 +269,7 @@ def _open(
     )
     housekeeper.start()
     stack.callback(housekeeper.stop)
-    pictures = Pictures(cluster, store.fetch)
+    pictures = Pictures(cluster, accounts, store.fetch)
     stack.callback(pictures.stop)
     webhooks = Webhooks(database, settings, alone=settings.database_url is None)
     webhooks.start()
@@ -286,7 +296,7 @@ def _open(
         uploads=pieces,
         direct_uploads=store.direct_uploads,
         quota=quota,
-        upload_limits=UploadLimits(),
+        upload_limits=UploadLimits(accounts),
         ingest_queue=ingest_queue,
         deletion=deletion,
         hold=hold,
@@ -298,7 +308,7 @@ def _open(
         runner=runner,
         sign_in=access_control,
         key_watch=KeyWatch(Keys(database), Sessions(database), tenant_projects),
-        feed=EventFeed(Jobs(database), leaving.is_set),
+        feed=EventFeed(Jobs(database), accounts, leaving.is_set),
         audit=audit,
         readiness=readiness,
         threads=threads,

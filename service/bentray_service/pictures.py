@@ -34,6 +34,7 @@ from bentray_workers.rendering.tiles import PictureTasks
 from .compute import Cluster
 from .errors import Busy, StorageFull
 from .picture_queue import LONG_S, PictureQueue
+from .rows.accounts import Account, Accounts
 from .rows.tenants import Tenant
 from .rows.typed_rows import DatasetRow, FieldRow, VolumeRow
 
@@ -62,12 +63,13 @@ class Pictures:
     and Busy after the time limit.
     """
 
-    def __init__(self, cluster: Cluster, fetch: Callable[[Path], Path]) -> None:
+    def __init__(self, cluster: Cluster, accounts: Accounts, fetch: Callable[[Path], Path]) -> None:
         """Args:
         cluster: with the workers.
+        accounts: who take turns.
         fetch: makes an input file available at its path; see ``Store.fetch``.
         """
-        self._cluster = cluster
+        self._cluster, self._accounts = cluster, accounts
         self._fetch = fetch
         self._threads = ThreadPoolExecutor(THREADS, "pictures")
         self._asker = ThreadPoolExecutor(1, "workers")
@@ -200,9 +202,9 @@ class Pictures:
         what = "volume", f"shape {tuple(volume['shape'])}", cost
         return dict(await self._one(tenant, what, path, result_summary, {"scan": scan}))
 
-    def waiting(self) -> dict[Tenant, int]:
-        """Number of waiting tasks by tenant."""
-        return self._queue.waiting()
+    def waiting(self, tenant: Tenant) -> int:
+        """Number of waiting tasks of the account of a tenant."""
+        return self._queue.waiting().get(self._accounts.of(tenant), 0)
 
     async def close(self) -> None:
         """Stop polling for workers, in the event loop that uses this object."""
@@ -241,13 +243,14 @@ class Pictures:
             how: further arguments of each task.
         """
         field, found, cost = what
+        account = self._accounts.of(tenant)
         workers = await self._queue.workers()
         picture_cost.check_memory(field, found, cost, list(workers.values()))
         try:
-            async with self._queue.admitted(tenant, cost.seconds), asyncio.timeout(RENDER_SECONDS):
+            async with self._queue.admitted(account, cost.seconds), asyncio.timeout(RENDER_SECONDS):
                 tasks = tasks_of(await self._in_thread(lambda: self._fetch(path)))
                 try:
-                    return await _Run(self, tenant, cost, dict(how or {})).all(tasks)
+                    return await _Run(self, account, cost, dict(how or {})).all(tasks)
                 except (InvalidInput, FileNotFoundError):
                     # Report an input that was deleted or damaged in the meantime.
                     await self._in_thread(lambda: self._fetch(path))
@@ -281,8 +284,8 @@ def _water(dataset: DatasetRow) -> dict[str, float]:
 class _Run:
     """The tasks of one image."""
 
-    def __init__(self, pictures: Pictures, tenant: Tenant, cost: Cost, how: dict[str, Any]) -> None:
-        self._pictures, self._tenant, self._cost, self._how = pictures, tenant, cost, how
+    def __init__(self, pictures: Pictures, account: Account, cost: Cost, how: dict[str, Any]) -> None:
+        self._pictures, self._account, self._cost, self._how = pictures, account, cost, how
         self._long = cost.seconds > LONG_S
         self._begun: list[Any] = []
 
@@ -307,7 +310,7 @@ class _Run:
     async def _ended(self, task: tuple[Any, ...]) -> Any:
         """Run a task; returns its future, or raises its error."""
         for _ in range(MAX_TRIES):
-            async with self._pictures._queue.place(self._tenant, self._fits, long=self._long) as address:
+            async with self._pictures._queue.place(self._account, self._fits, long=self._long) as address:
                 begun = time.monotonic()
                 future = await self._pictures._in_thread(partial(self._submit, address, task))
                 self._begun.append(future)

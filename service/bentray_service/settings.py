@@ -94,7 +94,8 @@ class ServiceSettings(BaseSettings):
         16,
         ge=1,
         le=256,
-        description="Maximum number of running jobs including one of each tenant, beyond jobs_at_once.",
+        description="Maximum number of running jobs including one of each tenant, beyond jobs_at_once; the "
+        "last one is always that of another tenant.",
     )
     max_queued_jobs: int = Field(
         1000,

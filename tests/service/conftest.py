@@ -23,6 +23,8 @@ from bentray_service.app import create_app
 from bentray_service.ingest import canonical
 from bentray_service.ingest.ingest_process import convert_upload
 from bentray_service.ingest.sandbox import summary_in
+from bentray_service.rows.accounts import Account, Accounts
+from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
 from bentray_service.web.listening import Listening
 from bentray_service.web.server import Server
@@ -38,6 +40,15 @@ HDF5 = {"Content-Type": "application/x-hdf5"}
 ENDED = ("succeeded", "failed", "cancelled")
 # What takes longer hangs: a job may have to compile its kernels first, on a machine that is busy.
 PATIENCE_S = 240.0
+
+
+class NoProjects(Accounts):
+    """Accounts without a database: each tenant is its own."""
+
+    def __init__(self) -> None: ...
+
+    def of(self, tenant: Tenant) -> Account:
+        return Account(tenant)
 
 
 class FakeFuture:

@@ -7,7 +7,7 @@ import pytest
 
 from bentray_service import picture_queue
 from bentray_service.errors import RateLimited
-from bentray_service.picture_queue import LATEST_S, MAX_IN_TOTAL, MAX_PER_TENANT, PictureQueue
+from bentray_service.picture_queue import LATEST_S, MAX_IN_TOTAL, MAX_PER_ACCOUNT, PictureQueue
 from bentray_service.rows.tenants import Tenant
 from bentray_workers.cluster.capacities import WorkerCapacity
 
@@ -171,12 +171,12 @@ def test_late_pictures_are_rejected_with_retry_after():
 def test_the_number_of_pictures_is_bounded():
     async def go():
         run = Run()
-        held = [run.queue.admitted(A, 0.0) for _ in range(MAX_PER_TENANT)]
+        held = [run.queue.admitted(A, 0.0) for _ in range(MAX_PER_ACCOUNT)]
         for one in held:
             await one.__aenter__()
-        with pytest.raises(RateLimited, match=f"fewer than {MAX_PER_TENANT} per tenant"):
+        with pytest.raises(RateLimited, match=f"fewer than {MAX_PER_ACCOUNT} per tenant"):
             await run.queue.admitted(A, 0.0).__aenter__()
-        others = [run.queue.admitted(Tenant(f"t{k}"), 0.0) for k in range(MAX_IN_TOTAL - MAX_PER_TENANT)]
+        others = [run.queue.admitted(Tenant(f"t{k}"), 0.0) for k in range(MAX_IN_TOTAL - MAX_PER_ACCOUNT)]
         for one in others:
             await one.__aenter__()
         with pytest.raises(RateLimited):

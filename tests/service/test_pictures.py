@@ -137,7 +137,7 @@ def test_pictures_do_not_block_request_threads(tmp_path, held):
             # One worker has one task; the others have not been handed out.
             assert len(held.futures) == 1
             late = asyncio.create_task(bert.get(f"{there}/slice.png"))
-            await until(lambda: len(app.state.parts.pictures.waiting()) == 2)
+            await until(lambda: len(app.state.parts.pictures._queue.waiting()) == 2)
             held.gate.set()
             assert (await late).status_code == 200
             # Only the one that had begun already came before.

@@ -1,4 +1,4 @@
-"""Rate limits of tenants: a token bucket for each, with the capacity of one minute."""
+"""Rate limits of accounts and addresses: a token bucket for each, with the capacity of one minute."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class _TokenBucket:
 
 
 class RateLimits:
-    """Token buckets of tenants.
+    """Token buckets of accounts, or of addresses that sign in.
 
     Args:
         per_minute: rate limit and capacity; 0: unlimited.
@@ -31,7 +31,7 @@ class RateLimits:
         self._lock = threading.Lock()
         self._buckets: dict[str, _TokenBucket] = {}
 
-    def take(self, tenant: str, share: float = 1.0) -> float:
+    def take(self, key: str, share: float = 1.0) -> float:
         """0 if a request is allowed, else the seconds until it is; one of little work counts a share."""
         if not self.per_minute:
             return 0.0
@@ -39,7 +39,7 @@ class RateLimits:
             now = self._clock()
             if len(self._buckets) >= MANY:
                 self._forget(now)
-            bucket = self._buckets.setdefault(tenant, _TokenBucket(self.per_minute, now))
+            bucket = self._buckets.setdefault(key, _TokenBucket(self.per_minute, now))
             bucket.left, bucket.seen = self._level(bucket, now), now
             if bucket.left < share:
                 return (share - bucket.left) * 60.0 / self.per_minute

@@ -12,6 +12,7 @@ from starlette.datastructures import Headers
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import Forbidden, NotAuthenticated, RateLimited
+from ..rows.accounts import Accounts
 from ..rows.api_key import PREFIX, ApiKey
 from ..rows.keys import Keys
 from ..rows.projects import ROLES, Projects, membership
@@ -51,12 +52,19 @@ class SignIn:
         browsers: sessions of users who signed in at the OpenID provider; None without one.
     """
 
-    def __init__(self, settings: ServiceSettings, keys: Keys, sessions: Sessions, projects: Projects) -> None:
+    def __init__(
+        self,
+        settings: ServiceSettings,
+        keys: Keys,
+        sessions: Sessions,
+        projects: Projects,
+        accounts: Accounts,
+    ) -> None:
         """Raises:
         InvalidInput: if the service would be open to other machines, or for an invalid setting.
         """
         self._keys = keys
-        self._projects = projects
+        self._projects, self._accounts = projects, accounts
         self._trusted = networks(settings.trusted_proxies or "")
         self._user_header = settings.proxy_user_header
         self.browsers = None if settings.oidc_issuer is None else BrowserSessions(settings, sessions)
@@ -172,7 +180,7 @@ class SignIn:
             raise RateLimited("sign-ins", found, "a lower rate; see Retry-After", wait_s)
 
     def _take(self, rates: RateLimits, what: str, caller: Caller, share: float = 1.0) -> None:
-        wait_s = rates.take(caller.home, share) if caller.how != "open" else 0.0
+        wait_s = rates.take(self._accounts.of(caller.tenant), share) if caller.how != "open" else 0.0
         if wait_s > 0.0:
             raise RateLimited(
                 what, f"more than {rates.per_minute} per minute", "a lower rate; see Retry-After", wait_s

@@ -1,4 +1,4 @@
-"""The ingest queue: tenants take turns; uploads of one tenant are processed in order."""
+"""The ingest queue: accounts take turns; uploads of one account are processed in order."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from typing import Any
 from dask.system import CPU_COUNT
 from distributed.system import MEMORY_LIMIT
 
+from ..rows.accounts import Account, Accounts
 from ..rows.tenants import Tenant
 
-# Minimum number of threads, so that one tenant cannot occupy all of them.
+# Minimum number of threads, so that one account cannot occupy all of them.
 MIN_CONCURRENT = 3
 STOP_SECONDS = 30.0
 
@@ -36,20 +37,21 @@ class _QueuedRead:
 class FairQueue:
     """Runs up to ``at_once`` functions in threads.
 
-    The next tenant is the one with the fewest running functions, then the one served least recently. One
-    thread is reserved for other tenants, so that a single tenant cannot block the queue.
+    The next account is the one with the fewest running functions, then the one served least recently. One
+    thread is reserved for other accounts, so that a single one cannot block the queue.
 
     Attributes:
-        share: maximum number of running functions per tenant.
+        share: maximum number of running functions per account.
     """
 
-    def __init__(self, at_once: int) -> None:
+    def __init__(self, at_once: int, accounts: Accounts) -> None:
+        self._accounts = accounts
         self.share = max(1, at_once - 1)
-        self._waiting: dict[Tenant, deque[_QueuedRead]] = {}
-        # Turn in which each tenant was served last.
-        self._served: Counter[Tenant] = Counter()
+        self._waiting: dict[Account, deque[_QueuedRead]] = {}
+        # Turn in which each account was served last.
+        self._served: Counter[Account] = Counter()
         self._turn = 0
-        self._working: Counter[Tenant] = Counter()
+        self._working: Counter[Account] = Counter()
         self._changed = threading.Condition()
         self._leaving = False
         self._threads = [
@@ -77,27 +79,28 @@ class FairQueue:
 
     def submit(self, tenant: Tenant, work: Callable[[], Any]) -> Future[Any]:
         """Queue a function for a tenant; cancelling the future removes it from the queue."""
-        task = _QueuedRead(work, Future())
+        task, account = _QueuedRead(work, Future()), self._accounts.of(tenant)
         with self._changed:
-            self._waiting.setdefault(tenant, deque()).append(task)
+            self._waiting.setdefault(account, deque()).append(task)
             self._changed.notify()
         task.future.add_done_callback(
-            lambda future: self._leave(tenant, task) if future.cancelled() else None
+            lambda future: self._leave(account, task) if future.cancelled() else None
         )
         return task.future
 
     def waiting(self, tenant: Tenant) -> int:
-        """Number of queued functions of a tenant."""
+        """Number of queued functions of the account of a tenant."""
+        account = self._accounts.of(tenant)
         with self._changed:
-            return len(self._waiting.get(tenant, ()))
+            return len(self._waiting.get(account, ()))
 
-    def _leave(self, tenant: Tenant, task: _QueuedRead) -> None:
+    def _leave(self, account: Account, task: _QueuedRead) -> None:
         with self._changed:
-            tasks = self._waiting.get(tenant)
+            tasks = self._waiting.get(account)
             if tasks is not None and task in tasks:
                 tasks.remove(task)
                 if not tasks:
-                    del self._waiting[tenant]
+                    del self._waiting[account]
 
     def _loop(self) -> None:
         while True:
@@ -106,7 +109,7 @@ class FairQueue:
                     self._changed.wait()
             if taken is None:
                 return
-            tenant, task = taken
+            account, task = taken
             if task.future.set_running_or_notify_cancel():
                 try:
                     result = task.work()
@@ -115,20 +118,20 @@ class FairQueue:
                 else:
                     task.future.set_result(result)
             with self._changed:
-                self._working[tenant] -= 1
-                # Another thread may have skipped this tenant.
+                self._working[account] -= 1
+                # Another thread may have skipped this account.
                 self._changed.notify_all()
 
-    def _take(self) -> tuple[Tenant, _QueuedRead] | None:
+    def _take(self) -> tuple[Account, _QueuedRead] | None:
         """Take the next function from the queue."""
-        able = [tenant for tenant in self._waiting if self._working[tenant] < self.share]
+        able = [account for account in self._waiting if self._working[account] < self.share]
         if self._leaving or not able:
             return None
-        tenant = min(able, key=lambda one: (self._working[one], self._served[one]))
-        task = self._waiting[tenant].popleft()
-        if not self._waiting[tenant]:
-            del self._waiting[tenant]
-        self._working[tenant] += 1
+        account = min(able, key=lambda one: (self._working[one], self._served[one]))
+        task = self._waiting[account].popleft()
+        if not self._waiting[account]:
+            del self._waiting[account]
+        self._working[account] += 1
         self._turn += 1
-        self._served[tenant] = self._turn
-        return tenant, task
+        self._served[account] = self._turn
+        return account, task

@@ -24,6 +24,7 @@ from ..errors import StorageFull, StorageUnavailable, UnknownId
 from ..files.data_folder import Files
 from ..files.digests import digest_of
 from ..files.direct_uploads import DirectUploads
+from ..rows.accounts import Account, Accounts
 from ..rows.stored_tables import UploadedTable
 from ..rows.tenants import Tenant
 from ..rows.typed_rows import UploadRow
@@ -44,7 +45,7 @@ STOP_SECONDS = 30.0
 
 
 class UploadIngest:
-    """Submits complete uploads to the ingest queue, oldest first, with a limit for each tenant.
+    """Submits complete uploads to the ingest queue, oldest first, with a limit for each account.
 
     Uploads that a dead service was reading are read again.
     """
@@ -57,6 +58,7 @@ class UploadIngest:
         limits: IngestLimits,
         keep_s: float,
         queue: FairQueue,
+        accounts: Accounts,
         quota: Quota,
         direct: DirectUploads | None,
     ) -> None:
@@ -67,6 +69,7 @@ class UploadIngest:
         limits: of an ingest process.
         keep_s: how long the row of a completed upload is kept, s.
         queue: the ingest queue.
+        accounts: whose queued uploads are counted.
         quota: of the tenants.
         direct: uploads in the bucket, if there is one.
         """
@@ -76,11 +79,11 @@ class UploadIngest:
         self._stores = stores
         self._limits = limits
         self._keep_s = keep_s
-        self._queue = queue
+        self._queue, self._accounts = queue, accounts
         self._quota = quota
         self._lock = threading.Lock()
         # Queued uploads, and the process ids of those being read.
-        self._queued: dict[str, Tenant] = {}
+        self._queued: dict[str, Account] = {}
         self._children: dict[str, int] = {}
         self._put_off = False
         self._wake = threading.Event()
@@ -129,18 +132,18 @@ class UploadIngest:
                 self._wake.wait(IDLE_SECONDS)
 
     def _submit(self) -> None:
-        """Queue complete uploads, at most ``FairQueue.share`` of each tenant."""
+        """Queue complete uploads, at most ``FairQueue.share`` of each account."""
         with self._lock:
             queued = set(self._queued)
-            room = Counter({tenant: -count for tenant, count in Counter(self._queued.values()).items()})
+            room = Counter({account: -count for account, count in Counter(self._queued.values()).items()})
         for row in self._uploads.unread():
-            tenant = row["tenant"]
-            if row["id"] in queued or room[tenant] + self._queue.share <= 0 or not self._is_local(row):
+            account = self._accounts.of(row["tenant"])
+            if row["id"] in queued or room[account] + self._queue.share <= 0 or not self._is_local(row):
                 continue
-            room[tenant] -= 1
+            room[account] -= 1
             with self._lock:
-                self._queued[row["id"]] = tenant
-            future = self._queue.submit(tenant, partial(self._read, row))
+                self._queued[row["id"]] = account
+            future = self._queue.submit(row["tenant"], partial(self._read, row))
             future.add_done_callback(partial(self._ended, row["id"]))
 
     def _ended(self, upload_id: str, future: Future[None]) -> None:

@@ -14,6 +14,7 @@ import anyio
 from sqlalchemy.exc import SQLAlchemyError
 
 from ..errors import DatabaseUnavailable, TooManyStreams
+from ..rows.accounts import Account, Accounts
 from ..rows.jobs import Jobs
 from ..rows.tenants import Tenant
 from .watched import Watched, WatchedJob, WatchedTenant
@@ -24,7 +25,7 @@ log = logging.getLogger("bentray.jobs")
 INTERVAL_SECONDS = 0.5
 SOONEST_SECONDS = 0.05
 # Maximum number of open streams. Each holds a connection, but no thread and no query.
-OF_TENANT = 64
+OF_ACCOUNT = 64
 IN_ALL = 256
 
 Key = TypeVar("Key", bound=str)
@@ -34,16 +35,17 @@ Seen = TypeVar("Seen", bound=Watched)
 class EventFeed:
     """Polls the watched jobs and tenants while there are any; it must be used from the event loop only."""
 
-    def __init__(self, jobs: Jobs, leaving: Callable[[], bool]) -> None:
+    def __init__(self, jobs: Jobs, accounts: Accounts, leaving: Callable[[], bool]) -> None:
         """Args:
         jobs: the table of jobs.
+        accounts: whose streams are counted.
         leaving: whether the service stops; then every stream is woken.
         """
-        self._jobs = jobs
+        self._jobs, self._accounts = jobs, accounts
         self.leaving = leaving
         self._watched: dict[str, WatchedJob] = {}
         self._tenants: dict[Tenant, WatchedTenant] = {}
-        self._streams: Counter[Tenant] = Counter()
+        self._streams: Counter[Account] = Counter()
         self._polling: asyncio.Task[None] | None = None
         self._asked = asyncio.Event()
 
@@ -71,12 +73,13 @@ class EventFeed:
     def _stream(
         self, tenant: Tenant, table: dict[Key, Seen], key: Key, kind: Callable[[], Seen], instead: str
     ) -> Iterator[Seen]:
-        accepted = f"at most {OF_TENANT} per tenant and {IN_ALL} in total; poll GET {instead} instead"
-        if self._streams[tenant] >= OF_TENANT:
-            raise TooManyStreams("event streams", f"{OF_TENANT} streams of this tenant are open", accepted)
+        account = self._accounts.of(tenant)
+        accepted = f"at most {OF_ACCOUNT} per tenant and {IN_ALL} in total; poll GET {instead} instead"
+        if self._streams[account] >= OF_ACCOUNT:
+            raise TooManyStreams("event streams", f"{OF_ACCOUNT} streams of this tenant are open", accepted)
         if self._streams.total() >= IN_ALL:
             raise TooManyStreams("event streams", f"{IN_ALL} streams are open", accepted)
-        self._streams[tenant] += 1
+        self._streams[account] += 1
         if key not in table:
             table[key] = kind()
             self._asked.set()
@@ -90,9 +93,9 @@ class EventFeed:
             watched.watchers -= 1
             if not watched.watchers:
                 del table[key]
-            self._streams[tenant] -= 1
-            if not self._streams[tenant]:
-                del self._streams[tenant]
+            self._streams[account] -= 1
+            if not self._streams[account]:
+                del self._streams[account]
 
     async def _poll(self) -> None:
         # A thread of its own, so that polling does not wait for other work.

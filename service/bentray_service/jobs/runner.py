@@ -28,6 +28,7 @@ from ..files.data_folder import Files
 from ..files.disk import bytes_in
 from ..files.tenant_files import TenantFiles
 from ..logs import about
+from ..rows.accounts import Accounts
 from ..rows.job_queue import LEASE_S, Queue
 from ..rows.schema import ENDED
 from ..rows.typed_rows import JobRow
@@ -65,6 +66,7 @@ FULL = (errno.ENOSPC, errno.EDQUOT)
 class Runner:
     """Runs up to ``at_once`` jobs at the same time, and one job of every further tenant up to ``tenants``.
 
+    The last job of more than one is always that of a further tenant, so that none holds all.
     A thread only controls its job; the cluster, shared by all jobs, does the computation. Jobs wait while
     less than ``min_free_bytes`` of disk space is free, or the store is unavailable.
 
@@ -75,6 +77,7 @@ class Runner:
     def __init__(
         self,
         queue: Queue,
+        accounts: Accounts,
         files: Files,
         compute: Compute,
         at_once: int,
@@ -86,12 +89,12 @@ class Runner:
         tenants: the same including one job of each tenant without another.
         """
         self.metrics = JobMetrics()
-        self._queue = queue
+        self._queue, self._accounts = queue, accounts
         self._files = files
         self._compute = compute
         self._min_free_bytes = min_free_bytes
-        self._at_once = at_once
         self._most = max(at_once, tenants)
+        self._at_once = max(1, min(at_once, self._most - 1))
         self._shares = Shares()
         self._wake, self._leaving = threading.Event(), threading.Event()
         # The job of each thread. A released job may be claimed again before its thread has ended.
@@ -214,7 +217,7 @@ class Runner:
                 # The damaged file is replaced.
                 self._files.store.remove([target])
             client = self._compute.client
-            with self._shares.of(job["tenant"], kind.lane, client) as share:
+            with self._shares.of(self._accounts.of(job["tenant"]), kind.lane, client) as share:
                 control = JobControl(
                     on_progress=reporter.report, on_saved=reporter.saved, stop=reporter.stop, share=share
                 )

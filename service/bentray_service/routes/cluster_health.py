@@ -60,6 +60,6 @@ async def show_cluster(service: Service, tenant: CallerTenant) -> ClusterRecord:
             running=running,
             all_queued=all_queued,
             all_running=all_running,
-            waiting_images=service.pictures.waiting().get(tenant, 0),
+            waiting_images=service.pictures.waiting(tenant),
         ),
     )

@@ -12,6 +12,7 @@ from typing import cast
 
 from sqlalchemy import Connection, delete, func, insert, or_, select, update
 
+from .accounts import account_in
 from .database import Database
 from .schema import deliveries, jobs, webhook_secrets
 from .tenants import Tenant
@@ -19,8 +20,8 @@ from .typed_rows import DeliveryRow, Plain
 
 # Time after which an attempt whose service died is repeated, s.
 LEASE_S = 60.0
-# Attempts under way at once for one tenant, so that its slow receivers delay no others.
-OF_TENANT = 2
+# Attempts under way at once for one account, so that its slow receivers delay no others.
+OF_ACCOUNT = 2
 # Time for which a replaced secret still signs, s.
 OVERLAP_S = 86400.0
 STATES = ("waiting", "delivered", "failed")
@@ -82,11 +83,11 @@ class Deliveries:
         other = deliveries.alias()
         busy = (
             select(func.count())
-            .where(other.c.tenant == deliveries.c.tenant, other.c.lease_until > now)
+            .where(account_in(other.c.tenant) == account_in(deliveries.c.tenant), other.c.lease_until > now)
             .scalar_subquery()
         )
         free = or_(deliveries.c.lease_until.is_(None), deliveries.c.lease_until <= now)
-        due = deliveries.c.state == "waiting", deliveries.c.due <= now, free, busy < OF_TENANT
+        due = deliveries.c.state == "waiting", deliveries.c.due <= now, free, busy < OF_ACCOUNT
         next_one = select(deliveries).where(*due).order_by(busy, deliveries.c.due).limit(1)
         # Most queries find nothing, and take no write lock.
         if not self._database.rows(next_one):

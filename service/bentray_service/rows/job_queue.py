@@ -14,6 +14,7 @@ from .database import Database
 from .job_states import RUNNING, change
 from .schema import ENDED, jobs, projects, volumes
 from .tenants import Tenant
+from .turns import turns_of
 from .typed_rows import JobRow, Plain
 
 MAX_ATTEMPTS = 3
@@ -91,25 +92,14 @@ class Queue:
     def claim(self, *, idle_only: bool = False) -> JobRow | None:
         """Claim the next queued job and return it; None when no job is queued.
 
-        The next tenant is the one with the fewest running jobs, then the one whose last job started first;
-        the oldest job of this tenant is claimed.
+        The next account is the one with the fewest running jobs, then the one whose last job started first;
+        its oldest job is claimed.
 
         Args:
-            idle_only: only consider tenants without a running job.
+            idle_only: only consider accounts without a running job.
         """
-        of_tenant = jobs.alias()
-        same = of_tenant.c.tenant == jobs.c.tenant
-        running = select(func.count()).where(same, of_tenant.c.state.in_(RUNNING)).scalar_subquery()
-        served = select(func.coalesce(func.max(of_tenant.c.started), 0.0)).where(same).scalar_subquery()
-        next_one = (
-            select(jobs.c.id)
-            .where(jobs.c.state == "queued", *((running == 0,) if idle_only else ()))
-            .order_by(running, served, jobs.c.number)
-            .limit(1)
-            .with_for_update(skip_locked=True)
-        )
         with self._database.write() as connection:
-            job_id = connection.execute(next_one).scalar_one_or_none()
+            job_id = _next(connection, idle_only=idle_only)
             if job_id is None:
                 return None
             now = time.time()
@@ -243,3 +233,15 @@ class Queue:
                     )
                     again += 1
         return again
+
+
+def _next(connection: Connection, *, idle_only: bool) -> str | None:
+    """The job to claim, locked; those that another service claims at this moment are skipped."""
+    for turn in sorted(turns_of(connection).values()):
+        if idle_only and turn.running:
+            return None
+        mine = select(jobs.c.id).where(jobs.c.tenant.in_(turn.tenants), jobs.c.state == "queued")
+        oldest = mine.order_by(jobs.c.number).limit(1).with_for_update(skip_locked=True)
+        if job_id := connection.execute(oldest).scalar_one_or_none():
+            return str(job_id)
+    return None

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import cast
 
-from sqlalchemy import Connection, case, func, insert, or_, select
+from sqlalchemy import Connection, func, insert, select
 from sqlalchemy.exc import IntegrityError
 
 from ..errors import JobFinished, QueueFull, UnknownId
 from . import job_search, schema, usage
+from .accounts import account_of, family_of
 from .idempotency import RequestKey
 from .ids import checked, new_id
-from .job_states import RUNNING, append_event, change
-from .projects import family_of
+from .job_states import append_event, change
 from .schema import ENDED, UNFINISHED, jobs
 from .stored_tables import NamedTable
 from .tenants import Tenant
+from .turns import turns_of
 from .typed_rows import EventRow, JobProgress, JobRow, Plain
 
 BATCH = 500
@@ -137,31 +137,16 @@ class Jobs(NamedTable[JobRow]):
 
     def _place(self, tenant: Tenant, number: int | None) -> int:
         """The place of a queued job of a tenant, or without a number of one after all others."""
-        queued, running = (
-            func.coalesce(func.sum(case((jobs.c.state.in_(states), 1), else_=0)), 0)
-            for states in (("queued",), RUNNING)
-        )
-        waiting = select(jobs.c.tenant).where(jobs.c.state == "queued")
-        served = func.coalesce(func.max(jobs.c.started), 0.0)
-        oldest = func.min(case((jobs.c.state == "queued", jobs.c.number)))
-        turns = (
-            select(jobs.c.tenant, queued, running, served, oldest)
-            .where(or_(jobs.c.tenant == tenant, jobs.c.tenant.in_(waiting)))
-            .group_by(jobs.c.tenant)
-        )
-        older = [jobs.c.tenant == tenant, jobs.c.state == "queued"]
-        if number is not None:
-            older.append(jobs.c.number < number)
         with self._database.read() as connection:
+            account = account_of(connection, tenant)
+            turns = turns_of(connection, account)
+            own = turns.pop(account)
+            older = [jobs.c.tenant.in_(own.tenants), jobs.c.state == "queued"]
+            if number is not None:
+                older.append(jobs.c.number < number)
             mine = int(connection.execute(select(func.count()).where(*older)).scalar_one())
-            found = {
-                one: (int(count), (int(busy), float(last), math.inf if first is None else first))
-                for one, count, busy, last, first in connection.execute(turns)
-            }
-        # A tenant without any job is served first of those without a running one, its job is the newest.
-        _, own = found.pop(tenant, (0, (0, 0.0, math.inf)))
-        # Tenants take turns: one that goes first starts a job more before this one.
-        return mine + sum(min(count, mine + (turn < own)) for count, turn in found.values())
+        # Accounts take turns: one that goes first starts a job more before this one.
+        return mine + sum(min(turn.queued, mine + (turn < own)) for turn in turns.values())
 
     def durations(self, tenant: Tenant, kind: str, limit: int) -> list[tuple[Plain, float]]:
         """Plan and running time, s, of up to ``limit`` successful jobs of this tenant, the newest first."""

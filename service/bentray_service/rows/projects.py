@@ -177,14 +177,6 @@ def membership(project_id: str, member: str) -> str:
     return f"{project_id}/{member}"
 
 
-def family_of(connection: Connection, tenant: Tenant) -> list[Tenant]:
-    """A tenant and its projects, or those of the tenant of a project; the tenant comes first."""
-    owner = select(projects.c.tenant).where(projects.c.id == tenant)
-    root = connection.execute(owner).scalar_one_or_none() or tenant
-    mine = select(projects.c.id).where(projects.c.tenant == root).order_by(projects.c.number)
-    return [Tenant(root), *(Tenant(one) for one in connection.execute(mine).scalars())]
-
-
 def _put(connection: Connection, project_id: str, member: str, role: str) -> None:
     table = project_members.c
     mine = table.project_id == project_id, table.member == member

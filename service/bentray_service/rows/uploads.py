@@ -10,6 +10,7 @@ from sqlalchemy import delete as delete_from
 
 from ..errors import RateLimited
 from . import usage
+from .accounts import family_of
 from .ids import new_id
 from .schema import uploads
 from .stored_tables import TenantTable
@@ -142,7 +143,7 @@ class Uploads(TenantTable[UploadRow]):
 
 
 def _check_begun(connection: Connection, tenant: Tenant) -> None:
-    begun = uploads.c.tenant == tenant, uploads.c.state == "receiving"
+    begun = uploads.c.tenant.in_(family_of(connection, tenant)), uploads.c.state == "receiving"
     count = connection.execute(select(func.count()).where(*begun)).scalar_one()
     if count >= MAX_INCOMPLETE:
         accepted = f"fewer than {MAX_INCOMPLETE} incomplete uploads per tenant; delete those no longer needed"

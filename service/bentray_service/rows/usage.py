@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from sqlalchemy import ColumnElement, Connection, delete, func, insert, not_, or_, select, update
 
 from ..errors import QuotaExceeded
-from .projects import family_of
+from .accounts import account_of, family_of
 from .schema import projects, storage
 from .tenants import Tenant
 
@@ -166,5 +166,5 @@ def _counted() -> ColumnElement[bool]:
 def _take_turn(connection: Connection, tenant: Tenant) -> None:
     """Serialise write transactions of one tenant; those of SQLite are serialised anyway."""
     if connection.dialect.name != "sqlite":
-        digest = hashlib.sha256(f"storage/{family_of(connection, tenant)[0]}".encode()).digest()
+        digest = hashlib.sha256(f"storage/{account_of(connection, tenant)}".encode()).digest()
         connection.execute(select(func.pg_advisory_xact_lock(int.from_bytes(digest[:8], signed=True))))

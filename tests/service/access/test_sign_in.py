@@ -6,6 +6,7 @@ from starlette.datastructures import Headers
 from bentray_kernels.errors import InvalidInput
 from bentray_service.access.sign_in import SignIn
 from bentray_service.errors import Forbidden, NotAuthenticated, RateLimited
+from bentray_service.rows.accounts import Accounts
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
 from bentray_service.rows.keys import Keys
@@ -32,6 +33,7 @@ def sign_in(keys, tmp_path):
         keys,
         Sessions(keys._database),
         Projects(keys._database),
+        Accounts(keys._database),
     )
 
 

@@ -8,6 +8,8 @@ from bentray_service.ingest import fair_queue
 from bentray_service.ingest.fair_queue import FairQueue, readers_at_once
 from bentray_service.rows.tenants import Tenant
 
+from ..conftest import NoProjects
+
 PATIENCE_S = 60.0
 BUSY, SMALL, THIRD = Tenant("busy"), Tenant("small"), Tenant("third")
 
@@ -18,7 +20,7 @@ def start():
     made = []
 
     def go(at_once):
-        queue = FairQueue(at_once)
+        queue = FairQueue(at_once, NoProjects())
         queue.start()
         made.append(queue)
         return queue

@@ -13,6 +13,7 @@ from bentray_service.ingest import upload_ingest as reading
 from bentray_service.ingest.canonical import IngestLimits
 from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.upload_ingest import UploadIngest
+from bentray_service.rows.accounts import Accounts
 from bentray_service.rows.database import open_database
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
@@ -52,10 +53,13 @@ class Bench:
         self.uploads, self.files, self.store = Uploads(database), Files(folder), Store()
         self.files.prepare()
         self.answers, self.read = [], []
-        limits, self.queue = IngestLimits(2**30, 10.0, folder), FairQueue(1)
+        accounts = Accounts(database)
+        limits, self.queue = IngestLimits(2**30, 10.0, folder), FairQueue(1, accounts)
         self.queue.start()
         stores, quota = {"dataset": self.store}, Quota(database, 10**6)
-        self.reader = UploadIngest(self.uploads, self.files, stores, limits, 60.0, self.queue, quota, None)
+        self.reader = UploadIngest(
+            self.uploads, self.files, stores, limits, 60.0, self.queue, accounts, quota, None
+        )
 
     def meet(self, what, source, result_id, files, limits, given, reserve, started):
         self.read.append(result_id)

@@ -8,11 +8,13 @@ from bentray_service.errors import Busy, RateLimited
 from bentray_service.ingest.upload_limits import UploadLimits
 from bentray_service.rows.tenants import Tenant
 
+from ..conftest import NoProjects
+
 ONE, OTHER, THIRD = Tenant("one"), Tenant("other"), Tenant("third")
 
 
 def test_uploads_are_limited_per_tenant_and_in_total():
-    limits = UploadLimits(of_tenant=2, in_all=3)
+    limits = UploadLimits(NoProjects(), of_account=2, in_all=3)
     with ExitStack() as stack:
         for tenant in (ONE, ONE, OTHER):
             stack.enter_context(limits(tenant))
@@ -25,14 +27,14 @@ def test_uploads_are_limited_per_tenant_and_in_total():
 
 
 def test_failed_upload_is_removed():
-    limits = UploadLimits(of_tenant=1)
+    limits = UploadLimits(NoProjects(), of_account=1)
     for _ in range(3):
         with pytest.raises(ConnectionError), limits(ONE):
             raise ConnectionError
 
 
 def test_new_uploads_per_minute_are_limited():
-    limits = UploadLimits(begun_per_minute=3)
+    limits = UploadLimits(NoProjects(), begun_per_minute=3)
     for _ in range(3):
         limits.check_begin(ONE)
     with pytest.raises(RateLimited, match="more than 3 new uploads per minute") as refused:

@@ -130,7 +130,7 @@ def test_event_streams_share_one_query(start, uploaded, submitted, until, work, 
 
 
 def test_streams_are_bounded_for_a_tenant_and_in_all(serve, monkeypatch, uploaded, submitted, until, work):
-    monkeypatch.setattr(feed, "OF_TENANT", 3)
+    monkeypatch.setattr(feed, "OF_ACCOUNT", 3)
     work.hold.clear()
     url = serve()
     with httpx.Client(base_url=url, timeout=60.0) as http, ExitStack() as stack:

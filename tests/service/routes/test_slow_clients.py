@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from bentray_service.ingest.upload_limits import MAX_PER_TENANT
+from bentray_service.ingest.upload_limits import MAX_PER_ACCOUNT
 
 CLIENTS = 100
 PATIENCE_S = 60.0
@@ -72,7 +72,7 @@ def test_a_hundred_of_them(serve, tmp_path, begin):
             assert (status, problem["type"], problem["field"]) == (408, "/problems/too-slow", "body")
             assert "BENTRAY_UPLOAD_PATIENCE_S" in problem["accepted"]
         # In one request a tenant sends so many at a time; pieces are short requests, of any number.
-        assert refused == (CLIENTS - MAX_PER_TENANT if begin is one_shots else 0)
+        assert refused == (CLIENTS - MAX_PER_ACCOUNT if begin is one_shots else 0)
         assert http.get("/health/live").is_success
         if begin is pieces:
             # What came is kept, and the upload is free for whoever goes on with it.

@@ -6,7 +6,8 @@ from sqlalchemy import insert
 from bentray_kernels.errors import InvalidInput
 from bentray_service.errors import InUse, QuotaExceeded, UnknownId
 from bentray_service.rows import schema, usage
-from bentray_service.rows.projects import Projects, family_of, membership
+from bentray_service.rows.accounts import family_of
+from bentray_service.rows.projects import Projects, membership
 from bentray_service.rows.tenants import LOCAL, Tenant, tenant_of_user
 
 LAB, OTHER = Tenant("lab"), Tenant("other")

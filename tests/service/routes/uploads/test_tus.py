@@ -17,6 +17,7 @@ from sqlalchemy import update
 from bentray_service.ingest.upload_limits import UploadLimits
 from bentray_service.rows import schema
 
+from ...conftest import NoProjects
 from ...tus_records import settled
 
 TUS = {"Tus-Resumable": "1.0.0"}
@@ -359,7 +360,9 @@ def test_unverified_bytes_are_dropped_after_a_kill(start):
 
 def test_uploads_are_begun_no_faster_than_allowed(start):
     http = start()
-    http.app.state.parts = replace(http.app.state.parts, upload_limits=UploadLimits(begun_per_minute=2))
+    http.app.state.parts = replace(
+        http.app.state.parts, upload_limits=UploadLimits(NoProjects(), begun_per_minute=2)
+    )
     answers = [http.post("/v1/uploads", headers={**TUS, "Upload-Length": "9"}) for _ in range(3)]
     assert [one.status_code for one in answers] == [201, 201, 429]
     assert problem(answers[2], 429)["field"] == "uploads"

@@ -9,10 +9,12 @@ from starlette.requests import ClientDisconnect, Request
 
 from bentray_service.errors import Busy
 from bentray_service.ingest.fair_queue import FairQueue
-from bentray_service.ingest.upload_limits import MAX_PER_TENANT
+from bentray_service.ingest.upload_limits import MAX_PER_ACCOUNT
 from bentray_service.routes.uploads import one_shot_uploads
 from bentray_service.routes.uploads.one_shot_uploads import run_in_turn
 from bentray_service.rows.tenants import LOCAL, Tenant
+
+from ...conftest import NoProjects
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
 PATIENCE_S = 60.0
@@ -40,7 +42,7 @@ class Blockers:
 @pytest.fixture
 def queue():
     """A queue that another tenant keeps busy."""
-    made = FairQueue(1)
+    made = FairQueue(1, NoProjects())
     made.start()
     blockers = Blockers(made, 1)
     yield made
@@ -97,7 +99,7 @@ def test_too_many_uploads_get_retry_after(start, scan, uploaded):
     http = start()
     limits = http.app.state.parts.upload_limits
     with ExitStack() as stack:
-        for _ in range(MAX_PER_TENANT):
+        for _ in range(MAX_PER_ACCOUNT):
             stack.enter_context(limits(LOCAL))
         answer = http.post("/v1/datasets", content=scan().read_bytes(), headers=HDF5)
         assert (answer.status_code, answer.headers["retry-after"]) == (429, "10")

@@ -1,0 +1,62 @@
+"""Turns of accounts: the order in which queued jobs start, for the queue and for positions in it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sqlalchemy import Connection, case, func, literal, or_, select, union
+
+from .accounts import Account, account_in
+from .job_states import RUNNING
+from .schema import jobs, projects
+from .tenants import Tenant
+
+
+class Turn(NamedTuple):
+    """Turn of an account; smaller ones go first. An account without any job goes before those with one.
+
+    Attributes:
+        running: number of running jobs.
+        served: start of the job that started last, s since 1970.
+        oldest: number of the oldest queued job.
+        queued: number of queued jobs.
+        tenants: owners of the queued jobs, the account itself and its projects.
+    """
+
+    running: int = 0
+    served: float = 0.0
+    oldest: float = math.inf
+    queued: int = 0
+    tenants: tuple[Tenant, ...] = ()
+
+
+def turns_of(connection: Connection, further: Account | None = None) -> dict[Account, Turn]:
+    """Turns of all accounts with queued jobs, and of a ``further`` one."""
+    there = jobs.alias()
+    waiting = select(account_in(there.c.tenant)).where(there.c.state == "queued")
+    accounts = waiting if further is None else union(waiting, select(literal(further)))
+    of_them = or_(
+        jobs.c.tenant.in_(accounts),
+        jobs.c.tenant.in_(select(projects.c.id).where(projects.c.tenant.in_(accounts))),
+    )
+    queued, running = (
+        func.coalesce(func.sum(case((jobs.c.state.in_(states), 1), else_=0)), 0)
+        for states in (("queued",), RUNNING)
+    )
+    served = func.coalesce(func.max(jobs.c.started), 0.0)
+    oldest = func.min(case((jobs.c.state == "queued", jobs.c.number)))
+    each = select(account_in(jobs.c.tenant), jobs.c.tenant, queued, running, served, oldest)
+    found: dict[Account, Turn] = {} if further is None else {further: Turn()}
+    for account, tenant, waits, busy, last, first in connection.execute(
+        each.where(of_them).group_by(jobs.c.tenant)
+    ):
+        before = found.get(Account(account), Turn())
+        found[Account(account)] = Turn(
+            before.running + int(busy),
+            max(before.served, float(last)),
+            min(before.oldest, math.inf if first is None else first),
+            before.queued + int(waits),
+            (*before.tenants, Tenant(tenant)) if waits else before.tenants,
+        )
+    return found
