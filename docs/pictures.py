@@ -23,6 +23,7 @@ import numpy as np
 import trimesh
 from browser import browser
 from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse, Polygon
 from PIL import Image, ImageDraw
 
 from bentray_kernels import eikonal, rays
@@ -34,6 +35,7 @@ from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.reconstruction import read_reconstruction
+from bentray_workers.files.volume_axes import LPS, Grid
 from bentray_workers.images.canvas import drawing, new_figure, to_png
 from bentray_workers.images.captions import LABELS, NAMES
 from bentray_workers.images.maps import SPEED, draw_bar, draw_map
@@ -49,6 +51,13 @@ from benchmarks.shared._small_png import in_full_colour
 FOLDER = Path(__file__).parent / "pictures"
 # Beside the checkout, where the tests with real scans look for it.
 OTHERS = FOLDER.parents[2] / "shared" / "data" / "ring_wave_a.h5"
+# Alignment of the name of an axis at its end.
+ENDS: dict[str, dict[str, Any]] = {
+    "right": {"ha": "left", "va": "center"},
+    "left": {"ha": "right", "va": "center"},
+    "front": {"ha": "center", "va": "bottom"},
+    "back": {"ha": "center", "va": "top"},
+}
 BENTRAY = [sys.executable, "-m", "bentray_service.cli"]
 MM = 1e3
 
@@ -126,6 +135,40 @@ def fresnel() -> Image.Image:
     ax.set_title("Width of the first Fresnel zone in water of 1500 m/s")
     ax.grid(alpha=0.3)
     figure.legend(loc="outside right upper", frameon=False)
+    return _drawn(figure)
+
+
+def axes() -> Image.Image:
+    """One node in scan axes and in those of DICOM and MetaImage, seen from the head."""
+    figure, panels = plt.subplots(1, 2, figsize=(9.2, 4.1), layout="constrained", sharex=True, sharey=True)
+    grid = Grid((0.01, 0.01, 0.01), (-0.06, -0.04, 0.02))
+    node = np.array([10, 7, 0, 1])
+    place = MM * (grid.affine() @ node)[:3]
+    kinds = {
+        "RAS: HDF5, NIfTI, NRRD, VTI, OME-Zarr": (np.eye(4), ("right", "front")),
+        "LPS: DICOM, MetaImage": (LPS, ("left", "back")),
+    }
+    for panel, (title, (change, ways)) in zip(panels, kinds.items(), strict=True):
+        panel.add_patch(Ellipse((0, 0), 200, 130, facecolor="#eef3f6", edgecolor="#8aa1ad"))
+        panel.add_patch(Polygon([(-9, 64), (9, 64), (0, 78)], facecolor="#eef3f6", edgecolor="#8aa1ad"))
+        for name, way, sign, row in zip("xy", ways, np.diag(change), np.eye(2), strict=False):
+            tip = 36 * sign * row
+            arrow = {"arrowstyle": "-|>", "color": "#1d6996", "linewidth": 2}
+            panel.annotate("", tip, (0, 0), arrowprops=arrow)
+            panel.text(*(tip + 8 * sign * row), f"{name}, {way}", **ENDS[way], color="#1d6996")
+        panel.plot(0, 0, "o", markersize=9, markerfacecolor="white", color="#1d6996")
+        panel.plot(0, 0, ".", color="#1d6996")
+        beside = {"x": -6, "ha": "right"} if change[0, 0] > 0 else {"x": 6, "ha": "left"}
+        panel.text(**beside, y=0, s="z, head", va="center", color="#1d6996")
+        panel.plot(*place[:2], "s", color="#d1495b", markersize=10)
+        numbers = ", ".join(f"{value + 0:g}" for value in np.round(change[:3, :3] @ place, 6))
+        panel.text(place[0], place[1] + 8, f"({numbers}) mm", ha="center", color="#d1495b")
+        sides = {"right": (112, 0), "left": (-112, 0), "front": (0, 90), "back": (0, -80)}
+        for side, (x, y) in sides.items():
+            panel.text(x, y, side, ha="center", va="center", rotation=90 if y == 0 else 0, color="#5c6f7a")
+        panel.set(title=title, xlim=(-125, 125), ylim=(-90, 100), aspect="equal")
+        panel.axis("off")
+    figure.suptitle("One node of one volume, seen from the head: the numbers differ, the place does not")
     return _drawn(figure)
 
 
@@ -401,6 +444,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
         fronts,
         coupling,
         fresnel,
+        axes,
         glass,
         mesh,
         quantities,

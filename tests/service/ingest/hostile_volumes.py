@@ -121,7 +121,7 @@ REFUSED: dict[str, tuple[bytes, Given, str]] = {
     # NRRD.
     "a file beside it": (nrrd("data file: /etc/passwd"), {}, "data file"),
     "a list of files": (nrrd("data file: LIST", values=b"/etc/passwd\n"), {}, "data file"),
-    "numbered files": (nrrd("datafile: /etc/%03d 1 5 1"), {}, "datafile"),
+    "numbered files": (nrrd("datafile: /etc/%03d 1 5 1"), {}, "data file"),
     "skipped bytes": (nrrd("byte skip: -1"), {}, "byte skip"),
     "skipped lines": (nrrd("line skip: 100000000"), {}, "line skip"),
     "absurd sizes": (nrrd(sizes="1000000 1000000 1000"), {}, "sizes"),

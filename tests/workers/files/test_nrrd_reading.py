@@ -74,7 +74,7 @@ def test_lines_may_end_as_on_windows(tmp_path):
     ("fields", "field"),
     [
         (PLAIN + "data file: /etc/passwd\n", "data file"),
-        (PLAIN + "datafile: LIST\n", "datafile"),
+        (PLAIN + "datafile: LIST\n", "data file"),
         (PLAIN + "byte skip: -1\n", "byte skip"),
         (PLAIN + "line skip: 9\n", "line skip"),
         (PLAIN.replace("raw", "ascii"), "encoding"),
@@ -180,3 +180,70 @@ def test_whichever_way_the_space_goes_it_is_the_same_body(tmp_path, space, signs
     np.testing.assert_array_equal(volume.values, ramp())
     np.testing.assert_allclose(volume.spacing_m, 1e-3 * steps)
     np.testing.assert_allclose(volume.origin_m, 1e-3 * start)
+
+
+MINS, NODES = "axis mins: -1 -2 10\n", "centerings: node node node\n"
+TURNED = "space: LPS\nspacedirections: (-1,0,0) (0,-2,0) (0,0,5)\nspaceorigin: (1,2,10)\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "steps", "origin"),
+    [
+        # Node 0 and the last node.
+        (MINS + "axis maxs: 1 4 30\n" + NODES, (1, 2, 5), (-1, -2, 10)),
+        ("axismins: -1 -2 10\naxismaxs: 1 4 30\ncenters: node node node\n", (1, 2, 5), (-1, -2, 10)),
+        ("Axis Mins: -1 -2 10\nAXIS MAXS: 1 4 30\nCenterings: node node node\n", (1, 2, 5), (-1, -2, 10)),
+        # The outer sides of the cells.
+        (MINS + "axis maxs: 2 6 35\ncenterings: cell cell cell\n", (1, 2, 5), (-0.5, -1, 12.5)),
+        (MINS + "axis maxs: 2 4 35\ncenterings: cell node cell\n", (1, 2, 5), (-0.5, -2, 12.5)),
+        # Falling positions: the values are flipped.
+        ("axis mins: 1 4 30\naxis maxs: -1 -2 10\n" + NODES, (1, 2, 5), (-1, -2, 10)),
+        # One of them, with spacings.
+        (MINS + "spacings: 1 2 5\ncenterings: cell node node\n", (1, 2, 5), (-0.5, -2, 10)),
+        ("axis maxs: 1 4 30\nspacings: 1 2 5\n" + NODES, (1, 2, 5), (-1, -2, 10)),
+        (
+            MINS + "axis maxs: 1 4 30\nspacings: 1 nan 5\n" + NODES,
+            (1, 2, 5),
+            (-1, -2, 10),
+        ),
+        ("axis mins: -1 nan 10\nspacings: 1 2 5\ncenterings: node ??? node\n", (1, 2, 5), (-1, 0, 10)),
+        ("spacings: 1 2 5\nthicknesses: 3 3 3\nkinds: space space space\n", (1, 2, 5), (0, 0, 0)),
+        (TURNED + "spacings: 1 2 5\n", (1, 2, 5), (-1, -2, 10)),
+        # Not a field but a pair of key and value.
+        ("spacings: 1 2 5\naxis mins:=7 7 7\n", (1, 2, 5), (0, 0, 0)),
+    ],
+)
+def test_every_statement_of_positions_counts(tmp_path, more, steps, origin):
+    volume = import_volume(write(tmp_path / "v", PLAIN + more))
+    np.testing.assert_allclose(volume.spacing_m, 1e-3 * np.array(steps))
+    np.testing.assert_allclose(volume.origin_m, 1e-3 * np.array(origin))
+    upright = ramp()[::-1, ::-1, ::-1] if more.startswith("axis mins: 1 4") else ramp()
+    np.testing.assert_array_equal(volume.values, upright)
+
+
+@pytest.mark.parametrize(
+    ("more", "field"),
+    [
+        (MINS + "axis maxs: 1 4 30\n", "centerings"),
+        (MINS + "axis maxs: 1 4 30\ncenterings: node ??? node\n", "centerings"),
+        (MINS + "centerings: node node node\n", "axis mins"),
+        (MINS + "axis maxs: -1 4 30\n" + NODES, "axis mins"),
+        (MINS + "axis maxs: inf 4 30\n" + NODES, "axis mins"),
+        (MINS + "axis maxs: 1 4 30\nspacings: 1 2 6\n" + NODES, "spacings"),
+        (
+            MINS
+            + "axis maxs: 1 4 30\ncenterings: node node node\nspace dimension: 3\nspace origin: (1,1,1)\n",
+            "space origin",
+        ),
+        (MINS + "space dimension: 3\nspace directions: (1,0,0) (0,2,0) (0,0,5)\n", "axis mins"),
+        ("spacings: 1 2 6\nspace dimension: 3\nspace directions: (1,0,0) (0,2,0) (0,0,5)\n", "spacings"),
+        ("thicknesses: 1 2 6\n", "spacings"),
+        ("space: RAS\nspace directions: none (0,2,0) (0,0,5)\n", "space directions"),
+        ("space: RAS\nspace directions: (1,0,0) (0,2,0)\n", "space directions"),
+        ("space: 3D-left-handed\n", "space"),
+        ("space: up-down-sideways\n", "space"),
+        ("kinds: complex domain domain\n", "kinds"),
+    ],
+)
+def test_positions_that_are_stated_in_part_or_twice_are_refused(tmp_path, more, field):
+    assert refused(write(tmp_path / "v", PLAIN + more)).field == field

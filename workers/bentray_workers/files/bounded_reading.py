@@ -32,10 +32,12 @@ def any_shape(shape: Sequence[int]) -> None:
     """Accepts every shape."""
 
 
-def declared(field: str, shape: Sequence[int], dtype: np.dtype[Any], check: ShapeCheck = any_shape) -> int:
+def declared(
+    field: str, shape: Sequence[int], dtype: np.dtype[Any], check: ShapeCheck = any_shape, least: int = 2
+) -> int:
     """Check shape and type; returns the size of the values, bytes."""
     check_type(field, dtype)
-    check_shape(field, shape)
+    check_shape(field, shape, least)
     check(shape)
     count = math.prod(int(n) for n in shape) * dtype.itemsize
     if count > LARGEST_BYTES:

@@ -23,21 +23,27 @@ from .bounded_reading import (
 )
 from .damage import rejecting_damage
 from .volume import Volume
-from .volume_axes import reorient
+from .volume_axes import PositionedImage, reorient
 
 # Discards messages of nibabel about a header: the exception has the same text.
 _silent = logging.Logger("nibabel checks, silent", logging.CRITICAL + 1)
 
 
 def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
-    """The volume in an open, uncompressed file, with axes to the right, front and up of the body.
+    """The volume in an open, uncompressed file; see ``nifti_image``."""
+    return Volume.from_image(nifti_image(file, check))
 
-    Axes are permuted and flipped to the nearest orientation; values are never resampled, so a remaining tilt
-    is lost. A file without directions (both codes 0) is read as it is stored.
+
+def nifti_image(file: Any, check: ShapeCheck = any_shape, least: int = 2) -> PositionedImage:
+    """The image in an open, uncompressed file, with axes to the right, front and up of the body.
+
+    Axes are permuted and flipped to the nearest orientation (``reorient``). A file without directions (both
+    codes 0) is read as it is stored.
 
     Args:
         file: at its beginning. It is read to its end, so that the check sum of a compressed file is verified.
         check: called with the shape in the file before the values are read.
+        least: nodes along each axis; 1 accepts planes.
 
     Raises:
         InvalidInput: for other files, and for axes that are not orthogonal.
@@ -63,7 +69,9 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
         # A single volume often has a fourth axis of length 1.
         while len(shape) > 3 and shape[-1] == 1:
             shape = shape[:-1]
-        count = declared("dim", shape, dtype, check)
+        if least == 1:
+            shape = (*shape, 1) if len(shape) == 2 else shape
+        count = declared("dim", shape, dtype, check, least)
         offset = int(header["vox_offset"])
         if not size <= offset <= LONGEST_HEADER:
             raise InvalidInput("vox_offset", offset, f"{size} to {LONGEST_HEADER} bytes")
@@ -73,11 +81,8 @@ def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
         if (slope or 1.0, intercept or 0.0) != (1.0, 0.0):
             with np.errstate(over="ignore", invalid="ignore"):
                 values = values * np.float32(slope) + np.float32(intercept)
-        values, affine = reorient(values, affine, "affine")
-        scale = UNITS_M["mm" if unit == "unknown" else unit]
-        with np.errstate(over="ignore"):
-            spacing = scale * np.linalg.norm(affine[:3, :3], axis=0)
-        return Volume.of(values, spacing.tolist(), (scale * affine[:3, 3]).tolist(), _text(header["descrip"]))
+        affine[:3] *= UNITS_M["mm" if unit == "unknown" else unit]
+        return PositionedImage(*reorient(values, affine, "affine"), _text(header["descrip"]))
 
 
 def _check_numbers(header: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,19 +13,20 @@ from bentray_kernels.acquisition import Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
 
-from .bounded_reading import UNITS_M
 from .damage import rejecting_damage
 from .dataset.format import FORMAT as DATASET
 from .dataset.read import read_dataset
 from .hdf5_reading import SIGNATURE, Limits, opened
 from .reconstruction import read_reconstruction
 from .reconstruction_format import FORMAT as RECONSTRUCTION
-from .volume_formats import import_volume
+from .volume import check_shape
+from .volume_axes import PositionedImage, check_aligned
+from .volume_formats import import_volume, positioned_image
 
 ACCEPTED = "a dataset with a truth, a reconstruction, or speeds in m/s as NumPy, NRRD, NIfTI or a volume"
 # Below this a median is no speed of tissue in m/s, but one in mm/us or km/s.
 LEAST_MPS = 100.0
-NUMPY, GZIP = b"\x93NUMPY", b"\x1f\x8b"
+NUMPY = b"\x93NUMPY"
 
 
 class KnownTruth(NamedTuple):
@@ -40,8 +40,8 @@ def read_truth(path: Path, image: Reconstruction, spacing_m: Sequence[float] | N
     """Read a truth for an image.
 
     A dataset has its own truth and region. A reconstruction is taken as true, speed and attenuation. Other
-    files hold speeds in m/s: a volume in a format of ``import_volume``, or a slice as NumPy or NIfTI. A NumPy
-    array has no positions: without ``spacing_m`` it is on the nodes of the image, else centred on 0.
+    files hold speeds in m/s: a volume in a format of ``import_volume``, or a slice as NumPy, NRRD or NIfTI. A
+    NumPy array has no positions: without ``spacing_m`` it is on the nodes of the image, else centred on 0.
 
     Args:
         path: of the file.
@@ -55,6 +55,8 @@ def read_truth(path: Path, image: Reconstruction, spacing_m: Sequence[float] | N
     try:
         with path.open("rb") as file:
             start = file.read(540)
+            file.seek(0)
+            stored = positioned_image(file, start, least=1)
     except OSError as error:
         raise InvalidInput("truth", f"{path} ({error.strerror or error})", ACCEPTED) from None
     if start.startswith(NUMPY):
@@ -65,12 +67,20 @@ def read_truth(path: Path, image: Reconstruction, spacing_m: Sequence[float] | N
         known = _hdf5(path)
         if known is not None:
             return known
-    elif start.startswith(GZIP) or start[344:348] == b"n+1\0" or start[4:8] == b"n+2\0":
-        plane = _nifti_slice(path)
-        if plane is not None:
-            return KnownTruth(plane)
-    volume = import_volume(path)
-    return KnownTruth(_truth(volume.values, volume.spacing_m, volume.origin_m))
+    if stored is None:
+        volume = import_volume(path)
+        stored = PositionedImage(volume.values, volume.grid, volume.title)
+    return KnownTruth(_positioned_truth(stored))
+
+
+def _positioned_truth(stored: PositionedImage) -> Truth:
+    """Speeds of an image with positions; one slice across z becomes a plane."""
+    values, grid, _ = stored
+    check_aligned(grid, "truth", "axes along x, y and z; resample the truth on such a grid")
+    if values.shape[2] == 1:
+        return _truth(values[..., 0], grid.spacing_m[:2], grid.origin_m[:2])
+    check_shape("truth", values.shape)
+    return _truth(values, grid.spacing_m, grid.origin_m)
 
 
 def _truth(
@@ -123,27 +133,3 @@ def _hdf5(path: Path) -> KnownTruth | None:
         own = read_reconstruction(path)
         return KnownTruth(_truth(own.speed, own.spacing_m, own.origin_m, own.attenuation))
     return None
-
-
-def _nifti_slice(path: Path) -> Truth | None:
-    """The speeds of a NIfTI file with one slice; None for volumes, which ``import_volume`` reads."""
-    import nibabel
-
-    with rejecting_damage("truth", "a whole NIfTI file of one part"):
-        content = path.read_bytes()
-        if content.startswith(GZIP):
-            content = gzip.decompress(content)
-        image: Any = (nibabel.Nifti2Image if content[4:8] == b"n+2\0" else nibabel.Nifti1Image).from_bytes(
-            content
-        )
-        shape = image.shape
-        if len(shape) < 2 or any(n != 1 for n in shape[2:]):
-            return None
-        affine = np.asarray(image.affine)
-        plane = affine[:2, :2]
-        if not (np.diag(plane) > 0.0).all() or (plane != np.diag(np.diag(plane))).any():
-            raise InvalidInput("truth", "a slice whose axes are turned", "a slice along x and y")
-        unit = image.header.get_xyzt_units()[0]
-        scale = UNITS_M["mm" if unit == "unknown" else unit]
-        values = np.asarray(image.get_fdata()).reshape(shape[:2])
-    return _truth(values, (scale * np.diag(plane)).tolist(), (scale * affine[:2, 3]).tolist())

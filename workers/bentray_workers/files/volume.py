@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPACING_M
 from bentray_kernels.ranges import Range
 
 from .hdf5_reading import Limits, Reader, opened, printable
 from .hdf5_writing import atomic_hdf5
+from .volume_axes import MAX_SHEAR, Grid, PositionedImage
 
 FORMAT = "bentray-volume"
 VERSION = "1.0"
@@ -41,6 +43,7 @@ class Volume:
         spacing_m: between nodes along each axis, within ``SPACING_M``.
         origin_m: position of node 0, m, within ``ORIGIN_M``.
         title: of the volume.
+        direction: (3, 3), see ``volume_axes.Grid``; other than the identity for oblique axes.
 
     Raises:
         InvalidInput: naming the first field that is wrong.
@@ -50,6 +53,7 @@ class Volume:
     spacing_m: Triple
     origin_m: Triple = (0.0, 0.0, 0.0)
     title: str = ""
+    direction: Floats = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
         check_shape("values", self.values.shape)
@@ -62,6 +66,15 @@ class Volume:
         ):
             if len(given) != 3 or not all(map(within.holds, given)):
                 raise InvalidInput(name, given, f"three times {within.words}")
+        turned = self.direction
+        # Comparisons with NaN are false.
+        if turned.shape != (3, 3) or not (np.abs(turned.T @ turned - np.eye(3)) < MAX_SHEAR).all():
+            raise InvalidInput("direction", turned.ravel().tolist(), "nine numbers, orthonormal columns")
+
+    @property
+    def grid(self) -> Grid:
+        """Positions of the nodes."""
+        return Grid(self.spacing_m, self.origin_m, self.direction)
 
     @classmethod
     def of(
@@ -70,6 +83,7 @@ class Volume:
         spacing_m: Sequence[float],
         origin_m: Sequence[float] = (0.0, 0.0, 0.0),
         title: str = "",
+        direction: Floats | None = None,
     ) -> Volume:
         """A volume of any real type, converted to a stored type.
 
@@ -86,7 +100,14 @@ class Volume:
             tuple(float(step) for step in spacing_m),  # type: ignore[arg-type]
             tuple(float(place) for place in origin_m),  # type: ignore[arg-type]
             printable(title)[:200].strip(),
+            np.eye(3) if direction is None else direction,
         )
+
+    @classmethod
+    def from_image(cls, image: PositionedImage) -> Volume:
+        """A volume of an image from a foreign file; raises as ``of``."""
+        grid = image.grid
+        return cls.of(image.values, grid.spacing_m, grid.origin_m, image.title, grid.direction)
 
     def range(self) -> tuple[float, float]:
         """Least and greatest value."""
@@ -116,9 +137,9 @@ def _as_float32(values: NDArray[Any]) -> NDArray[np.float32]:
     return stored
 
 
-def check_shape(field: str, shape: Sequence[int]) -> None:
-    """Reject shapes other than (nx, ny, nz) with two or more nodes along each axis."""
-    if len(shape) != 3 or min(shape) < 2:
+def check_shape(field: str, shape: Sequence[int], least: int = 2) -> None:
+    """Reject shapes other than (nx, ny, nz) with ``least`` or more nodes along each axis."""
+    if len(shape) != 3 or min(shape) < least:
         raise InvalidInput(field, f"shape {tuple(shape)}", "(nx, ny, nz), at least two nodes along each axis")
 
 
@@ -134,7 +155,7 @@ def write_volume(path: Path, volume: Volume) -> None:
     """Write a volume; ``path`` is replaced atomically.
 
     The file holds ``values``, uncompressed, since every picture reads all of them, and the root attributes
-    ``format``, ``format_version``, ``spacing_m``, ``origin_m`` and ``title``.
+    ``format``, ``format_version``, ``spacing_m``, ``origin_m``, ``direction`` (by rows) and ``title``.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
@@ -144,6 +165,7 @@ def write_volume(path: Path, volume: Volume) -> None:
         file.attrs["format_version"] = VERSION
         file.attrs["spacing_m"] = volume.spacing_m
         file.attrs["origin_m"] = volume.origin_m
+        file.attrs["direction"] = volume.direction.ravel()
         file.attrs["title"] = volume.title
         file.create_dataset("values", data=volume.values, track_times=False)
 
@@ -153,7 +175,10 @@ def volume_in(reader: Reader) -> Volume:
     reader.check_format(FORMAT, VERSION)
     values = reader.required("values", "buif", "(nx, ny, nz) numbers")
     spacing, origin = (reader.numbers("", name, "m") or () for name in ("spacing_m", "origin_m"))
-    return Volume.of(values, spacing, origin, reader.text("", "title") or "")
+    # Files of earlier versions have none.
+    turned = np.array(reader.numbers("", "direction", "no unit") or np.eye(3).ravel())
+    direction = turned.reshape(3, 3) if turned.size == 9 else turned
+    return Volume.of(values, spacing, origin, reader.text("", "title") or "", direction)
 
 
 def read_volume(path: Path, limits: Limits | None = None) -> Volume:

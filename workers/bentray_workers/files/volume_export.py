@@ -29,6 +29,7 @@ from .hdf5_reading import Limits, opened
 from .quantities import IMAGES, QUANTITIES, REFLECTION
 from .reconstruction import read_reconstruction
 from .volume import FORMAT, Volume, read_volume
+from .volume_axes import Grid
 
 ATTENUATION, ATTENUATION_DB = IMAGES["attenuation"], "attenuation_db_cm_mhz"
 UNITS = {**{one.array: one.unit for one in QUANTITIES.values()}, ATTENUATION_DB: "dB/(cm.MHz)"}
@@ -79,15 +80,14 @@ class Content:
 
     Attributes:
         values: (nx, ny[, nz]): the selected quantity of a reconstruction, or the values of an upload.
-        spacing_m, origin_m: per axis, m; NaN for uneven heights.
+        grid: positions of the nodes.
         title: of the volume.
         images: all arrays on this grid by name, including the values.
         seconds: time of the file, s since 1970.
     """
 
     values: NDArray[Any]
-    spacing_m: Sequence[float]
-    origin_m: Sequence[float]
+    grid: Grid
     title: str
     images: Mapping[str, NDArray[Any]]
     seconds: float = 0.0
@@ -177,7 +177,7 @@ def export_image(
             found = f"{chosen.quantity}, {chosen.attenuation}"
             raise InvalidInput("quantity", found, "none: an uploaded volume has values only")
         images = {"values": image.values}
-        content = Content(image.values, image.spacing_m, image.origin_m, image.title, images, seconds)
+        content = Content(image.values, image.grid, image.title, images, seconds)
     else:
         content = _reconstructed(image, chosen, seconds)
     FORMATS[name].write(target, content)
@@ -197,8 +197,7 @@ def _reconstructed(own: Reconstruction, chosen: Selection, seconds: float) -> Co
         image = own.reflection
         return Content(
             image.db,
-            image.spacing_m,
-            image.origin_m,
+            Grid(image.spacing_m, image.origin_m),
             TITLES[REFLECTION],
             {REFLECTION: image.db},
             seconds,
@@ -207,7 +206,8 @@ def _reconstructed(own: Reconstruction, chosen: Selection, seconds: float) -> Co
     if selected is None:
         present = ", ".join(name for name in QUANTITIES if own.image(name) is not None)
         raise InvalidInput("quantity", f"{chosen.quantity} of a result without it", present)
-    return Content(images[selected], own.spacing_m, own.origin_m, TITLES[selected], images, seconds)
+    grid = Grid(own.spacing_m, own.origin_m)
+    return Content(images[selected], grid, TITLES[selected], images, seconds)
 
 
 def _frequency(provenance: Mapping[str, str], chosen: Selection) -> float:
@@ -230,32 +230,32 @@ def _npy(target: Path, content: Content) -> None:
 
 def _on_grid(write: Callable[..., None]) -> Callable[[Path, Content], None]:
     """Use a writer that takes values and grid."""
-    return lambda target, content: write(
-        target, content.values, content.spacing_m, content.origin_m, content.title
-    )
+    return lambda target, content: write(target, content.values, content.grid, content.title)
 
 
 def _mat(target: Path, content: Content) -> None:
-    grid = {"spacing_m": np.array(content.spacing_m), "origin_m": np.array(content.origin_m)}
+    own = content.grid
+    grid = {"spacing_m": np.array(own.spacing_m), "origin_m": np.array(own.origin_m)}
+    if content.values.ndim == 3:
+        grid["direction"] = own.direction
     axes = ",".join("xyz"[: content.values.ndim])
     write_mat(target, {**content.images, **grid, "axes": axes, "title": content.title})
 
 
 def _vti(target: Path, content: Content) -> None:
     active = next(name for name, image in content.images.items() if image is content.values)
-    write_vti(target, content.images, content.spacing_m, content.origin_m, active)
+    write_vti(target, content.images, content.grid, active)
 
 
 def _ome_zarr(target: Path, content: Content) -> None:
-    write_ome_zarr(target, content.images, UNITS, content.spacing_m, content.origin_m, content.title)
+    write_ome_zarr(target, content.images, UNITS, content.grid, content.title)
 
 
 def _dicom(target: Path, content: Content) -> None:
     write_dicom(
         target,
         content.images,
-        content.spacing_m,
-        content.origin_m,
+        content.grid,
         content.title,
         version("bentray"),
         content.seconds,

@@ -15,13 +15,14 @@ from bentray_kernels.errors import InvalidInput
 from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared
 from .damage import first_bytes, rejecting_damage
 from .hdf5_reading import SIGNATURE, Limits, opened, printable
-from .nifti_reading import read_nifti
+from .nifti_reading import nifti_image
 from .npy_headers import PARSING
 from .npz_reading import START as NPZ
 from .npz_reading import read_npz
-from .nrrd_reading import read_nrrd
+from .nrrd_reading import nrrd_image
 from .reconstruction_format import FORMAT as RECONSTRUCTION
 from .volume import FORMAT, Volume, volume_in
+from .volume_axes import PositionedImage
 
 ACCEPTED = "a volume as NumPy (.npy, .npz), NRRD, NIfTI or HDF5 of Bentray, or raw bytes with shape and dtype"
 
@@ -57,7 +58,7 @@ def import_volume(path: Path, given: VolumeMetadata | None = None, check: ShapeC
     """Read a volume in any of the formats.
 
     Axes keep the order of the file, x first; those of NIfTI and anatomical NRRD go to the right, front and
-    up (``read_nifti``, ``read_nrrd``). Lengths in mm become m. A reconstruction becomes its speed, m/s.
+    up (``nifti_image``, ``nrrd_image``). Lengths in mm become m. A reconstruction becomes its speed, m/s.
 
     Args:
         path: of the file.
@@ -92,15 +93,35 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: VolumeMetadata, chec
         )
     if start.startswith(SIGNATURE):
         return _hdf5(path, check)
-    if start.startswith(b"NRRD000"):
-        return read_nrrd(file, check)
-    if start.startswith(b"\x1f\x8b"):
-        with rejecting_damage("file", "a whole NIfTI file packed with gzip"), gzip.open(file) as unpacked:
-            return read_nifti(unpacked, check)
-    if start[344:348] == b"n+1\0" or start[4:8] == b"n+2\0":
-        return read_nifti(file, check)
+    image = positioned_image(file, start, check)
+    if image is not None:
+        return Volume.from_image(image)
     found = "an empty file" if not start else f"a file of another kind ({first_bytes(start)})"
     raise InvalidInput("file", found, ACCEPTED)
+
+
+def positioned_image(
+    file: IO[bytes], start: bytes, check: ShapeCheck = any_shape, least: int = 2
+) -> PositionedImage | None:
+    """The image of an NRRD or NIfTI file; None for other files.
+
+    Args:
+        file: open, at its start.
+        start: its first 540 bytes.
+        check: of the shape, called before the values are read.
+        least: nodes along each axis; 1 accepts planes.
+
+    Raises:
+        InvalidInput: as ``import_volume``.
+    """
+    if start.startswith(b"NRRD000"):
+        return nrrd_image(file, check, least)
+    if start.startswith(b"\x1f\x8b"):
+        with rejecting_damage("file", "a whole NIfTI file packed with gzip"), gzip.open(file) as unpacked:
+            return nifti_image(unpacked, check, least)
+    if start[344:348] == b"n+1\0" or start[4:8] == b"n+2\0":
+        return nifti_image(file, check, least)
+    return None
 
 
 def _raw(path: Path, given: VolumeMetadata, check: ShapeCheck) -> Volume:

@@ -8,6 +8,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..files.dataset.read import read_dataset
 from ..files.reconstruction import read_reconstruction
+from ..files.volume_axes import Grid
 from ..files.volume_export import FORMATS, SINGLE, Content
 
 
@@ -39,4 +40,4 @@ def export_truth(volume: Path, *, scan: Path, target: Path, name: str) -> None:
         raise InvalidInput("quantity", f"truth: {reason}", "a quantity of the result") from None
     title = "True speed of sound, m/s"
     images = {"truth_mps": values}
-    FORMATS[name].write(target, Content(values, own.spacing_m, own.origin_m, title, images))
+    FORMATS[name].write(target, Content(values, Grid(own.spacing_m, own.origin_m), title, images))

@@ -16,6 +16,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
+from ..volume_axes import LPS, Grid
 from .even_spacing import check_even_spacing
 from .optional_library import import_optional
 
@@ -40,22 +41,21 @@ MAKER, MODEL, SCHEME = "Bentray", "bentray", "99BENTRAY"
 def write_dicom(
     path: Path,
     images: Mapping[str, NDArray[Any]],
-    spacing_m: Sequence[float],
-    origin_m: Sequence[float],
+    grid: Grid,
     title: str,
     version: str,
     seconds: float,
 ) -> None:
     """Write the quantities of ``QUANTITIES`` as one Parametric Map; ``path`` is replaced atomically.
 
-    Frames are slices across z, rows are along y and columns along x; positions are those of the volume in mm,
-    in the patient axes of DICOM, without an orientation in the body. Patient and study are empty. The same
-    volume gives the same bytes.
+    Frames are slices across z, rows are along y and columns along x, in the order of the volume; positions
+    are in mm in the patient axes of DICOM, LPS. Patient and study are empty. The same volume gives the same
+    bytes.
 
     Args:
         path: of the file.
         images: (nx, ny[, nz]) by name, stored as float32.
-        spacing_m, origin_m: per axis, m.
+        grid: positions of the nodes.
         title: for the description.
         version: of the software.
         seconds: time of the content, s since 1970.
@@ -67,17 +67,22 @@ def write_dicom(
     hd = import_optional("highdicom", "export", "DICOM")
     names = [name for name in QUANTITIES if name in images]
     first = images[names[0]]
-    check_even_spacing(spacing_m, "DICOM")
+    check_even_spacing(grid.spacing_m, "DICOM")
     if max(first.shape) > MAX_NODES:
         raise InvalidInput(
             "volume", f"{max(first.shape)} nodes", f"at most {MAX_NODES} along an axis for DICOM"
         )
     # (frames, rows, columns, quantities).
     pixels = np.stack([_frames(images[name]) for name in names], axis=-1)
-    steps = np.divide((*spacing_m, spacing_m[0])[:3], UNITS_M["mm"])
-    corner = np.divide((*origin_m, 0.0)[:3], UNITS_M["mm"])
-    digest = hashlib.sha256(pixels.tobytes() + repr((names, title, *steps, *corner)).encode()).hexdigest()
-    source = _source(digest, pixels.shape[1:3], steps, corner)
+    # Adding 0 makes −0 the same as 0.
+    affine = LPS @ grid.affine(UNITS_M["mm"]) + 0.0
+    steps = np.divide((*grid.spacing_m, grid.spacing_m[0])[:3], UNITS_M["mm"])
+    orientation = tuple(_decimal(value) for value in (affine[:3, :2] / steps[:2]).T.ravel())
+    positions = [
+        tuple(_decimal(value) for value in affine[:3, 3] + k * affine[:3, 2]) for k in range(len(pixels))
+    ]
+    digest = hashlib.sha256(pixels.tobytes() + repr((names, title, *affine.ravel())).encode()).hexdigest()
+    source = _source(digest, pixels.shape[1:3], steps, orientation, positions[0])
     made = hd.pm.ParametricMap(
         source_images=[source],
         pixel_array=pixels,
@@ -105,14 +110,11 @@ def write_dicom(
             spacing_between_slices=_decimal(steps[2]),
         ),
         plane_orientation=hd.PlaneOrientationSequence(
-            coordinate_system="PATIENT", image_orientation=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+            coordinate_system="PATIENT", image_orientation=orientation
         ),
         plane_positions=[
-            hd.PlanePositionSequence(
-                coordinate_system="PATIENT",
-                image_position=(_decimal(corner[0]), _decimal(corner[1]), _decimal(corner[2] + k * steps[2])),
-            )
-            for k in range(len(pixels))
+            hd.PlanePositionSequence(coordinate_system="PATIENT", image_position=position)
+            for position in positions
         ],
     )
     _settle(made, digest, datetime.fromtimestamp(math.floor(seconds), UTC))
@@ -126,7 +128,13 @@ def _frames(image: NDArray[Any]) -> NDArray[np.float32]:
     return np.ascontiguousarray(stacked.transpose(2, 1, 0), dtype=np.float32)
 
 
-def _source(digest: str, shape: Sequence[int], steps: NDArray[Any], corner: NDArray[Any]) -> Any:
+def _source(
+    digest: str,
+    shape: Sequence[int],
+    steps: NDArray[Any],
+    orientation: Sequence[float],
+    position: Sequence[float],
+) -> Any:
     """An image of an anonymous patient in the frame of reference of the volume, which highdicom requires."""
     from pydicom.dataset import Dataset
     from pydicom.uid import UltrasoundImageStorage
@@ -141,8 +149,8 @@ def _source(digest: str, shape: Sequence[int], steps: NDArray[Any], corner: NDAr
     source.Rows, source.Columns = (int(n) for n in shape)
     source.SliceThickness = _decimal(steps[2])
     source.PixelSpacing = [_decimal(steps[1]), _decimal(steps[0])]
-    source.ImageOrientationPatient = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
-    source.ImagePositionPatient = [_decimal(value) for value in corner]
+    source.ImageOrientationPatient = list(orientation)
+    source.ImagePositionPatient = list(position)
     for name in ("PatientID", "PatientName", "PatientBirthDate", "PatientSex", "AccessionNumber", "StudyID"):
         setattr(source, name, "")
     for name in ("StudyDate", "StudyTime", "ReferringPhysicianName", "PositionReferenceIndicator"):

@@ -1,8 +1,7 @@
-"""Writing volumes as MetaImage files (.mha): a text header, then the values; lengths in mm."""
+"""Writing volumes as MetaImage files (.mha): a text header, then the values; positions in mm, LPS."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bounded_reading import UNITS_M
+from ..volume_axes import LPS, Grid
 from .even_spacing import check_even_spacing
 from .header_and_values import type_name, write_header_and_values
 
@@ -20,20 +20,15 @@ ELEMENTS = {"u1": "MET_UCHAR", "u2": "MET_USHORT", "f4": "MET_FLOAT", "f8": "MET
 def write_metaimage(
     path: Path,
     values: NDArray[Any],
-    spacing_m: Sequence[float],
-    origin_m: Sequence[float],
+    grid: Grid,
     title: str,
 ) -> None:
     """Write a volume as MetaImage, header and values in one file; ``path`` is replaced atomically.
 
-    Positions are in the axes of the volume, without an orientation in the body: ITK, whose axes go to the
-    left, back and up, shows the same numbers.
-
     Args:
         path: of the file.
         values: (nx, ny[, nz]), of a type of ``ELEMENTS``.
-        spacing_m: per axis, m.
-        origin_m: position of node 0, per axis, m.
+        grid: positions of the nodes.
         title: for the comment.
 
     Raises:
@@ -43,8 +38,10 @@ def write_metaimage(
     Source:
         The tags and their order are those of the MetaIO documentation of ITK.
     """
-    check_even_spacing(spacing_m, "MetaImage")
+    check_even_spacing(grid.spacing_m, "MetaImage")
     ndim = values.ndim
+    origin = (LPS @ grid.affine(UNITS_M["mm"]))[:ndim, 3]
+    directions = (LPS[:3, :3] @ grid.direction)[:ndim, :ndim]
     tags = {
         "ObjectType": "Image",
         "NDims": ndim,
@@ -52,10 +49,10 @@ def write_metaimage(
         "BinaryData": True,
         "BinaryDataByteOrderMSB": False,
         "CompressedData": False,
-        "TransformMatrix": _row(np.eye(ndim, dtype=int).ravel()),
-        "Offset": _row(np.divide(origin_m, UNITS_M["mm"])),
+        "TransformMatrix": _row(directions.T.ravel()),
+        "Offset": _row(origin),
         "CenterOfRotation": _row(np.zeros(ndim, int)),
-        "ElementSpacing": _row(np.divide(spacing_m, UNITS_M["mm"])),
+        "ElementSpacing": _row(np.divide(grid.spacing_m, UNITS_M["mm"])),
         "DimSize": _row(values.shape),
         "ElementType": type_name(values, ELEMENTS),
         # The values follow this line.
@@ -68,4 +65,5 @@ def write_metaimage(
 
 
 def _row(values: Any) -> str:
-    return " ".join(str(value) for value in np.asarray(values).tolist())
+    # Adding 0 makes −0 the same as 0.
+    return " ".join(str(value + 0) for value in np.asarray(values).tolist())

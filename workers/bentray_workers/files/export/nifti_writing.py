@@ -1,17 +1,16 @@
-"""Writing volumes as NIfTI files: lengths in mm, axes to the right, front and up."""
+"""Writing volumes as NIfTI files: lengths in mm, positions in RAS."""
 
 from __future__ import annotations
 
 import gzip
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
+from ..volume_axes import Grid
 from .even_spacing import check_even_spacing
 
 # Largest number of nodes along an axis in the header of NIfTI-1.
@@ -23,8 +22,7 @@ SCANNER = 1
 def write_nifti(
     path: Path,
     values: NDArray[Any],
-    spacing_m: Sequence[float],
-    origin_m: Sequence[float],
+    grid: Grid,
     title: str,
 ) -> None:
     """Write a volume as NIfTI-1, or as NIfTI-2 where an axis is too long; ``path`` is replaced atomically.
@@ -32,8 +30,7 @@ def write_nifti(
     Args:
         path: of the file; compressed with gzip if its name ends in ``.gz``.
         values: (nx, ny[, nz]), of a type of NIfTI.
-        spacing_m: per axis, m.
-        origin_m: position of node 0, per axis, m.
+        grid: positions of the nodes.
         title: for the description, truncated.
 
     Raises:
@@ -43,10 +40,8 @@ def write_nifti(
     from nibabel.nifti1 import Nifti1Image
     from nibabel.nifti2 import Nifti2Image
 
-    check_even_spacing(spacing_m, "NIfTI")
-    affine, ndim = np.eye(4), values.ndim
-    affine[range(ndim), range(ndim)] = np.divide(spacing_m, UNITS_M["mm"])
-    affine[:ndim, 3] = np.divide(origin_m, UNITS_M["mm"])
+    check_even_spacing(grid.spacing_m, "NIfTI")
+    affine = grid.affine(UNITS_M["mm"])
     kind = Nifti1Image if max(values.shape) <= MAX_NODES else Nifti2Image
     image = kind(values, affine)
     image.set_sform(affine, SCANNER)

@@ -1,15 +1,14 @@
-"""Writing volumes as NRRD files: lengths in mm, without an orientation in the body."""
+"""Writing volumes as NRRD files: lengths in mm, positions in RAS."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from ..bounded_reading import UNITS_M
+from ..volume_axes import Grid
 from .even_spacing import check_even_spacing
 from .header_and_values import type_name, write_header_and_values
 
@@ -19,17 +18,17 @@ TYPES = {"u1": "uint8", "u2": "uint16", "f4": "float", "f8": "double"}
 def write_nrrd(
     path: Path,
     values: NDArray[Any],
-    spacing_m: Sequence[float],
-    origin_m: Sequence[float],
+    grid: Grid,
     title: str,
 ) -> None:
     """Write a volume as NRRD 4, header and raw values in one file; ``path`` is replaced atomically.
 
+    A plane becomes a volume of one slice, since NRRD has no names for the spaces of planes.
+
     Args:
         path: of the file.
         values: (nx, ny[, nz]), of a type of ``TYPES``.
-        spacing_m: per axis, m.
-        origin_m: position of node 0, per axis, m.
+        grid: positions of the nodes.
         title: for the content.
 
     Raises:
@@ -40,18 +39,18 @@ def write_nrrd(
         "Definition of NRRD File Format", teem.sourceforge.net/nrrd/format.html. The values are written by
         slices, which pynrrd cannot do.
     """
-    check_even_spacing(spacing_m, "NRRD")
-    ndim = values.ndim
-    steps = np.diag(np.divide(spacing_m, UNITS_M["mm"]))
+    check_even_spacing(grid.spacing_m, "NRRD")
+    values = values[..., None] if values.ndim == 2 else values
+    affine = grid.affine(UNITS_M["mm"])
     fields = {
         "content": " ".join(title.split()),
         "type": type_name(values, TYPES),
-        "dimension": ndim,
-        "space dimension": ndim,
+        "dimension": 3,
+        "space": "right-anterior-superior",
         "sizes": " ".join(map(str, values.shape)),
-        "space directions": " ".join(_vector(row) for row in steps),
-        "space units": " ".join(['"mm"'] * ndim),
-        "space origin": _vector(np.divide(origin_m, UNITS_M["mm"])),
+        "space directions": " ".join(_vector(step) for step in affine[:3, :3].T),
+        "space units": " ".join(['"mm"'] * 3),
+        "space origin": _vector(affine[:3, 3]),
         "endian": "little",
         "encoding": "raw",
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,14 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 
 from ..atomic import atomic_replace
+from ..volume_axes import Grid, check_aligned
 from .even_spacing import check_even_spacing
 from .optional_library import import_optional
 
 VERSION = "0.5"
 ROOT = "zarr.json"
+# Directions in which x, y and z increase.
+RAS = ("left-to-right", "posterior-to-anterior", "inferior-to-superior")
 # Nodes along the sides of a chunk.
 CHUNK = 128
 # Of the members of a zip: the same volume gives the same bytes.
@@ -28,31 +31,31 @@ def write_ome_zarr(
     path: Path,
     images: Mapping[str, NDArray[Any]],
     units: Mapping[str, str],
-    spacing_m: Sequence[float],
-    origin_m: Sequence[float],
+    grid: Grid,
     title: str,
 ) -> None:
     """Write images on one grid as channels of one multiscale image with one level.
 
     The axes are (c, z, y, x), or (c, y, x) of a plane, in metres; scale and translation give the positions of
-    the nodes. Labels of channels have the unit.
+    the nodes, RAS, which is stated as in RFC-4. Labels of channels have the unit.
 
     Args:
         path: of a zip, which is replaced atomically, or with the suffix ``.zarr`` of a new folder.
         images: (nx, ny[, nz]) by name, of one type.
         units: by name.
-        spacing_m, origin_m: per axis, m.
+        grid: positions of the nodes.
         title: of the image.
 
     Raises:
-        InvalidInput: for uneven spacing, an existing folder, or without zarr.
+        InvalidInput: for uneven spacing, oblique axes, an existing folder, or without zarr.
         OSError: where the folder cannot be written to or the disk is full.
 
     Source:
-        OME-Zarr 0.5, ngff.openmicroscopy.org/0.5.
+        OME-Zarr 0.5, ngff.openmicroscopy.org/0.5; orientation: ngff.openmicroscopy.org/rfc/4.
     """
-    check_even_spacing(spacing_m, "OME-Zarr")
-    members = _members(images, _attributes(images, units, spacing_m, origin_m, title))
+    check_even_spacing(grid.spacing_m, "OME-Zarr")
+    check_aligned(grid, "volume", "axes along x, y and z for OME-Zarr; nifti, nrrd or hdf5 hold any")
+    members = _members(images, _attributes(images, units, grid, title))
     if path.suffix == ".zarr":
         _write_folder(path, members)
     else:
@@ -62,12 +65,14 @@ def write_ome_zarr(
 def _attributes(
     images: Mapping[str, NDArray[Any]],
     units: Mapping[str, str],
-    spacing_m: Sequence[float],
-    origin_m: Sequence[float],
+    grid: Grid,
     title: str,
 ) -> dict[str, Any]:
     """The attribute ``ome`` of the group."""
-    space = [{"name": name, "type": "space", "unit": "meter"} for name in "xyz"[: len(spacing_m)]]
+    space = [
+        {"name": name, "type": "space", "unit": "meter", "orientation": {"type": "anatomical", "value": way}}
+        for name, way in zip("xyz", RAS, strict=True)
+    ][: len(grid.spacing_m)]
     ranges = {name: (float(image.min()), float(image.max())) for name, image in images.items()}
     return {
         "version": VERSION,
@@ -79,8 +84,8 @@ def _attributes(
                     {
                         "path": "0",
                         "coordinateTransformations": [
-                            {"type": "scale", "scale": [1.0, *map(float, spacing_m[::-1])]},
-                            {"type": "translation", "translation": [0.0, *map(float, origin_m[::-1])]},
+                            {"type": "scale", "scale": [1.0, *map(float, grid.spacing_m[::-1])]},
+                            {"type": "translation", "translation": [0.0, *map(float, grid.origin_m[::-1])]},
                         ],
                     }
                 ],

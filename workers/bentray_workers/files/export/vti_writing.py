@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..atomic import atomic_replace
+from ..volume_axes import Grid
 from .even_spacing import check_even_spacing
 
 TYPES = {"u1": "UInt8", "u2": "UInt16", "f4": "Float32", "f8": "Float64"}
@@ -21,8 +22,7 @@ SIZE = struct.Struct("<Q")
 def write_vti(
     path: Path,
     images: Mapping[str, NDArray[Any]],
-    spacing_m: Sequence[float],
-    origin_m: Sequence[float],
+    grid: Grid,
     active: str,
 ) -> None:
     """Write images on one grid as point data; ``path`` is replaced atomically.
@@ -30,7 +30,7 @@ def write_vti(
     Args:
         path: of the file.
         images: (nx, ny[, nz]) by name, of a type of ``TYPES``.
-        spacing_m, origin_m: per axis, m; VTK has no unit, so lengths are in m.
+        grid: positions of the nodes, stored in m, RAS: VTK has no unit and no body.
         active: name of the image that is shown first.
 
     Raises:
@@ -40,11 +40,11 @@ def write_vti(
     Source:
         "VTK XML Formats" of the VTK documentation: ``ImageData``, appended data, encoding raw.
     """
-    check_even_spacing(spacing_m, "VTI")
+    check_even_spacing(grid.spacing_m, "VTI")
     shape = (*next(iter(images.values())).shape, 1)[:3]
     extent = " ".join(f"0 {n - 1}" for n in shape)
     # A plane has one layer; its thickness is not shown.
-    spacing, origin = (*spacing_m, spacing_m[0])[:3], (*origin_m, 0.0)[:3]
+    spacing, origin = (*grid.spacing_m, grid.spacing_m[0])[:3], grid.affine()[:3, 3]
     arrays, offset = [], 0
     for name, image in images.items():
         kind = TYPES[image.dtype.newbyteorder("<").str[1:]]
@@ -55,7 +55,8 @@ def write_vti(
     header = (
         '<?xml version="1.0"?>\n'
         '<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
-        f'<ImageData WholeExtent="{extent}" Origin="{_row(origin)}" Spacing="{_row(spacing)}">\n'
+        f'<ImageData WholeExtent="{extent}" Origin="{_row(origin)}" Spacing="{_row(spacing)}" '
+        f'Direction="{_row(grid.direction.ravel())}">\n'
         f'<Piece Extent="{extent}"><PointData Scalars={quoteattr(active)}>\n'
         + "\n".join(arrays)
         + '\n</PointData></Piece></ImageData>\n<AppendedData encoding="raw">_'
@@ -71,5 +72,5 @@ def write_vti(
         file.write(b"</AppendedData>\n</VTKFile>\n")
 
 
-def _row(values: Sequence[float]) -> str:
+def _row(values: Iterable[float]) -> str:
     return " ".join(repr(float(value)) for value in values)
