@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..arrays import Floats, Ints
+from .program import Program
 from .session import Session, set_arguments
 
 # Points along a side of a block, by dimensions of the grid; 64 points either way.
@@ -41,6 +42,15 @@ def travel_times(
         fields = crossings if shared else crossings[part]
         times[part] = _advance_until_settled(session, blocks, fields, seeds[part], tolerance)
     return times
+
+
+def programs() -> Iterator[Program]:
+    """The programs in two and three dimensions."""
+    return map(_program, EDGES)
+
+
+def _program(ndim: int) -> Program:
+    return Program(("fast_iterative",), (f"DIMS={ndim}", f"EDGE={EDGES[ndim]}"))
 
 
 class Blocks:
@@ -108,7 +118,7 @@ def _advance_until_settled(
         row[: len(listed)] = sorted(listed)
         queued[list(listed)] = 1
     ndim = len(blocks.shape)
-    kernel = session.kernel(("fast_iterative",), "advance", f"DIMS={ndim}", f"EDGE={blocks.edge}")
+    kernel = session.kernel(_program(ndim), "advance")
     group = (blocks.edge,) * ndim
     sides = (*blocks.counts, 1)[:3]
     with session.lock:

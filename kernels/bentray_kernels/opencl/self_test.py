@@ -17,12 +17,9 @@ import numpy as np
 from ..arrays import Floats
 from .blocks import travel_times
 from .devices import find_devices
-from .session import Session, probe
+from .session import WIDTHS, Session, probe
 
-# Vector widths of doubles tested, each in its own stage.
-WIDTHS = (1, 2, 4, 8, 16)
-
-# Stages that the kernels need; they use no vectors.
+# Stages that the kernels need; they use no vectors. Each other width has its own stage.
 NEEDED = ("double1", "solve")
 STAGES = (*NEEDED, *(f"double{width}" for width in WIDTHS[1:]))
 

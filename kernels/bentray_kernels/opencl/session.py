@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import threading
 import warnings
-from importlib import resources
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats
 from .devices import Device, handle_of
+from .program import Program
+
+# Vector widths of doubles that the self-test tries.
+WIDTHS = (1, 2, 4, 8, 16)
 
 
 class Session:
@@ -33,37 +37,29 @@ class Session:
         self.handle = handle_of(device)
         self.context = cl.Context([self.handle])
         self.queue = cl.CommandQueue(self.context)
-        self._kernels: dict[tuple[tuple[str, ...], str, tuple[str, ...]], Any] = {}
-        self._programs: dict[tuple[tuple[str, ...], tuple[str, ...]], Any] = {}
+        self._kernels: dict[tuple[Program, str], Any] = {}
+        self._programs: dict[Program, Any] = {}
 
-    def kernel(self, sources: tuple[str, ...], name: str, *defines: str) -> Any:
-        """A kernel of the files ``sources/<source>.cl``, built as one program on first use.
-
-        Args:
-            sources: names of the files, in the order in which the compiler reads them.
-            name: name of the kernel.
-            defines: ``NAME=VALUE`` for the compiler.
-        """
-        key = (sources, name, defines)
+    def kernel(self, program: Program, name: str) -> Any:
+        """A kernel of a program, which is built on first use."""
+        key = (program, name)
         if key not in self._kernels:
-            self._kernels[key] = self.own_kernel(sources, name, *defines)
+            self._kernels[key] = self.own_kernel(program, name)
         return self._kernels[key]
 
-    def own_kernel(self, sources: tuple[str, ...], name: str, *defines: str) -> Any:
+    def own_kernel(self, program: Program, name: str) -> Any:
         """As ``kernel``, but a new one of the caller's own, whose arguments nobody else sets."""
         import pyopencl as cl
 
-        key = (sources, defines)
-        if key not in self._programs:
-            text = "".join(_named(source) for source in sources)
+        if program not in self._programs:
             with warnings.catch_warnings():
                 # Compiler remarks about programs that pass the self-test.
                 warnings.simplefilter("ignore", cl.CompilerWarning)
                 # Drivers cache programs themselves; pyopencl's own cache warns under load.
-                self._programs[key] = cl.Program(self.context, text).build(
-                    [f"-D{define}" for define in defines], cache_dir=False
+                self._programs[program] = cl.Program(self.context, program.text).build(
+                    [f"-D{define}" for define in program.defines], cache_dir=False
                 )
-        return cl.Kernel(self._programs[key], name)
+        return cl.Kernel(self._programs[program], name)
 
     def upload(self, array: Any) -> Any:
         """A buffer on the device with a copy of a C-ordered array."""
@@ -120,17 +116,20 @@ class Session:
         return int(min(self.handle.max_mem_alloc_size, self.handle.global_mem_size // 4)) // 8
 
 
-def _named(source: str) -> str:
-    """The text of a file, with its name for messages of the compiler."""
-    file = f"{source}.cl"
-    text = resources.files(__package__).joinpath("sources", *file.split("/")).read_text()
-    return f'#line 1 "{file}"\n{text}\n'
-
-
 def set_arguments(kernel: Any, *arguments: Any) -> None:
     """Set buffers and numpy scalars in order, without the launcher that pyopencl generates and caches."""
     for place, argument in enumerate(arguments):
         kernel.set_arg(place, argument)
+
+
+def programs() -> Iterator[Program]:
+    """The programs of ``probe``."""
+    return map(_probing, WIDTHS)
+
+
+def _probing(width: int) -> Program:
+    real = "double" if width == 1 else f"double{width}"
+    return Program(("probe",), (f"REAL={real}",))
 
 
 def probe(session: Session, width: int, a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -139,8 +138,7 @@ def probe(session: Session, width: int, a: Floats, b: Floats) -> tuple[Floats, F
     Args:
         a, b: (n,), n a multiple of ``width``.
     """
-    real = "double" if width == 1 else f"double{width}"
-    kernel = session.kernel(("probe",), "probe", f"REAL={real}")
+    kernel = session.kernel(_probing(width), "probe")
     root, lower = np.empty_like(a), np.empty_like(a)
     with session.lock:
         buffers = [session.upload(array) for array in (a, b, root, lower)]

@@ -11,7 +11,8 @@ from pathlib import Path
 from .child_process import answers_of
 from .devices import Device
 from .records import read_record, record_file, write_record
-from .self_test import NEEDED, STAGES, WIDTHS
+from .self_test import NEEDED, STAGES
+from .session import WIDTHS
 
 # Building all kernels takes seconds; the machine may be busy with starting workers.
 TIME_OUT_S = 120.0
@@ -90,7 +91,7 @@ def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tupl
 
 def _file(device: Device) -> Path:
     package = Path(__file__).parent
-    names = ("self_test.py", "blocks.py", "session.py", "pocl.py", "link/shared_library.py")
+    names = ("self_test.py", "blocks.py", "session.py", "program.py", "pocl.py", "link/shared_library.py")
     sources = (*(package / name for name in names), *sorted((package / "sources").rglob("*.cl")))
     return record_file("opencl", device, (source.read_bytes() for source in sources))
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,10 @@ from ..isosurface import crossing
 from ..isosurface.crossing import Search
 from ..isosurface.roots import STEPS
 from ..opencl import OpenCLFallbackWarning, Session, Work, computing_on, scene_or_warning
+from ..opencl.program import Program
 from ..opencl.session import set_arguments
+from ..splines.filters import FILTERS
+from ..splines.sampling import Stencil, stencil_of
 from .camera import perspective
 from .caster import RefractiveMedium, Traced, allocate_results, cast
 from .scene import Scene
@@ -149,7 +154,8 @@ class OpenCLCaster:
         """As ``cast``, on the device, without self-test."""
         # Place, point, direction, weight and the two whole numbers of a ray; its path.
         at_once = max(1, self.session.doubles_at_once() // (10 + 3 * traced.vertices.shape[1]))
-        kernel = self.session.kernel(SOURCES, "follow", *self._defines(medium, search))
+        program = _program(self.precision, self._sum.name, medium.field.stencil, _way(search))
+        kernel = self.session.kernel(program, "follow")
         for start in range(0, len(places), at_once):
             rays = slice(start, start + at_once)
             with self.session.lock:
@@ -217,23 +223,33 @@ class OpenCLCaster:
     def _kind_of(self, array: Any) -> Any:
         return self._real if array.dtype.kind == "f" else array.dtype
 
-    def _defines(self, medium: RefractiveMedium, search: Search) -> tuple[str, ...]:
-        names = {"float64": "double", "float32": "float"}
-        weights = medium.field.stencil.weights
-        tolerance, shortest = FINENESS[self.precision]
-        return (
-            f"REAL={names[self.precision]}",
-            f"SUM={names[self._sum.name]}",
-            f"TAPS={len(medium.field.stencil.places)}",
-            f"POWERS={int(np.flatnonzero(weights.any(axis=(1, 2)))[-1]) + 1}",
-            f"WIDTH={weights.shape[-1]}",
-            f"HOW={_way(search)}",
-            f"TOLERANCE={tolerance}",
-            f"SHORTEST={shortest}",
-            f"MAX_HALVINGS={crossing.MAX_HALVINGS}",
-            f"UNPROVED={crossing.UNPROVED}",
-            f"DEEPEST={STEPS}",
-        )
+
+def programs() -> Iterator[Program]:
+    """The programs of every filter and root finder, in every precision of rays and of sums."""
+    ways = ("STEPS", *WITHIN_CELLS.values())
+    sums = {"float64": ("float64", "float32"), "float32": ("float32",)}
+    for name, way, precision in product(FILTERS, ways, FINENESS):
+        for summed in sums[precision]:
+            yield _program(precision, summed, stencil_of(FILTERS[name]), way)
+
+
+def _program(precision: str, summed: str, stencil: Stencil, way: str) -> Program:
+    names = {"float64": "double", "float32": "float"}
+    tolerance, shortest = FINENESS[precision]
+    defines = (
+        f"REAL={names[precision]}",
+        f"SUM={names[summed]}",
+        f"TAPS={len(stencil.places)}",
+        f"POWERS={int(np.flatnonzero(stencil.weights.any(axis=(1, 2)))[-1]) + 1}",
+        f"WIDTH={stencil.weights.shape[-1]}",
+        f"HOW={way}",
+        f"TOLERANCE={tolerance}",
+        f"SHORTEST={shortest}",
+        f"MAX_HALVINGS={crossing.MAX_HALVINGS}",
+        f"UNPROVED={crossing.UNPROVED}",
+        f"DEEPEST={STEPS}",
+    )
+    return Program(SOURCES, defines)
 
 
 def work_of(scene: Scene, rays: int) -> Work:

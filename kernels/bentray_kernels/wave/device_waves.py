@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..opencl.program import Program
 from .device_grid import ROWS, DeviceGrid, Gather, Group
 from .device_memory import FlightPlan, FlightSize
 from .medium import Medium
@@ -182,21 +183,46 @@ class DeviceWaves:
 
     def misfit(self, name: str, *arguments: Any) -> Any:
         """A kernel of ``misfits.cl`` with its arguments."""
-        return self._own_kernel("wave/misfits", name, {}, arguments)
+        return self._own_kernel(_misfits(self.kind), name, arguments)
 
     def _kernel(self, name: str, store: int, *arguments: Any) -> Any:
-        sizes = {"DIMS": len(self.grid.shape), "HALO": HALO, "TAPS": 2 * REACH, "ROWS": ROWS, "STORE": store}
-        sizes["FILLED"] = int(self._fills)
-        return self._own_kernel("wave/waves", name, sizes, arguments)
+        program = _waves(self.kind, len(self.grid.shape), store, self._fills)
+        return self._own_kernel(program, name, arguments)
 
-    def _own_kernel(self, source: str, name: str, sizes: dict[str, int], arguments: tuple[Any, ...]) -> Any:
+    def _own_kernel(self, program: Program, name: str, arguments: tuple[Any, ...]) -> Any:
         from ..opencl.session import set_arguments
 
-        real = "float" if self.kind == np.float32 else "double"
-        defines = (f"REAL={real}", *(f"{key}={value}" for key, value in sizes.items()))
-        kernel = self.session.own_kernel((source,), name, *defines)
+        kernel = self.session.own_kernel(program, name)
         set_arguments(kernel, *arguments)
         return kernel
+
+
+def programs() -> Iterator[Program]:
+    """The programs in both precisions and dimensions, for all that a step stores."""
+    for kind in (np.dtype(np.float32), np.dtype(np.float64)):
+        yield _misfits(kind)
+        for ndim, store, fills in product((2, 3), (NOTHING, *STORES.values()), (False, True)):
+            yield _waves(kind, ndim, store, fills)
+
+
+def _misfits(kind: np.dtype[Any]) -> Program:
+    return Program(("wave/misfits",), (_real(kind),))
+
+
+def _waves(kind: np.dtype[Any], ndim: int, store: int, fills: bool) -> Program:
+    sizes = {
+        "DIMS": ndim,
+        "HALO": HALO,
+        "TAPS": 2 * REACH,
+        "ROWS": ROWS,
+        "STORE": store,
+        "FILLED": int(fills),
+    }
+    return Program(("wave/waves",), (_real(kind), *(f"{key}={value}" for key, value in sizes.items())))
+
+
+def _real(kind: np.dtype[Any]) -> str:
+    return "REAL=" + ("float" if kind == np.float32 else "double")
 
 
 def tiles(emitters: int, most: int) -> Iterator[slice]:

@@ -6,29 +6,33 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
+from bentray_kernels.opencl.program import Program
 from bentray_kernels.opencl.session import probe
+
+PROBE = Program(("probe",), ("REAL=double",))
 
 
 def test_a_kernel_is_built_once(session):
-    first = session.kernel(("probe",), "probe", "REAL=double")
-    assert session.kernel(("probe",), "probe", "REAL=double") is first
-    assert session.kernel(("probe",), "probe", "REAL=double2") is not first
+    first = session.kernel(PROBE, "probe")
+    assert session.kernel(PROBE, "probe") is first
+    assert session.kernel(Program(("probe",), ("REAL=double2",)), "probe") is not first
 
 
 def test_a_source_that_does_not_compile_is_an_error(session):
     with pytest.raises(cl.RuntimeError):
-        session.kernel(("probe",), "probe", "REAL=no_such_type")
+        session.kernel(Program(("probe",), ("REAL=no_such_type",)), "probe")
 
 
 def test_a_program_of_several_files_names_the_one_that_does_not_compile(session):
     text = resources.files("bentray_kernels.opencl").joinpath("sources", "refraction", "field.cl").read_text()
     line = 1 + text[: text.index("const SUM *coefficients")].count("\n")
     with pytest.raises(cl.RuntimeError, match=rf"field\.cl:{line}:"):
-        session.kernel(("probe", "refraction/field"), "probe", "REAL=double")
+        session.kernel(Program(("probe", "refraction/field"), ("REAL=double",)), "probe")
 
 
 def test_later_files_see_earlier_definitions(session):
-    assert session.kernel(("refraction/rays", "probe"), "probe", "REAL=double").function_name == "probe"
+    both = Program(("refraction/rays", "probe"), ("REAL=double",))
+    assert session.kernel(both, "probe").function_name == "probe"
 
 
 def test_buffers_round_trip(session):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING
 from ...opencl import OpenCLFallbackWarning, Session, Work, computing_on, scene_or_warning
+from ...opencl.program import Program
 from ...opencl.session import set_arguments
 from ...refraction.backdrop import Colours
 from ...refraction.camera import Camera
@@ -129,7 +131,7 @@ class OpenCLTracer:
                 accepted = "on a device one of " + ", ".join(lookup_scene.FACE_WAYS)
                 raise InvalidInput(name, getattr(settings, name), accepted)
         image = np.empty((settings.rows, settings.columns, 3), dtype=np.uint8)
-        kernel = self.session.kernel(SOURCES, "trace", *self._defines())
+        kernel = self.session.kernel(_program(self.precision), "trace")
         with self.session.lock:
             # Setting an argument does not keep its buffer alive: the names do.
             views = self.session.upload(np.stack([camera.origin, camera.direction]).astype(self._real))
@@ -149,19 +151,26 @@ class OpenCLTracer:
             for array in arrays
         ]
 
-    def _defines(self) -> tuple[str, ...]:
-        later, never = ROUNDING[self.precision]
-        return (
-            "REAL=" + {"float64": "double", "float32": "float"}[self.precision],
-            f"LATER=R({later!r})",
-            f"NEVER=R({never!r})",
-            f"ALMOST_ZERO=R({float(cube.ALMOST_ZERO)!r})",
-            f"MARGIN=R({float(cube.MARGIN)!r})",
-            f"SLACK=R({float(accurate_lookup.SLACK)!r})",
-            f"MIN_DISTANCE=R({lookup_scene.MIN_DISTANCE!r})",
-            f"MAX_STEPS={accurate_lookup.STEPS}",
-            f"WAITING={WAITING}",
-        )
+
+def programs() -> Iterator[Program]:
+    """The programs in both precisions."""
+    return map(_program, ROUNDING)
+
+
+def _program(precision: str) -> Program:
+    later, never = ROUNDING[precision]
+    defines = (
+        "REAL=" + {"float64": "double", "float32": "float"}[precision],
+        f"LATER=R({later!r})",
+        f"NEVER=R({never!r})",
+        f"ALMOST_ZERO=R({float(cube.ALMOST_ZERO)!r})",
+        f"MARGIN=R({float(cube.MARGIN)!r})",
+        f"SLACK=R({float(accurate_lookup.SLACK)!r})",
+        f"MIN_DISTANCE=R({lookup_scene.MIN_DISTANCE!r})",
+        f"MAX_STEPS={accurate_lookup.STEPS}",
+        f"WAITING={WAITING}",
+    )
+    return Program(SOURCES, defines)
 
 
 def work_of(world: World, rays: int) -> Work:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,17 +11,23 @@ import numpy as np
 from ...arrays import Flags, Floats, Ints
 from ...opencl import Session, session_or_warning
 from ...opencl.lost_device import computing_on
+from ...opencl.program import Program
 from ...opencl.session import set_arguments
 from .delay_and_sum import Pixels, Signals, Sums, empty_sums, sum_echoes
 from .element_times import ElementTimes
 
-SOURCES = ("reflection/delay_and_sum",)
+PROGRAM = Program(("reflection/delay_and_sum",))
 
 # Pixels of a work-group, and at once at most: the views of all elements at these lie on the device.
 GROUP, PIXELS = 64, 2**15
 
 # Of a view of a pixel from an element, and of a sum of a pixel, bytes.
 VIEW_BYTES = SUM_BYTES = 16
+
+
+def programs() -> Iterator[Program]:
+    """The one program."""
+    yield PROGRAM
 
 
 def sum_echoes_opencl(
@@ -76,7 +83,7 @@ def _summed(
     least = math.cos(math.radians(pair_angle_deg))
     views = session.reserve(VIEW_BYTES * elements * at_once)
     found, total = session.reserve(SUM_BYTES * emissions * at_once), session.reserve(SUM_BYTES * at_once)
-    kernels = [session.kernel(SOURCES, name) for name in ("view_pixels", "sum_receivers", "sum_emissions")]
+    kernels = [session.kernel(PROGRAM, name) for name in ("view_pixels", "sum_receivers", "sum_emissions")]
     for start in range(0, len(column), at_once):
         where = slice(start, start + at_once)
         m, n = column[where], row[where]

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...arrays import Float32s, Floats, Ints
 from ...errors import InvalidInput
+from ...opencl.program import Program
 from ...opencl.session import Session, set_arguments
 from ...rays.vectorised import LONGEST
 from ..result import RESIDUAL_EDGES_S
 
 SOURCES = ("tomography/fronts", "tomography/sart")
 
-# Work-items of a group that tracks a wave front, at most; of a group that takes rays of one emitter.
-GROUP, RAYS_GROUP = 256, 64
+# Work-items of a group that tracks a wave front, as many as the device takes; of a group that takes rays of
+# one emitter.
+GROUPS, RAYS_GROUP = (256, 128, 64, 32, 16, 8, 4, 2, 1), 64
 
 # Part of a device's memory that slices in flight may fill, and slices in flight on a processor.
 MEMORY_SHARE = 0.5
@@ -136,8 +138,8 @@ def slices_in_flight(session: Session, size: SliceSize) -> int:
             f"at most {limit:.0f} bytes, {largest:.0f} in one array, on the device",
         )
     local = int(session.handle.local_mem_size)
-    if ring_bytes(size.shape[1]) > local - 16 * GROUP:
-        most = (local - 16 * GROUP) // 4 // (SLOTS + CROSSINGS) - BESIDE
+    if ring_bytes(size.shape[1]) > local - 16 * GROUPS[0]:
+        most = (local - 16 * GROUPS[0]) // 4 // (SLOTS + CROSSINGS) - BESIDE
         raise InvalidInput("nodes", size.shape[1], f"at most {most}, for the local memory of the device")
     return min(found, PROCESSOR_SLICES) if device.kind == "cpu" else found
 
@@ -178,10 +180,7 @@ class DeviceSlices:
         self._emitters = max(len(one.emitters) for one in emissions)
         self._rings, self._receivers = emissions[0].receivers.shape[:2]
         self._most = LONGEST * (nx + ny)
-        group = GROUP
-        while group > session.handle.max_work_group_size:
-            group //= 2
-        self._group = group
+        self._group = next(group for group in GROUPS if group <= session.handle.max_work_group_size)
         self._numbers = np.array([len(one.emitters) for one in emissions], np.uint32)
         up, reserve = session.upload, session.reserve
         self._slowness = up(np.ascontiguousarray(slowness))
@@ -256,7 +255,7 @@ class DeviceSlices:
         traced = self._taken, self._residuals, self._correction
 
         def kernel(name: str, *arguments: Any) -> Any:
-            made = session.own_kernel(SOURCES, name, f"GROUP={group}")
+            made = session.own_kernel(_program(group), name)
             set_arguments(made, *arguments)
             return made
 
@@ -319,6 +318,15 @@ def local_memory(size_bytes: int) -> Any:
     import pyopencl as cl
 
     return cl.LocalMemory(size_bytes)
+
+
+def programs() -> Iterator[Program]:
+    """The programs for all sizes of groups."""
+    return map(_program, GROUPS)
+
+
+def _program(group: int) -> Program:
+    return Program(SOURCES, (f"GROUP={group}",))
 
 
 def _filled(count: int, group: int = RAYS_GROUP) -> int:

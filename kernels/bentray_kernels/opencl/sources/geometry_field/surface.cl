@@ -33,7 +33,8 @@ typedef struct {
     REAL distance, first, second, third, determinant;
 } Meeting;
 
-constant const Found NOT_FOUND = {-1, INFINITY, 0, 0};
+// A macro, since INFINITY is no compile-time constant for the compiler of NVIDIA.
+#define NOT_FOUND ((Found){-1, NONE, 0, 0})
 
 REAL part(Vector a, int axis) { return axis == 0 ? a.x : axis == 1 ? a.y : a.z; }
 REAL over_(REAL a) { return size_of(a) > 1 / NEVER ? 1 / a : NEVER; }
