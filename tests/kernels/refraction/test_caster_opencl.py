@@ -9,12 +9,14 @@ from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import OpenCLFallbackWarning, session_or_warning
+from bentray_kernels.opencl.program import Program
 from bentray_kernels.refraction import (
     Layers,
     Picture,
     RenderSettings,
     Scene,
     backdrop_of,
+    caster_opencl,
     checkerboard,
     orthographic,
     perspective,
@@ -282,7 +284,8 @@ def test_a_device_that_casts_wrong_is_left_with_a_warning(monkeypatch):
 
 def test_a_device_that_cannot_build_the_program_is_left_too(monkeypatch):
     scene = nested()
-    monkeypatch.setattr(OpenCLCaster, "_defines", lambda *_: ("REAL=nonsense",))
+    nonsense = Program(caster_opencl.SOURCES, ("REAL=nonsense",))
+    monkeypatch.setattr(caster_opencl, "_program", lambda *_: nonsense)
     caster, how = caster_of(scene), RenderSettings(16, 16)
     with pytest.warns(OpenCLFallbackWarning, match="caster.cast takes over: it ends with "):
         found = render(scene, CAMERAS["perspective"], BACKDROP, how, caster)
