@@ -19,6 +19,7 @@ from ..errors import InvalidInput
 from ..task_graph import ThreadPool, run
 from . import pairs
 from .attenuation import EXPERIMENTAL
+from .cautions import bound_cautions, fit_cautions
 from .decomposition import with_decomposition
 from .device_choice import ScanSize, needs_decision, with_device
 from .gauss_newton.gauss_newton_step import Iterate
@@ -41,7 +42,7 @@ from .reconstruction_graph import (
 from .reflection.memory_echoes import MemoryEchoScan
 from .reflection.reflection_plan import Echoes, check_reflection
 from .reflection.with_reflection import with_reflection
-from .result import Progress, Reconstruction, Trial
+from .result import Caution, Progress, Reconstruction, Trial
 from .sart.sart_step import State
 from .settings import Settings
 from .stage_graphs import Scan
@@ -291,28 +292,35 @@ def _assembled(
     losses = evaluated(solve_attenuation)
     spread = [graph.value_of(estimate_uncertainty) for graph in graphs]
     known = all(one is not None for one in spread)
-    caution = {} if losses is None else {"attenuation": EXPERIMENTAL}
+    experimental = {} if losses is None else {"attenuation": EXPERIMENTAL}
+    speed = image([1.0 / state.slowness for state in states])
+    coverage = image([state.coverage for state in states])
+    residuals, history = np.sum([state.residuals for state in states], axis=0), progress_of(graphs).history
+    bounds, water = settings.speed_bounds_mps, dataset.water_speed_mps
+    cautions = [*bound_cautions(speed, coverage, bounds, water)]
+    cautions += fit_cautions(dataset, settings, residuals, history)
     if known and any(one.caution for one in spread):
-        caution["uncertainty"] = _cautions([one.caution for one in spread])
+        cautions.append(Caution("uncertainty", _of_slices([one.caution for one in spread])))
     return Reconstruction(
-        speed=image([1.0 / state.slowness for state in states]),
-        coverage=image([state.coverage for state in states]),
+        speed=speed,
+        coverage=coverage,
         spacing_m=spacing,
         origin_m=origin,
-        water_speed_mps=dataset.water_speed_mps,
+        water_speed_mps=water,
         settings=settings,
-        history=progress_of(graphs).history,
+        history=history,
         attenuation=losses,
         recovery=evaluated(check_resolution),
         uncertainty=image([one.deviation for one in spread]) if known else None,
         resolution_width_m=tuple(one.width_m for one in spread) if known else (),
-        residuals=np.sum([state.residuals for state in states], axis=0),
+        residuals=residuals,
         trials=trials,
-        provenance={**provenance(), **recorded(settings.numerics), **caution},
+        cautions=tuple(cautions),
+        provenance={**provenance(), **recorded(settings.numerics), **experimental},
     )
 
 
-def _cautions(slices: Sequence[str]) -> str:
+def _of_slices(slices: Sequence[str]) -> str:
     """The first caution about the uncertainty, and of how many slices there is one."""
     found = [one for one in slices if one]
     return found[0] if len(slices) == 1 else f"{found[0]} (One of {len(found)} of {len(slices)} slices.)"

@@ -16,10 +16,51 @@ _DECADES = np.logspace(-10.0, -4.0, 49)
 RESIDUAL_EDGES_S = np.concatenate((-_DECADES[::-1], _DECADES))
 
 
+# Begins the first line of a doubtful result, and the advice of its job.
+DOUBTFUL = "Doubtful result."
+
+
 def residual_counts(residuals: NDArray[np.float64]) -> NDArray[np.int64]:
     """Histogram of residuals, s, over ``RESIDUAL_EDGES_S``; the outer bins include all beyond the ends."""
     within = np.clip(residuals, RESIDUAL_EDGES_S[0], RESIDUAL_EDGES_S[-1])
     return np.histogram(within, RESIDUAL_EDGES_S)[0].astype(np.int64)
+
+
+def residual_within(counts: NDArray[np.int64], share: float) -> float:
+    """The absolute residual, s, that this share does not exceed; 0 without residuals.
+
+    Args:
+        counts: of the bins between ``RESIDUAL_EDGES_S``.
+        share: in (0, 1]; residuals are assumed uniform in a bin.
+    """
+    if not counts.sum():
+        return 0.0
+    middle = len(counts) // 2
+    # Both signs together, from the bin around zero outwards.
+    sizes = np.concatenate((counts[middle : middle + 1], counts[middle + 1 :] + counts[middle - 1 :: -1]))
+    edges = np.concatenate(([0.0], RESIDUAL_EDGES_S[middle + 1 :]))
+    below = np.concatenate(([0.0], np.cumsum(sizes) / counts.sum()))
+    k = int(np.searchsorted(below, share - 1e-12)) - 1
+    part = (share - below[k]) / (below[k + 1] - below[k])
+    return float(edges[k] + part * (edges[k + 1] - edges[k]))
+
+
+@dataclass(frozen=True)
+class Caution:
+    """Something that the reader of a result must know.
+
+    Attributes:
+        code: ``bounds``: the image is cut off by the speed bounds; ``residual``: it does not explain the
+            times; ``constant``: it explains them no better than one speed; ``noise``: they contradict each
+            other; ``uncertainty``: the standard deviations may be too small; ``settings``: settings without
+            effect.
+        text: one or two sentences for the reader, with the numbers and what to do.
+        doubtful: whether the image itself is in doubt.
+    """
+
+    code: str
+    text: str
+    doubtful: bool = False
 
 
 @dataclass(frozen=True)
@@ -130,6 +171,7 @@ class Reconstruction:
         residuals: histogram of the residuals of the last iteration over ``RESIDUAL_EDGES_S``.
         settings: the settings that were used; never ``method`` auto.
         trials: the candidate models of ``auto``, the best first.
+        cautions: what the reader must know, doubts about the image first.
         provenance: versions of the software, and automatic decisions.
     """
 
@@ -147,6 +189,7 @@ class Reconstruction:
     reflection: Reflection | None = None
     residuals: NDArray[np.int64] | None = None
     trials: tuple[Trial, ...] = ()
+    cautions: tuple[Caution, ...] = ()
     provenance: dict[str, str] = field(default_factory=dict)
 
     def image(self, quantity: str) -> GridImage | None:
@@ -162,6 +205,12 @@ class Reconstruction:
         if isinstance(held, Reflection):
             return GridImage(held.db, held.spacing_m, held.origin_m)
         return GridImage(held, self.spacing_m, self.origin_m)
+
+    @property
+    def doubt(self) -> str:
+        """Why the image is doubtful, in sentences; empty without a reason."""
+        reasons = " ".join(one.text for one in self.cautions if one.doubtful)
+        return f"{DOUBTFUL} {reasons}" if reasons else ""
 
     @property
     def residual_rms_s(self) -> float | None:

@@ -39,7 +39,7 @@ def submit_batch(
     tls: Path | None,
     *,
     as_json: bool,
-) -> None:
+) -> list[Entry]:
     """Reconstruct every scan of a folder into OUTPUT/NAME/; existing results are skipped.
 
     Args:
@@ -51,6 +51,9 @@ def submit_batch(
         at_once: number of concurrent datasets; None: one more than the number of workers.
         tls: folder of the certificates.
         as_json: print one JSON object at the end.
+
+    Returns:
+        The state of each scan.
 
     Raises:
         InvalidInput: for an invalid folder, scheduler or setting.
@@ -65,7 +68,7 @@ def submit_batch(
     for entry in entries:
         found = finished(results / entry.name, entry.source, settings, given)
         if found is not None:
-            entry.skip(found["seconds"], found["residual_rms_s"])
+            entry.skip(found["seconds"], found["residual_rms_s"], found.get("doubt", ""))
     waiting = [entry for entry in entries if entry.state == "waiting"]
     if waiting:
         with open_cluster(scheduler, tls=tls) as cluster, watching(entries) as watch:
@@ -76,6 +79,7 @@ def submit_batch(
                 at_once or cluster.describe()["workers"] + 1,
             )
     report(folder, results, entries, as_json=as_json)
+    return entries
 
 
 def entries_of(folder: Path) -> list[Entry]:
@@ -133,6 +137,7 @@ def reconstruct_one(
                 return bytes(drawn.result())
 
             result = reconstruct(client, scan, settings, entry.show, stop, work_dir)
+            entry.doubt = result.doubt
             dataset = read_dataset(scan, traces=False)
             write_results(
                 folder, result, dataset, entry.seconds, draw, file=str(entry.source), request=request

@@ -13,6 +13,7 @@ import typer
 from .options.paths import output_folder
 from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options
 from .options.settings_options import SettingsOptions, settings_from, with_settings_options
+from .output.exit_codes import AcceptDoubtful, end_doubtful
 from .output.results import show_results, write_results
 from .output.terminal import AsJson, progress_bar, residual_note
 
@@ -38,9 +39,12 @@ def reconstruct(
             help="Worker processes; 1 runs in this process.",
         ),
     ] = None,
+    accept_doubtful: AcceptDoubtful = False,
     as_json: AsJson = False,
 ) -> None:
     """Reconstruct a scan into OUTPUT/reconstruction.h5, .png and .json.
+
+    The exit code is 3 for a doubtful result: its first line says why.
 
     Example:  bentray reconstruct scan.h5 -o result --rays curved --iterations 6
     """
@@ -63,6 +67,7 @@ def reconstruct(
         result = run(scan, dataset, settings, workers, show)
     found = write_results(folder, result, dataset, time.perf_counter() - started, file=str(source))
     show_results(f"Reconstruction of {source.name}", found, as_json=as_json)
+    end_doubtful(bool(found["doubt"]), 1, accepted=accept_doubtful)
 
 
 def run(

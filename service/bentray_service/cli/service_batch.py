@@ -41,7 +41,7 @@ def submit_service_batch(
     *,
     wait: bool,
     as_json: bool,
-) -> None:
+) -> list[Entry]:
     """Upload every scan of a folder, reconstruct all as one batch, and download the results to OUTPUT/NAME/.
 
     Scans with a result in OUTPUT are skipped, and those that are on the service are not uploaded again. If an
@@ -56,6 +56,9 @@ def submit_service_batch(
         wait: whether to wait for the results.
         as_json: print one JSON object at the end.
 
+    Returns:
+        The state of each scan.
+
     Raises:
         InvalidInput: for an invalid folder or setting.
         WorkFailed: when a scan failed; the others are completed.
@@ -67,7 +70,7 @@ def submit_service_batch(
     for entry in entries:
         found = finished(results / entry.name, entry.source, settings, given)
         if found is not None:
-            entry.skip(found["seconds"], found["residual_rms_s"])
+            entry.skip(found["seconds"], found["residual_rms_s"], found.get("doubt", ""))
     with client_errors(), Client(url, on_wait=remark) as client:
         waiting = _upload_all(client, entries, settings, given)
         batch = _start(client, folder.resolve().name, list(waiting), settings) if waiting else None
@@ -76,7 +79,7 @@ def submit_service_batch(
                 print_json(batch.model_dump(mode="json"))
             else:
                 print_lines([f"{batch.id} {batch.state}", f"{client.url}{batch.links['self']}"])
-            return
+            return entries
         if batch is not None:
             remark(
                 f"{batch.id}: it goes on if this command is interrupted, and the same command finds it again"
@@ -88,6 +91,7 @@ def submit_service_batch(
                         with _ending(entry):
                             _download(client, job, entry, results, settings, given)
     report(folder, results, entries, as_json=as_json)
+    return entries
 
 
 def _upload_all(
@@ -159,6 +163,7 @@ def _download(
     folder = output_folder(results / entry.name)
     volume = client.download(record.volume or "", "hdf5", folder / "reconstruction.h5")
     result = read_reconstruction(volume)
+    entry.doubt = result.doubt
     with _dataset(entry, given) as scan:
         # The ground truth is in the local file only.
         dataset = read_dataset(scan, traces=False)

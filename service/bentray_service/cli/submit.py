@@ -13,7 +13,7 @@ from bentray_kernels.errors import InvalidInput
 from .options.paths import output_folder
 from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options
 from .options.settings_options import SettingsOptions, settings_from, with_settings_options
-from .output.exit_codes import client_errors
+from .output.exit_codes import AcceptDoubtful, client_errors, end_doubtful
 from .output.results import show_results, write_results
 from .output.terminal import AsJson, Step, print_json, print_lines, progress_bar, remark, residual_note
 from .worker import Tls
@@ -77,6 +77,7 @@ def submit(
         ),
     ] = None,
     tls: Tls = None,
+    accept_doubtful: AcceptDoubtful = False,
     as_json: AsJson = False,
 ) -> None:
     """Upload a scan, reconstruct it on a service and download the result.
@@ -87,6 +88,8 @@ def submit(
     With --batch, reconstruct a folder of scans with one progress: on the service, or with --scheduler on a
     Dask cluster without one. Scans with a valid result for the same file and settings are skipped, so an
     interrupted batch can be repeated. Other scans continue after a failure; then the exit code is 1.
+
+    Of a doubtful result the first line says why, and the exit code is 3.
 
     Example:  bentray submit scan.h5 --url http://127.0.0.1:8000 -o result
 
@@ -118,15 +121,18 @@ def submit(
         source = input_scan(file)
         folder = None if output is None else output_folder(output)
         with dataset_file(source, given, folder or Path(gettempdir())) as scan:
-            _submit(source, scan, settings, url, folder, wait=wait, webhook=webhook, as_json=as_json)
+            job = _submit(source, scan, settings, url, folder, wait=wait, webhook=webhook, as_json=as_json)
+        end_doubtful(job.doubtful, 1, accepted=accept_doubtful)
     if batch is not None and scheduler is None:
         from .service_batch import submit_service_batch
 
-        submit_service_batch(batch, url, settings, given, output, wait=wait, as_json=as_json)
+        entries = submit_service_batch(batch, url, settings, given, output, wait=wait, as_json=as_json)
+        end_doubtful(sum(bool(one.doubt) for one in entries), len(entries), accepted=accept_doubtful)
     elif batch is not None and scheduler is not None:
         from .batch import submit_batch
 
-        submit_batch(batch, scheduler, settings, given, output, at_once, tls, as_json=as_json)
+        entries = submit_batch(batch, scheduler, settings, given, output, at_once, tls, as_json=as_json)
+        end_doubtful(sum(bool(one.doubt) for one in entries), len(entries), accepted=accept_doubtful)
 
 
 def _submit(
@@ -139,8 +145,8 @@ def _submit(
     wait: bool,
     webhook: str | None,
     as_json: bool,
-) -> None:
-    """Submit ``scan``, the dataset file made of ``source``."""
+) -> JobRecord:
+    """Submit ``scan``, the dataset file made of ``source``; the last record of its job."""
     from bentray_kernels.tomography.requirements import check_scan
     from bentray_workers.files.dataset import read_dataset
     from bentray_workers.files.dataset.traces import trace_samples
@@ -165,7 +171,9 @@ def _submit(
     elif as_json:
         print_json(job.model_dump(mode="json"))
     else:
-        print_lines([f"{job.id} {job.state}", f"{client.url}{job.links['self']}"])
+        # Without a download, the doubts about the result and its notes are those of the job.
+        print_lines(filter(None, [job.advice, f"{job.id} {job.state}", f"{client.url}{job.links['self']}"]))
+    return job
 
 
 def show_job(record: JobRecord, step: Step) -> None:

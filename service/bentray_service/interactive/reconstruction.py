@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from pathlib import Path
 from typing import Unpack
 
@@ -16,6 +17,10 @@ from .scan import Scan, read
 from .setting_types import Method, ReconstructionSettings
 
 MOST_THREADS = 1024
+
+
+class DoubtfulWarning(UserWarning):
+    """A result is doubtful; ``Result.cautions`` has the reasons."""
 
 
 def reconstruct(
@@ -42,7 +47,8 @@ def reconstruct(
 
     Returns:
         The result: ``speed`` (nx, ny[, nz]) in m/s and ``coverage`` in m; with amplitudes ``attenuation`` in
-        Np/m; and, by their settings, ``recovery``, ``uncertainty`` in m/s and ``reflection`` in dB.
+        Np/m; and, by their settings, ``recovery``, ``uncertainty`` in m/s and ``reflection`` in dB. Of a
+        doubtful image a warning says why, as do ``cautions`` and the first line of its text.
 
     Raises:
         InvalidInput: naming the setting or the field of the scan, its value and what is accepted; for an
@@ -73,6 +79,8 @@ def reconstruct(
             step(now.done, now.total, now.phase if rms is None else f"residual {1e9 * rms:.0f} ns")
 
         image = run_interruptibly(work, show)
+    if image.doubt:
+        warnings.warn(image.doubt, DoubtfulWarning, stacklevel=2)
     told = {"title": source.title, "scan": source.name, "seconds": f"{time.perf_counter() - begun:.2f}"}
     given = {name: text for name, text in told.items() if text}
     return result_of(image, given, truth=source.truth, roi=source.dataset.roi)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import (
+    Caution,
     Iteration,
     Reconstruction,
     RegionStatistics,
@@ -134,6 +135,11 @@ class Result:
     def history(self) -> tuple[Iteration, ...]:
         """The misfit after each iteration; raises InvalidInput for an uploaded volume."""
         return self._reconstruction().history
+
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """What the reader must know, doubts first; raises InvalidInput for an uploaded volume."""
+        return self._reconstruction().cautions
 
     @property
     def trials(self) -> tuple[Trial, ...]:
@@ -299,7 +305,9 @@ class Result:
         name, array = next(iter(self.values.items()))
         size = " x ".join(map(str, array.shape))
         spread = f"{np.nanmin(array):.6g} to {np.nanmax(array):.6g} {self.units[name]}".rstrip()
-        return f"<bentray.Result of {size} nodes: {', '.join(self.values)}; {name} {spread}>"
+        doubt = self.image.doubt if isinstance(self.image, Reconstruction) else ""
+        shown = f"<bentray.Result of {size} nodes: {', '.join(self.values)}; {name} {spread}>"
+        return f"{doubt}\n{shown}" if doubt else shown
 
     def _repr_html_(self) -> str:
         from bentray_workers.images.captions import facts
@@ -315,6 +323,7 @@ class Result:
         rows += [(f"{name} (m)", f"{at[0]:.4g} to {at[-1]:.4g}") for name, at in self.coordinates.items()]
         if isinstance(self.image, Reconstruction):
             rows.append(("method", facts(self.image)))
+            rows[:0] = [("caution", one.text) for one in self.image.cautions]
         told = ("seconds", "water", "geometry", "quality", "waveform", "bentray")
         rows += [(name, self.attributes[name]) for name in told if name in self.attributes]
         title = self.attributes.get("title") or "Result"

@@ -242,9 +242,11 @@ def field_links(field_id: str) -> dict[str, str]:
 
 
 def _describe(result: Reconstruction) -> Plain:
-    noted = map(result.provenance.get, ("water", "geometry", "uncertainty"))
-    notes = [*noted, advice_of(result) if result.trials else None]
-    advice = " ".join(filter(None, notes))
+    noted = map(result.provenance.get, ("water", "geometry"))
+    cautions = (one.text for one in result.cautions if not one.doubtful)
+    notes = [result.doubt, *noted, *cautions, advice_of(result) if result.trials else None]
+    # At most what the table of jobs holds.
+    advice = " ".join(filter(None, notes))[:2000]
     return {
         "axes": ",".join("xyz"[: result.speed.ndim]),
         "shape": list(result.speed.shape),

@@ -6,6 +6,7 @@ import time
 from contextlib import suppress
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.result import DOUBTFUL
 from bentray_workers.rendering.refraction_view import check_even
 
 from ..jobs.kinds import KINDS, field_links
@@ -67,6 +68,7 @@ def job_record(
     seconds = None if started is None else (row["finished"] or time.time()) - started
     record = {**row, **reads, "field": None, **made, "progress": progress, "seconds": seconds, "links": links}
     record |= {"ahead": ahead, "minutes": minutes, "batch": row["batch_id"]}
+    record["doubtful"] = (row["advice"] or "").startswith(DOUBTFUL)
     record["webhook"] = _webhook_record(row["webhook"], delivery)
     if row["batch_id"] is not None:
         links["batch"] = f"/v1/batches/{row['batch_id']}"

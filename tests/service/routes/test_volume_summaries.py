@@ -84,7 +84,7 @@ def test_a_scan_without_truth_has_none(http, uploaded, work, submitted, until):
     assert http.get(f"{here}/summary").json() == {
         "quantities": ["speed", "coverage"],
         "resolution_width_m": [],
-        "uncertainty_caution": "",
+        "cautions": [],
         "grids": {},
         "candidates": [],
         "reason": "",

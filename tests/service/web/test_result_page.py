@@ -13,6 +13,8 @@ from matplotlib import colormaps
 from playwright.sync_api import expect
 from scipy.ndimage import map_coordinates
 
+from bentray_kernels.tomography import Caution
+
 from .conftest import PATIENCE_MS
 from .finished_results import ORIGIN_M, SPACING_M, finished, known
 
@@ -126,7 +128,7 @@ def test_the_resolution_is_the_recovered_fraction(page, shared_service):
     recovered = np.linspace(0.2, 0.9, SPEED.size).reshape(SPEED.shape)
     job = finished(address, scan, work, monkeypatch, SPEED, recovery=recovered)
     ready(page, f"{address}/#/jobs/{job}")
-    expect(page.locator("#result-caution")).to_be_hidden()
+    expect(page.locator("#result-cautions")).to_be_empty()
     page.get_by_role("button", name="Resolution").click()
     page.locator(".colour-bar").get_by_text("recovered fraction of a checkerboard").wait_for()
     assert window_of(page) == [0.0, 1.0]
@@ -144,11 +146,13 @@ def test_the_uncertainty_fades_what_is_not_known(page, shared_service):
     spread = np.zeros(SPEED.shape)
     spread[8:], spread[16:] = 14.0, 35.0
     caution = "The standard deviations may be too small: <b>rays</b> gather."
-    provenance = {"uncertainty": caution}
-    job = finished(address, scan, work, monkeypatch, SPEED, uncertainty=spread, provenance=provenance)
+    cautions = (Caution("bounds", "Cut off at 1800 m/s.", doubtful=True), Caution("uncertainty", caution))
+    job = finished(address, scan, work, monkeypatch, SPEED, uncertainty=spread, cautions=cautions)
     ready(page, f"{address}/#/jobs/{job}?window=1430,1570")
     expect(page.locator("#result-facts")).to_contain_text("resolution width 2.5 mm")
-    expect(page.locator("#result-caution")).to_have_text(caution)
+    expect(page.locator("#result-cautions p")).to_have_text(
+        ["Doubtful result. Cut off at 1800 m/s.", caution]
+    )
     canvas = page.locator("canvas.plane")
 
     def alpha(share_x):

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.tomography.result import residual_counts
+from bentray_kernels.tomography.result import residual_counts, residual_within
 from bentray_workers.images.canvas import drawing, new_figure, to_png
-from bentray_workers.images.residuals import draw_residuals, within
+from bentray_workers.images.residuals import draw_residuals
 
 sizes_s = st.floats(1e-11, 9e-5)
 
@@ -17,7 +17,7 @@ sizes_s = st.floats(1e-11, 9e-5)
 @given(st.lists(sizes_s, min_size=1), st.floats(0.01, 1.0))
 def test_reported_share_lies_within_the_reported_limit(found: list[float], share: float) -> None:
     residuals = np.array(found) * np.where(np.arange(len(found)) % 2, 1.0, -1.0)
-    size = within(residual_counts(residuals), share)
+    size = residual_within(residual_counts(residuals), share)
     # A bin is a third wide, and the one around zero a tenth of a nanosecond.
     assert np.mean(np.abs(residuals) <= 1.34 * size + 1e-10) >= share - 1e-9
     assert np.mean(np.abs(residuals) < size / 1.34 - 1e-10) <= share + 1e-9
@@ -28,11 +28,11 @@ def test_reported_share_lies_within_the_reported_limit(found: list[float], share
 def test_shares_of_gaussian_residuals_are_those_of_its_quantiles(seed: int, sigma_s: float) -> None:
     counts = residual_counts(np.random.default_rng(seed).normal(0.0, sigma_s, 20_000))
     for share, quantile in ((0.5, 0.6745), (0.9, 1.645), (0.99, 2.576)):
-        assert within(counts, share) == pytest.approx(quantile * sigma_s, rel=0.1)
+        assert residual_within(counts, share) == pytest.approx(quantile * sigma_s, rel=0.1)
 
 
 def test_without_residuals_the_size_is_zero() -> None:
-    assert within(residual_counts(np.array([])), 0.9) == 0.0
+    assert residual_within(residual_counts(np.array([])), 0.9) == 0.0
 
 
 def panel(residuals_s: np.ndarray, rms_s: float | None = None):

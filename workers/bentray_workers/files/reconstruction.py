@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import RESIDUAL_EDGES_S, Iteration, Reconstruction, Settings, Trial
+from bentray_kernels.tomography import RESIDUAL_EDGES_S, Caution, Iteration, Reconstruction, Settings, Trial
 from bentray_kernels.tomography.result import Reflection
 from bentray_kernels.tomography.stored_settings import from_stored
 
@@ -43,7 +43,7 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
     ``reflection_db``, if present, with attributes ``spacing_m`` and ``origin_m`` of its own; ``history``
     with a column for each field of ``Iteration``; ``residuals`` with ``count`` and the ``edge_s`` of its
     bins; and root attributes ``spacing_m``, ``origin_m``, ``axes``, ``water_speed_mps``, ``settings``,
-    ``trials`` and ``provenance``, the last three JSON.
+    ``trials``, ``cautions`` and ``provenance``, the last four JSON.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
@@ -57,6 +57,7 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
         file.attrs["water_speed_mps"] = reconstruction.water_speed_mps
         file.attrs["settings"] = json.dumps(reconstruction.settings.to_dict())
         file.attrs["trials"] = json.dumps([asdict(trial) for trial in reconstruction.trials])
+        file.attrs["cautions"] = json.dumps([asdict(one) for one in reconstruction.cautions])
         file.attrs["provenance"] = json.dumps(reconstruction.provenance)
         for name, place in IMAGES.items():
             if getattr(reconstruction, name) is not None:
@@ -114,6 +115,7 @@ def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstr
             history=_history(reader),
             residuals=_residuals(reader),
             trials=_trials(reader),
+            cautions=_cautions(reader, provenance.pop("uncertainty", "")),
             provenance=provenance,
         )
 
@@ -241,6 +243,18 @@ def _trials(reader: Reader) -> tuple[Trial, ...]:
     except (ValueError, TypeError, KeyError, RecursionError):
         accepted = "a JSON list of trials by this version"
         raise InvalidInput("@trials", repr((reader.text("", "trials") or "")[:60]), accepted) from None
+
+
+def _cautions(reader: Reader, earlier: str) -> tuple[Caution, ...]:
+    """The cautions; before there was a list, the one about the uncertainty was in the provenance."""
+    if not reader.text("", "cautions"):
+        return (Caution("uncertainty", earlier),) if earlier else ()
+    try:
+        cautions = json.loads(reader.text("", "cautions") or "")
+        return tuple(Caution(str(c["code"]), str(c["text"]), bool(c["doubtful"])) for c in cautions)
+    except (ValueError, TypeError, KeyError, RecursionError):
+        accepted = "a JSON list of cautions by this version"
+        raise InvalidInput("@cautions", repr((reader.text("", "cautions") or "")[:60]), accepted) from None
 
 
 def _json(reader: Reader, name: str) -> dict[str, Any]:

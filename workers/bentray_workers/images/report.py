@@ -48,6 +48,9 @@ GRIDS = {3: (1, 3), 4: (2, 2), 6: (2, 3), 8: (2, 4), 9: (3, 3), 12: (3, 4)}
 # Characters per inch of the line under the panels.
 CHARACTERS_AN_INCH = 15
 
+# Of the first line of a doubtful result.
+DOUBT = "#b00020"
+
 COLORMAPS = {
     "coverage": COVERAGE,
     "attenuation": ATTENUATION,
@@ -163,8 +166,12 @@ def _sheet(result: Reconstruction, k: int, own: int) -> tuple[Figure, Iterator[A
     count = own + len(_quantities(result)) + 1 + (result.residuals is not None)
     rows, columns = next(grid for most, grid in GRIDS.items() if count <= most)
     figure = new_figure(PANEL_IN[0] * columns, PANEL_IN[1] * rows + 0.6)
+    line = int(CHARACTERS_AN_INCH * figure.get_figwidth())
     figure.suptitle(f"Sound speed{slice_caption(result, k)}")
-    words = textwrap.wrap(advice_of(result), int(CHARACTERS_AN_INCH * figure.get_figwidth()))
+    if result.doubt:
+        text = "\n".join(textwrap.wrap(result.doubt, line))
+        figure.suptitle(f"{text}\nSound speed{slice_caption(result, k)}", color=DOUBT, fontsize=9)
+    words = textwrap.wrap(advice_of(result), line)
     figure.supxlabel("\n".join([facts(result), *words]), fontsize=8, color="#666666")
     panels = figure.subplots(rows, columns).ravel()
     for blank in panels[count:]:

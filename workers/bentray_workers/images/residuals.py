@@ -1,4 +1,4 @@
-"""Histogram panel of the residuals of the last iteration, and their quantiles."""
+"""Histogram panel of the residuals of the last iteration."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from bentray_kernels.tomography import RESIDUAL_EDGES_S
+from bentray_kernels.tomography.result import RESIDUAL_EDGES_S, residual_within
 
 Counts = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -21,42 +21,23 @@ CUT_OFF = 0.0005
 BAR = "#7fa6b8"
 
 
-def within(counts: Counts, share: float) -> float:
-    """The absolute residual, s, that this share does not exceed; 0 without residuals.
-
-    Args:
-        counts: of the bins between ``RESIDUAL_EDGES_S``.
-        share: in (0, 1]; residuals are assumed uniform in a bin.
-    """
-    if not counts.sum():
-        return 0.0
-    middle = len(counts) // 2
-    # Both signs together, from the bin around zero outwards.
-    sizes = np.concatenate((counts[middle : middle + 1], counts[middle + 1 :] + counts[middle - 1 :: -1]))
-    edges = np.concatenate(([0.0], RESIDUAL_EDGES_S[middle + 1 :]))
-    below = np.concatenate(([0.0], np.cumsum(sizes) / counts.sum()))
-    k = int(np.searchsorted(below, share - 1e-12)) - 1
-    part = (share - below[k]) / (below[k + 1] - below[k])
-    return float(edges[k] + part * (edges[k + 1] - edges[k]))
-
-
 def draw_residuals(axes: Axes, counts: Counts, rms_s: float | None) -> None:
     """Histogram on an axis in ns, linear for two thirds of the residuals and logarithmic beyond.
 
     The height of a bar is the count over its width on this axis, so that areas are comparable.
     """
-    linear = within(counts, 0.68) or RESIDUAL_EDGES_S[-1]
+    linear = residual_within(counts, 0.68) or RESIDUAL_EDGES_S[-1]
     edges, merged = _merged(counts, linear)
     axes.stairs(merged / np.diff(_place(edges, linear)), 1e9 * edges, fill=True, color=BAR)
     # With this scale the axis is smooth at the end of its linear part.
     axes.set_xscale("symlog", linthresh=1e9 * linear, linscale=0.9 / np.log(10.0))
-    reach = 1e9 * max(within(counts, 1.0 - CUT_OFF), 2.0 * linear)
+    reach = 1e9 * max(residual_within(counts, 1.0 - CUT_OFF), 2.0 * linear)
     axes.set_xlim(-reach, reach)
     if rms_s is not None:
         for sign in (-1.0, 1.0):
             axes.axvline(sign * 1e9 * rms_s, color="#555555", linewidth=0.8, linestyle="--")
     axes.set_title("Residuals" if rms_s is None else f"Residuals, {1e9 * rms_s:.3g} ns rms")
-    half, most = (f"{float(f'{1e9 * within(counts, share):.2g}'):g}" for share in (0.5, 0.95))
+    half, most = (f"{float(f'{1e9 * residual_within(counts, share):.2g}'):g}" for share in (0.5, 0.95))
     axes.set_xlabel(f"measured minus predicted (ns)\nhalf within {half}, 95 % within {most} ns")
     axes.set_ylabel("number of pairs (area)", labelpad=1)
     axes.xaxis.set_major_locator(FixedLocator(_ticks(1e9 * linear, reach)))

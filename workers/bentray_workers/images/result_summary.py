@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,8 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
     Returns:
         ``quantities``: those in the file, and ``truth`` if the scan has one on comparable axes;
         ``resolution_width_m``: of each slice, or one, m; empty without uncertainty;
-        ``uncertainty_caution``: why the standard deviations may be too small; empty without a reason;
+        ``cautions``: what the reader must know, each with ``code``, ``text`` and whether it makes the image
+        ``doubtful``;
         ``grids``: shape, spacing and origin of quantities whose grid is not that of the speed;
         ``candidates``: the models that were compared, the chosen one first, each with ``label``,
         ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s``,
@@ -65,7 +67,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
     return {
         "quantities": quantities,
         "resolution_width_m": list(own.resolution_width_m),
-        "uncertainty_caution": own.provenance.get("uncertainty", ""),
+        "cautions": [asdict(one) for one in own.cautions],
         "grids": {
             name: {
                 "shape": list(image.values.shape),

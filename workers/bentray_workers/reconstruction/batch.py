@@ -35,6 +35,7 @@ class Entry:
         residual_rms_s: of the latest iteration, s; None before the first is finished.
         seconds: duration so far.
         reason: of a failure.
+        doubt: why its result is doubtful; else empty.
     """
 
     source: Path
@@ -43,6 +44,7 @@ class Entry:
     total: int = 0
     residual_rms_s: float | None = None
     reason: str = ""
+    doubt: str = ""
     _begun: float = field(default=0.0, repr=False)
     _seconds: float | None = field(default=None, repr=False)
 
@@ -71,9 +73,10 @@ class Entry:
         self._seconds = self.seconds
         self.state, self.reason = state, reason
 
-    def skip(self, seconds: float, residual_rms_s: float | None) -> None:
+    def skip(self, seconds: float, residual_rms_s: float | None, doubt: str = "") -> None:
         """Skip: its result exists already."""
         self.state, self._seconds, self.residual_rms_s = "skipped", seconds, residual_rms_s
+        self.doubt = doubt
 
 
 def run(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...acquisition import Dataset
 from .. import pairs
 from ..attenuation import EXPERIMENTAL
+from ..cautions import bound_cautions
 from ..model_selection.selection import CLEARLY
 from ..numerics import recorded
 from ..reconstruction_graph import Run, progress_of
@@ -159,13 +160,16 @@ class Refinement:
         if len(losses) == len(images):
             pairs_of = zip(images, losses, strict=True)
             attenuation = stacked([replace(image, speed=loss) for image, loss in pairs_of])
-        caution = {} if attenuation is None else {"attenuation": EXPERIMENTAL}
-        # The uncertainty of the rays does not belong to this image.
-        of_both = {name: text for name, text in rays.provenance.items() if name != "uncertainty"}
+        experimental = {} if attenuation is None else {"attenuation": EXPERIMENTAL}
+        speed, coverage = stacked(images), stacked(_slices(rays, rays.coverage))
+        bounds = self._settings.speed_bounds_mps
+        cautions = [*bound_cautions(speed, coverage, bounds, rays.water_speed_mps)]
+        # The bounds and the uncertainty of the rays do not belong to this image; it began with their misfit.
+        cautions += [one for one in rays.cautions if one.code not in ("bounds", "uncertainty")]
         return replace(
             rays,
-            speed=stacked(images),
-            coverage=stacked(_slices(rays, rays.coverage)),
+            speed=speed,
+            coverage=coverage,
             attenuation=attenuation,
             recovery=of_rays(rays.recovery),
             uncertainty=None,
@@ -175,12 +179,13 @@ class Refinement:
             settings=replace(self._settings, method="waveform"),
             history=progress_of(graphs[-1:]).history,
             residuals=None,
+            cautions=tuple(cautions),
             provenance={
-                **of_both,
+                **rays.provenance,
                 "ray_numerics": rays.provenance["numerics"],
                 **recorded(self._settings.numerics),
                 "waveform": _summary(rays, self._plan, graphs),
-                **caution,
+                **experimental,
             },
         )
 

@@ -40,7 +40,8 @@ def watching(entries: Sequence[Entry]) -> Iterator[Callable[[], None]]:
         for entry in entries:
             if entry.state in ("succeeded", "failed") and entry.name not in reported:
                 reported.add(entry.name)
-                remark(f"{entry.name} {entry.state} after {entry.seconds:.1f} s {entry.reason}".rstrip())
+                why = entry.reason or entry.doubt
+                remark(f"{entry.name} {entry.state} after {entry.seconds:.1f} s {why}".rstrip())
 
     yield show
 
@@ -66,11 +67,12 @@ def cells(entry: Entry) -> tuple[str, ...]:
     progress = f"{part} %" if entry.state in ("running", "failed") else ""
     misfit = residual_note(entry.residual_rms_s).removeprefix("residual ")
     seconds = "" if entry.state == "waiting" else f"{entry.seconds:.1f}"
-    return entry.name, entry.state, progress, misfit, seconds
+    state = f"{entry.state}, doubtful" if entry.doubt else entry.state
+    return entry.name, state, progress, misfit, seconds
 
 
 def report(folder: Path, results: Path, entries: Sequence[Entry], *, as_json: bool) -> None:
-    """Print the results of a batch as a table with the reasons of failures, or as JSON.
+    """Print the results of a batch as a table with the reasons of failures and doubts, or as JSON.
 
     Raises:
         WorkFailed: when a dataset failed.
@@ -82,7 +84,8 @@ def report(folder: Path, results: Path, entries: Sequence[Entry], *, as_json: bo
         print_json({"folder": str(folder), **states, "datasets": [_figures(results, one) for one in entries]})
     else:
         print_table(f"Batch of {folder.name}", COLUMNS, [cells(entry) for entry in entries], NUMBERS)
-        print_lines([*(f"{entry.name}: {entry.reason}" for entry in failed), str(results)])
+        print_lines(f"{one.name}: {one.reason or one.doubt}" for one in entries if one.reason or one.doubt)
+        print_lines([str(results)])
     if failed:
         raise WorkFailed(f"{len(failed)} of {len(entries)} datasets failed: the reasons are above")
 
@@ -95,5 +98,6 @@ def _figures(results: Path, entry: Entry) -> dict[str, Any]:
         "seconds": round(entry.seconds, 3),
         "residual_rms_s": entry.residual_rms_s,
         "reason": entry.reason,
+        "doubt": entry.doubt,
         "output": None if entry.state == "failed" else str(results / entry.name),
     }

@@ -1,11 +1,11 @@
-"""Exit codes: 0 success, 1 failure, 2 invalid input, 130 after Ctrl-C."""
+"""Exit codes: 0 success, 1 failure, 2 invalid input, 3 doubtful result, 130 after Ctrl-C."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -13,11 +13,26 @@ from .command_list import CommandList
 
 WORK_FAILED = 1
 BAD_INPUT = 2
+DOUBTFUL = 3
 INTERRUPTED = 130
 
 
 class WorkFailed(Exception):  # noqa: N818 - the command's ending, not a fault of the program
     """The work failed although the input was valid; the message is for the user."""
+
+
+class DoubtfulResult(Exception):  # noqa: N818 - the command's ending, not a fault of the program
+    """The result was written, but says itself that it is doubtful; the message is for the user."""
+
+
+AcceptDoubtful = Annotated[
+    bool,
+    typer.Option(
+        "--accept-doubtful",
+        help="Exit with code 0 although a result is doubtful: an image cut off by the speed bounds, or one "
+        "that does not explain the times. Without it the code is 3; the files are written in both cases.",
+    ),
+]
 
 
 class Commands(CommandList):
@@ -36,6 +51,8 @@ class Commands(CommandList):
             _end(str(error), WORK_FAILED if _unavailable(error) else BAD_INPUT)
         except WorkFailed as error:
             _end(str(error), WORK_FAILED)
+        except DoubtfulResult as error:
+            _end(str(error), DOUBTFUL)
         except typer.TyperException as error:
             context = getattr(error, "ctx", None)
             hint = f" (see {context.command_path} --help)" if context is not None else ""
@@ -57,6 +74,17 @@ def _unavailable(error: Exception) -> bool:
     from ...errors import DatabaseUnavailable, StorageFull, StorageUnavailable
 
     return isinstance(error, DatabaseUnavailable | StorageUnavailable | StorageFull)
+
+
+def end_doubtful(doubtful: int, results: int, *, accepted: bool) -> None:
+    """End a command whose results are doubtful, after they were written and shown.
+
+    Raises:
+        DoubtfulResult: unless ``accepted``, or if none of the ``results`` is ``doubtful``.
+    """
+    if doubtful and not accepted:
+        which = "the result is" if results == 1 else f"{doubtful} of {results} results are"
+        raise DoubtfulResult(f"{which} doubtful, for the reasons above (--accept-doubtful: exit code 0)")
 
 
 @contextmanager

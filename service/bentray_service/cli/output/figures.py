@@ -14,7 +14,7 @@ from bentray_kernels.acquisition.quality.finding import NOTHING_FOUND
 from bentray_kernels.tomography import Reconstruction
 from bentray_kernels.tomography.comparison import NotComparable, compare
 from bentray_kernels.tomography.model_selection.selection import advice_of, trial_table
-from bentray_workers.images.residuals import within
+from bentray_kernels.tomography.result import residual_within
 
 # Percentages for the quantiles of the residuals.
 SHARES = (50, 90, 99)
@@ -32,11 +32,14 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         settings, residual history, speed range, time and provenance; ``residual_within_s``: quantiles of the
         absolute residuals of the last iteration by percentage; ``recovery_mean``: mean of the resolution
         check inside the array; ``uncertainty_rms_mps``: root mean square of the standard deviations inside
-        the array; ``uncertainty_caution``: why they may be too small; ``resolution_width_m``: of each slice,
-        or one; ``trials`` and ``reason``: candidate models and choice of ``auto``; ``candidates``: rows of
-        their table. Missing values are None, missing cautions, widths, trials and reasons are empty.
+        the array; ``resolution_width_m``: of each slice, or one; ``doubt``: why the image is doubtful, and
+        ``cautions``: all that the reader must know, with codes; ``trials`` and ``reason``: candidate models
+        and choice of ``auto``; ``candidates``: rows of their table. Missing values are None, missing doubts,
+        cautions, widths, trials and reasons are empty.
     """
     return {
+        "doubt": result.doubt,
+        "cautions": [asdict(one) for one in result.cautions],
         "seconds": round(seconds, 3),
         "slices": dataset.slices,
         "shape": list(result.speed.shape),
@@ -48,12 +51,11 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         "residual_within_s": (
             None
             if result.residuals is None
-            else {str(share): within(result.residuals, share / 100.0) for share in SHARES}
+            else {str(share): residual_within(result.residuals, share / 100.0) for share in SHARES}
         ),
         "history": [asdict(sweep) for sweep in result.history],
         "recovery_mean": _recovery_mean(result),
         "uncertainty_rms_mps": _uncertainty_rms(result),
-        "uncertainty_caution": result.provenance.get("uncertainty", ""),
         "resolution_width_m": list(result.resolution_width_m),
         "reason": advice_of(result),
         "candidates": trial_table(result.trials),

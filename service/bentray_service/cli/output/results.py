@@ -49,16 +49,17 @@ def write_results(
 def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
     """Print the summary table, the choice of ``auto`` and the paths; or all metrics as JSON.
 
-    What offsets all speeds or blurs the image comes first: an assumption about the water, the geometry, and
-    deviations that may be too small.
+    What makes the image doubtful comes first, then what offsets all speeds or blurs it: an assumption about
+    the water, the geometry, and other cautions.
     """
     from .figures import summary
 
     if as_json:
         print_json(found)
         return
-    first = ("water", "geometry", "uncertainty")
-    print_lines(found["provenance"][name] for name in first if name in found["provenance"])
+    print_lines(filter(None, [found["doubt"]]))
+    print_lines(found["provenance"][name] for name in ("water", "geometry") if name in found["provenance"])
+    print_lines(one["text"] for one in found["cautions"] if not one["doubtful"])
     print_table(title, ("figure", "value"), summary(found))
     if found["candidates"]:
         print_table("", ("candidate", "held-out misfit", "result"), found["candidates"], {"held-out misfit"})

@@ -190,7 +190,11 @@ class JobRecord(ShownRecord):
     settings: dict[str, Any]
     plan: PlanRecord | None = Field(description="Null for geometry fields, and for jobs of earlier versions.")
     advice: str | None = Field(
-        description="Method chosen by auto, and the reason; and whether the water was assumed."
+        description="Why the result is doubtful; whether the water was assumed; method chosen by auto, why."
+    )
+    doubtful: bool = Field(
+        description="Whether the result calls its image into question: cut off by the speed bounds, or not "
+        "explaining the times. advice says why; the summary of the volume lists its cautions."
     )
     progress: ProgressRecord
     history: list[SweepRecord] = Field(description="Iterations so far; a long history is thinned evenly.")

@@ -51,6 +51,18 @@ class GridRecord(BaseModel):
     origin_m: list[float | None] = Field(description="Position of node 0, m.")
 
 
+class CautionRecord(BaseModel):
+    """Something that the reader of a result must know."""
+
+    code: str = Field(
+        description="bounds: the image is cut off by the speed bounds; residual: it does not explain the "
+        "times; constant: it explains them no better than one speed; noise: they contradict each other; "
+        "uncertainty: the standard deviations may be too small; settings: settings without effect."
+    )
+    text: str = Field(description="Sentences with the numbers and what to do.")
+    doubtful: bool = Field(description="Whether the image itself is in doubt.")
+
+
 class SummaryRecord(BaseModel):
     """What a reconstruction holds, and how its model was chosen."""
 
@@ -61,8 +73,8 @@ class SummaryRecord(BaseModel):
         description="Standard deviation, m, of the Gaussian that smooths the truth like the image: one for "
         "each slice, or one of a slice or volume; the uncertainty refers to it. Empty without uncertainty."
     )
-    uncertainty_caution: str = Field(
-        description="Why the standard deviations may be too small, in a sentence; empty without a reason."
+    cautions: list[CautionRecord] = Field(
+        description="What the reader must know, doubts about the image first; empty without a reason."
     )
     grids: dict[str, GridRecord] = Field(
         description="Grids of quantities that are not on the grid of the volume, such as reflection."

@@ -1,4 +1,4 @@
-"""Exit codes: 0 done, 1 failed, 2 bad input; one line on stderr and no traceback for the last two."""
+"""Exit codes: 0 done, 1 failed, 2 bad input, 3 doubtful; one line on stderr without a traceback."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner, Result
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.cli.output.exit_codes import Commands, WorkFailed, client_errors
+from bentray_service.cli.output.exit_codes import Commands, DoubtfulResult, WorkFailed, client_errors
 from bentray_service.client import ClientError
 from bentray_service.client.errors import from_problem
 from bentray_service.web.problem import Problem
@@ -42,6 +42,7 @@ def ending(raised: BaseException | None) -> Result:
         (MemoryError("9 GiB"), 1, "bentray: out of memory: 9 GiB\n"),
         (MemoryError(), 1, "bentray: out of memory: no details\n"),
         (OSError("odd"), 1, "bentray: the system: odd\n"),
+        (DoubtfulResult("cut off"), 3, "bentray: cut off\n"),
         (KeyboardInterrupt(), 130, "bentray: interrupted\n"),
         (typer.Exit(3), 3, ""),
     ],

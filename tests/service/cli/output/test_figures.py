@@ -12,7 +12,7 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import words
-from bentray_kernels.tomography import Iteration, Settings, Trial
+from bentray_kernels.tomography import Caution, Iteration, Settings, Trial
 from bentray_kernels.tomography.result import residual_counts
 from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_service.cli.output.figures import errors, figures, summary
@@ -133,9 +133,11 @@ def test_summary_shows_the_uncertainty_inside_the_array() -> None:
     assert found["resolution_width_m"] == [0.0016, 0.002, 0.0031]
     assert dict(summary(found))["uncertainty"] == "6.0 m/s rms, at a resolution width of 2.0 mm"
     assert "uncertainty" not in dict(summary(figures(image(speed), dataset(None), 1.0)))
-    assert found["uncertainty_caution"] == ""
-    doubted = replace(result, provenance={"uncertainty": "too small"})
-    assert figures(doubted, dataset(None), 1.0)["uncertainty_caution"] == "too small"
+    assert (found["doubt"], found["cautions"]) == ("", [])
+    cautious = replace(result, cautions=(Caution("uncertainty", "too small"),))
+    listed = figures(cautious, dataset(None), 1.0)
+    assert listed["cautions"] == [{"code": "uncertainty", "text": "too small", "doubtful": False}]
+    assert listed["doubt"] == ""
 
 
 def test_summary_shows_residuals_resolution_and_candidates() -> None:

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Reconstruction, Settings
+from bentray_kernels.tomography import Caution, Reconstruction, Settings
+from bentray_service.cli.output.exit_codes import DoubtfulResult, end_doubtful
 from bentray_service.cli.output.results import show_results, write_results
 
 
-def test_a_caution_about_the_uncertainty_is_printed_first(
+def test_a_doubt_is_the_first_line_and_other_cautions_follow(
     tmp_path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     angles = 2.0 * np.pi * np.arange(8) / 8
@@ -22,8 +23,14 @@ def test_a_caution_about_the_uncertainty_is_printed_first(
         (0.0, 0.0),
         1500.0,
         Settings(),
-        provenance={"uncertainty": "They may be too small."},
+        cautions=(Caution("bounds", "Cut off.", doubtful=True), Caution("uncertainty", "May be too small.")),
+        provenance={"water": "Water of 20 °C is assumed."},
     )
     found = write_results(tmp_path, result, scan, 1.0, draw=lambda: b"")
     show_results("Reconstruction", found, as_json=False)
-    assert capsys.readouterr().out.startswith("They may be too small.\n")
+    lines = ["Doubtful result. Cut off.", "Water of 20 °C is assumed.", "May be too small."]
+    assert capsys.readouterr().out.splitlines()[:3] == lines
+    with pytest.raises(DoubtfulResult, match="the result is doubtful"):
+        end_doubtful(1, 1, accepted=False)
+    end_doubtful(1, 1, accepted=True)
+    end_doubtful(0, 1, accepted=False)

@@ -19,7 +19,7 @@ const PAGE = `
   <p class="crumb"><a href="#/jobs">Jobs</a> · <a id="result-scan">Scan</a></p>
   <h1 id="result-name"></h1>
   <p id="result-facts" class="facts"></p>
-  <p id="result-caution" class="notice" role="note" hidden></p>
+  <div id="result-cautions"></div>
   <div id="result-actions" class="links"></div>
   <form id="rename" class="rename" hidden>
     <label>Name <input name="name" type="text" maxlength="200"></label>
@@ -81,8 +81,11 @@ export async function open(root, { id, query }) {
   };
   entitle();
   part("result-facts").textContent = facts(result);
-  part("result-caution").textContent = summary.uncertainty_caution;
-  part("result-caution").hidden = !summary.uncertainty_caution;
+  part("result-cautions").append(...summary.cautions.map((one) => {
+    const notice = make("p", one.doubtful ? "error" : "notice", `${one.doubtful ? "Doubtful result. " : ""}${one.text}`);
+    notice.setAttribute("role", "note");
+    return notice;
+  }));
   part("result-scan").href = `#/scans/${job.dataset}`;
   const shown = viewer(part("result-viewer"), [{ title: nameOf(result), values: result.values, stored: summary.quantities }], stateOf(query), keepQuery);
   const stored = () => QUANTITIES[shown.state.quantity].reads[0];

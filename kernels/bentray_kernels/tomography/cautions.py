@@ -1,0 +1,135 @@
+"""Doubts about a finished image: cut off by the speed bounds, or travel times that it does not explain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..acquisition import Dataset
+from ..arrays import Floats, Ints
+from .directivity import within_opening
+from .pairs import reciprocal_noise
+from .result import Caution, Iteration, residual_within
+from .settings import Settings
+from .stopping import travel_time_noise
+
+# This part of the residuals is judged, so that a few wrong picks do not decide; of normal ones with standard
+# deviation 1 it is within ``NORMAL``.
+TYPICAL, NORMAL = 0.9, 1.645
+
+# An image is cut off where this part of the nodes with rays lies within ``NEAR`` of a bound: the radar
+# profile and the trunk of the tests have 0.034 and 0.051, good images none. Water on a bound does not count.
+CUT_OFF, NEAR = 0.01, 1e-3
+
+# The residual is far above the noise beyond this many times the noise, if it is also this part of what one
+# constant speed leaves; good images have 0.25 of that at most where the noise is low. Residual and noise are
+# too large beyond ``TOO_LARGE`` of the travel times, 30 m/s along a whole path in water. Below ``SMALL`` of
+# them, 1.5 m/s, errors of picks and grids exceed the noise.
+OVER_NOISE, OF_CONSTANT, TOO_LARGE, SMALL = 2.0, 0.3, 0.02, 1e-3
+
+# The image is no better than a constant if it leaves more than this part of its residual.
+NO_BETTER = 0.9
+
+CHECK = "check the units, the order of the elements, time zero and the speed of the water (bentray quality)"
+
+
+def fit_cautions(
+    dataset: Dataset, settings: Settings, residuals: Ints, history: Sequence[Iteration]
+) -> Iterator[Caution]:
+    """What the residuals of an image by rays say against it.
+
+    The noise is that which the dataset states, else that of pairs measured both ways, else that of the
+    roughness of the times.
+
+    Args:
+        dataset: with the travel times that were fitted.
+        settings: of the image.
+        residuals: histogram of its residuals, see ``residual_counts``.
+        history: of its iterations. A single one says nothing: it began with water.
+    """
+    delta, distance = dataset.differential_tof(), dataset.distance_m()
+    if settings.opening_angle_deg is not None:
+        delta = np.where(within_opening(dataset, settings.opening_angle_deg), delta, np.nan)
+    used = np.isfinite(delta)
+    residual = residual_within(residuals, TYPICAL)
+    if not used.any() or max((one.sweep + one.stage for one in history), default=0) < 2:
+        return
+    time = float(np.broadcast_to(distance, delta.shape)[used].mean()) / dataset.water_speed_mps
+    speed, constant = _best_constant(delta[used], np.broadcast_to(distance, delta.shape)[used], dataset)
+    words = f"{_time(residual)}, {100.0 * residual / time:.2g} % of the travel times"
+    if residual > SMALL * time and residual > NO_BETTER * constant:
+        yield Caution(
+            "constant",
+            f"One constant speed of {speed:.0f} m/s explains the times as well as the image: nine tenths of "
+            f"the residuals of the image are within {words}, of the constant within {_time(constant)}. "
+            f"The image shows nothing of the object: {CHECK}.",
+            doubtful=True,
+        )
+        return
+    noise = _noise(dataset, delta)
+    if noise > TOO_LARGE * time:
+        yield Caution(
+            "noise",
+            f"The times contradict each other: their noise is {_time(noise)}, {100.0 * noise / time:.2g} % "
+            f"of the travel times; {CHECK}.",
+            doubtful=True,
+        )
+    over = residual > max(OVER_NOISE * NORMAL * noise, OF_CONSTANT * constant, SMALL * time)
+    if over or residual > TOO_LARGE * time:
+        yield Caution(
+            "residual",
+            f"The image does not explain the times: nine tenths of the residuals are within {words}, where "
+            f"the noise is {_time(noise)}; {CHECK}, or try bent rays, more iterations and a weaker penalty.",
+            doubtful=True,
+        )
+
+
+def bound_cautions(
+    speed: Floats, coverage: Floats, bounds_mps: tuple[float, float], water_mps: float
+) -> Iterator[Caution]:
+    """Whether an image is cut off by the bounds of the speed.
+
+    Args:
+        speed, coverage: (nx, ny[, nz]), m/s and m: nodes without rays keep the speed of the water.
+        bounds_mps: lowest and highest speed of a node.
+        water_mps: speed of the water.
+    """
+    crossed = speed[coverage > 0.0]
+    low, high = (
+        float((np.abs(crossed / bound - 1.0) < NEAR).mean())
+        if crossed.size and abs(water_mps / bound - 1.0) >= NEAR
+        else 0.0
+        for bound in bounds_mps
+    )
+    if low + high >= CUT_OFF:
+        yield Caution(
+            "bounds",
+            f"The image is cut off: {100.0 * low:.1f} % of the nodes with rays are at the lowest speed "
+            f"allowed, {bounds_mps[0]:g} m/s, and {100.0 * high:.1f} % at the highest, {bounds_mps[1]:g} "
+            "m/s. "
+            f"If the object can be slower or faster, widen speed_bounds_mps; else {CHECK}.",
+            doubtful=True,
+        )
+
+
+def _noise(dataset: Dataset, delta: Floats) -> float:
+    """Standard deviation of the times, s: as stated, else of pairs measured both ways, else estimated."""
+    both_ways = 0.0
+    if dataset.sigma_s is None:
+        slices = delta.reshape(-1, *delta.shape[-2:])
+        both_ways = max(reciprocal_noise(dataset.tx, dataset.rx, one) for one in slices)
+    return both_ways or travel_time_noise(dataset)
+
+
+def _best_constant(delta: Floats, distance: Floats, dataset: Dataset) -> tuple[float, float]:
+    """The constant speed, m/s, that explains times best along straight lines, and its typical residual, s."""
+    slower = float(distance @ delta) / float(distance @ distance)
+    left = np.abs(delta - slower * distance)
+    slowness = 1.0 / dataset.water_speed_mps + slower
+    return 1.0 / slowness if slowness > 0.0 else math.inf, float(np.quantile(left, TYPICAL))
+
+
+def _time(seconds: float) -> str:
+    return f"{1e6 * seconds:.3g} µs" if seconds >= 1e-6 else f"{1e9 * seconds:.3g} ns"

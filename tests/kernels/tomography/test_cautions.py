@@ -1,0 +1,132 @@
+"""A result says that it is doubtful: cut off at a bound, above the noise, or no better than a constant."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from bentray_kernels.acquisition import Dataset
+from bentray_kernels.acquisition.noise import with_noise
+from bentray_kernels.tomography import Caution, Reconstruction, Settings, reconstruct
+from bentray_kernels.tomography.cautions import bound_cautions
+
+ELEMENTS, RADIUS, WATER = 32, 0.08, 1480.0
+DATA = Path(__file__).parents[4] / "shared" / "data"
+ANGLE = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
+ORDER = np.random.default_rng(3).permutation(ELEMENTS)
+
+
+def ring(speed: float = 1520.0, radius: float = 0.02) -> Dataset:
+    """Times along straight rays through a disc off the centre."""
+    place = RADIUS * np.column_stack((np.cos(ANGLE), np.sin(ANGLE)))
+    way = place[None] - place[:, None]
+    towards = np.array([0.02, 0.01]) - place[:, None]
+    length = np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
+    beside = np.abs(towards[..., 0] * way[..., 1] - towards[..., 1] * way[..., 0]) / length
+    chord = 2.0 * np.sqrt(np.maximum(radius**2 - beside**2, 0.0))
+    everyone = np.arange(ELEMENTS)
+    return Dataset(place, everyone, everyone, WATER, delta_tof_s=chord * (1.0 / speed - 1.0 / WATER))
+
+
+def noisy(scan: Dataset, snr: float, seed: int = 0) -> Dataset:
+    off = ~np.eye(ELEMENTS, dtype=bool)
+    return replace(scan, delta_tof_s=with_noise(scan.delta_tof_s, snr, np.random.default_rng(seed), off)[0])
+
+
+def changed(scan: Dataset, change) -> Dataset:
+    return replace(scan, delta_tof_s=change(scan.delta_tof_s))
+
+
+def image(scan: Dataset, method: str, **settings) -> Reconstruction:
+    return reconstruct(scan, Settings.of(method=method, **{"nodes": 32, **settings}))
+
+
+def codes(result: Reconstruction) -> list[str]:
+    assert bool(result.doubt) == any(one.doubtful for one in result.cautions)
+    assert result.doubt.startswith("Doubtful result. ") or not result.doubt
+    return [one.code for one in result.cautions]
+
+
+DISC = ring()
+WAY = DISC.distance_m()
+GOOD = {
+    "a disc": (DISC, {}),
+    "a slow disc": (ring(1400.0), {}),
+    "noise": (noisy(DISC, 10.0), {}),
+    "more noise than the goals": (noisy(DISC, 3.0), {}),
+    "wrong picks": (changed(DISC, lambda d: np.where(ORDER[:, None] == ORDER[None, ::-1], 2e-6, d)), {}),
+    "water": (changed(DISC, lambda d: 0.0 * d), {}),
+    "noisy water": (changed(DISC, lambda d: np.random.default_rng(0).normal(0.0, 3e-8, d.shape)), {}),
+    "an arc": (replace(DISC, valid=np.add.outer(np.arange(32), np.zeros(32, int)) < 20), {}),
+    "bounds at the water": (noisy(DISC, 10.0), {"speed_bounds_mps": (WATER, 1600.0)}),
+    "one iteration": (DISC, {"iterations": 1}),
+}
+BAD = {
+    "too fast for the bounds": (changed(DISC, lambda d: 30.0 * d), {}, {"bounds"}),
+    "narrow bounds": (DISC, {"speed_bounds_mps": (1470.0, 1490.0)}, {"bounds"}),
+    "another order": (changed(DISC, lambda d: d[np.ix_(ORDER, ORDER)]), {}, {"constant"}),
+    "another water": (changed(DISC, lambda d: WAY * (1.0 / 1485.0 - 1.0 / WATER)), {}, {"constant"}),
+    "water not subtracted": (changed(DISC, lambda d: d + WAY / WATER), {}, {"bounds"}),
+    "one receiver on": (
+        changed(DISC, lambda d: np.roll(d + WAY / WATER, 1, 1) - WAY / WATER),
+        {},
+        {"constant", "noise"},
+    ),
+}
+
+
+@pytest.mark.parametrize("method", ["sart", "gauss-newton"])
+@pytest.mark.parametrize("name", GOOD)
+def test_a_good_image_is_not_doubted(name: str, method: str) -> None:
+    scan, settings = GOOD[name]
+    assert codes(image(scan, method, **settings)) == []
+
+
+@pytest.mark.parametrize("method", ["sart", "gauss-newton"])
+@pytest.mark.parametrize("name", BAD)
+def test_an_image_of_impossible_times_is_doubted(name: str, method: str) -> None:
+    scan, settings, expected = BAD[name]
+    found = codes(image(scan, method, **settings))
+    assert expected.intersection(found), found
+
+
+def test_the_sentences_hold_the_numbers_and_what_to_do() -> None:
+    speed = np.full((10, 10), 1500.0)
+    speed[0], speed[1, :2] = 1800.0, 1300.0
+    coverage = np.ones_like(speed)
+    coverage[5:] = 0.0
+    (caution,) = bound_cautions(speed, coverage, (1300.0, 1800.0), 1500.0)
+    assert caution == Caution("bounds", caution.text, doubtful=True)
+    assert "4.0 % of the nodes with rays are at the lowest speed allowed, 1300 m/s" in caution.text
+    assert "20.0 % at the highest, 1800 m/s" in caution.text
+    assert "widen speed_bounds_mps" in caution.text
+    assert not [*bound_cautions(speed[2:], coverage[2:], (1300.0, 1800.0), 1500.0)]
+    scan, settings, _ = BAD["another order"]
+    text = image(scan, "sart", **settings).doubt
+    assert "One constant speed of 148" in text
+    assert "explains the times as well as the image" in text
+
+
+@pytest.mark.real
+def test_the_measured_trunk_and_the_small_radar_profile_are_doubted() -> None:
+    """Apparent speeds of 430 to 2,270 m/s, and radar scaled to a tenth, within bounds of tissue."""
+    if not DATA.is_dir():
+        pytest.skip(f"no measured scans: {DATA} is absent")
+    places = loadmat(DATA / "tree_markers.mat")["Markers"]
+    everyone = np.arange(len(places))
+    times = 1e-6 * loadmat(DATA / "tree_runtimes.mat")["Runtimes"]
+    trunk = Dataset(places - places.mean(axis=0), everyone, everyone, 1500.0, tof_s=times)
+    assert codes(image(trunk, "gauss-newton", rays="straight", decomposition="volume", nodes=20))
+
+    radar = loadmat(DATA / "arrenaes_am13.mat")
+    ends = 0.1 * np.stack([radar["S"], radar["R"]])
+    places, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+    (tx, rows), (rx, columns) = (np.unique(one, return_inverse=True) for one in index.reshape(2, -1))
+    times = np.full((tx.size, rx.size), np.nan)
+    times[rows, columns] = 0.1 * 1e-9 * 1.4e8 / 1500.0 * radar["d_obs"].ravel()
+    profile = Dataset(places - places.mean(axis=0), tx, rx, 1500.0, tof_s=times)
+    thin = {"penalty_strength": 0.1, "nodes": 48}
+    assert codes(image(profile, "gauss-newton", **thin)) == ["bounds"]
+    assert codes(image(profile, "gauss-newton", speed_bounds_mps=(1000.0, 2500.0), **thin)) == []
