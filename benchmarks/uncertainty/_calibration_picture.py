@@ -39,7 +39,7 @@ def calibration_picture(judged: Sequence[Judged]) -> bytes:
         curve.set_title("Calibration")
         curve.legend(loc="lower right", fontsize=8)
         colours = [
-            SHADOW if one is worst else CAUTION if "uncertainty" in one.result.provenance else OTHER
+            SHADOW if one is worst else CAUTION if one.result.caution("uncertainty") else OTHER
             for one in judged
         ]
         bars.bar(range(len(judged)), [100.0 * one.within for one in judged], color=colours)

@@ -105,8 +105,8 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 def cautions(judged: Sequence[Judged]) -> Iterable[Row]:
     """Error of the images whose result says that its deviations may be too small, over that of the others."""
-    told = [one for one in judged if "uncertainty" in one.result.provenance]
-    rest = [one for one in judged if "uncertainty" not in one.result.provenance]
+    told = [one for one in judged if one.result.caution("uncertainty")]
+    rest = [one for one in judged if not one.result.caution("uncertainty")]
     names = ", ".join(one.name.split(":")[0] for one in told)
     parts = [f"{100.0 * part_within(group, DEVIATIONS):.0f} %" if group else "none" for group in (told, rest)]
     error = [
@@ -130,7 +130,7 @@ def slow_water(context: BenchmarkContext) -> Iterable[Row]:
         context.progress(number, SLOW_SCANS, scan.name)
         judged.append(judge(scan))
     least = min(judged, key=lambda one: one.within)
-    told = ["uncertainty" in one.result.provenance for one in judged]
+    told = [bool(one.result.caution("uncertainty")) for one in judged]
     each = "; ".join(
         f"{one.name}{', with a caution' if doubted else ''}: {100.0 * one.within:.0f} %"
         for one, doubted in zip(judged, told, strict=True)

@@ -206,6 +206,10 @@ class Reconstruction:
             return GridImage(held.db, held.spacing_m, held.origin_m)
         return GridImage(held, self.spacing_m, self.origin_m)
 
+    def caution(self, code: str) -> str:
+        """The text of the caution with a code; empty without it."""
+        return next((one.text for one in self.cautions if one.code == code), "")
+
     @property
     def doubt(self) -> str:
         """Why the image is doubtful, in sentences; empty without a reason."""

@@ -61,7 +61,7 @@ GOOD = {
     "noisy water": (changed(DISC, lambda d: np.random.default_rng(0).normal(0.0, 3e-8, d.shape)), {}),
     "an arc": (replace(DISC, valid=np.add.outer(np.arange(32), np.zeros(32, int)) < 20), {}),
     "bounds at the water": (noisy(DISC, 10.0), {"speed_bounds_mps": (WATER, 1600.0)}),
-    "one iteration": (DISC, {"iterations": 1}),
+    "two iterations": (DISC, {"iterations": 2}),
 }
 BAD = {
     "too fast for the bounds": (changed(DISC, lambda d: 30.0 * d), {}, {"bounds"}),

@@ -74,6 +74,7 @@ class StandIn:
             "progress": {"done": 24 * done, "total": 24, "phase": "picking"},
             "history": [sweep] if done else [],
             "volume": "volume-1" if done else None,
+            "doubtful": False,
             "seconds": 1.5,
             "created": 0.0,
             "links": {"self": "/v1/jobs/job-1"},

@@ -110,7 +110,7 @@ def test_sart_has_an_uncertainty_too_and_slices_have_their_own(times):
     assert not np.array_equal(both.uncertainty[..., 1], alone.uncertainty)
     assert len(both.resolution_width_m) == 2
     # Nothing calls these images into question.
-    assert "uncertainty" not in alone.provenance
+    assert not alone.caution("uncertainty")
 
 
 def test_the_result_states_why_its_deviations_may_be_too_small(times, monkeypatch):
@@ -118,10 +118,10 @@ def test_the_result_states_why_its_deviations_may_be_too_small(times, monkeypatc
     monkeypatch.setattr(model_errors, "MISFIT_CROSSING", 0.0)
     one = scan(times, 6e-8)
     plan = replace(PLAN, method="sart", iterations=1)
-    alone = reconstruct(one, plan).provenance["uncertainty"]
+    alone = reconstruct(one, plan).caution("uncertainty")
     assert alone.startswith("The standard deviations may be too small: bent rays through the image leave")
     stacked = replace(
         one, delta_tof_s=np.stack([one.delta_tof_s, one.delta_tof_s]), slice_z_m=np.array([0.0, 0.002])
     )
-    assert reconstruct(stacked, plan).provenance["uncertainty"] == f"{alone} (One of 2 of 2 slices.)"
-    assert "uncertainty" not in reconstruct(one, replace(plan, uncertainty=False)).provenance
+    assert reconstruct(stacked, plan).caution("uncertainty") == f"{alone} (One of 2 of 2 slices.)"
+    assert not reconstruct(one, replace(plan, uncertainty=False)).caution("uncertainty")
