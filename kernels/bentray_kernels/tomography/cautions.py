@@ -24,9 +24,9 @@ TYPICAL, NORMAL = 0.9, 1.645
 CUT_OFF, NEAR = 0.01, 1e-3
 
 # The residual is far above the noise beyond this many times the noise, if it is also this part of what one
-# constant speed leaves: after three iterations of SART it is 0.35 at most, of finished images 0.25. Residual
-# and noise are too large beyond ``TOO_LARGE`` of the travel times, 30 m/s along a whole path in water. Below ``SMALL`` of
-# them, 1.5 m/s, errors of picks and grids exceed the noise.
+# constant speed leaves: after two iterations of SART it is 0.35, of finished images 0.25. Residual and noise
+# are too large beyond ``TOO_LARGE`` of the travel times, 30 m/s along a whole path in water. Below ``SMALL``
+# of them, 1.5 m/s, errors of picks and grids exceed the noise.
 OVER_NOISE, OF_CONSTANT, TOO_LARGE, SMALL = 2.0, 0.5, 0.02, 1e-3
 
 # The image is no better than a constant if it leaves more than this part of its residual.
@@ -50,8 +50,8 @@ def fit_cautions(
         dataset: with the travel times that were fitted.
         settings: of the image.
         residuals: histogram of its residuals, see ``residual_counts``.
-        history: of its iterations. Fewer than ``FITTED`` say nothing: residuals are measured before an update,
-            the first ones in water.
+        history: of its iterations. Fewer than ``FITTED`` say nothing: residuals are measured before an
+            update, the first ones in water.
     """
     delta, distance = dataset.differential_tof(), dataset.distance_m()
     if settings.opening_angle_deg is not None:
