@@ -69,6 +69,7 @@ release: docs ## build wheel, sdist, bill of materials and checksums into dist/
 lock: ## update the lock files (needs uv on the PATH)
 	@command -v uv >/dev/null || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
 	$(call compile,requirements.lock,--extra build --extra export --extra postgres pyproject.toml)
+	$(call compile,requirements-image.lock,--extra build --extra export --extra postgres --extra slurm --extra kubernetes --extra otel $(foreach name,$(OF_CONTROLLER),--no-emit-package $(name)) -c requirements.lock pyproject.toml)
 	$(call compile,requirements-dev.lock,--extra build --extra export --extra postgres --extra test --extra lint -c requirements.lock pyproject.toml)
 	$(call compile,requirements-docs.lock,--extra build --extra export --extra postgres --extra docs -c requirements-dev.lock pyproject.toml)
 	$(call compile,requirements-generator.lock,--group generator)
@@ -76,6 +77,10 @@ lock: ## update the lock files (needs uv on the PATH)
 clean: ## remove build outputs, caches and .venv
 	rm -rf .venv build dist demo-output .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find kernels workers service tests benchmarks -name __pycache__ -prune -exec rm -rf {} +
+
+# Requirements of the Dask operator itself, 0.1 GB, that its clients do not import; the image has the client alone.
+OF_CONTROLLER = kubernetes kubernetes-asyncio kopf pykube-ng durationpy oauthlib python-json-logger requests-oauthlib \
+  websocket-client
 
 # The lock files contain the wheels of every platform (--universal) and no index address, so they work with any mirror.
 define compile

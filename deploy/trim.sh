@@ -15,3 +15,7 @@ for service in botocore/data/*/; do
     *) rm -rf "$service" ;;
   esac
 done
+# PoCL's functions for processors of 2006 to 2015 (Core 2, Penryn, Bulldozer). There `bentray devices` says that the
+# device fails, and compiled code computes instead.
+rm -f pocl_binary_distribution/.libs/share/pocl/kernel-*-ssse3.bc pocl_binary_distribution/.libs/share/pocl/kernel-*-sse41.bc \
+  pocl_binary_distribution/.libs/share/pocl/kernel-*-avx_fma4.bc

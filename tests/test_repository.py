@@ -17,6 +17,7 @@ PACKAGES = {"bentray_kernels": "kernels", "bentray_workers": "workers", "bentray
 LOCKS = {
     "requirements.lock": ("build", "export", "postgres"),
     "requirements-dev.lock": ("build", "export", "postgres", "test", "lint"),
+    "requirements-image.lock": ("build", "export", "postgres", "slurm", "kubernetes", "otel"),
 }
 
 # Folders of one machine, and hosts of package indexes; spelt so that this file does not contain them.
@@ -168,9 +169,10 @@ def test_lock_files_cover_pyproject(lock: str, extras: tuple[str, ...]) -> None:
     assert {normal(one) for one in asked} - set(requirements(lock)) == set()
 
 
-def test_both_lock_files_pin_the_same_versions() -> None:
+def test_all_lock_files_pin_the_same_versions() -> None:
     # Behind the version stands for which platforms it is, which may be more of them for the tests.
-    plain, development = (
+    plain, *others = (
         {name: lines[0].partition(" ")[0] for name, lines in requirements(lock).items()} for lock in LOCKS
     )
-    assert {name: version for name, version in plain.items() if development[name] != version} == {}
+    for other in others:
+        assert {name: version for name, version in plain.items() if other[name] != version} == {}

@@ -38,6 +38,7 @@ from .ingest.upload_limits import UploadLimits
 from .jobs.feed import EventFeed
 from .jobs.kinds import KINDS
 from .jobs.runner import Runner
+from .jobs.traces import telemetry_from
 from .metrics import Metrics
 from .pictures import Pictures
 from .readiness import Readiness, Threaded
@@ -123,6 +124,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
         version=__version__,
         description=DESCRIPTION,
         lifespan=lifespan,
+        telemetry=telemetry_from(),
         docs_url=None,
         redoc_url=None,
         routes=[*_routes()],

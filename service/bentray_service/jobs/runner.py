@@ -37,6 +37,7 @@ from .job_metrics import JobMetrics
 from .kind import JobRun, Kind
 from .kinds import KINDS
 from .reporter import Reporter
+from .traces import JobTraces
 
 log = logging.getLogger("bentray.jobs")
 
@@ -88,7 +89,7 @@ class Runner:
         at_once: maximum number of running jobs.
         tenants: the same including one job of each tenant without another.
         """
-        self.metrics = JobMetrics()
+        self.metrics, self._traces = JobMetrics(), JobTraces()
         self._queue, self._accounts = queue, accounts
         self._files = files
         self._compute = compute
@@ -133,8 +134,14 @@ class Runner:
             except SQLAlchemyError:
                 log.exception("the leases could not be renewed")
 
-    def notify(self) -> None:
-        """Wake the runner after a job was queued."""
+    def notify(self, started: str = "") -> None:
+        """Wake the runner after jobs were queued.
+
+        Args:
+            started: id of the job or batch that the present request started.
+        """
+        if started:
+            self._traces.remember(started)
         self._wake.set()
 
     def alive(self) -> bool:
@@ -196,7 +203,7 @@ class Runner:
         return shutil.disk_usage(self._files.root).free >= self._min_free_bytes
 
     def _run(self, job: JobRow) -> None:
-        with about(job=job["id"]):
+        with about(job=job["id"]), self._traces.attempt(job):
             self._run_logged(job)
 
     def _run_logged(self, job: JobRow) -> None:

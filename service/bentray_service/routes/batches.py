@@ -75,7 +75,7 @@ def start_batch(
     how = Submission(*limits, idempotency_key, caller.who, webhook)
     row = service.batches.add(caller.tenant, batch_request.name, settings.to_dict(), new, how)
     log.info("%s queued, %d jobs", row["id"], row["size"], extra={"figures": {"batch": row["id"]}})
-    service.runner.notify()
+    service.runner.notify(row["id"])
     batch = batch_record(row)
     response.headers["Location"] = batch.links["self"]
     return batch

@@ -75,7 +75,7 @@ def start_job(
     )
     job = _shown(service, row)
     log.info("%s queued, kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
-    service.runner.notify()
+    service.runner.notify(job.id)
     response.headers["Location"] = job.links["self"]
     return job
 

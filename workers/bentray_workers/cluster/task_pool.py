@@ -71,6 +71,7 @@ class ClusterPool:
     def cancel(self, running: list[Future]) -> None:
         for future in running:
             future.cancel()
+        self._attempts.end_spans()
         self._share.pause()
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from distributed import Client, Future, KilledWorker
+from opentelemetry import trace
 
 from bentray_kernels.opencl import with_cpu_retry
 from bentray_kernels.task_graph import Task
@@ -17,6 +18,8 @@ from .resources import RECONSTRUCTION
 
 # Deaths of workers while a task runs, after which it fails.
 MAX_DEATHS = 2
+# Does nothing where the process has no OpenTelemetry provider.
+TRACER = trace.get_tracer("bentray")
 
 
 class ResultsLostError(ConnectionError):
@@ -27,6 +30,7 @@ class _Attempt(NamedTuple):
     task: Task
     priority: int
     marker: Path
+    span: trace.Span
     deaths: int = 0
 
 
@@ -61,7 +65,10 @@ class Attempts:
             task: to run.
             priority: higher ones first, where tasks wait for the same worker.
         """
-        return self._submit(_Attempt(task, priority, next(self._markers)))
+        # From here to its result, retries included; below the span of the job.
+        name = getattr(task.function, "__name__", type(task.function).__name__)
+        span = TRACER.start_span(f"task {name}")
+        return self._submit(_Attempt(task, priority, next(self._markers), span))
 
     def result(self, future: Future) -> tuple[Future | None, Any]:
         """The result of a task; or a new attempt, where its worker died and it may not be the cause.
@@ -81,6 +88,7 @@ class Attempts:
             ResultsLostError: where needed results were lost with their workers and not computed again.
         """
         attempt = self._attempts.pop(future)
+        again = False
         try:
             kept = attempt.task.keep_on_worker and future.status == "finished"
             return None, future if kept else future.result()
@@ -91,7 +99,18 @@ class Attempts:
                 raise
             if any(needed.status == "error" for needed in _futures(attempt.task.arguments)):
                 raise ResultsLostError("results that a task needs were lost with their workers") from error
+            again = True
+            attempt.span.add_event("its worker died")
             return self._submit(attempt._replace(deaths=deaths)), None
+        finally:
+            if not again:
+                attempt.span.set_attribute("dask.status", future.status)
+                attempt.span.end()
+
+    def end_spans(self) -> None:
+        """End the spans of tasks whose results are not needed any more."""
+        for attempt in self._attempts.values():
+            attempt.span.end()
 
     def _submit(self, attempt: _Attempt) -> Future:
         placement = self._placement()
