@@ -8,13 +8,6 @@ find . \( -path ./pyopencl -o -path ./pocl_binary_distribution \) -prune -o -typ
   -o -name '*.h' -o -name '*.hpp' -o -name '*.pyx' -o -name '*.pxd' -o -name '*.a' \) -exec rm -f {} +
 # Debug symbols. strip would break libraries that were edited after linking (PoCL, NumPy); eu-strip does not.
 find . -type f \( -name '*.so' -o -name '*.so.*' \) -exec eu-strip {} +
-# botocore's descriptions of AWS services, except S3 and the sign-in services.
-for service in botocore/data/*/; do
-  case ${service#botocore/data/} in
-    s3/ | sts/ | sso/ | sso-oidc/ | signin/) ;;
-    *) rm -rf "$service" ;;
-  esac
-done
 # PoCL's functions for processors of 2006 to 2015 (Core 2, Penryn, Bulldozer). There `bentray devices` says that the
 # device fails, and compiled code computes instead.
 rm -f pocl_binary_distribution/.libs/share/pocl/kernel-*-ssse3.bc pocl_binary_distribution/.libs/share/pocl/kernel-*-sse41.bc \
