@@ -7,17 +7,18 @@ followed. Proxies of the environment are not used: a proxy resolves the name aga
 
 from __future__ import annotations
 
-import http.client
+import errno
 import ipaddress
 import logging
 import socket
 import ssl
-import threading
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from http import HTTPStatus
 from typing import Any, NamedTuple
 from urllib.parse import SplitResult, urlsplit
+
+import httptools
 
 from bentray_kernels.errors import InvalidInput
 
@@ -32,8 +33,33 @@ CONNECT_S = 5.0
 EXCHANGE_S = 15.0
 ACCEPTED = "an https address on the public internet, without user and fragment"
 
-# IPv6 networks whose addresses contain an IPv4 address, and the position of its first bit.
-EMBEDDING = ((ipaddress.ip_network("64:ff9b::/96"), 0), (ipaddress.ip_network("2002::/16"), 80))
+# Longest headers of a response, bytes.
+LONGEST_HEADERS = 64 * 1024
+
+# IPv6 networks of which the last 32 bits are the IPv4 address that is reached: mapped addresses and NAT64.
+EMBEDDING = (ipaddress.ip_network("::ffff:0:0/96"), ipaddress.ip_network("64:ff9b::/96"))
+# Assigned as unicast to the public. Outside are loopback, mapped, unique local, link-local and multicast
+# addresses, discard (100::/64), dummy (100:0:0:1::/64), local NAT64 (64:ff9b:1::/48) and SRv6 (5f00::/16).
+UNICAST = ipaddress.ip_network("2000::/3")
+# Source: the IANA registries of special-purpose addresses for IPv4 and IPv6 (RFC 6890), as of 2025, whole:
+# also what is globally reachable there is infrastructure, as anycast relays and AS112, and no receiver.
+RESERVED = tuple(
+    ipaddress.ip_network(one)
+    for one in (
+        # This network, private use, shared (carriers), loopback, link-local.
+        *("0.0.0.0/8", "10.0.0.0/8", "100.64.0.0/10", "127.0.0.0/8", "169.254.0.0/16", "172.16.0.0/12"),
+        # IETF protocols, documentation, AS112, AMT, 6to4 relays, private use, AS112.
+        *("192.0.0.0/24", "192.0.2.0/24", "192.31.196.0/24", "192.52.193.0/24", "192.88.99.0/24"),
+        *("192.168.0.0/16", "192.175.48.0/24"),
+        # Benchmarks, documentation, reserved and broadcast.
+        *("198.18.0.0/15", "198.51.100.0/24", "203.0.113.0/24", "240.0.0.0/4"),
+        # IETF protocols with Teredo and ORCHID, documentation, 6to4, AS112, documentation.
+        *("2001::/23", "2001:db8::/32", "2002::/16", "2620:4f:8000::/48", "3fff::/20"),
+        # Beside the registries: multicast (RFC 5771), and the host of virtual machines of Azure, which
+        # answers them alone.
+        *("224.0.0.0/4", "168.63.129.16/32"),
+    )
+)
 
 
 class Outcome(NamedTuple):
@@ -93,7 +119,7 @@ def post(url: str, headers: Mapping[str, str], body: bytes, permitted: Sequence[
     status, error = None, ""
     try:
         parts = check_url(url, permitted)
-        status = _exchange(parts, headers, body, permitted)
+        status = _exchange(parts, headers, body, permitted, begun + EXCHANGE_S)
         if 300 <= status < 400:
             error = "redirects are not followed"
         elif not 200 <= status < 300:
@@ -108,33 +134,88 @@ def post(url: str, headers: Mapping[str, str], body: bytes, permitted: Sequence[
         error = f"no answer within {EXCHANGE_S:g} s"
     except ssl.SSLCertVerificationError as failed:
         error = f"the certificate is not valid: {failed.verify_message}"
-    except (OSError, http.client.HTTPException) as failed:
-        expired = time.monotonic() - begun >= EXCHANGE_S
-        reason = getattr(failed, "strerror", None) or type(failed).__name__
-        error = f"no answer within {EXCHANGE_S:g} s" if expired else f"no answer: {reason}"
+    except (OSError, httptools.HttpParserError) as failed:
+        error = f"no answer: {getattr(failed, 'strerror', None) or type(failed).__name__}"
         if variable := proxy_variable(urlsplit(url).scheme):
             error += f" (webhooks do not use {variable})"
     return Outcome(status, error, round(time.monotonic() - begun, 3))
 
 
 def _exchange(
-    parts: SplitResult, headers: Mapping[str, str], body: bytes, permitted: Sequence[Network]
+    parts: SplitResult, headers: Mapping[str, str], body: bytes, permitted: Sequence[Network], end: float
 ) -> int:
-    """Send a request to a checked address; returns the status of the response, whose body is not read."""
+    """Send a request to a checked address; returns the status of the response, whose body is not read.
+
+    Args:
+        end: of the exchange, on the monotonic clock.
+    """
     host = parts.hostname or ""
-    connection = _Pinned(parts, *_permitted_address(host, parts, permitted))
-    # A receiver that sends one byte now and then would never exceed the time limit of a single operation.
-    end = threading.Timer(EXCHANGE_S, connection.abort)
-    end.daemon = True
-    end.start()
-    try:
-        path = parts.path or "/"
-        target = f"{path}?{parts.query}" if parts.query else path
-        connection.request("POST", target, body, {**headers, "Connection": "close"})
-        return connection.getresponse().status
-    finally:
-        end.cancel()
-        connection.close()
+    family, address = _permitted_address(host, parts, permitted)
+    shown = f"[{host}]" if ":" in host else host
+    if address[1] != (443 if parts.scheme == "https" else 80):
+        shown += f":{address[1]}"
+    target = f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/"
+    lines = [f"POST {target} HTTP/1.1", f"Host: {shown}", f"Content-Length: {len(body)}", "Connection: close"]
+    lines += [f"{name}: {value}" for name, value in headers.items()]
+    with socket.socket(family, socket.SOCK_STREAM) as connection:
+        connection.settimeout(min(CONNECT_S, _left(end)))
+        connection.connect(address)
+        if parts.scheme != "https":
+            return _answer(connection, "\r\n".join([*lines, "", ""]).encode() + body, end)
+        with certificates().wrap_socket(connection, server_hostname=host) as secured:
+            return _answer(secured, "\r\n".join([*lines, "", ""]).encode() + body, end)
+
+
+def _answer(connection: socket.socket, request: bytes, end: float) -> int:
+    """Send a request; returns the status of its response when all headers have come."""
+    connection.settimeout(_left(end))
+    connection.sendall(request)
+    response, came = _Response(), 0
+    while response.status is None:
+        # A receiver that sends one byte now and then would never exceed the limit of a single operation.
+        connection.settimeout(_left(end))
+        piece = connection.recv(LONGEST_HEADERS)
+        came += len(piece)
+        if not piece or came > LONGEST_HEADERS:
+            found = f"more than {LONGEST_HEADERS} bytes of headers" if piece else "the connection was closed"
+            raise OSError(errno.EPROTO, found)
+        response.feed(piece)
+    return response.status
+
+
+class _Response:
+    """Reads the status of a response; interim ones (1xx) are passed over."""
+
+    def __init__(self) -> None:
+        self.status: int | None = None
+        self._parser = httptools.HttpResponseParser(self)
+
+    def feed(self, piece: bytes) -> None:
+        """Raises HttpParserError for what is no response."""
+        try:
+            self._parser.feed_data(piece)
+        except httptools.HttpParserError:
+            # What follows the headers does not matter.
+            if self.status is None:
+                raise
+
+    def on_headers_complete(self) -> None:
+        """Called by the parser after the empty line, never at the end of the connection."""
+        status = self._parser.get_status_code()
+        if self.status is None and (status >= 200 or status == HTTPStatus.SWITCHING_PROTOCOLS):
+            self.status = status
+
+
+def _left(end: float) -> float:
+    """Time until ``end``, s.
+
+    Raises:
+        TimeoutError: when it has passed.
+    """
+    left = end - time.monotonic()
+    if left <= 0.0:
+        raise TimeoutError
+    return left
 
 
 def _permitted_address(
@@ -160,41 +241,7 @@ def _is_permitted(address: str, scheme: str, permitted: Sequence[Network]) -> bo
     if within(address, tuple(permitted)):
         return True
     parsed = ipaddress.ip_address(address)
-    if isinstance(parsed, ipaddress.IPv6Address):
-        inner = [parsed.ipv4_mapped] if parsed.ipv4_mapped is not None else []
-        inner += [
-            ipaddress.IPv4Address((int(parsed) >> shift) & 0xFFFFFFFF)
-            for network, shift in EMBEDDING
-            if parsed in network
-        ]
-        if inner:
-            return all(_is_permitted(str(one), scheme, permitted) for one in inner)
-        # Only what is assigned as unicast to the public; Python counts some reserved networks as global.
-        if parsed not in ipaddress.ip_network("2000::/3"):
-            return False
-    return scheme == "https" and parsed.is_global and not parsed.is_multicast
-
-
-class _Pinned(http.client.HTTPConnection):
-    """A connection to a checked address, with the host name for certificate and Host header."""
-
-    def __init__(self, parts: SplitResult, family: socket.AddressFamily, address: Any) -> None:
-        self._secure = parts.scheme == "https"
-        # Used in the Host header.
-        self.default_port = 443 if self._secure else 80
-        super().__init__(parts.hostname or "", address[1])
-        self._family, self._address = family, address
-
-    def connect(self) -> None:
-        self.sock = socket.socket(self._family, socket.SOCK_STREAM)
-        self.sock.settimeout(CONNECT_S)
-        self.sock.connect(self._address)
-        if self._secure:
-            self.sock = certificates().wrap_socket(self.sock, server_hostname=self.host)
-        self.sock.settimeout(EXCHANGE_S)
-
-    def abort(self) -> None:
-        """End the connection from another thread."""
-        if self.sock is not None:
-            with suppress(OSError):
-                self.sock.shutdown(socket.SHUT_RDWR)
+    if any(parsed in network for network in EMBEDDING):
+        return _is_permitted(str(ipaddress.IPv4Address(int(parsed) & 0xFFFFFFFF)), scheme, permitted)
+    unicast = parsed.version == 4 or parsed in UNICAST
+    return scheme == "https" and unicast and not any(parsed in network for network in RESERVED)

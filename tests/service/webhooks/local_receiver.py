@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import chain, repeat
 
 Message = tuple[dict[str, str], bytes]
 
@@ -19,14 +20,16 @@ class Receiver:
         answers: statuses of the next requests; 200 when there are none left.
         location: of redirects.
         hold: while it is clear, requests wait before they are answered.
-        drip: headers are sent byte by byte, for ever.
+        raw: sent in place of an answer, with pauses; the last piece for ever, None closes the connection.
+        pause_s: between them.
     """
 
     def __init__(self, tls: ssl.SSLContext | None = None) -> None:
         self.messages: list[Message] = []
         self.answers: list[int] = []
         self.location = ""
-        self.drip = False
+        self.raw: list[bytes | None] = []
+        self.pause_s = 0.0
         self.hold = threading.Event()
         self.hold.set()
         receiver = self
@@ -36,10 +39,12 @@ class Receiver:
                 body = self.rfile.read(int(self.headers["Content-Length"]))
                 receiver.messages.append(({k.lower(): v for k, v in self.headers.items()}, body))
                 receiver.hold.wait(60.0)
-                if receiver.drip:
-                    while True:
-                        self.wfile.write(b"H")
-                        time.sleep(0.05)
+                for piece in chain(receiver.raw, repeat(receiver.raw[-1]) if receiver.raw else ()):
+                    if piece is None:
+                        self.close_connection = True
+                        return
+                    self.wfile.write(piece)
+                    time.sleep(receiver.pause_s)
                 self.send_response(receiver.answers.pop(0) if receiver.answers else 200)
                 if receiver.location:
                     self.send_header("Location", receiver.location)

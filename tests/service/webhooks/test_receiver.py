@@ -41,6 +41,18 @@ def receiver():
             "https://[ff02::1]/",
         ),
         *("https://[::ffff:127.0.0.1]/", "https://[64:ff9b::10.0.0.1]/", "https://[2002:7f00:1::1]/"),
+        # The registries of special-purpose addresses, also what is in the last 32 bits of NAT64.
+        *("https://192.0.0.9/", "https://192.0.0.192/", "https://192.0.2.1/", "https://192.31.196.1/"),
+        *("https://192.52.193.1/", "https://192.88.99.1/", "https://192.175.48.1/", "https://240.0.0.1/"),
+        *("https://198.51.100.1/", "https://203.0.113.1/", "https://168.63.129.16/"),
+        *(
+            "https://[3fff::1]/",
+            "https://[2620:4f:8000::1]/",
+            "https://[5f00::1]/",
+            "https://[100:0:0:1::1]/",
+        ),
+        *("https://[2001::1]/", "https://[2001:1::1]/", "https://[2001:4:112::1]/", "https://[2001:20::1]/"),
+        *("https://[2002:5db8:d822::1]/", "https://[64:ff9b::c058:6301]/", "https://[64:ff9b:1::1]/"),
         *("https://[::127.0.0.1]/", "https://[2001:db8::1]/", "https://[fec0::1]/", "https://[100::1]/"),
         *(
             "http://example.org/",
@@ -151,15 +163,40 @@ def test_unknown_name_and_closed_port(receiver, monkeypatch):
     assert "not known" in post("https://nobody.example/", {}, b"{}", ()).error
 
 
-@pytest.mark.parametrize("slowly", ["silent", "byte by byte"])
-def test_a_slow_receiver_ends_in_time(receiver, slowly, monkeypatch):
-    monkeypatch.setattr(module, "EXCHANGE_S", 0.5)
-    if slowly == "silent":
+ENDLESS = {
+    "silent": [],
+    "a reason for ever": [b"HTTP/1.1 200 O", b"K"],
+    "silent after the status": [b"HTTP/1.1 200 OK\r\n", b""],
+    "headers for ever": [b"HTTP/1.1 200 OK\r\n", b"A: b\r\n"],
+    "a header for ever": [b"HTTP/1.1 200 OK\r\nA: ", b"b"],
+    "interim responses for ever": [b"HTTP/1.1 103 Early Hints\r\n\r\n"],
+}
+
+
+@pytest.mark.parametrize("pieces", ENDLESS.values(), ids=ENDLESS)
+def test_a_receiver_without_end_fails_in_time(receiver, pieces, monkeypatch):
+    """The last piece is repeated. A closed connection would be taken for the end of the headers."""
+    monkeypatch.setattr(module, "EXCHANGE_S", 0.3)
+    if not pieces:
         receiver.hold.clear()
-    receiver.drip = slowly == "byte by byte"
+    receiver.raw, receiver.pause_s = pieces, 0.02
     outcome = post(receiver.url, {}, b"{}", LOOPBACK)
-    assert outcome.error == "no answer within 0.5 s"
-    assert 0.4 < outcome.seconds < 5.0
+    assert (outcome.status, outcome.error) == (None, "no answer within 0.3 s")
+    assert 0.2 < outcome.seconds < 5.0
+
+
+@pytest.mark.parametrize(
+    ("pieces", "error"),
+    [
+        ([b"HTTP/1.1 200 OK\r\nA: b\r\n", None], "no answer: the connection was closed"),
+        ([b"HTTP/1.1 200 OK\r\n", b"A: " + b"b" * 10000], "no answer: more than 65536 bytes of headers"),
+        ([b"220 mail.example ready\r\n", None], "no answer: HttpParserError"),
+        ([b"HTTP/1.1 100 Continue\r\n\r\nHTTP/1.1 204 No Content\r\n\r\n", None], ""),
+    ],
+)
+def test_an_answer_is_a_whole_response(receiver, pieces, error):
+    receiver.raw = pieces
+    assert post(receiver.url, {}, b"{}", LOOPBACK).error == error
 
 
 def test_certificates_are_checked_for_the_name(monkeypatch, tmp_path):
