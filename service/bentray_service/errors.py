@@ -51,6 +51,13 @@ class WrongMediaType(Rejection):
         super().__init__("Content-Type", repr(found) if found else "nothing", " or ".join(accepted))
 
 
+class PackedBody(Rejection):
+    """The body is packed; the response has Accept-Encoding (RFC 9110, 15.5.16)."""
+
+    def __init__(self, header: str, found: str, accepted: str) -> None:
+        super().__init__(header, repr(found[:80]), f"{accepted}: send the body as it is, without packing")
+
+
 class EmptyBody(InvalidInput):
     """The request has no body."""
 

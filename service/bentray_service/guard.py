@@ -1,4 +1,4 @@
-"""Middleware that authenticates and logs every request."""
+"""Middleware that authenticates and logs every request, and refuses packed bodies."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from bentray_kernels.errors import InvalidInput
 
 from .access.caller import Caller
 from .access.key_watch import answer_while_valid
+from .errors import PackedBody
 from .web.errors import problem_response
 from .wiring import Parts
 
@@ -57,6 +58,7 @@ class Guard:
             if not _public(scope["path"]):
                 caller = await run_in_threadpool(_authenticate, scope, seen)
                 scope.setdefault("state", {})["caller"] = caller
+            _check_codings(Headers(scope=scope))
         except InvalidInput as error:
             await problem_response(error, scope["path"])(scope, receive, seen.sending(send))
         else:
@@ -76,6 +78,16 @@ def _authenticate(scope: Scope, seen: _RequestLog) -> Caller:
     seen.caller = sign_in.in_project(seen.caller, headers)
     sign_in.check(seen.caller, scope["method"], scope["path"])
     return seen.caller
+
+
+def _check_codings(headers: Headers) -> None:
+    """Raise PackedBody for a packed body; Content-Encoding means nothing without a body."""
+    chunked = "transfer-encoding" in headers
+    for header, accepted in (("Content-Encoding", "identity"), ("Transfer-Encoding", "chunked")):
+        given = ", ".join(headers.getlist(header))
+        packed = any(one.strip().lower() not in ("", accepted) for one in given.split(","))
+        if packed and (chunked or headers.get("content-length", "0") != "0"):
+            raise PackedBody(header, given, accepted)
 
 
 def _public(path: str) -> bool:

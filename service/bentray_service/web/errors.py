@@ -50,6 +50,7 @@ PROBLEMS: Mapping[type[Exception], ProblemType] = {
     errors.Deleted: ProblemType(404, "deleted", "Deleted"),
     errors.Damaged: ProblemType(500, "stored-data-damaged", "Stored data is damaged"),
     errors.WrongMediaType: ProblemType(415, "wrong-media-type", "Unsupported media type"),
+    errors.PackedBody: ProblemType(415, "packed-body", "Unsupported content coding"),
     errors.EmptyBody: ProblemType(422, "empty-body", "Empty body"),
     errors.TooLarge: ProblemType(413, "too-large", "Body too large"),
     errors.BodyTimeout: ProblemType(408, "too-slow", "Body received too slowly"),
@@ -198,6 +199,8 @@ def problem_response(error: InvalidInput, path: str | None) -> Response:
         headers["Retry-After"] = str(math.ceil(error.wait_s))
     if isinstance(error, errors.NotAuthenticated):
         headers["WWW-Authenticate"] = 'Bearer realm="bentray"'
+    if isinstance(error, errors.PackedBody):
+        headers["Accept-Encoding"] = "identity"
     if isinstance(error, errors.RangeNotSatisfiable):
         headers["Content-Range"] = f"bytes */{error.size}"
     return _respond(problem_of(error, path), headers)

@@ -13,6 +13,7 @@ import re
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import closing
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -248,6 +249,39 @@ def test_unauthenticated_requests_are_rejected_unread(place: Place) -> None:
                 assert not re.search("é|YTpi", str(problem))
     assert public == {"/health/live", "/health/ready"}
     assert stored(place) == before
+
+
+PACKED = [
+    *(
+        {"content-encoding": one}
+        for one in ("gzip", "GZIP", "x-gzip", "deflate", "br", "zstd", "identity, br")
+    ),
+    *({"content-encoding": one} for one in ("gzip, gzip", "compress", "aes128gcm", "nonsense")),
+    {"transfer-encoding": "gzip, chunked"},
+    {"transfer-encoding": "chunked", "content-encoding": "gzip"},
+]
+
+
+def test_packed_bodies_are_refused_unread(place: Place) -> None:
+    taking = [asked for asked in operations(place) if "requestBody" in asked.what]
+    assert {"PATCH", "POST", "PUT"} == {asked.verb for asked in taking}
+    for asked, packed in product(taking, PACKED):
+        headers = {**asked.headers(), **place.auth["acme"], **packed}
+        status, problem = unread(place.http.app, asked.verb, filled(asked.path, place.ids), headers)
+        assert (status, problem["field"].lower()) == (415, [*packed][-1]), (asked.verb, asked.path, packed)
+        assert "without packing" in problem["detail"]
+
+
+@pytest.mark.parametrize(
+    ("method", "coding", "status"),
+    [("POST", "Gzip", 415), ("POST", "identity", 422), ("POST", "", 422), ("GET", "gzip", 405)],
+)
+def test_what_coding_is_accepted_is_said(place: Place, method: str, coding: str, status: int) -> None:
+    headers = {**place.auth["acme"], "Content-Type": "application/json", "Content-Encoding": coding}
+    content = None if method == "GET" else b"{}"
+    answer = place.http.request(method, "/v1/plans", content=content, headers=headers)
+    assert answer.status_code == status
+    assert answer.headers.get("accept-encoding") == ("identity" if status == 415 else None)
 
 
 def test_objects_of_other_tenants_are_not_found(place: Place) -> None:
