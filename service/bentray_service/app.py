@@ -66,6 +66,7 @@ from .rows.accounts import Accounts
 from .rows.ages import ExpiryMarks
 from .rows.batches import Batches
 from .rows.checksums import Checksums
+from .rows.claimed_tenants import ClaimedTenants
 from .rows.database import open_database
 from .rows.deliveries import Deliveries
 from .rows.job_queue import Queue
@@ -205,7 +206,14 @@ def _open(
     quota = Quota(database, settings.max_tenant_bytes)
     quota.begin(files, alone=settings.database_url is None)
     tenant_projects, accounts = Projects(database), Accounts(database)
-    access_control = SignIn(settings, Keys(database), Sessions(database), tenant_projects, accounts)
+    access_control = SignIn(
+        settings,
+        Keys(database),
+        Sessions(database),
+        tenant_projects,
+        accounts,
+        ClaimedTenants(database),
+    )
     stack.callback(access_control.close)
     if cluster is None:
         cluster = stack.enter_context(

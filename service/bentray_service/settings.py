@@ -142,7 +142,7 @@ class ServiceSettings(BaseSettings):
     proxy_user_header: str = Field(
         "X-Forwarded-User",
         pattern=r"^[A-Za-z0-9-]+$",
-        description="Header with the user name from such a proxy; the user is the tenant.",
+        description="Header with the user name from such a proxy; each user is a tenant.",
     )
     public_url: str | None = Field(
         None,
@@ -151,6 +151,7 @@ class ServiceSettings(BaseSettings):
     )
     oidc_issuer: str | None = Field(
         None,
+        max_length=500,
         pattern=r"^https?://[^?#@\s]+$",
         description="Issuer of an OpenID Connect provider, at which users of the page sign in.",
     )

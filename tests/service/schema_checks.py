@@ -68,9 +68,8 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
     },
     # As those of each of its jobs; each dataset once.
     "POST /v1/batches": {422: {*(f"settings.{name}" for name in SETTINGS), "settings", "datasets", WEBHOOK}},
-    # A name that no other project has, as many as a tenant may have; a member, as many as a project may have.
-    "POST /v1/projects": {422: {"name", "projects"}},
-    "PATCH /v1/projects/{project_id}": {422: {"name"}},
+    # As many as a tenant may have; a member, as many as a project may have.
+    "POST /v1/projects": {422: {"projects"}},
     "PUT /v1/projects/{project_id}/members": {422: {"member", "members", "role"}},
     "POST /v1/plans": {
         422: {*(f"settings.{name}" for name in SETTINGS), "settings", "volume", "mesh", WEBHOOK}

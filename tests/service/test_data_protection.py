@@ -23,6 +23,7 @@ STATED = {
     "volumes": "scans, volumes, meshes, fields",
     "uploads": "unfinished uploads",
     "keys": "API keys",
+    "claimed_tenants": "users",
     "sessions": "sessions of browsers",
     "pending_sign_ins": "sign-ins in progress",
     "projects": "projects and members",

@@ -14,6 +14,7 @@ from starlette.datastructures import Headers
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import Forbidden, NotAuthenticated
+from ..rows.claimed_tenants import ClaimedTenants
 from ..rows.sessions import PENDING_S, PendingSignIn, Sessions
 from ..settings import ServiceSettings
 from ..web.addresses import names_loopback
@@ -51,7 +52,7 @@ class Cookie:
 class BrowserSessions:
     """Signs users in and out, and finds the session of a request."""
 
-    def __init__(self, settings: ServiceSettings, sessions: Sessions) -> None:
+    def __init__(self, settings: ServiceSettings, sessions: Sessions, claimed: ClaimedTenants) -> None:
         """Raises:
         InvalidInput: for an invalid or a missing setting.
         """
@@ -65,7 +66,7 @@ class BrowserSessions:
         self._origin = f"{parts.scheme}://{parts.netloc.lower()}"
         self._sessions = sessions
         self._provider = Provider(settings)
-        self._mapping = ClaimMapping(settings)
+        self._mapping = ClaimMapping(settings, claimed)
         self._seconds = settings.session_hours * 3600.0
         self.name = settings.oidc_name or urlsplit(self._provider.issuer).hostname or ""
         # Browsers accept names with this prefix only with Secure, for one host and from it.

@@ -146,7 +146,9 @@ class Provider:
             # OpenID Connect Core 5.3.2: else they may be those of another user.
             if more is None or more.get("sub") != claims["sub"]:
                 raise NotAuthenticated("sub", "another user in the user info", "the user of the ID token")
-            claims = {**more, **claims}
+            # An address and whether it is verified come from one source.
+            pair = {} if {"email", "email_verified"} <= claims.keys() else {"email", "email_verified"}
+            claims = {**more, **{name: value for name, value in claims.items() if name not in pair}}
         return claims
 
     def _verified(self, token: str, nonce: str) -> dict[str, Any]:

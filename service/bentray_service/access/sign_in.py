@@ -14,14 +14,16 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import Forbidden, NotAuthenticated, RateLimited
 from ..rows.accounts import Accounts
 from ..rows.api_key import PREFIX, ApiKey
+from ..rows.claimed_tenants import ClaimedTenants
 from ..rows.keys import Keys
 from ..rows.projects import ROLES, Projects, membership
 from ..rows.sessions import Sessions
-from ..rows.tenants import LOCAL, Tenant, tenant_of_user
+from ..rows.tenants import LOCAL, Tenant
 from ..settings import ServiceSettings
 from ..web.addresses import is_loopback, names_loopback, networks, within
 from .browser_sessions import BrowserSessions
 from .caller import ANYONE, SCOPES, USUAL, Caller, scope_of
+from .openid_claims import LONGEST_USER
 from .rate_limits import RateLimits
 
 log = logging.getLogger("bentray.access")
@@ -59,15 +61,16 @@ class SignIn:
         sessions: Sessions,
         projects: Projects,
         accounts: Accounts,
+        claimed: ClaimedTenants,
     ) -> None:
         """Raises:
         InvalidInput: if the service would be open to other machines, or for an invalid setting.
         """
         self._keys = keys
-        self._projects, self._accounts = projects, accounts
+        self._projects, self._accounts, self._claimed = projects, accounts, claimed
         self._trusted = networks(settings.trusted_proxies or "")
         self._user_header = settings.proxy_user_header
-        self.browsers = None if settings.oidc_issuer is None else BrowserSessions(settings, sessions)
+        self.browsers = None if settings.oidc_issuer is None else BrowserSessions(settings, sessions, claimed)
         self._guarded = bool(self._trusted) or self.browsers is not None
         self._sign_ins = RateLimits(SIGN_INS_PER_MINUTE)
         self._requests = RateLimits(settings.requests_per_minute)
@@ -113,7 +116,12 @@ class SignIn:
         users = headers.getlist(self._user_header) if within(address, self._trusted) else []
         if len(users) == 1 and users[0].strip():
             user = users[0].strip()
-            return Caller(tenant_of_user(user), "proxy", user, frozenset(USUAL))
+            if len(user) > LONGEST_USER:
+                raise NotAuthenticated(
+                    self._user_header, f"{len(user)} characters", f"at most {LONGEST_USER}"
+                )
+            tenant = self._claimed.tenant("proxy", self._user_header.lower(), user, user)
+            return Caller(tenant, "proxy", user, frozenset(USUAL))
         found = "nothing" if not scheme else "something that is not a key"
         accepted = "Bearer and a key; see `bentray keys create`"
         if self.browsers is not None:

@@ -31,7 +31,7 @@ projects = typer.Typer(
 
 @projects.command()
 def create(
-    name: Annotated[str, typer.Argument(help="Name, unique in the tenant.")],
+    name: Annotated[str, typer.Argument(help="Name of the project.")],
     owner: Annotated[str, typer.Option(help="Its owner: user:NAME, or key:ID.")],
     tenant: Annotated[str, typer.Option(help="Tenant of the project.")] = "local",
     data: Data = None,

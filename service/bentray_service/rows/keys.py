@@ -14,9 +14,10 @@ from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from .api_key import ApiKey
+from .claimed_tenants import is_claimed, keep_from_claims
 from .database import Database
 from .schema import keys
-from .tenants import Tenant
+from .tenants import GIVEN, Tenant
 from .typed_rows import KeyRow
 
 log = logging.getLogger("bentray.access")
@@ -37,12 +38,16 @@ class Keys:
         """Insert a key without its secret.
 
         Raises:
-            InvalidInput: when the id exists.
+            InvalidInput: when the id exists, or the tenant is that of a user who signs in or a project.
         """
         row = {"id": token.id, "tenant": tenant, "name": name, "scopes": list(scopes)}
         made = {"sha256": token.digest(), "created": time.time(), "expires": expires}
         try:
             with self._database.write() as connection:
+                if GIVEN.fullmatch(tenant) or is_claimed(connection, tenant):
+                    accepted = "another name; for users and programs together, BENTRAY_OIDC_TENANTS"
+                    raise InvalidInput("tenant", f"{tenant}, of a user who signs in or a project", accepted)
+                keep_from_claims(connection, [tenant])
                 connection.execute(insert(keys).values(**row, **made))
         except IntegrityError:
             raise InvalidInput("key", f"{token.id}, which exists", "a key with a new id") from None

@@ -200,6 +200,33 @@ def _to_12(connection: Connection) -> None:
     connection.execute(text("CREATE UNIQUE INDEX datasets_by_key ON datasets (tenant, idempotency_key)"))
 
 
+def _to_13(connection: Connection) -> None:
+    """Version 13: tenants of claimed names; names of projects are not unique."""
+    schema.claimed_tenants.create(connection)
+    tables = ("datasets", "jobs", "projects", "volumes", "uploaded_volumes", "meshes", "geometry_fields")
+    tenants = " UNION ".join(f"SELECT tenant FROM {table}" for table in (*tables, "uploads", "storage"))  # noqa: S608
+    # A key has no claimed name, and the items of a project have its id.
+    named = "SELECT tenant FROM keys UNION SELECT id FROM projects UNION SELECT 'local'"
+    connection.execute(
+        text(
+            "INSERT INTO claimed_tenants (tenant, issuer, claim, value) "  # noqa: S608
+            f"SELECT tenant, '', '', tenant FROM ({tenants}) AS held WHERE tenant NOT IN ({named})"
+        )
+    )
+    # Users sign in again, and get their tenants.
+    connection.execute(text("DELETE FROM sessions"))
+    if connection.dialect.name != "sqlite":
+        connection.execute(text("ALTER TABLE projects DROP CONSTRAINT IF EXISTS projects_tenant_name_key"))
+        connection.execute(text("CREATE INDEX IF NOT EXISTS projects_by_tenant ON projects (tenant)"))
+        return
+    columns = "number, id, tenant, name, created"
+    connection.execute(text("DROP INDEX IF EXISTS projects_by_tenant"))
+    connection.execute(text("ALTER TABLE projects RENAME TO projects_of_version_12"))
+    schema.projects.create(connection)
+    connection.execute(text(f"INSERT INTO projects ({columns}) SELECT {columns} FROM projects_of_version_12"))  # noqa: S608
+    connection.execute(text("DROP TABLE projects_of_version_12"))
+
+
 def _count_stored_bytes(connection: Connection) -> None:
     """Initialise storage accounting from the rows; the service corrects the sizes when it starts."""
     rows = [f"SELECT tenant, id, bytes, false FROM {table}" for table in STORED_IN_VERSION_3]  # noqa: S608
@@ -211,5 +238,9 @@ def _count_stored_bytes(connection: Connection) -> None:
 
 
 STEPS: Mapping[int, Callable[[Connection], None]] = MappingProxyType(
-    dict(enumerate((_to_2, _to_3, _to_4, _to_5, _to_6, _to_7, _to_8, _to_9, _to_10, _to_11, _to_12), start=1))
+    dict(
+        enumerate(
+            (_to_2, _to_3, _to_4, _to_5, _to_6, _to_7, _to_8, _to_9, _to_10, _to_11, _to_12, _to_13), start=1
+        )
+    )
 )

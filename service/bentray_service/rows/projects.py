@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import cast
 
 from sqlalchemy import Connection, delete, func, insert, select, update
-from sqlalchemy.exc import IntegrityError
 
 from bentray_kernels.errors import InvalidInput
 
@@ -48,7 +47,10 @@ _HOLDING = (
 
 
 class Projects:
-    """Projects of tenants. ``member`` None stands for a caller who may do everything in the tenant."""
+    """Projects of tenants; several may have the same name.
+
+    ``member`` None stands for a caller who may do everything in the tenant.
+    """
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -57,20 +59,17 @@ class Projects:
         """Insert a project; ``member`` becomes its owner.
 
         Raises:
-            InvalidInput: when the tenant has a project of this name, or too many.
+            InvalidInput: when the tenant has too many.
         """
         project_id = new_id("project")
         row = {"id": project_id, "tenant": tenant, "name": name, "created": time.time()}
-        try:
-            with self._database.write() as connection:
-                mine = select(func.count()).where(projects.c.tenant == tenant)
-                if (count := connection.execute(mine).scalar_one()) >= MOST_PROJECTS:
-                    raise InvalidInput("projects", f"{count} of this tenant", f"at most {MOST_PROJECTS}")
-                connection.execute(insert(projects).values(**row))
-                if member is not None:
-                    _put(connection, project_id, member, OWNER)
-        except IntegrityError:
-            raise InvalidInput("name", repr(name), "a name that no other project has") from None
+        with self._database.write() as connection:
+            mine = select(func.count()).where(projects.c.tenant == tenant)
+            if (count := connection.execute(mine).scalar_one()) >= MOST_PROJECTS:
+                raise InvalidInput("projects", f"{count} of this tenant", f"at most {MOST_PROJECTS}")
+            connection.execute(insert(projects).values(**row))
+            if member is not None:
+                _put(connection, project_id, member, OWNER)
         return self.get(tenant, project_id, member)
 
     def get(self, tenant: Tenant, name: str, member: str | None) -> ProjectRow:
@@ -95,12 +94,9 @@ class Projects:
         return cast(list[MemberRow], self._database.rows(query))
 
     def rename(self, project: ProjectRow, name: str) -> None:
-        """Raises InvalidInput when the tenant has another project of this name."""
-        try:
-            with self._database.write() as connection:
-                connection.execute(update(projects).where(projects.c.id == project["id"]).values(name=name))
-        except IntegrityError:
-            raise InvalidInput("name", repr(name), "a name that no other project has") from None
+        """Rename a project."""
+        with self._database.write() as connection:
+            connection.execute(update(projects).where(projects.c.id == project["id"]).values(name=name))
 
     def put_member(self, project: ProjectRow, member: str, role: str) -> None:
         """Add a member, or change their role.

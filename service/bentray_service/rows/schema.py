@@ -20,7 +20,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 12
+VERSION = 13
 
 STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
@@ -175,9 +175,10 @@ projects = Table(
     Column("number", Integer, primary_key=True, autoincrement=True),
     Column("id", String(32), nullable=False, unique=True),
     _tenant(),
+    # Not unique, so that nobody learns the names of projects of others.
     Column("name", String(200), nullable=False),
     Column("created", Float, nullable=False),
-    UniqueConstraint("tenant", "name"),
+    Index("projects_by_tenant", "tenant"),
 )
 
 project_members = Table(
@@ -348,6 +349,19 @@ keys = Table(
     Column("expires", Float),
     Column("revoked", Float),
     Column("used", Float),
+)
+
+# Tenants of claimed names: of users and groups that an OpenID provider or a proxy reports. Without issuer it
+# is a tenant of before version 13 that no key has; the first name that had it then keeps it.
+claimed_tenants = Table(
+    "claimed_tenants",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("tenant", String(64), nullable=False, unique=True),
+    Column("issuer", String(500), nullable=False),
+    Column("claim", String(200), nullable=False),
+    Column("value", String(255), nullable=False),
+    UniqueConstraint("issuer", "claim", "value"),
 )
 
 # Sessions of browsers whose users signed in at an OpenID provider. Only the digest of the secret is stored.

@@ -12,8 +12,8 @@ from bentray_kernels.errors import InvalidInput
 PATTERN = re.compile(r"[a-z0-9][a-z0-9._@+-]{0,63}")
 ACCEPTED = "1 to 64 of a-z, 0-9 and . _ @ + -, beginning with a letter or digit"
 
-# Not accepted as names: digests, see below, and ids of projects, which the items of projects have as tenant.
-_RESERVED = re.compile(r"user-[0-9a-f]{40}|project-[0-9a-f]{20}")
+# Names that nobody chooses: of claimed names, and of projects, whose id is the tenant of their items.
+GIVEN = re.compile(r"user-[0-9a-f]{40}|project-[0-9a-f]{20}")
 
 Tenant = NewType("Tenant", str)
 
@@ -32,11 +32,8 @@ def checked_tenant(text: str) -> Tenant:
     return Tenant(text)
 
 
-def tenant_of_user(user: str) -> Tenant:
-    """The tenant of a user named by a proxy: the name itself, or its digest if the name is not valid.
-
-    Two users never share a tenant, and no user becomes ``LOCAL`` or a project.
-    """
-    if PATTERN.fullmatch(user) and user != LOCAL and not _RESERVED.fullmatch(user):
+def former_tenant(user: str) -> Tenant:
+    """The tenant of a user before version 13 of the database: the name itself, or its digest if not valid."""
+    if PATTERN.fullmatch(user) and user != LOCAL and not GIVEN.fullmatch(user):
         return Tenant(user)
     return Tenant(f"user-{hashlib.sha256(user.encode()).hexdigest()[:40]}")

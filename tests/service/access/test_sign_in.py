@@ -8,6 +8,7 @@ from bentray_service.access.sign_in import SignIn
 from bentray_service.errors import Forbidden, NotAuthenticated, RateLimited
 from bentray_service.rows.accounts import Accounts
 from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.claimed_tenants import ClaimedTenants
 from bentray_service.rows.database import open_database
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.projects import Projects
@@ -34,6 +35,7 @@ def sign_in(keys, tmp_path):
         Sessions(keys._database),
         Projects(keys._database),
         Accounts(keys._database),
+        ClaimedTenants(keys._database),
     )
 
 
@@ -104,14 +106,24 @@ def test_user_header_is_accepted_only_from_trusted_proxies(sign_in):
     found, named = sign_in(**PROXIED), Headers({"X-Forwarded-User": "alice@example.org"})
     for address in (FAR, "10.1.2.3", "::ffff:10.1.2.3"):
         caller = found.caller(named, address)
-        assert (caller.tenant, caller.how, caller.who) == ("alice@example.org", "proxy", "alice@example.org")
+        assert (caller.how, caller.who) == ("proxy", "alice@example.org")
+        assert caller.tenant == found.caller(named, FAR).tenant != "alice@example.org"
         assert "metrics" not in caller.scopes
     for address in (NEAR, "192.0.2.8", "", "testclient"):
         with pytest.raises(NotAuthenticated):
             found.caller(named, address)
 
 
-@pytest.mark.parametrize("users", [[], [""], ["  "], ["alice", "mallory"]])
+def test_a_user_is_never_the_tenant_of_a_key(sign_in, keys):
+    token = ApiKey.new()
+    keys.add(token, Tenant("acme"), "one", ("read",))
+    found = sign_in(**PROXIED)
+    assert found.caller(bearer(token), FAR).tenant == "acme"
+    for user in ("acme", "local", " acme", "ACME"):
+        assert found.caller(Headers({"X-Forwarded-User": user}), FAR).tenant not in ("acme", LOCAL)
+
+
+@pytest.mark.parametrize("users", [[], [""], ["  "], ["alice", "mallory"], ["a" * 201]])
 def test_proxy_must_name_exactly_one_user(sign_in, users):
     raw = [(b"x-forwarded-user", user.encode()) for user in users]
     with pytest.raises(NotAuthenticated):
@@ -123,7 +135,7 @@ def test_a_key_comes_through_a_proxy_too_and_another_bearer_is_the_proxys_own(si
     keys.add(token, Tenant("acme"), "one", ("read",))
     assert found.caller(bearer(token), FAR).tenant == "acme"
     oidc = Headers({"Authorization": "Bearer eyJhbGciOi", "X-Forwarded-User": "alice"})
-    assert found.caller(oidc, FAR).tenant == "alice"
+    assert found.caller(oidc, FAR).who == "alice"
     with pytest.raises(NotAuthenticated):
         found.caller(
             Headers({"Authorization": f"Bearer {ApiKey.new().shown()}", "X-Forwarded-User": "alice"}), FAR

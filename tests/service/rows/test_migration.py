@@ -5,10 +5,10 @@ import sqlite3
 
 import pytest
 from sqlalchemy import create_engine, inspect, select, text
-from sqlalchemy.dialects import postgresql
 from sqlalchemy.exc import IntegrityError
 
 from bentray_service.rows import migration, schema
+from bentray_service.rows.claimed_tenants import ClaimedTenants
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import WebhookSecrets
 from bentray_service.rows.ids import new_id, volume_of
@@ -16,7 +16,7 @@ from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.stored_tables import Datasets, Volumes
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.usage import Usage, usage_of
 
 # The tables of version 1, word for word as SQLite kept them.
@@ -53,7 +53,7 @@ INSERT INTO about VALUES (1, 0.0);
 DATASET, DONE, WAITING = new_id("dataset"), new_id("job"), new_id("job")
 
 
-@pytest.fixture(params=[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11])
+@pytest.fixture(params=[*range(1, schema.VERSION)])
 def old(request, tmp_path):
     """A database as an older version left it, with a finished and a waiting job."""
     path = tmp_path / "old.sqlite"
@@ -120,7 +120,7 @@ def test_the_old_tables_were_those_of_version_1(old, tmp_path):
     connection.close()
     later = {"uploaded_volumes", "meshes", "geometry_fields", "keys", "uploads", "bucket_mark"}
     later |= {"checksums", "too_old", "storage", "sessions", "pending_sign_ins", "batches", "projects"}
-    later |= {"project_members", "deliveries", "webhook_secrets"}
+    later |= {"project_members", "deliveries", "webhook_secrets", "claimed_tenants"}
     assert names == set(expected) - later
 
 
@@ -176,11 +176,13 @@ def test_keys_hold_afterwards(old):
 
 
 def test_failed_migration_keeps_the_old_database(old, monkeypatch):
+    last = migration.STEPS[schema.VERSION - 1]
+
     def broken(connection):
-        migration._to_12(connection)
+        last(connection)
         raise RuntimeError("the power went")
 
-    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, 11: broken})
+    monkeypatch.setattr(migration, "STEPS", {**migration.STEPS, schema.VERSION - 1: broken})
     with pytest.raises(RuntimeError, match="power"):
         open_database(old)
     monkeypatch.undo()
@@ -197,87 +199,31 @@ def test_dangling_reference_stops_the_migration(old, tmp_path):
         open_database(old)
 
 
-class Recorder:
-    """A connection to Postgres that only writes down what it is told."""
-
-    dialect = postgresql.dialect()
-
-    def __init__(self):
-        self.said = []
-
-    def execute(self, statement):
-        self.said.append(str(statement.compile(dialect=self.dialect)))
-
-
-def test_postgres_changes_the_columns_in_place(monkeypatch):
-    told = Recorder()
-    monkeypatch.setattr(type(schema.uploaded_volumes), "create", lambda table, to: to.said.append(table.name))
-    migration.migrate(told, 1)
-    into = "INSERT INTO storage (tenant, name, bytes, reserved)"
-    assert told.said[:-1] == [
-        "uploaded_volumes",
-        "ALTER TABLE jobs ALTER COLUMN dataset_id DROP NOT NULL",
-        "ALTER TABLE jobs ADD COLUMN volume_id VARCHAR(32)",
-        *(
-            f"ALTER TABLE {table} ADD COLUMN tenant VARCHAR(64) NOT NULL DEFAULT 'local'"
-            for table in ("datasets", "uploaded_volumes", "volumes", "jobs")
-        ),
-        "ALTER TABLE jobs ADD COLUMN idempotency_key VARCHAR(200)",
-        "ALTER TABLE jobs ADD COLUMN request_sha256 VARCHAR(64)",
-        "ALTER TABLE jobs ADD COLUMN lease_owner VARCHAR(64)",
-        "ALTER TABLE jobs ADD COLUMN lease_until FLOAT",
-        "ALTER TABLE jobs ADD COLUMN phase VARCHAR(32)",
-        "ALTER TABLE jobs ADD COLUMN plan JSON",
-        "ALTER TABLE jobs ADD COLUMN advice VARCHAR(2000)",
-        "ALTER TABLE jobs ADD COLUMN mesh_id VARCHAR(32)",
-        "ALTER TABLE jobs ADD COLUMN field_id VARCHAR(32)",
-        "ALTER TABLE datasets ADD COLUMN job_id VARCHAR(32)",
-        "CREATE INDEX jobs_by_tenant ON jobs (tenant, state)",
-        "CREATE UNIQUE INDEX jobs_by_key ON jobs (tenant, idempotency_key)",
-        "CREATE INDEX datasets_by_tenant ON datasets (tenant, number)",
-        "CREATE INDEX uploaded_volumes_by_tenant ON uploaded_volumes (tenant, created)",
-        "CREATE INDEX volumes_by_tenant ON volumes (tenant, created)",
-        "CREATE INDEX jobs_by_age ON jobs (tenant, number)",
-        "meshes",
-        "geometry_fields",
-        "keys",
-        "uploads",
-        "bucket_mark",
-        "ALTER TABLE about ADD COLUMN observed_s FLOAT NOT NULL DEFAULT 0",
-        "ALTER TABLE about ADD COLUMN begun INTEGER NOT NULL DEFAULT 0",
-        "ALTER TABLE datasets ADD COLUMN counts JSON",
-        "checksums",
-        "too_old",
-        "storage",
-        *(
-            f"{into} SELECT tenant, id, bytes, false FROM {table}"
-            for table in ("datasets", "uploaded_volumes", "volumes", "meshes", "geometry_fields")
-        ),
-        f"{into} SELECT tenant, result_id, length, true FROM uploads "
-        "WHERE state IN ('receiving', 'reading') AND result_id NOT IN (SELECT name FROM storage)",
-        *(
-            f"ALTER TABLE {table} ADD COLUMN {column} NOT NULL DEFAULT ''"
-            for table in ("datasets", "jobs")
-            for column in ("name VARCHAR(200)", "notes VARCHAR(4000)")
-        ),
-        "ALTER TABLE jobs ADD COLUMN started_by VARCHAR(200) NOT NULL DEFAULT ''",
-        "ALTER TABLE datasets ADD COLUMN water_temperature_c FLOAT",
-        "sessions",
-        "pending_sign_ins",
-        "ALTER TABLE jobs ADD COLUMN batch_id VARCHAR(32)",
-        "CREATE INDEX jobs_by_batch ON jobs (batch_id)",
-        "batches",
-        "projects",
-        "project_members",
-        "ALTER TABLE jobs ADD COLUMN webhook VARCHAR(2000)",
-        "deliveries",
-        "webhook_secrets",
-        "ALTER TABLE uploads ADD COLUMN multipart_id VARCHAR(1024)",
-        "ALTER TABLE datasets ADD COLUMN idempotency_key VARCHAR(200)",
-        "ALTER TABLE datasets ADD COLUMN request_sha256 VARCHAR(64)",
-        "CREATE UNIQUE INDEX datasets_by_key ON datasets (tenant, idempotency_key)",
+@pytest.mark.parametrize("old", [12], indirect=True)
+def test_tenants_without_keys_are_those_of_claimed_names(old, tmp_path):
+    project = "project-0123456789abcdef0123"
+    with sqlite3.connect(tmp_path / "old.sqlite") as connection:
+        for number, tenant in enumerate(("alice", "alice", "bob@x", "clinic", project, "local")):
+            connection.execute(
+                "INSERT INTO storage (tenant, name, bytes, reserved) VALUES (?, ?, 1, 0)",
+                (tenant, str(number)),
+            )
+        connection.execute("INSERT INTO keys VALUES (1, 'k', 'clinic', '', '', '[]', 1, NULL, 1, NULL)")
+        connection.execute("INSERT INTO projects VALUES (1, ?, 'lab', 'Trial 7', 1)", (project,))
+        connection.execute("INSERT INTO project_members VALUES (1, ?, 'user:alice', 'owner', 1)", (project,))
+        connection.execute("INSERT INTO sessions VALUES (1, 's', 'clinic', 'eve', 'd', '[]', 1, 9e9)")
+    connection.close()
+    opened = open_database(old)
+    rows = opened.rows(select(schema.claimed_tenants))
+    assert sorted((row["tenant"], row["issuer"]) for row in rows) == [
+        ("alice", ""),
+        ("bob@x", ""),
+        ("lab", ""),
     ]
-    assert told.said[-1].startswith("UPDATE about SET version")
+    assert opened.rows(select(schema.sessions)) == []
+    Projects(opened).add(Tenant("lab"), "Trial 7", "user:alice")
+    assert [one["role"] for one in Projects(opened).all(Tenant("lab"), "user:alice")] == ["owner", "owner"]
+    opened.close()
 
 
 @pytest.mark.parametrize("version", [1, 6])
@@ -299,7 +245,8 @@ def test_a_real_postgres_keeps_its_jobs_and_is_as_a_new_one_afterwards(postgresq
             # What only the tables of this version hold: an upload under way, and an owner of a job.
             connection.exec_driver_sql(
                 "INSERT INTO uploads VALUES (4, 'up-x', 'dataset', 'ds-y', 9, '{}', '', 'receiving', NULL,"
-                " 1, 4e9, 'clinic'); UPDATE jobs SET started_by = 'alice'"
+                " 1, 4e9, 'clinic'); UPDATE jobs SET started_by = 'alice', tenant = 'alice';"
+                "INSERT INTO keys VALUES (1, 'k', 'clinic', '', '', '[]', 1, NULL, 1, NULL)"
             )
     engine.dispose()
     opened, new = map(open_database, addresses)
@@ -308,6 +255,8 @@ def test_a_real_postgres_keeps_its_jobs_and_is_as_a_new_one_afterwards(postgresq
     assert (job["id"], job["webhook"], job["batch_id"]) == (WAITING, None, None)
     if version == 6:
         assert job["started_by"] == "alice"
+        assert ClaimedTenants(opened).tenant("https://id.example", "sub", "1", "alice") == "alice"
+        assert ClaimedTenants(opened).tenant("https://id.example", "sub", "2", "clinic") != "clinic"
         (upload,) = opened.rows(select(schema.uploads))
         assert (upload["id"], upload["multipart_id"], upload["tenant"]) == ("up-x", None, "clinic")
     # What the new tables are for works in the migrated database.

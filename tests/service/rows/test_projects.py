@@ -8,7 +8,7 @@ from bentray_service.errors import InUse, QuotaExceeded, UnknownId
 from bentray_service.rows import schema, usage
 from bentray_service.rows.accounts import family_of
 from bentray_service.rows.projects import Projects, membership
-from bentray_service.rows.tenants import LOCAL, Tenant, tenant_of_user
+from bentray_service.rows.tenants import Tenant
 
 LAB, OTHER = Tenant("lab"), Tenant("other")
 ALICE, BOB = "user:alice", "user:bob"
@@ -63,14 +63,13 @@ def test_members_are_keys_or_users(projects, member):
         projects.put_member(projects.add(LAB, "One", ALICE), member, "reader")
 
 
-def test_names_are_unique_in_a_tenant(projects):
-    one = projects.add(LAB, "One", ALICE)
-    two = projects.add(LAB, "Two", ALICE)
-    projects.add(OTHER, "One", ALICE)
-    for use in (lambda: projects.add(LAB, "One", BOB), lambda: projects.rename(two, "One")):
-        with pytest.raises(InvalidInput, match="no other project"):
-            use()
-    projects.rename(one, "One")
+def test_names_of_projects_of_others_are_free(projects):
+    """A refusal would tell that there is one."""
+    projects.add(LAB, "One", ALICE)
+    two = projects.add(LAB, "Two", BOB)
+    assert projects.add(LAB, "One", BOB)["name"] == "One"
+    projects.rename(two, "One")
+    assert [row["name"] for row in projects.all(LAB, BOB)] == ["One", "One"]
 
 
 def test_memberships_end(projects):
@@ -110,9 +109,3 @@ def test_only_an_empty_project_is_deleted(projects, database):
         usage.release(connection, Tenant(project["id"]), "ds-1")
     projects.delete(project)
     assert projects.all(LAB, None) == []
-
-
-def test_no_user_is_a_project():
-    assert tenant_of_user("project-0123456789abcdef0123").startswith("user-")
-    assert tenant_of_user("project-x") == "project-x"
-    assert LOCAL == "local"
