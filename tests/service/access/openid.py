@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import hmac
 import json
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 from urllib.parse import parse_qs, urlencode, urlsplit
@@ -16,7 +15,6 @@ from urllib.parse import parse_qs, urlencode, urlsplit
 import flask
 import httpx
 import werkzeug.serving
-from joserfc import jwt
 from joserfc.jwk import RSAKey
 
 with warnings.catch_warnings():
@@ -24,8 +22,7 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore")
     from oidc_provider_mock import User, app
 
-# Changes the claims and the header of an ID token, and may return another key to sign with.
-Tamper = Callable[[dict[str, Any], dict[str, Any]], Any]
+from .forged_tokens import Tamper, coded, compact
 
 
 class TestProvider:
@@ -34,13 +31,15 @@ class TestProvider:
     Attributes:
         issuer: its address.
         tamper: what happens to the next ID tokens.
+        keys: published beside its own.
         requests: paths that were requested.
     """
 
     __test__ = False
 
     def __init__(self, users: dict[str, dict[str, Any]]) -> None:
-        self.tamper: Tamper = lambda claims, header: None
+        self.tamper: Tamper | None = None
+        self.keys: list[dict[str, Any]] = []
         self.document: dict[str, Any] = {}
         self.user_info: dict[str, Any] = {}
         self.requests: list[str] = []
@@ -70,7 +69,7 @@ class TestProvider:
             form = flask.request.form
             challenge = self._challenges.pop(form["code"], None)
             hashed = hashlib.sha256(form["code_verifier"].encode()).digest()
-            if challenge != _coded(hashed):
+            if challenge != coded(hashed):
                 return flask.Response('{"error": "invalid_grant"}', 400)
         return None
 
@@ -89,8 +88,9 @@ class TestProvider:
             answer.set_data(json.dumps({**answer.get_json(), **self.document}))
         if path == "/userinfo":
             answer.set_data(json.dumps({**answer.get_json(), **self.user_info}))
-        if path == "/jwks" and self._rotated is not None:
-            answer.set_data(json.dumps({"keys": [self._rotated.as_dict(private=False)]}))
+        if path == "/jwks":
+            rotated = [] if self._rotated is None else [self._rotated.as_dict(private=False)]
+            answer.set_data(json.dumps({"keys": [*self.keys, *(rotated or answer.get_json()["keys"])]}))
         if path == "/oauth2/token":
             answer.set_data(json.dumps(self._tampered(answer.get_json())))
         return answer
@@ -103,15 +103,8 @@ class TestProvider:
         own = held if isinstance(held, RSAKey) else RSAKey.import_key(held.as_dict(is_private=True))
         if self._rotated is not None:
             own, header["kid"] = self._rotated, self._rotated.kid
-        key = self.tamper(claims, header) or own
-        token = jwt.encode({**header, "alg": "RS256"}, claims, key)
-        if header["alg"] != "RS256":
-            signed = f"{_coded(json.dumps(header).encode())}.{token.split('.')[1]}"
-            # What confuses verifiers: no signature, or the public key as a shared secret.
-            secret = own.as_pem(private=False)
-            made = hmac.digest(secret, signed.encode(), "sha256") if header["alg"] == "HS256" else b""
-            token = f"{signed}.{_coded(made)}"
-        return {**answer, "id_token": token}
+        token = self.tamper(claims, header, own) if self.tamper else None
+        return {**answer, "id_token": compact(header, claims, own) if token is None else token}
 
     def authorize(self, address: str, user: str | None) -> str:
         """Sign a user in, or deny; returns the address to which the browser is sent."""
@@ -119,10 +112,6 @@ class TestProvider:
         answer = self.http.post(address, data=form)
         assert answer.status_code == 302, answer.text
         return answer.headers["Location"]
-
-
-def _coded(some: bytes) -> str:
-    return base64.urlsafe_b64encode(some).rstrip(b"=").decode()
 
 
 @contextmanager

@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from urllib.parse import parse_qs, urlencode, urlsplit
 
 import pytest
-from joserfc.jwk import RSAKey
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.access import openid_provider
@@ -15,6 +14,19 @@ from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
 
 from ..conftest import FakeCluster, TestClient
+from .forged_tokens import (
+    ACCEPTED,
+    EXPIRED,
+    FOREIGN,
+    FORGED,
+    MALFORMED,
+    TOO_LARGE,
+    another_key,
+    coded,
+    compact,
+    edit,
+    head,
+)
 from .openid import providing
 
 # Of the provider, which uses names that Authlib will remove.
@@ -44,7 +56,7 @@ def provider():
 @pytest.fixture(autouse=True)
 def honest(provider):
     yield
-    provider.tamper, provider.down = lambda claims, header: None, False
+    provider.tamper, provider.down, provider.keys = None, False, []
     provider.document, provider.user_info = {}, {}
 
 
@@ -243,41 +255,68 @@ def test_a_user_may_decline(http, provider):
     refused(http.get(back(http, provider, user=None)), 401, "access_denied", "Sign in again")
 
 
-def edit(**values):
-    def tamper(claims, header):
-        claims.update(values)
-        for name in [name for name, value in values.items() if value is None]:
-            del claims[name]
-
-    return tamper
-
-
-def signed_by(algorithm):
-    return lambda claims, header: header.update(alg=algorithm)
-
-
-LIES = {
-    "nonce": edit(nonce="another"),
-    "no nonce": edit(nonce=None),
-    "audience": edit(aud="another client"),
-    "audiences without azp": edit(aud=["bentray", "another"]),
-    "azp": edit(azp="another client"),
-    "issuer": edit(iss="http://evil.example"),
-    "expired": edit(exp=int(time.time()) - 3600),
-    "no exp": edit(exp=None),
-    "from the future": edit(iat=int(time.time()) + 3600),
-    "no subject": edit(sub=None),
-    "alg none": signed_by("none"),
-    "the public key as a shared secret": signed_by("HS256"),
-    "another key": lambda claims, header: RSAKey.generate_key(2048),
-}
+LIES = FORGED | EXPIRED | FOREIGN | MALFORMED
 
 
 @pytest.mark.parametrize("name", LIES)
 def test_id_tokens_that_lie(http, provider, name):
     provider.tamper = LIES[name]
-    refused(http.get(back(http, provider)), 401, "ID token")
+    refused(http.get(back(http, provider)), 401, "sign-in did not succeed")
     assert http.get("/v1/access").status_code == 401
+
+
+@pytest.mark.parametrize("name", ACCEPTED)
+def test_id_tokens_that_do_not(http, provider, name):
+    provider.tamper = ACCEPTED[name]
+    signed_in(http, provider)
+    assert http.get("/v1/access").json()["who"] == "alice"
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"use": "enc"}, {"key_ops": ["encrypt"]}, {"key_ops": ["wrapKey"]}, {"alg": "RSA-OAEP"}]
+)
+def test_keys_of_another_use_do_not_sign(http, provider, wrong):
+    published = {**another_key().as_dict(private=False), **wrong}
+    provider.keys = [published]
+    provider.tamper = lambda claims, header, key: compact({**header, "kid": "another"}, claims, another_key())
+    refused(http.get(back(http, provider)), 401, "ID token")
+    provider.keys = [{"kty": "oct", "k": coded(b"known to all" * 4), "kid": "another"}]
+    provider.tamper = lambda claims, header, key: compact(
+        {"alg": "HS256", "kid": "another"}, claims, key, b"known to all" * 4
+    )
+    refused(http.get(back(http, provider)), 401, "ID token")
+
+
+def test_a_token_without_end(http, provider):
+    provider.tamper = TOO_LARGE
+    refused(http.get(back(http, provider)), 503, "more than 1048576 bytes")
+
+
+def test_a_token_of_before_does_not_count(http, provider):
+    kept = []
+    provider.tamper = lambda claims, header, key: kept.append(compact(header, claims, key))
+    signed_in(http, provider)
+    http.cookies.clear()
+    provider.tamper = lambda claims, header, key: kept[0]
+    refused(http.get(back(http, provider)), 401, "nonce")
+
+
+def test_an_address_and_its_verification_come_from_one_source(tmp_path, provider):
+    provider.user_info = {"email": "a@lab.example", "email_verified": True}
+    with started(tmp_path, provider, oidc_user_claim="email") as http:
+        for claims, status in (
+            ({"email": "a@lab.example"}, 303),
+            ({"email": "a@lab.example", "email_verified": True}, 303),
+            ({"email": "a@lab.example", "email_verified": "true"}, 403),
+            ({"email": "a@lab.example", "email_verified": False}, 403),
+            # What is verified is the address in the user info.
+            ({"email": "boss@lab.example"}, 303),
+        ):
+            http.cookies.clear()
+            provider.tamper = edit(**claims)
+            assert http.get(back(http, provider)).status_code == status, claims
+            if status == 303:
+                assert http.get("/v1/access").json()["who"] == "a@lab.example"
 
 
 def test_keys_rotate(http, provider, monkeypatch):
@@ -286,7 +325,7 @@ def test_keys_rotate(http, provider, monkeypatch):
     signed_in(http, provider)
     # Invented keys do not make the service ask without end.
     monkeypatch.setattr(openid_provider, "ROTATION_S", 30.0)
-    provider.tamper = lambda claims, header: header.update(kid="invented")
+    provider.tamper = head(kid="invented")
     before = provider.requests.count("/jwks")
     for _ in range(3):
         refused(http.get(back(http, provider)), 401, "ID token")
