@@ -239,6 +239,8 @@ class Provider:
                     body += piece
                     if len(body) > MAX_BYTES:
                         raise ProviderUnavailable(f"an answer of more than {MAX_BYTES} bytes")
+        except ProviderUnavailable:
+            raise
         except (httpx.HTTPError, httpx.InvalidURL, InvalidInput) as error:
             # For the operator: users do not see proxies.
             proxy = through_proxy(error.request.url) if isinstance(error, httpx.TransportError) else ""
