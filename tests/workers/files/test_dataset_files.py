@@ -149,7 +149,6 @@ WRONG = {
             array(f"waveform/{n}", np.zeros((12, 12, 20), np.int16))[1](f) for n in ("object", "water")
         ],
     ),
-    "traces too wide": array("waveform/object", np.zeros((12, 24, 20), np.int32)),
     "water traces": array("waveform/water", np.zeros((12, 24, 10), np.int16)),
     "scale": attr("waveform", "scale", 0.0),
     "trace scale": array("waveform/object_scale", np.ones(12)),

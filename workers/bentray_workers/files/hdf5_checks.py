@@ -9,6 +9,8 @@ import h5py
 
 from bentray_kernels.errors import InvalidInput
 
+from .complex_numbers import check_real
+
 FILTERS = {
     h5py.h5z.FILTER_DEFLATE: "gzip",
     h5py.h5z.FILTER_SHUFFLE: "shuffle",
@@ -65,6 +67,7 @@ def check_storage(path: str, stored: h5py.Dataset, accepted: str, limits: Limits
     """
     kind = stored.id.get_type().get_class()
     if kind not in TYPES:
+        check_real(path, stored.dtype, accepted)
         raise InvalidInput(path, OTHER_TYPES.get(kind, "an unknown type"), accepted)
     if kind == h5py.h5t.ENUM and stored.dtype.kind != "b":
         raise InvalidInput(path, "names of numbers", accepted)

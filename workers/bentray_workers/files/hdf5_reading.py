@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
+from .complex_numbers import check_real
 from .damage import first_bytes, rejecting_damage
 from .hdf5_checks import OTHER_TYPES, TYPES, Limits, check_storage
 
@@ -147,6 +148,7 @@ class Reader:
             attribute = h5py.h5a.open(owner.id, name.encode())
             kind = attribute.get_type().get_class()
             if kind != h5py.h5t.STRING and kind not in TYPES:
+                check_real(field, attribute.dtype, "text or numbers")
                 raise InvalidInput(field, OTHER_TYPES.get(kind, "an unknown type"), "text or numbers")
             if attribute.get_space().get_simple_extent_npoints() not in range(1, 17):
                 raise InvalidInput(field, f"shape {attribute.shape}", "one value, or one per axis")

@@ -16,6 +16,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPACING_M
 from bentray_kernels.ranges import Range
 
+from .complex_numbers import check_real
 from .hdf5_reading import Limits, Reader, opened, printable
 from .hdf5_writing import atomic_hdf5
 from .volume_axes import MAX_SHEAR, Grid, PositionedImage
@@ -145,8 +146,9 @@ def check_shape(field: str, shape: Sequence[int], least: int = 2) -> None:
 
 def check_type(field: str, dtype: np.dtype[Any]) -> None:
     """Refuse what is not a real number."""
+    check_real(field, dtype, "integers or floating-point numbers")
     if dtype.kind not in "buif":
-        words = {"c": "complex numbers", "O": "Python objects", "V": "records, as RGB"}
+        words = {"O": "Python objects", "V": "records, as RGB"}
         found = words.get(dtype.kind, "no numbers")
         raise InvalidInput(field, f"{found} ({dtype})", "integers or floating-point numbers")
 

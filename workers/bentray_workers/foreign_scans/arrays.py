@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import COUNTED, OVER_PAIRS, check_size
 
+from ..files.complex_numbers import check_real
+
 # Of an array that is read whole, and of one row of an array that is read by rows.
 LARGEST_WHOLE = 256 * 2**20
 LARGEST_ROW = 256 * 2**20
@@ -88,6 +90,7 @@ def check_declared(
     Raises:
         InvalidInput: naming it.
     """
+    check_real(name, dtype, "real numbers")
     if dtype.kind not in "iufb" or dtype.itemsize > 8:
         raise InvalidInput(name, f"{dtype}", "real numbers of at most 8 bytes, or booleans")
     if len(shape) > MAX_AXES or any(n < 0 for n in shape):

@@ -10,7 +10,7 @@ from bentray_kernels.acquisition.plausibility import ImplausibleUnit
 from bentray_kernels.errors import InvalidInput
 
 from ..files.dataset.copy import copy_dataset
-from ..files.dataset.read import trace_type
+from ..files.dataset.read import kept_traces
 from ..files.dataset.write import Piece, bytes_of, write_dataset
 from ..files.hdf5_reading import Limits
 from .arrays import Arrays
@@ -104,7 +104,7 @@ def _write(arrays: Arrays, layout: Layout, target: Path, on_size: Callable[[int]
         place = layout.traces[name]
         for e, emission in enumerate(arrays.rows(place)):
             where = (slice(e, e + 1), slice(0, emission.shape[0]), slice(0, emission.shape[1]))
-            yield where, trace_type(place, emission[None])
+            yield where, kept_traces(emission[None])
 
     write_dataset(target, layout.dataset, pieces)
     return layout.dataset

@@ -100,4 +100,4 @@ def placeholder(arrays: Arrays, name: str) -> NDArray[Any]:
     shape, dtype = declared(arrays, name)
     if len(shape) != 3:
         raise InvalidInput(name, f"shape {shape}", "(ntx, nrx, nt)")
-    return np.broadcast_to(trace_type(name, np.zeros((), dtype=dtype)), shape)
+    return np.broadcast_to(np.zeros((), trace_type(dtype)), shape)

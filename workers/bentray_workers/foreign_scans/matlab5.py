@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
+from ..files.complex_numbers import ACCEPTED
 from .arrays import check_declared, check_row
 from .stream import Stream
 
@@ -39,7 +40,7 @@ OTHERS = {
     16: "a function",
     17: "opaque",
 }
-COMPLEX = 0x0800
+COMPLEX, COMPLEX_NUMBERS = 0x0800, "complex numbers"
 
 MAX_VARIABLES = 1000
 LONGEST_NAME = 200
@@ -95,7 +96,10 @@ class Matlab5:
         if variable is None:
             return None
         if isinstance(variable.found, str):
-            raise InvalidInput(name, variable.found, "a plain array of real numbers")
+            accepted = "a plain array of real numbers"
+            if variable.found == COMPLEX_NUMBERS:
+                accepted = f"{accepted}; {ACCEPTED}"
+            raise InvalidInput(name, variable.found, accepted)
         shape, dtype, stored = variable.found
         reversed_shape = shape[::-1]
         packing = PACKING if variable.packed else 1.0
@@ -167,7 +171,7 @@ class Matlab5:
         shape_data = self._small(stream, 4 * 32)
         name = self._small(stream, LONGEST_NAME).decode("ascii", "replace")
         if number not in NUMBERS or word & COMPLEX:
-            what = "complex numbers" if number in NUMBERS else OTHERS.get(number, f"class {number}")
+            what = COMPLEX_NUMBERS if number in NUMBERS else OTHERS.get(number, f"class {number}")
             return name, _Variable(offset, length, packed, 0, what)
         shape = tuple(int(n) for n in np.frombuffer(shape_data, dtype=self._order + "i4"))
         kind, count, inline = self._tag(stream)

@@ -37,7 +37,7 @@ def _read(scan: OpenScan) -> StreamedScan:
     version = reader.text("", "format_version")
     if version is not None and not version.startswith(MAJOR):
         raise InvalidInput("@format_version", repr(version), "version 1 of openUSCT")
-    data = reader.checked(DATA, "f", DATA_SHAPE)
+    data = reader.checked(DATA, "iuf", DATA_SHAPE)
     assert data is not None
     if data.ndim != 3 or 0 in data.shape:
         raise InvalidInput(DATA, f"shape {data.shape}", DATA_SHAPE)
@@ -46,6 +46,10 @@ def _read(scan: OpenScan) -> StreamedScan:
     if position is None or position.ndim != 2 or len(position) != receivers:
         found = "nothing" if position is None else f"shape {position.shape}"
         raise InvalidInput(POSITION, found, f"({receivers}, 2 or 3), as many as receivers in {DATA}")
+    count = reader.number("geometry", "n_elements", "elements")
+    if count not in (None, receivers):
+        found = f"{count:g}, with {receivers} elements in {POSITION}"
+        raise InvalidInput("geometry@n_elements", found, f"{receivers}, or no attribute")
     emitters = _small(reader, EMITTERS, "iu", "(n_tx,) integers", emissions)
     if emitters is not None and emitters.shape != (emissions,):
         raise InvalidInput(EMITTERS, f"shape {emitters.shape}", f"({emissions},), as of {DATA}")
@@ -93,7 +97,7 @@ READER = ScanReader(
     "time. Attributes are marked with @. The ground truth of a simulation is not read.",
     variables=(
         Variable("/geometry/element_pos", "(N, 2 or 3)", "m", "positions of the elements"),
-        Variable("/acquisition/data", "(n_tx, n_samples, n_rx) float32", "any", "traces; N is n_rx"),
+        Variable("/acquisition/data", "(n_tx, n_samples, n_rx) numbers", "any", "traces; N is n_rx"),
         Variable("/acquisition @sample_rate_hz", "number", "Hz", "sampling rate"),
         Variable(
             "/acquisition/tx_elements",
@@ -104,6 +108,7 @@ READER = ScanReader(
         ),
         Variable("/acquisition @tx_centre_freq_hz", "number", "Hz", "centre frequency", "no"),
         Variable("/acquisition @nominal_speed_m_s", "number", "m/s", "speed in the coupling medium", "no"),
+        Variable("/geometry @n_elements", "number", "", "N, which is checked", "no"),
         Variable("/geometry @radius_m", "number", "m", "radius of the ring", "no"),
     ),
     detect=_detect,

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import check_size
 
+from ..files.complex_numbers import ACCEPTED
 from ..files.hdf5_reading import Reader
 from .layouts import named_layout
 from .matlab73 import rows_of
@@ -47,14 +48,15 @@ def _read(scan: OpenScan) -> StreamedScan:
     track = next(track for track in TRACKS if scan.has(track + RAW))
     if scan.has("tracks/track_1"):
         raise InvalidInput("tracks", "several tracks", "a file with one track")
-    raw = reader.checked(track + RAW, "if", RAW_SHAPE)
+    raw = reader.checked(track + RAW, "iuf", RAW_SHAPE)
     assert raw is not None
     if raw.ndim != 5 or 0 in raw.shape:
         raise InvalidInput(track + RAW, f"shape {raw.shape}", RAW_SHAPE)
     frames, emissions, samples, elements, channels = raw.shape
     if frames != 1 or channels != 1:
         found = f"{frames} frames and {channels} channels (shape {raw.shape})"
-        raise InvalidInput(track + RAW, found, "one frame of radio-frequency data (n_frames 1, n_ch 1)")
+        accepted = f"one frame of radio-frequency data (n_frames 1, n_ch 1); {ACCEPTED}"
+        raise InvalidInput(track + RAW, found, accepted)
     field = _Fields(reader, track)
     position = field.numbers("probe_geometry", (elements, 3), "m")
     rate = field.number("sampling_frequency", "Hz")
@@ -164,7 +166,7 @@ READER = ScanReader(
     "frame of radio-frequency data. An array in a plane becomes a 2-D scan. Maps of the true speed are not "
     "read.",
     variables=(
-        Variable("data/raw_data", "(1, n_tx, n_ax, n_el, 1) float32 or int16", "any", "traces"),
+        Variable("data/raw_data", "(1, n_tx, n_ax, n_el, 1) numbers", "any", "traces"),
         Variable(
             "scan/probe_geometry or probe/probe_geometry", "(n_el, 3)", "m", "positions of the elements"
         ),

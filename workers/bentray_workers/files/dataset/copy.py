@@ -12,7 +12,7 @@ import h5py
 from bentray_kernels.acquisition import Dataset
 
 from ..hdf5_reading import Limits, opened, rejecting_hdf5_damage
-from .read import NUMERIC, TRACES, dataset_of, placeholder_traces, trace_type
+from .read import NUMERIC, TRACES, dataset_of, kept_traces, placeholder_traces
 from .write import Piece, bytes_of, write_dataset
 
 # Size of one piece; it takes about three times as much while it is read, converted and compressed.
@@ -56,7 +56,7 @@ def copy_dataset(
             for where in blocks(stored, chunk):
                 with rejecting_hdf5_damage(path, TRACES):
                     values = stored[where]
-                yield where, trace_type(path, values)
+                yield where, kept_traces(values)
 
         write_dataset(target, dataset, pieces)
     return dataset

@@ -28,7 +28,7 @@ from .units import POSITION_UNITS, TIME_UNITS
 NUMERIC = "iuf"
 # Arrays whose number of rows, pairs or nodes is checked before anything is read.
 SIZED = (*(place for place in COUNTED if place not in OVER_PAIRS), *OVER_PAIRS, *OVER_NODES)
-TRACES = "int16 or float32 traces over (ntx, nrx, nt)"
+TRACES = "real numbers, traces over (ntx, nrx, nt)"
 
 
 def read_dataset(path: Path, *, traces: bool = True, limits: Limits | None = None) -> Dataset:
@@ -172,25 +172,24 @@ def placeholder_traces(reader: Reader) -> Waveform:
         stored = reader.checked(path, NUMERIC, TRACES)
         if stored is None:
             return None
-        zero = trace_type(path, np.zeros((), dtype=stored.dtype))
-        return np.broadcast_to(zero, stored.shape)
+        return np.broadcast_to(np.zeros((), trace_type(stored.dtype)), stored.shape)
 
     return _waveform(reader, placeholder)
 
 
-def trace_type(path: str, array: NDArray[Any]) -> NDArray[Any]:
-    """Traces as int16 or float32, whichever holds them.
+def trace_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
+    """Type in which traces are kept: int16 where that holds theirs, else float32.
 
-    Raises:
-        InvalidInput: naming ``path``, for wider integers.
+    Values of 24 bits stay exact; longer ones, of wide integers and float64, are rounded to -144 dB of each.
     """
-    if array.dtype.kind == "f":
-        # A damaged NaN may signal, which is no reason to warn.
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.ascontiguousarray(array, dtype=np.float32).reshape(array.shape)
-    if not np.can_cast(array.dtype, np.int16):
-        raise InvalidInput(path, f"{array.dtype}", TRACES)
-    return np.ascontiguousarray(array, dtype=np.int16).reshape(array.shape)
+    return np.dtype(np.int16 if np.can_cast(dtype, np.int16) else np.float32)
+
+
+def kept_traces(array: NDArray[Any]) -> NDArray[Any]:
+    """Traces as ``trace_type``, contiguous."""
+    # A damaged NaN may signal, which is no reason to warn.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.ascontiguousarray(array, dtype=trace_type(array.dtype)).reshape(array.shape)
 
 
 def _waveform(reader: Reader, traces: Callable[[str], NDArray[Any] | None] | None = None) -> Waveform:
@@ -210,7 +209,7 @@ def _waveform(reader: Reader, traces: Callable[[str], NDArray[Any] | None] | Non
 
 def _traces(reader: Reader, path: str) -> NDArray[Any] | None:
     array = reader.array(path, NUMERIC, TRACES)
-    return None if array is None else trace_type(path, array)
+    return None if array is None else kept_traces(array)
 
 
 def _truth(reader: Reader) -> Truth | None:

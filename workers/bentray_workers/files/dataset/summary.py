@@ -18,7 +18,7 @@ from bentray_kernels.tomography.settings import Settings
 
 from ..hdf5_reading import Limits, Reader, opened
 from .counts import DatasetCounts, Summary, array_counts
-from .read import NUMERIC
+from .read import NUMERIC, trace_type
 from .scan import spectrum_in
 from .traces import samples_in
 
@@ -52,7 +52,7 @@ def counts_in(path: Path) -> DatasetCounts:
             amplitudes=_bytes(reader, "amplitude/log_ratio_np") > 0,
             traces_bytes=sum(_bytes(reader, f"waveform/{name}") for name in ("object", "water")),
             samples=samples_in(reader),
-            sample_bytes=0 if received is None else 2 if received.dtype.kind != "f" else 4,
+            sample_bytes=0 if received is None else trace_type(received.dtype).itemsize,
             rate_hz=reader.number("acquisition", "sampling_rate_hz", "Hz"),
             frequency_hz=frequency,
             # The speed hardly affects sizes.

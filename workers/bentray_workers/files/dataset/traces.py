@@ -18,7 +18,7 @@ from bentray_kernels.acquisition.emissions import Emissions
 
 from ..hdf5_reading import Limits, Reader, opened, rejecting_hdf5_damage
 from .counts import BLOCK_BYTES
-from .read import NUMERIC, TRACES, trace_type
+from .read import NUMERIC, TRACES, kept_traces, trace_type
 
 
 def trace_samples(path: Path) -> int:
@@ -97,12 +97,12 @@ def emissions_in(
         some = slice(number * block, (number + 1) * block)
         with rejecting_hdf5_damage(path, TRACES):
             found = stored[some] if index is None else stored[index, some]
-        return trace_type(path, found)
+        return kept_traces(found)
 
     def emission(e: int) -> NDArray[Any]:
         poll()
         traces: NDArray[Any] = rows(e // block)[e % block]
         return traces
 
-    dtype = trace_type(path, np.zeros(1, dtype=stored.dtype)).dtype
+    dtype = trace_type(stored.dtype)
     return Emissions.of(emission, stored.shape[-3:], dtype)
