@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
 from .mesh import TriangleMesh
 from .opening import cut_open
-from .topology import components, edges_of, side_ends, topology_of
-
-# Lowest ratio of a triangle's height to its longest side: angles of thinner ones are dominated by rounding.
-THINNEST = 1e-9
+from .repair import THINNEST, merged_nearly, thinness, without_flat_faces, without_repetition
+from .topology import Topology, components, edges_of, side_ends, topology_of
 
 
 @dataclass(frozen=True)
@@ -24,8 +23,10 @@ class SoundMesh:
     Attributes:
         mesh: every vertex is used by one fan of faces; closed surfaces have their normals outward.
         origin: (vertices,) original vertex of each.
-        merged: number of vertices at the position of another one.
+        merged: number of vertices at the position of another one, or as near to it as a file rounds.
         unused: number of vertices without a face.
+        flat: number of faces without area that were left out; a neighbour was divided where that was needed.
+        repeated: number of faces of the same vertices as another one that were left out.
         turned: number of faces with reversed orientation.
         parted: number of vertices added where fans of faces touched in one.
         holes: boundaries; 0 for a closed surface.
@@ -36,6 +37,8 @@ class SoundMesh:
     origin: Ints
     merged: int
     unused: int
+    flat: int
+    repeated: int
     turned: int
     parted: int
     holes: int
@@ -43,52 +46,49 @@ class SoundMesh:
 
 
 def sound(vertices: Floats, faces: NDArray[np.integer]) -> SoundMesh:
-    """Merge coincident vertices, orient faces consistently, split touching fans, and reject other defects.
+    """Repair what has one repair, orient faces consistently, split touching fans, and reject other defects.
 
     Args:
         vertices: (vertices, 3), any unit.
         faces: (faces, 3) rows of ``vertices``.
 
     Raises:
-        InvalidInput: for other shapes, no faces, rows out of range, vertices that are not finite, faces of no
-            area, edges of three faces or more, a surface that cannot be oriented, or several pieces.
+        InvalidInput: for other shapes, no faces, rows out of range, vertices of faces that are not finite,
+            faces without area that cannot be left out, edges of three faces or more, a surface that cannot be
+            oriented, or several pieces.
     """
     rows: Ints = np.asarray(faces, np.int64)
     vertices = np.asarray(vertices, np.float64)
     _plain(vertices, rows)
+    in_a_face = np.unique(rows)
     # Adding 0 makes −0 the same as 0.
-    _, first, place = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
-    used, inverse = np.unique(place.ravel()[rows], return_inverse=True)
-    joined = inverse.reshape(-1, 3)
-    origin = first[used]
-    mesh = TriangleMesh(vertices[origin], joined.astype(np.int32))
-    thin = _thinness(mesh)
-    flat, needles = int((thin == 0.0).sum()), int((thin < THINNEST).sum())
-    if flat:
-        raise InvalidInput("faces", f"{flat} without area", "triangles whose corners are not on one line")
-    if needles:
-        accepted = f"triangles as high as {THINNEST:g} of their longest side or higher"
-        raise InvalidInput("faces", f"{needles} needles without height", accepted)
-    oriented, turned = _turned_alike(joined)
+    _, first, place = np.unique(vertices[in_a_face] + 0.0, axis=0, return_index=True, return_inverse=True)
+    origin = in_a_face[first]
+    joined: Ints = place.ravel()[np.searchsorted(in_a_face, rows)]
+    places = vertices[origin]
+    joined, repeated = without_repetition(joined)
+    joined, flat = without_flat_faces(places, joined)
+    _check_area(places, origin, joined, flat)
+    joined, near = merged_nearly(places, joined)
+    joined, repeated_near = without_repetition(joined) if near else (joined, 0)
+    oriented, turned = _turned_alike(joined, origin, vertices)
     topology = topology_of(oriented)
-    pieces = int(topology.pieces.max()) + 1
-    if pieces > 1:
-        raise InvalidInput("faces", f"{pieces} pieces", "one connected surface")
+    _check_one_piece(places, topology)
     whole = cut_open(topology, np.zeros(len(topology.edges), bool))
     holes = len(topology.boundary_loops)
-    result = TriangleMesh(mesh.vertices[whole.origin], whole.faces.astype(np.int32))
+    result = TriangleMesh(places[whole.origin], whole.faces.astype(np.int32))
     if holes == 0 and _volume(result) < 0.0:
         result = TriangleMesh(result.vertices, np.ascontiguousarray(result.faces[:, ::-1]))
-        turned = len(faces) - turned
-    in_a_face = np.zeros(len(vertices), bool)
-    in_a_face[rows] = True
+        turned = len(oriented) - turned
     return SoundMesh(
         result,
         origin[whole.origin],
-        merged=int(in_a_face.sum()) - len(used),
-        unused=int((~in_a_face).sum()),
+        merged=len(in_a_face) - len(origin) + near,
+        unused=len(vertices) - len(in_a_face),
+        flat=flat,
+        repeated=repeated + repeated_near,
         turned=turned,
-        parted=len(whole.origin) - len(used),
+        parted=len(whole.origin) - len(np.unique(oriented)),
         holes=holes,
         genus=topology_of(result.faces).genus,
     )
@@ -104,32 +104,58 @@ def _plain(vertices: Floats, faces: Ints) -> None:
         wrong = int(((faces < 0) | (faces >= len(vertices))).sum())
         accepted = f"rows 0 to {len(vertices) - 1} of the vertices"
         raise InvalidInput("faces", f"{wrong} corners out of range", accepted)
-    infinite = int((~np.isfinite(vertices)).any(axis=1).sum())
-    if infinite:
-        raise InvalidInput("vertices", f"{infinite} that are not finite", "finite numbers")
+    infinite = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    infinite = infinite[np.isin(infinite, faces)]
+    if infinite.size:
+        found = f"{infinite.size} that are not finite, the first number {infinite[0]} (from 0)"
+        raise InvalidInput("vertices", found, "finite numbers, or no face with them")
     # The square of an area must neither overflow nor vanish.
     span = float(np.ptp(vertices[faces.ravel()], axis=0).max())
     if not 1e-60 < span < 1e60:
         raise InvalidInput("vertices", f"a box of {span:g}", "a longest side between 1e-60 and 1e60")
 
 
-def _thinness(mesh: TriangleMesh) -> Floats:
-    """(faces,) height over the longest side; 0 if it is below the rounding of the coordinates."""
-    corners = mesh.corners
-    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1).max(axis=1)
-    rounding = np.finfo(np.float64).eps * np.abs(mesh.vertices).max()
-    longest = np.where(longest > 0.0, longest, 1.0)
-    height = 2.0 * np.linalg.norm(mesh.face_normals, axis=1) / longest
-    return np.asarray(np.where(height <= 4.0 * rounding, 0.0, height / longest))
-
-
-def _turned_alike(faces: Ints) -> tuple[Ints, int]:
-    """Orient the faces consistently, with the fewest changes in each piece; returns the number changed."""
-    _, side_edge, count = edges_of(faces)
-    if (count > 2).any():
+def _check_area(places: Floats, origin: Ints, faces: Ints, left_out: int) -> None:
+    """Reject faces without area that are left; ``left_out`` others are gone."""
+    if not len(faces):
+        raise InvalidInput("faces", f"{left_out} without area and no other", "triangles with an area")
+    thin = thinness(places, faces)
+    number = int((thin < THINNEST).sum())
+    if number:
+        corners = ", ".join(map(str, origin[faces[np.argmin(thin)]]))
+        found = f"{number} without area, the first between the vertices {corners}"
         raise InvalidInput(
-            "faces", f"{(count > 2).sum()} edges of three faces or more", "two at most along an edge"
+            "faces", found, f"triangles as high as {THINNEST:g} of their longest side or higher"
         )
+
+
+def _check_one_piece(places: Floats, topology: Topology) -> None:
+    """Reject several pieces, with the distance of their vertices: what belongs together may lie apart."""
+    pieces = int(topology.pieces.max()) + 1
+    if pieces == 1:
+        return
+    largest = topology.pieces == np.bincount(topology.pieces).argmax()
+    own, others = (np.unique(topology.faces[part]) for part in (largest, ~largest))
+    apart = float(cKDTree(places[own]).query(places[others])[0].min())
+    found = f"{pieces} pieces that share no edges, their nearest corners {apart:g} apart"
+    raise InvalidInput("faces", found, "one connected surface: merge its corners, or keep the largest piece")
+
+
+def _turned_alike(faces: Ints, origin: Ints, vertices: Floats) -> tuple[Ints, int]:
+    """Orient the faces consistently, with the fewest changes in each piece; returns the number changed.
+
+    Args:
+        faces: (faces, 3) rows of ``origin``.
+        origin: original vertices, rows of ``vertices``, for errors.
+        vertices: (vertices, 3).
+    """
+    edges, side_edge, count = edges_of(faces)
+    if (count > 2).any():
+        start, end = origin[edges[np.argmax(count > 2)]]
+        where = ", ".join(f"{value:g}" for value in vertices[start])
+        first = f"the first from vertex {start} ({where}) to {end}"
+        found = f"{(count > 2).sum()} edges of three faces or more, {first}"
+        raise InvalidInput("faces", found, "two at most along an edge")
     order = np.argsort(side_edge, kind="stable")
     second = np.cumsum(count)[count == 2] - 1
     one, other = order[second - 1], order[second]

@@ -125,8 +125,8 @@ REFUSED: dict[str, tuple[spoil.Build, str]] = {
     "a square of indices": (spoil.replaced("acquisition/tx", data=np.zeros((3, 4), int)), "acquisition/tx"),
     "two elements": (spoil.replaced(POSITION, data=np.zeros((2, 2))), POSITION),
     "four dimensions": (spoil.replaced(POSITION, data=np.zeros((24, 4))), POSITION),
-    "traces of 32 bits": (
-        spoil.replaced("waveform/object", data=np.zeros((12, 24, 20), "i4")),
+    "complex traces": (
+        spoil.replaced("waveform/object", data=np.zeros((12, 24, 20), "c8")),
         "waveform/object",
     ),
     "no traces": (spoil.replaced("waveform/object", data=np.zeros((12, 24, 0), "i2")), "waveform/object"),

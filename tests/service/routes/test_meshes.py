@@ -67,6 +67,9 @@ def test_repairs_are_reported(http):
     faces[7] = faces[7, ::-1]
     made = send(http, off(mesh_with(doubled, faces))).json()
     assert (made["repairs"]["merged_vertices"], made["repairs"]["turned_faces"]) == (480, 1)
+    listed = np.vstack((RING.faces, RING.faces[:2, ::-1], [[0, 0, 1]]))
+    repairs = send(http, off(mesh_with(faces=listed))).json()["repairs"]
+    assert (repairs["repeated_faces"], repairs["flat_faces"], repairs["turned_faces"]) == (2, 1, 0)
     left = RING.corners.mean(axis=1)[:, 0] < 0.3
     half_a_ring = send(http, off(mesh_with(faces=RING.faces[left]))).json()
     assert (half_a_ring["closed"], half_a_ring["holes"], half_a_ring["genus"]) == (False, 2, 0)
@@ -87,8 +90,8 @@ BROKEN = {
         "faces",
         "2 pieces",
     ),
-    "a face without area": (
-        mesh_with(faces=np.vstack((RING.faces, [[0, 0, 1]]))),
+    "faces without area": (
+        mesh_with(faces=np.repeat(RING.faces[:, :1], 3, axis=1)),
         "faces",
         "without area",
     ),

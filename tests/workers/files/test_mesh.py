@@ -42,6 +42,8 @@ def test_summary_lists_repairs():
     assert found["repairs"] == {
         "merged_vertices": 0,
         "unused_vertices": 1,
+        "flat_faces": 0,
+        "repeated_faces": 0,
         "turned_faces": 1,
         "parted_vertices": 0,
         "dropped_pieces": 2,

@@ -61,6 +61,8 @@ def summary_of(stored: StoredMesh, surface: SoundMesh, kind: str, pieces: int = 
     repairs = {
         "merged_vertices": surface.merged,
         "unused_vertices": surface.unused,
+        "flat_faces": surface.flat,
+        "repeated_faces": surface.repeated,
         "turned_faces": surface.turned,
         "parted_vertices": surface.parted,
         "dropped_pieces": pieces - 1,

@@ -13,8 +13,12 @@ from ...html_tables import ShownRecord
 class Repairs(BaseModel):
     """Repairs of a mesh."""
 
-    merged_vertices: int = Field(description="Merged duplicate vertices.")
+    merged_vertices: int = Field(
+        description="Merged vertices at one position, within the rounding of a file."
+    )
     unused_vertices: int = Field(description="Removed vertices without a face.")
+    flat_faces: int = Field(0, description="Removed faces without area; the surface stays the same.")
+    repeated_faces: int = Field(0, description="Removed faces of the same three vertices as another one.")
     turned_faces: int = Field(description="Faces with reversed orientation.")
     parted_vertices: int = Field(description="Vertices duplicated at non-manifold points.")
     dropped_pieces: int = Field(description="Removed components of an iso-surface, all but the largest.")
