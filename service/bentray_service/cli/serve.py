@@ -150,7 +150,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, unused: list[str],
     # Uvicorn exits when the application cannot start; the reason is raised below.
     with suppress(SystemExit), logs.configured(settings.log_format):
         for words in unused:
-            _announce(settings, words)
+            _announce(settings, words, logging.WARNING)
         server.run(sockets=[listening])
     if server.interrupted:
         raise KeyboardInterrupt
@@ -190,9 +190,9 @@ class _Starting:
             self.failure = error
 
 
-def _announce(settings: ServiceSettings, words: str) -> None:
+def _announce(settings: ServiceSettings, words: str, level: int = logging.INFO) -> None:
     if settings.log_format == "json":
-        log.info(words)
+        log.log(level, words)
     else:
         remark(words)
 
