@@ -1,4 +1,4 @@
-"""The service under load: large uploads, slow clients, and three kinds of requests during a long job."""
+"""The service under load: large uploads, slow clients, requests during a job, short jobs beside long ones."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ from bentray_service.client import Client
 from ..shared._synthetic_scan import made_up_scan
 from ._http_load import Calls, connect, got, load
 from ._large_upload import TUS, large_scan, room_for, send
+from ._short_jobs import SETTINGS as TWO_TENANTS
+from ._short_jobs import short_jobs
 from ._slow_clients import dripping
 
 GIGABYTE = 1e9
@@ -39,16 +41,21 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
             process = next(child for child in psutil.Process().children() if "serve" in child.cmdline())
             for row in measured(url, process, folder, context.quick, context.progress):
                 yield replace(row, detail=f"{row.detail}; load average {busy:.1f} at the start")
+    context.progress(3, 4, "short jobs")
+    with tempfile.TemporaryDirectory() as name, environment(TWO_TENANTS):
+        folder = Path(name)
+        with running_service(folder / "data", folder / "log") as url:
+            yield from short_jobs(url, folder, quick=context.quick)
 
 
 def measured(url: str, process: psutil.Process, folder: Path, quick: bool, progress: Step) -> Iterator[Row]:
     seconds = 4.0 if quick else 20.0
-    progress(0, 3, "large uploads")
+    progress(0, 4, "large uploads")
     for gigabytes in QUICK_SIZES if quick else SIZES:
         yield from large_upload(url, process, folder, gigabytes)
-    progress(1, 3, "slow clients")
+    progress(1, 4, "slow clients")
     yield from slow_clients(url, seconds)
-    progress(2, 3, "beside a reconstruction")
+    progress(2, 4, "beside a reconstruction")
     yield from beside_work(url, folder, seconds, quick)
 
 

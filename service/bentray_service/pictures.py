@@ -16,6 +16,7 @@ from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.cluster.capacities import WorkerCapacity, capacities_by_address
+from bentray_workers.cluster.resources import PICTURE_PRIORITY
 from bentray_workers.files import volume_export
 from bentray_workers.images import drawing_tasks
 from bentray_workers.images.result_summary import result_summary
@@ -40,8 +41,6 @@ from .rows.typed_rows import DatasetRow, FieldRow, VolumeRow
 
 # Time limit of an image, s.
 RENDER_SECONDS = 120.0
-# Higher than the priority of reconstruction tasks.
-RENDER_PRIORITY = 10
 # Threads that submit tasks and fetch results, without waiting for tasks.
 THREADS = 8
 # Time limit for the list of workers, and interval between checks of a running task, s.
@@ -344,7 +343,7 @@ class _Run:
     def _submit(self, address: str, task: tuple[Any, ...]) -> Any:
         where = picture_cost.placed(self._cost.bytes, {address: self._pictures._queue.offer(address)})
         return self._pictures._cluster.client.submit(
-            *task, **self._how, pure=False, priority=RENDER_PRIORITY, **where, workers=[address]
+            *task, **self._how, pure=False, priority=PICTURE_PRIORITY, **where, workers=[address]
         )
 
     async def _leaves(self, future: Any, address: str) -> bool:

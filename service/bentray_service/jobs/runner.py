@@ -19,7 +19,9 @@ from distributed.scheduler import NoValidWorkerError, NoWorkerError
 from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.task_graph import Cancelled
+from bentray_workers.cluster.capacities import capacities_of
 from bentray_workers.cluster.fair_shares import Shares
+from bentray_workers.cluster.short_lane import SHORT_LANE, is_short
 from bentray_workers.cluster.task_pool import JobControl
 
 from ..compute import Compute
@@ -31,7 +33,8 @@ from ..logs import about
 from ..rows.accounts import Accounts
 from ..rows.job_queue import LEASE_S, Queue
 from ..rows.schema import ENDED
-from ..rows.typed_rows import JobRow
+from ..rows.typed_rows import JobRow, Plain
+from .estimate import estimate
 from .failures import CRASHED, explain
 from .job_metrics import JobMetrics
 from .kind import JobRun, Kind
@@ -224,7 +227,10 @@ class Runner:
                 # The damaged file is replaced.
                 self._files.store.remove([target])
             client = self._compute.client
-            with self._shares.of(self._accounts.of(job["tenant"]), kind.lane, client) as share:
+            plan, lane = job["plan"] or {}, kind.lane
+            if is_short(plan, _seconds(plan), capacities_of(client)):
+                lane = SHORT_LANE
+            with self._shares.of(self._accounts.of(job["tenant"]), lane, client) as share:
                 control = JobControl(
                     on_progress=reporter.report, on_saved=reporter.saved, stop=reporter.stop, share=share
                 )
@@ -345,6 +351,12 @@ class Runner:
                     return None
                 if self._leaving.wait(IDLE_SECONDS):
                     raise
+
+
+def _seconds(plan: Plain) -> float | None:
+    """Estimated duration of a planned job on idle workers, s."""
+    minutes = estimate(plan, ()).minutes
+    return None if minutes is None else 60.0 * minutes
 
 
 def _join(threads: Iterable[threading.Thread]) -> None:

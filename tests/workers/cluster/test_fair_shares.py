@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from bentray_workers.cluster.fair_shares import IN_FLIGHT, TURN_S, Share, Shares
+from bentray_workers.cluster.fair_shares import IN_FLIGHT, TURN_S, Shares
 
 
 @dataclass
@@ -41,14 +41,14 @@ def run(workers: int, jobs: Sequence[Job], until_s: float = 1e4) -> None:
     client: Any = SimpleNamespace(
         scheduler_info=lambda n_workers: {"workers": {str(k): {} for k in range(workers)}}
     )
-    queues: list[list[tuple[int, int, Job]]] = [[] for _ in range(workers)]
+    queues: list[list[tuple[float, int, Job]]] = [[] for _ in range(workers)]
     busy: list[tuple[float, int, Job] | None] = [None] * workers
     joined: dict[int, Any] = {}
 
     def drive(job: Job) -> None:
         while job.share.may_submit(job.in_flight, job.ready):
             queue = min(range(workers), key=lambda w: len(queues[w]) + (busy[w] is not None))
-            heapq.heappush(queues[queue], (-Share.priority(job.in_flight), next(number), job))
+            heapq.heappush(queues[queue], (-job.share.priority(job.in_flight), next(number), job))
             job.in_flight += 1
             job.begun += 1
 

@@ -55,11 +55,11 @@ def test_slurm_workers_have_resources_warm_kernels_and_no_dashboard(managers: li
     deploy("slurm", ClusterRequest(workers=12, template=DEPLOY / "slurm" / "cluster.yaml"))
     (made,) = managers
     assert made.scaled == {"jobs": 12}
-    assert (made.asked["processes"], made.asked["cores"]) == (1, 2)
+    assert [made.asked[name] for name in ("processes", "cores", "job_cpu")] == [1, 3, 2]
     assert {"memory", "walltime", "queue"} <= set(made.asked), "from the template"
     words = made.asked["worker_extra_args"]
     assert {
-        "--resources=recon=1,render=1",
+        "--resources=recon=1,render=1,short=1",
         "--preload=bentray_workers.compilation.warmup",
         "--no-dashboard",
     } <= set(words)

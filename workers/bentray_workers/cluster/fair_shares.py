@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from typing import Any
 
 from distributed import Client
 
 from .connected import connected_workers
+from .resources import PRIORITIES, RECONSTRUCTION, SHORT
+from .short_lane import LEAVES_S, LONG_LANE, SHORT_LANE
 
 # Tasks in flight for each worker without competition: one running and one ready.
 IN_FLIGHT = 2
@@ -28,12 +31,13 @@ class Share:
         tenant, lane: owner of the job, and the resource of its tasks.
         in_flight, ready: tasks that are submitted and not finished; tasks that could be submitted.
         begun: number of its last task among all tasks; requested_at: time of its last request, s.
+        used_s: time that its tasks were in flight, s.
     """
 
     def __init__(self, shares: Shares, tenant: str, lane: str, count: Callable[[], int]) -> None:
         self.tenant, self.lane = tenant, lane
         self.in_flight = self.ready = 0
-        self.begun, self.requested_at = 0, -REQUEST_VALID_S
+        self.begun, self.requested_at, self.used_s = 0, -REQUEST_VALID_S, 0.0
         self._shares = shares
         self._count = count
         self._workers, self._counted = 1, -COUNT_S
@@ -61,10 +65,15 @@ class Share:
         """Wait briefly for a turn; for jobs with nothing in flight to wait for."""
         self._shares.wait(TURN_S)
 
-    @staticmethod
-    def priority(in_flight: int) -> int:
-        """Dask priority of the next task: the first of a job runs before the second of others."""
-        return -in_flight
+    def placed(self, placement: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Where the next task may run: as given, or in the lane of short jobs while the job is in it."""
+        if self.lane != SHORT_LANE or placement.get("resources") != RECONSTRUCTION:
+            return placement
+        return {**placement, "resources": SHORT}
+
+    def priority(self, in_flight: int) -> float:
+        """Dask priority of the next task: by lanes, then the first of a job before the second of others."""
+        return PRIORITIES[self.lane] + 1.0 / (1 + in_flight)
 
 
 class Shares:
@@ -108,25 +117,35 @@ class Shares:
         share = Share(self, tenant, lane, lambda: len(connected_workers(client)))
         with self._changed:
             self._account()
-            others = [self._had[one.lane, one.tenant] for one in self._jobs if one.lane == lane]
-            # A new tenant starts with the least worker time of the others.
-            self._had.setdefault((lane, tenant), min(others, default=0.0))
-            self._jobs.append(share)
+            self._add(share)
         return share
 
     def _leave(self, share: Share) -> None:
-        whose = share.lane, share.tenant
         with self._changed:
             self._account()
-            self._jobs.remove(share)
-            if all((one.lane, one.tenant) != whose for one in self._jobs):
-                del self._had[whose]
-            self._changed.notify_all()
+            self._remove(share)
+
+    def _add(self, share: Share) -> None:
+        others = [self._had[one.lane, one.tenant] for one in self._jobs if one.lane == share.lane]
+        # A new tenant starts with the least worker time of the others.
+        self._had.setdefault((share.lane, share.tenant), min(others, default=0.0))
+        self._jobs.append(share)
+
+    def _remove(self, share: Share) -> None:
+        whose = share.lane, share.tenant
+        self._jobs.remove(share)
+        if all((one.lane, one.tenant) != whose for one in self._jobs):
+            del self._had[whose]
+        self._changed.notify_all()
 
     def decide(self, share: Share, in_flight: int, ready: int, workers: int) -> bool:
         """As ``Share.may_submit``."""
         with self._changed:
             self._account()
+            if share.lane == SHORT_LANE and share.used_s > LEAVES_S:
+                self._remove(share)
+                share.lane = LONG_LANE
+                self._add(share)
             fewer = in_flight < share.in_flight
             share.in_flight, share.ready, share.requested_at = in_flight, ready, self.clock()
             may = ready > 0 and self._is_next(share, workers)
@@ -194,7 +213,9 @@ class Shares:
     def _account(self) -> None:
         now = self.clock()
         for one in self._jobs:
-            self._had[one.lane, one.tenant] += one.in_flight * (now - self._updated)
+            used_s = one.in_flight * (now - self._updated)
+            one.used_s += used_s
+            self._had[one.lane, one.tenant] += used_s
         self._updated = now
 
 

@@ -11,12 +11,14 @@ from types import MappingProxyType
 from typing import Any, Protocol
 
 import yaml
+from dask.system import CPU_COUNT
 from distributed import LocalCluster
+from distributed.system import MEMORY_LIMIT
 
 from bentray_kernels.errors import InvalidInput
 
 from .dask_settings import NO_DASHBOARD, ours
-from .resources import OFFERED, THREADS
+from .resources import CORES, OFFERED, THREADS
 from .supervision import SupervisedCluster
 from .tls import own_security, security_of
 
@@ -69,6 +71,8 @@ def embedded(request: ClusterRequest) -> DeployedCluster:
     local: DeployedCluster = (SupervisedCluster if request.processes else LocalCluster)(
         n_workers=count,
         threads_per_worker=THREADS,
+        # As Dask divides it, by cores instead of threads.
+        memory_limit=int(MEMORY_LIMIT * min(1.0, CORES / CPU_COUNT)),
         processes=request.processes,
         resources=OFFERED,
         dashboard_address=NO_DASHBOARD,
@@ -86,7 +90,7 @@ def slurm(request: ClusterRequest) -> DeployedCluster:
 
     The template holds arguments of ``dask_jobqueue.SLURMCluster``, see ``deploy/slurm/``.
     """
-    arguments = {"cores": THREADS, "processes": 1, **_template(request)}
+    arguments = {"cores": THREADS, "job_cpu": CORES, "processes": 1, **_template(request)}
     own = [f"--resources={_argument(OFFERED)}", f"--preload={PRELOAD}", f"--dashboard-address={NO_DASHBOARD}"]
     # Arguments of the template come last, so that a site with OpenCL devices can set its resources.
     arguments["worker_extra_args"] = [*own, "--no-dashboard", *arguments.get("worker_extra_args", ())]

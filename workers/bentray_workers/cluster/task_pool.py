@@ -43,18 +43,17 @@ class ClusterPool:
         attempts: of the job.
         client: of the cluster.
         share: of the workers.
-        priority: above or below the tasks of other jobs.
     """
 
-    def __init__(self, attempts: Attempts, client: Client, share: Share, priority: int = 0) -> None:
+    def __init__(self, attempts: Attempts, client: Client, share: Share) -> None:
         self._attempts, self._client, self._share = attempts, client, share
-        self._priority = self._next_priority = priority
+        self._next_priority = 0.0
 
     def devices(self) -> int:
         return max(1, sum("opencl" in one.resources for one in capacities_of(self._client)))
 
     def may_submit(self, running: int, ready: int) -> bool:
-        self._next_priority = self._priority + self._share.priority(running)
+        self._next_priority = self._share.priority(running)
         return self._share.may_submit(running, ready)
 
     def submit(self, task: Task) -> Future:
@@ -82,7 +81,6 @@ def open_pool(
     *,
     lane: str = "recon",
     placement: Callable[[], Placement] = lambda: {"resources": RECONSTRUCTION},
-    priority: int = 0,
     threads: int | None = None,
 ) -> Pool:
     """The pool of a job.
@@ -93,13 +91,13 @@ def open_pool(
         share: of the workers; None: all of them.
         lane: the resource that the share counts.
         placement: where tasks may run; evaluated for each attempt, since workers come and go.
-        priority: see ``ClusterPool``.
         threads: without a client; None: one for each core.
     """
     if client is None:
         return ThreadPool(threads)
-    attempts = Attempts(client, folder, placement)
-    return ClusterPool(attempts, client, share or exclusive_share(client, lane), priority)
+    share = share or exclusive_share(client, lane)
+    attempts = Attempts(client, folder, lambda: share.placed(placement()))
+    return ClusterPool(attempts, client, share)
 
 
 def run_job(
@@ -109,13 +107,12 @@ def run_job(
     *,
     lane: str = "recon",
     placement: Callable[[], Placement] = lambda: {"resources": RECONSTRUCTION},
-    priority: int = 0,
     **control: Unpack[JobControl],
 ) -> None:
     """Run a task graph whose finished tasks leave files, from which a later run resumes.
 
     Args:
-        client, folder, lane, placement, priority: see ``open_pool``.
+        client, folder, lane, placement: see ``open_pool``.
         graph: to run.
         control: see ``JobControl``.
 
@@ -124,7 +121,7 @@ def run_job(
         KilledWorker: for a task that kills its workers.
     """
     on_progress, on_saved = control.get("on_progress"), control.get("on_saved")
-    pool = open_pool(client, folder, control.get("share"), lane=lane, placement=placement, priority=priority)
+    pool = open_pool(client, folder, control.get("share"), lane=lane, placement=placement)
 
     def report() -> None:
         if on_progress is not None:

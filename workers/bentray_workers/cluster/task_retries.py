@@ -28,7 +28,7 @@ class ResultsLostError(ConnectionError):
 
 class _Attempt(NamedTuple):
     task: Task
-    priority: int
+    priority: float
     marker: Path
     span: trace.Span
     deaths: int = 0
@@ -58,7 +58,7 @@ class Attempts:
         self._markers = (folder / f"task-{number}" for number in count())
         self._attempts: dict[Future, _Attempt] = {}
 
-    def submit(self, task: Task, priority: int = 0) -> Future:
+    def submit(self, task: Task, priority: float = 0.0) -> Future:
         """Submit a task; when its future has ended it is to be passed to ``result``.
 
         Args:

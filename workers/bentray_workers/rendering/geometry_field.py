@@ -18,7 +18,6 @@ from ..files.atomic import sync
 from ..files.geometry_field_folder import FieldFiles, read_json
 from .field_settings import FieldSettings
 from .field_tasks import TASK_RAYS, finish, inner_rows, outer_rows, parameterise_mesh
-from .turntable import PRIORITY
 
 
 class GeometryFieldGraph:
@@ -112,7 +111,7 @@ def build_field(
     if not target.exists():
         graph = GeometryFieldGraph(mesh_path, settings, work_dir)
         where = {"resources": RENDER}
-        run_job(client, graph, work_dir, lane="render", placement=lambda: where, priority=PRIORITY, **control)
+        run_job(client, graph, work_dir, lane="render", placement=lambda: where, **control)
         _move(graph.folder, target)
     elif on_progress := control.get("on_progress"):
         on_progress(Progress(1, 1))

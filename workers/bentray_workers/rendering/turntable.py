@@ -34,8 +34,6 @@ MAX_FRAMES = 720
 MAX_PIXELS = 2**27
 # Of an uncompressed pixel, and of the headers of a picture and of its entry in an archive.
 PIXEL_BYTES, PICTURE_BYTES = 4, 4096
-# Below interactive pictures.
-PRIORITY = 0
 
 FRAME_MS = 80
 # Zip files store a date; a fixed one gives the same file for the same frames.
@@ -153,7 +151,7 @@ def draw_turntable(
         return placed(size, capacities_by_address(client))
 
     graph = TurntableGraph(path, turntable, target, work_dir)
-    run_job(client, graph, work_dir, lane="render", placement=placement, priority=PRIORITY, **control)
+    run_job(client, graph, work_dir, lane="render", placement=placement, **control)
 
 
 def draw_frame_tile(path: Path, turntable: Turntable, number: int, first: int, last: int) -> Drawn:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from ..files.atomic import atomic_replace
 from ..files.npy_headers import PARSING
 from .cost import Timed, emitters_a_task
 from .request import Simulated
+from .shared_media import made_once
 from .waves import WaveSimulationSettings, simulate_emission
 
 # Modules that determine the values of a part.
@@ -100,17 +100,8 @@ def _computed(settings: Simulated, part: Part, poll: Poll) -> list[NDArray[Any]]
     return [np.concatenate(arrays) for arrays in zip(*rows, strict=True)]
 
 
-# Threads of one process share a medium, which takes longer to sample than to use.
-_SAMPLING = Lock()
-
-
+@made_once(2)
 def _medium(settings: Timed, number: int) -> FineMedium:
-    with _SAMPLING:
-        return _sampled(settings, number)
-
-
-@lru_cache(maxsize=2)
-def _sampled(settings: Timed, number: int) -> FineMedium:
     return settings.medium(number)
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
-from threading import Lock
 from typing import ClassVar
 
 import numpy as np
@@ -27,6 +25,7 @@ from bentray_kernels.wave.stencil import longest_step, phase_error
 from bentray_kernels.wave.time_blocks import Poll, no_poll
 
 from .plane import NODES, SNR, ring_radius
+from .shared_media import made_once
 
 # The pulse is a sine with a Gaussian envelope; at this multiple of its centre frequency its spectrum has 3 %
 # of its maximum.
@@ -249,18 +248,9 @@ def simulate_emission(
     return received.astype(np.float32), water.astype(np.float32)
 
 
-# Threads of one process share the media.
-_MAKING = Lock()
-
-
+@made_once(1)
 def _media(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
     """Of object and water."""
-    with _MAKING:
-        return _made(settings)
-
-
-@lru_cache(maxsize=1)
-def _made(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
     received, water = (
         Medium.of(
             speed,
