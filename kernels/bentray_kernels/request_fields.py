@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import field, fields
+from dataclasses import field, fields, is_dataclass
 from functools import cache
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range, check_ranges, ranged
@@ -13,6 +14,20 @@ from bentray_kernels.ranges import Range, check_ranges, ranged
 # Of a side of a picture, and of the square of it in rays.
 MAX_PIXELS = 4096
 MAX_RAYS = MAX_PIXELS**2
+
+# When a field has an effect: alternatives, in each of which other fields have one of some values or lie in a
+# range. Names of what only the scan decides are those of ``FACTS``.
+Use = Mapping[str, "tuple[Any, ...] | Range"]
+Uses = tuple[Use, ...]
+ALWAYS: Uses = ({},)
+# Under this key a field's metadata holds its ``Uses``, and the values that ask for nothing.
+USED_WHEN, NEUTRAL = "used_when", "neutral"
+# What a scan may have, in words.
+FACTS = {
+    "scan_amplitudes": "the scan has amplitudes",
+    "scan_traces": "the scan has traces of object and water",
+    "scan_picks": "travel times are picked from traces",
+}
 
 
 def setting(
@@ -25,6 +40,8 @@ def setting(
     label: str = "",
     unit: str = "",
     words: Mapping[str, str] | None = None,
+    used_when: Uses = ALWAYS,
+    neutral: tuple[Any, ...] = (),
 ) -> Any:
     """A field of a dataclass with the metadata for OpenAPI, the command line, the web page and the documents.
 
@@ -37,6 +54,8 @@ def setting(
         label: short name on a form.
         unit: of its numbers, on a form.
         words: accepted values on a form, where they are not as in the file.
+        used_when: when the field has an effect, see ``Uses``.
+        neutral: values that ask for nothing, as the default does.
     """
     shown = {"x-label": label, "x-unit": unit, "x-unset": unset, "x-words": dict(words or {})}
     extra = {
@@ -44,6 +63,7 @@ def setting(
         **{name: value for name, value in shown.items() if value},
     }
     more = {"description": description, "unset": unset, "json_schema_extra": extra or None}
+    more |= {USED_WHEN: used_when, NEUTRAL: neutral}
     return field(default=default, metadata=more) if within is None else ranged(default, within, **more)
 
 
@@ -80,3 +100,103 @@ def check(record: Any, choices: Mapping[str, Sequence[str]] | None = None, place
         if value not in words and not (value is None and name in optional):
             raise InvalidInput(before + name, repr(value), "one of " + ", ".join(words))
     check_ranges(record, before)
+
+
+class Declared(NamedTuple):
+    """A field of a request where its record is part of another one.
+
+    Attributes:
+        place: its name with those of the records that hold it, for errors.
+        default: its value where nothing is requested.
+        uses: when it has an effect.
+        neutral: other values that ask for nothing.
+    """
+
+    place: str
+    default: Any
+    uses: Uses
+    neutral: tuple[Any, ...]
+
+
+def declared(kind: Any, place: str = "") -> dict[str, Declared]:
+    """The fields of a dataclass, and of the dataclasses in it, by their own names.
+
+    A field ``enabled`` has the name of its record: ``reflection`` is ``reflection.enabled``.
+    """
+    found: dict[str, Declared] = {}
+    for one in fields(kind):
+        if is_dataclass(one.default):
+            found |= declared(one.default, f"{place}{one.name}.")
+        else:
+            name = place.rstrip(".") if one.name == "enabled" and place else one.name
+            known = one.metadata.get(USED_WHEN, ALWAYS), one.metadata.get(NEUTRAL, ())
+            found[name] = Declared(place + one.name, one.default, *known)
+    return found
+
+
+def value_at(record: Any, place: str) -> Any:
+    """The value of a field by its place, such as ``sart.relaxation``."""
+    for name in place.split("."):
+        record = getattr(record, name)
+    return record
+
+
+def unused(
+    record: Any, facts: Mapping[str, bool] | None = None, requested: Any = None
+) -> dict[str, tuple[Any, str]]:
+    """Fields that request something but have no effect: by place, the default and what they lack.
+
+    Args:
+        record: a dataclass of settings, as it is used.
+        facts: see ``FACTS``; what is not known may hold.
+        requested: the same as requested, where some fields were decided since.
+    """
+    known = declared(type(record))
+    values: dict[str, Any] = {name: value_at(record, one.place) for name, one in known.items()}
+    values |= facts or {}
+    idle = {}
+    for place, default, uses, neutral in known.values():
+        value = value_at(record if requested is None else requested, place)
+        lacking = [_lacking(use, values, known) for use in uses]
+        if value not in (default, *neutral) and all(lacking):
+            # What needs more than another alternative says nothing new.
+            shortest = [one for one in lacking if not any(other < one for other in lacking)]
+            idle[place] = default, ", or ".join(" and ".join(sorted(one)) for one in shortest)
+    return idle
+
+
+def check_used(record: Any) -> Any:
+    """The record, if each of its fields that requests something may have an effect beside the others.
+
+    Raises:
+        InvalidInput: naming the first field that has none, and when it would.
+    """
+    for place, (default, lacking) in unused(record).items():
+        value = value_at(record, place)
+        found = repr(value) if isinstance(value, str) else value
+        raise InvalidInput(place, found, f"{_word(default)}, unless {lacking}")
+    return record
+
+
+def _lacking(use: Use, values: Mapping[str, Any], known: Mapping[str, Declared]) -> set[str]:
+    """The conditions of an alternative that do not hold, as ``method is sart or auto``; empty if all may."""
+    parts = set()
+    for name, accepted in use.items():
+        in_range = isinstance(accepted, Range)
+        value = values.get(name)
+        if name not in values or (
+            value is not None and accepted.holds(value) if in_range else value in accepted
+        ):
+            continue
+        if name in FACTS:
+            parts.add(FACTS[name])
+            continue
+        *others, last = [accepted.words] if in_range else map(_word, accepted)
+        words = f"{', '.join(others)} or {last}" if others else last
+        parts.add(f"{known[name].place} is {words}")
+    return parts
+
+
+def _word(value: Any) -> str:
+    """A value as JSON has it, a word without quotes."""
+    return value if isinstance(value, str) else json.dumps(value)

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.request_fields import check_used
 from bentray_kernels.tomography.settings import NUMERICAL, PLACES, Settings
 from bentray_kernels.tomography.stored_settings import REMOVED, RENAMED
 
@@ -88,7 +89,8 @@ def settings_of(values: Mapping[str, Any]) -> Settings:
     """The settings of a nested record of numbers and words as JSON has them; the rest takes its default.
 
     Raises:
-        InvalidInput: naming the first setting that is unknown or wrong, its value and what is accepted.
+        InvalidInput: naming the first setting that is unknown, wrong, or without effect beside the others,
+            its value and what is accepted.
     """
     return record_of(Settings, values)
 
@@ -96,13 +98,14 @@ def settings_of(values: Mapping[str, Any]) -> Settings:
 def record_of(kind: type[Record], values: Mapping[str, Any]) -> Record:
     """As ``settings_of`` for any dataclass of settings."""
     try:
-        return _adapter(kind)(check_setting_names(dict(values), kind))
+        record: Record = check_used(_adapter(kind)(check_setting_names(dict(values), kind)))
     except ValidationError as error:
         # Loads FastAPI, which nothing else here needs.
         from .web.errors import fault_of
 
         fault = fault_of(error.errors()[0])
         raise InvalidInput(fault.field, fault.found, fault.accepted) from None
+    return record
 
 
 def plain_numbers(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..acquisition import Dataset
 from ..arrays import Floats, Ints
+from ..request_fields import declared, unused, value_at
 from .directivity import within_opening
 from .pairs import reciprocal_noise
-from .result import Caution, Iteration, residual_within
+from .result import Caution, Iteration, Reconstruction, residual_within
 from .settings import Settings
 from .stopping import travel_time_noise
 
@@ -116,6 +118,33 @@ def bound_cautions(
             f"If the object can be slower or faster, widen speed_bounds_mps; else {CHECK}.",
             doubtful=True,
         )
+
+
+def with_settings_caution(result: Reconstruction, requested: Settings, *, picks: bool) -> Reconstruction:
+    """The result with a caution about requested settings without effect on it, or replaced by auto.
+
+    Args:
+        result: with the settings that were used.
+        requested: the settings of the user.
+        picks: whether travel times were picked from traces.
+    """
+    amplitudes, waves = result.attenuation is not None, "waveform" in result.provenance
+    facts = {"scan_amplitudes": amplitudes, "scan_traces": waves, "scan_picks": picks}
+    idle = unused(result.settings, facts, requested)
+    sentences = []
+    if idle:
+        without = "; ".join(f"{place}, unless {lacking}" for place, (_, lacking) in idle.items())
+        sentences.append(f"Settings without effect on this result: {without}.")
+    changes = []
+    for one in declared(Settings).values():
+        value, used = (value_at(settings, one.place) for settings in (requested, result.settings))
+        if value not in (used, one.default) and one.place not in (*idle, "method"):
+            changes.append(f"{one.place} {value} by {used}")
+    if changes:
+        sentences.append(f"Settings replaced by auto: {', '.join(changes)}.")
+    if not sentences:
+        return result
+    return replace(result, cautions=(*result.cautions, Caution("settings", " ".join(sentences))))
 
 
 def _noise(dataset: Dataset, delta: Floats) -> float:

@@ -19,7 +19,7 @@ from ..errors import InvalidInput
 from ..task_graph import ThreadPool, run
 from . import pairs
 from .attenuation import EXPERIMENTAL
-from .cautions import bound_cautions, fit_cautions
+from .cautions import bound_cautions, fit_cautions, with_settings_caution
 from .decomposition import with_decomposition
 from .device_choice import ScanSize, needs_decision, with_device
 from .gauss_newton.gauss_newton_step import Iterate
@@ -98,12 +98,12 @@ def reconstruct(
     def wave_scan(plan: WaveSettings, index: int) -> WaveScan:
         return MemoryWaveScan(dataset, plan, index=index)
 
-    recorded = dataset.waveform
+    recorded, requested = dataset.waveform, settings
     settings = on_this_machine(dataset, settings, 0 if recorded is None else recorded.object.shape[-1])
     echoes = None
     if recorded is not None:
         echoes = Echoes(recorded.object.shape[-1], lambda index: MemoryEchoScan(dataset, index))
-    return run_reconstruction(
+    result = run_reconstruction(
         dataset,
         settings,
         lambda plan, part: MemoryScan(dataset, plan, part),
@@ -112,6 +112,7 @@ def reconstruct(
         0 if recorded is None or recorded.water is None else recorded.object.shape[-1],
         echoes,
     )
+    return with_settings_caution(result, requested, picks=False)
 
 
 def on_this_machine(dataset: Dataset, settings: Settings, samples: int) -> Settings:

@@ -9,7 +9,7 @@ from ..errors import InvalidInput
 from ..limits import SPEED_MPS, WATER_C
 from ..picker_names import DEFAULT_PICKER, PickerName
 from ..ranges import SEED, Range
-from ..request_fields import check, setting
+from ..request_fields import Uses, check, declared, setting
 from .numerics import Numerics
 
 # The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
@@ -20,6 +20,21 @@ MIN_NODES = 16
 SPEED = {"type": "number", **SPEED_MPS.schema}
 # What holds before the scan is known.
 AUTOMATIC = Numerics()
+# When a setting has an effect: auto tries SART and Gauss-Newton, and waveform begins with its image.
+SART, GAUSS_NEWTON = ("sart", "auto", "waveform"), ("gauss-newton", "auto", "waveform")
+ABOVE_ZERO = Range(0.0, 10.0, above=True)
+LOSSES = {"attenuation": (True,), "scan_amplitudes": (True,)}
+ECHOES: Uses = ({"reflection": (True,)},)
+BY_SART: Uses = ({"method": SART}, {**LOSSES, "attenuation_solver": ("sart",)})
+# The compiled pass of SART over a slice exists for devices, full waveforms and reflection.
+_SLICES = {"method": ("sart", "auto"), "decomposition": (None, "slices")}
+ON_DEVICES: Uses = (
+    {**_SLICES, "eikonal": (DEVIATION,), "speed_range_mps": (None,)},
+    {**_SLICES, "rays": ("straight",)},
+    {"method": ("waveform",)},
+    {"method": ("auto",), "minutes": Range(0.0, 1e6, above=True)},
+    *ECHOES,
+)
 # No unknown names in JSON.
 FORBID = {"extra": "forbid"}
 
@@ -35,6 +50,7 @@ class SartSettings:
         "Relaxation factor λ of an update (Li 2008, chapter 6, equation 1).",
         Range(0.0, 2.0, above=True, below=True),
         label="Relaxation factor λ",
+        used_when=BY_SART,
     )
     smoothing_nodes: float = setting(
         1.0,
@@ -42,6 +58,7 @@ class SartSettings:
         Range(0.0, 32.0),
         label="Smoothing of updates",
         unit="nodes",
+        used_when=BY_SART,
     )
     speed_range_mps: tuple[float, float] | None = setting(
         None,
@@ -50,6 +67,7 @@ class SartSettings:
         unset="the image as it is",
         label="Known speed range",
         unit="m/s",
+        used_when=({"method": ("sart",), "rays": ("curved",)},),
     )
 
     def __post_init__(self) -> None:
@@ -70,6 +88,7 @@ class GaussNewtonSettings:
         "initial one.",
         label="Penalty",
         words={"total-variation": "Total variation", "laplacian": "Laplacian", "tikhonov": "Tikhonov"},
+        used_when=({"method": GAUSS_NEWTON},),
     )
     penalty_strength: float = setting(
         0.3,
@@ -77,6 +96,10 @@ class GaussNewtonSettings:
         "is regularised by it as well.",
         Range(0.0, 10.0),
         label="Strength of the penalty",
+        used_when=(
+            {"method": GAUSS_NEWTON},
+            {**LOSSES, "attenuation_solver": ("penalised",)},
+        ),
     )
     edge_mps: float = setting(
         0.0,
@@ -86,6 +109,13 @@ class GaussNewtonSettings:
         Range(0.0, 1000.0, unit="m/s"),
         label="Edges above",
         unit="m/s",
+        used_when=(
+            {
+                "method": GAUSS_NEWTON,
+                "penalty": ("total-variation",),
+                "penalty_strength": ABOVE_ZERO,
+            },
+        ),
     )
 
     def __post_init__(self) -> None:
@@ -99,7 +129,10 @@ class PickingSettings:
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
     picker: PickerName = setting(  # noqa: RUF009 - a string, by its alias
-        DEFAULT_PICKER, "How the first arrival of a trace is picked.", label="Picker"
+        DEFAULT_PICKER,
+        "How the first arrival of a trace is picked.",
+        label="Picker",
+        used_when=({"scan_picks": (True,)},),
     )
     examine: bool = setting(
         True,
@@ -131,6 +164,7 @@ class AttenuationSettings:
         "to water; spectrum: read from the traces, loss of high frequencies relative to low ones.",
         label="Amplitudes",
         words={"recorded": "Recorded", "ratio": "Pulse height", "spectrum": "Spectrum"},
+        used_when=({"attenuation": (True,)},),
     )
     attenuation_solver: Literal["penalised", "sart"] = setting(
         "penalised",
@@ -138,19 +172,18 @@ class AttenuationSettings:
         "other with the settings of sart, without a penalty (Li 2008, chapter 6).",
         label="Solver",
         words={"penalised": "Penalised", "sart": "SART"},
+        used_when=(LOSSES,),
     )
     focusing: bool = setting(
         False,
         "Correct amplitudes for focusing by refraction, by the spreading of ray tubes in the speed image; "
         "needs the frequency of the amplitudes.",
         label="Correct for focusing",
+        used_when=({**LOSSES, "amplitudes": ("recorded", "ratio")},),
     )
 
     def __post_init__(self) -> None:
         check(self, place="attenuation")
-        if self.amplitudes == "spectrum" and self.focusing:
-            accepted = f"false: amplitudes {self.amplitudes} do not depend on focusing"
-            raise InvalidInput("attenuation.focusing", True, accepted)
 
 
 @dataclass(frozen=True)
@@ -171,6 +204,7 @@ class ReflectionSettings:
         "comparison.",
         label="Travel times in",
         words={"reconstructed": "Reconstructed speed", "water": "Water"},
+        used_when=ECHOES,
     )
     pixel_m: float | None = setting(
         None,
@@ -179,6 +213,7 @@ class ReflectionSettings:
         unset="an eighth of the wavelength in water at the centre frequency, at most 2048 along a side",
         label="Pixel spacing",
         unit="m",
+        used_when=ECHOES,
     )
     pair_angle_deg: float = setting(
         90.0,
@@ -187,11 +222,13 @@ class ReflectionSettings:
         Range(1.0, 180.0, unit="degrees"),
         label="Largest angle of a pair",
         unit="degrees",
+        used_when=ECHOES,
     )
     coherence_factor: bool = setting(
         True,
         "Multiply by the coherence factor of the emissions, which suppresses echoes that do not focus.",
         label="Coherence factor",
+        used_when=ECHOES,
     )
     gain: Literal["none", "spreading", "attenuation"] = setting(
         "none",
@@ -200,6 +237,7 @@ class ReflectionSettings:
         "in the reconstructed attenuation.",
         label="Compensate",
         words={"none": "Nothing", "spreading": "Spreading", "attenuation": "Spreading and attenuation"},
+        used_when=ECHOES,
     )
 
     def __post_init__(self) -> None:
@@ -258,6 +296,7 @@ class Settings:
         DEVIATION,
         "Eikonal solver for curved rays. deviation is for SART on slices; elsewhere accurate replaces it.",
         label="Eikonal solver",
+        used_when=({"rays": ("curved",)}, {"uncertainty": (True,)}, {"focusing": (True,), **LOSSES}),
     )
     decomposition: Literal["slices", "volume"] | None = setting(
         None,
@@ -324,8 +363,16 @@ class Settings:
         "slices or emitters at a time. The images differ by rounding; the result states which was used.",
         label="Compute on",
         words={"auto": "Automatic", "cpu": "Processor", "opencl": "OpenCL device"},
+        used_when=ON_DEVICES,
+        neutral=("cpu",),
     )
-    seed: int = setting(0, "Seed of the random order of emitters.", SEED, label="Random seed")
+    seed: int = setting(
+        0,
+        "Seed of the random order of emitters.",
+        SEED,
+        label="Random seed",
+        used_when=(*BY_SART, {"uncertainty": (True,)}),
+    )
     resolution_check: bool = setting(
         False,
         "Also reconstruct a checkerboard along the same rays, and report its recovery at each node.",
@@ -348,6 +395,7 @@ class Settings:
         unset="waveform: no limit; auto: no refinement",
         label="Time for full waveforms",
         unit="minutes of one core",
+        used_when=({"method": ("auto", "waveform"), "scan_traces": (True,)},),
     )
     sart: SartSettings = field(
         default=SartSettings(), metadata=_record("SART", "For method sart, and the attenuation by it.")
@@ -371,9 +419,6 @@ class Settings:
     def __post_init__(self) -> None:
         check(self)
         _check_speeds("speed_bounds_mps", self.speed_bounds_mps)
-        if self.method != "sart" and self.sart.speed_range_mps is not None:
-            accepted = f"null with method {self.method}, or method sart"
-            raise InvalidInput("sart.speed_range_mps", self.sart.speed_range_mps, accepted)
         if self.method == "waveform" and self.decomposition == "volume":
             raise InvalidInput("decomposition", "'volume'", "slices, with method waveform")
         if self.reflection.enabled and self.decomposition == "volume":
@@ -471,22 +516,10 @@ class FixedSettings(Settings):
             raise InvalidInput("ray_width_m", fixed.ray_width_m, "0, unless method is gauss-newton")
 
 
-def _places() -> dict[str, str]:
-    places = {}
-    for one in fields(Settings):
-        if is_dataclass(one.default):
-            for leaf in fields(one.default):
-                name = one.name if leaf.name == "enabled" else leaf.name
-                places[name] = f"{one.name}.{leaf.name}"
-        else:
-            places[one.name] = one.name
-    return places
-
-
 PUBLIC = tuple(one.name for one in fields(Settings))
 NUMERICAL = tuple(one.name for one in fields(Numerics))
 # Where each setting is, by the name that is its own: ``relaxation`` is ``sart.relaxation``.
-PLACES = _places()
+PLACES = {name: one.place for name, one in declared(Settings).items()}
 
 
 def _check_speeds(name: str, pair: tuple[float, float]) -> None:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 from fastapi.openapi.models import Example
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 
+from bentray_kernels.request_fields import check_used
 from bentray_workers.cluster.task_pool import JobControl
 
 from ..compute import Compute
@@ -39,6 +40,12 @@ class JobRequest(BaseModel):
         """Reject unknown settings by name, with the accepted ones."""
         kind: Any = cls.model_fields["settings"].annotation
         return check_setting_names(settings, kind)
+
+    @field_validator("settings", mode="after", check_fields=False)
+    @classmethod
+    def check_effect(cls, settings: Any) -> Any:
+        """Reject settings that have no effect beside the others, by name."""
+        return check_used(settings)
 
 
 R = TypeVar("R", bound=JobRequest)

@@ -148,10 +148,6 @@ def test_progress_rises_to_the_end(scan, method):
         ({"relaxation": float("nan")}, "sart.relaxation"),
         ({"nodes": 4}, "nodes"),
         ({"iterations": 0}, "iterations"),
-        (
-            {"speed_range_mps": (1400.0, 1600.0), "method": "gauss-newton"},
-            "sart.speed_range_mps",
-        ),
         ({"method": "guess"}, "method"),
         ({"penalty_strength": -1.0}, "gauss_newton.penalty_strength"),
         ({"speed_bounds_mps": (1600.0, 1500.0)}, "speed_bounds_mps"),

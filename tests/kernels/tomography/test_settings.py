@@ -8,7 +8,7 @@ import pytest
 from bentray_kernels.acquisition import PICKERS
 from bentray_kernels.eikonal import methods
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.request_fields import choices_of
+from bentray_kernels.request_fields import check_used, choices_of
 from bentray_kernels.tomography import (
     AttenuationSettings,
     GaussNewtonSettings,
@@ -79,5 +79,5 @@ def test_choices_are_those_of_the_code():
 )
 def test_an_error_names_the_place(values, field):
     with pytest.raises(InvalidInput) as error:
-        Settings.of(**values)
+        check_used(Settings.of(**values))
     assert error.value.field == field

@@ -18,6 +18,7 @@ from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED, replace
 from bentray_kernels.acquisition.water import describe_assumption
 from bentray_kernels.task_graph import Pool, run, run_resumable
 from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
+from bentray_kernels.tomography.cautions import with_settings_caution
 from bentray_kernels.tomography.guided_picking import same_picks
 from bentray_kernels.tomography.reconstruction import run_reconstruction
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph, TomographyGraph, progress_of
@@ -82,6 +83,7 @@ def reconstruct(
         Cancelled: when ``stop`` returned true.
         InvalidInput: from the file or the settings, and for a device that no worker offers.
     """
+    requested = settings
     with _folder(work_dir) as folder:
         settings = settled(client, folder, dataset_path, settings)
         settings = settled_blocks(client, folder, dataset_path, settings)
@@ -98,7 +100,10 @@ def reconstruct(
         )
     if settings.picking.examine or findings.findings:
         estimated["quality"] = findings.words(stacked=result.speed.ndim == 3)
-    return replace(result, provenance={**result.provenance, **estimated})
+    result = replace(result, provenance={**result.provenance, **estimated})
+    header = read_dataset(dataset_path, traces=False)
+    picks = header.tof_s is None and header.delta_tof_s is None
+    return with_settings_caution(result, requested, picks=picks)
 
 
 def _estimated(

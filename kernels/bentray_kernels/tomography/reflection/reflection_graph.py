@@ -279,7 +279,7 @@ def echo_signals(
             traces *= window
         else:
             # Its size cancels in the least squares.
-            water = np.asarray(recorded.water[e], dtype=np.float64)
+            water = np.array(recorded.water[e], dtype=np.float64)
             water[~(used[n] & np.isfinite(water).all(axis=1))] = 0.0
             later = transmitted_s[n] - _water_times(plan, emissions[n : n + 1])[0]
             water = high_pass(water, rate, plan.frequency_hz, later)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from bentray_kernels.request_fields import check_used
 from bentray_kernels.tomography.settings import Settings
 
 from ...html_tables import ShownRecord
@@ -39,6 +40,13 @@ class BatchRequest(BaseModel):
     def check_names(cls, settings: Any) -> Any:
         """Reject unknown settings by name, with the accepted ones."""
         return check_setting_names(settings, Settings)
+
+    @field_validator("settings", mode="after")
+    @classmethod
+    def check_effect(cls, settings: Settings) -> Settings:
+        """Reject settings that have no effect beside the others, by name."""
+        checked: Settings = check_used(settings)
+        return checked
 
 
 class BatchJobRecord(ShownRecord):
