@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 
 from bentray_kernels.ranges import RANGE
-from bentray_kernels.request_fields import choices_of
+from bentray_kernels.request_fields import choices_of, effective_when
 from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_service.cli.options.settings_options import OPTIONS, default_of
 
@@ -19,6 +19,7 @@ def reconstruction_settings() -> str:
 
 
 def _rows() -> Iterator[tuple[str, str, str, str, str]]:
+    effective = effective_when(Settings)
     for name, place in PLACES.items():
         record, _, leaf = place.rpartition(".")
         kind = type(getattr(Settings(), record)) if record else Settings
@@ -26,5 +27,8 @@ def _rows() -> Iterator[tuple[str, str, str, str, str]]:
         words = ", ".join(f"`{word}`" for word in choices_of(kind).get(leaf, ()))
         within = field.metadata.get(RANGE)
         accepted = words or (within.words if within else "")
+        meaning = field.metadata["description"]
+        if place in effective:
+            meaning += f" Has an effect if {effective[place]}."
         default = default_of(field) if field.default is None else f"`{default_of(field)}`"
-        yield f"`{place}`", default, accepted, f"`{OPTIONS[name].name}`", field.metadata["description"]
+        yield f"`{place}`", default, accepted, f"`{OPTIONS[name].name}`", meaning

@@ -178,23 +178,42 @@ def check_used(record: Any) -> Any:
     return record
 
 
+def effective_when(kind: Any) -> dict[str, str]:
+    """When fields of a dataclass have an effect, in words, by place; without those that always have one."""
+    known = declared(kind)
+    return {
+        one.place: ", or ".join(
+            " and ".join(_in_words(*term, known) for term in use.items()) for use in one.uses
+        )
+        for one in known.values()
+        if all(one.uses)
+    }
+
+
 def _lacking(use: Use, values: Mapping[str, Any], known: Mapping[str, Declared]) -> set[str]:
     """The conditions of an alternative that do not hold, as ``method is sart or auto``; empty if all may."""
-    parts = set()
-    for name, accepted in use.items():
-        in_range = isinstance(accepted, Range)
-        value = values.get(name)
-        if name not in values or (
-            value is not None and accepted.holds(value) if in_range else value in accepted
-        ):
-            continue
-        if name in FACTS:
-            parts.add(FACTS[name])
-            continue
-        *others, last = [accepted.words] if in_range else map(_word, accepted)
-        words = f"{', '.join(others)} or {last}" if others else last
-        parts.add(f"{known[name].place} is {words}")
-    return parts
+    return {
+        _in_words(name, accepted, known)
+        for name, accepted in use.items()
+        if name in values and not _meets(values[name], accepted)
+    }
+
+
+def _meets(value: Any, accepted: tuple[Any, ...] | Range) -> bool:
+    if isinstance(accepted, Range):
+        return value is not None and accepted.holds(value)
+    return value in accepted
+
+
+def _in_words(name: str, accepted: tuple[Any, ...] | Range, known: Mapping[str, Declared]) -> str:
+    if name in FACTS:
+        return FACTS[name]
+    *others, last = [accepted.words] if isinstance(accepted, Range) else map(_word, accepted)
+    return (
+        f"{known[name].place} is {', '.join(others)} or {last}"
+        if others
+        else f"{known[name].place} is {last}"
+    )
 
 
 def _word(value: Any) -> str:

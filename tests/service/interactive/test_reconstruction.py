@@ -44,6 +44,7 @@ def test_it_is_the_pipeline_of_the_service(simulated: bentray.Scan, tmp_path: Pa
         ({"relaxation": 3.0}, "sart.relaxation: found 3.0; accepted: a number above 0"),
         ({"method": "sirt"}, "method: found 'sirt'; accepted: 'sart', 'gauss-newton', 'auto' or 'waveform'"),
         ({"method": "waveform"}, "accepted: "),
+        ({"method": "sart", "minutes": 3}, "minutes: found 3.0; accepted: null, unless method is auto or"),
         ({"threads": 0}, "threads: found 0; accepted: a number from 1 to "),
     ],
 )

@@ -130,6 +130,10 @@ def test_unknown_setting_lists_the_known_ones(http, dataset):
         ({"speed_bounds_mps": [-1, 1500]}, "settings.speed_bounds_mps"),
         ({"speed_bounds_mps": [0, 1500]}, "settings.speed_bounds_mps"),
         ({"method": "auto", "sart": {"speed_range_mps": [1400, 1600]}}, "settings.sart.speed_range_mps"),
+        ({"method": "sart", "minutes": 3}, "settings.minutes"),
+        ({"rays": "straight", "eikonal": "fmm"}, "settings.eikonal"),
+        ({"gauss_newton": {"penalty": "laplacian", "edge_mps": 7}}, "settings.gauss_newton.edge_mps"),
+        ({"reflection": {"gain": "spreading"}}, "settings.reflection.gain"),
         ([], "settings"),
     ],
 )

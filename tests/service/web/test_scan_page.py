@@ -119,7 +119,7 @@ def test_a_refused_setting_is_told_at_its_field(page, address, scan, work):
     lowest.fill("1400")
     page.get_by_label("Known speed range, highest").fill("1600")
     # Which the service knows, and the form does not.
-    expect(page.locator(".setting", has=lowest).get_by_role("alert")).to_contain_text("method sart")
+    expect(page.locator(".setting", has=lowest).get_by_role("alert")).to_contain_text("method is sart")
     page.get_by_label("Method", exact=True).select_option("SART")
     page.get_by_text("16 nodes per side").wait_for()
     page.get_by_role("button", name="Start").click()
