@@ -62,7 +62,7 @@ def setting(
         **((schema or {}) if within is None else within.schema),
         **{name: value for name, value in shown.items() if value},
     }
-    more = {"description": description, "unset": unset, "json_schema_extra": extra or None}
+    more: dict[str, Any] = {"description": description, "unset": unset, "json_schema_extra": extra or None}
     more |= {USED_WHEN: used_when, NEUTRAL: neutral}
     return field(default=default, metadata=more) if within is None else ranged(default, within, **more)
 
