@@ -25,6 +25,7 @@ from .compute import Cluster, Compute
 from .files.checked_store import CheckedStore
 from .files.data_folder import Files, installation_of, lock
 from .files.deletion import Deletion
+from .files.folder_database import check_authentication, open_folder_database
 from .files.open_store import open_store
 from .files.orphans import Orphans
 from .files.private import private_files
@@ -67,7 +68,6 @@ from .rows.ages import ExpiryMarks
 from .rows.batches import Batches
 from .rows.checksums import Checksums
 from .rows.claimed_tenants import ClaimedTenants
-from .rows.database import open_database
 from .rows.deliveries import Deliveries
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
@@ -187,7 +187,7 @@ def _open(
     files.check_restored()
     files.give_to_local()
     files.drop_leftovers()
-    database = open_database(settings.database)
+    database = open_folder_database(files, settings.database)
     stack.callback(database.close)
     store = CheckedStore(
         open_store(
@@ -215,6 +215,7 @@ def _open(
         ClaimedTenants(database),
     )
     stack.callback(access_control.close)
+    check_authentication(files.root, required=not access_control.open())
     if cluster is None:
         cluster = stack.enter_context(
             open_cluster(

@@ -19,8 +19,8 @@ from bentray_workers.files.atomic import sync, write_bytes
 
 from ..errors import Damaged
 from ..files.data_folder import RESTORING, Files, lock
+from ..files.folder_database import write_stamp
 from ..files.open_store import open_store
-from ..files.orphans import stamp
 from ..files.private import private_files
 from ..files.tenant_files import KEPT
 from ..rows import schema
@@ -64,7 +64,7 @@ def restore(
                 _copy(folder / name, target, sums[name], always=name == DATABASE)
             report(len(sums), len(sums))
             begun = _restore_database(root, settings, mark)
-            stamp(root, mark, begun)
+            write_stamp(root, mark, begun)
             (root / RESTORING).unlink()
             sync(root)
     return backup

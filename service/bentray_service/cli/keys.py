@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ..rows.database import Database
     from ..rows.keys import Keys
     from ..rows.typed_rows import KeyRow
+    from ..settings import ServiceSettings
 
 Data = Annotated[
     Path | None,
@@ -57,6 +58,7 @@ def create(
     Example:  bentray keys create --tenant clinic --name scanner --expires 90d
     """
     from ..access.caller import checked_scopes
+    from ..files.folder_database import remember_authentication
     from ..rows.api_key import ApiKey
     from ..rows.tenants import checked_tenant
 
@@ -67,6 +69,7 @@ def create(
     token = ApiKey.new()
     with _opened(data) as store:
         row = store.add(token, whose, name, requested, until)
+        remember_authentication(_settings(data).data_dir)
     if as_json:
         print_json({**_shown(row), "key": token.shown()})
     else:
@@ -130,18 +133,24 @@ def _opened(data: Path | None) -> Iterator[Keys]:
 def opened_database(data: Path | None) -> Iterator[Database]:
     """The database of the service with this data folder, which may be running."""
     from ..files.data_folder import Files
+    from ..files.folder_database import open_folder_database
     from ..files.private import private_files
-    from ..rows.database import open_database
-    from ..settings import ServiceSettings
 
-    settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
+    settings = _settings(data)
     with private_files():
-        Files(settings.data_dir).prepare()
-        database = open_database(settings.database)
+        files = Files(settings.data_dir)
+        files.prepare()
+        database = open_folder_database(files, settings.database)
         try:
             yield database
         finally:
             database.close()
+
+
+def _settings(data: Path | None) -> ServiceSettings:
+    from ..settings import ServiceSettings
+
+    return ServiceSettings.load(**({} if data is None else {"data_dir": data}))
 
 
 def _seconds(text: str) -> float:

@@ -33,17 +33,17 @@ def verify(
     """
     from ..files.checked_store import CheckedStore
     from ..files.data_folder import Files, lock
+    from ..files.folder_database import open_folder_database
     from ..files.open_store import open_store
     from ..files.orphans import Orphans
     from ..files.scrub import scrub
     from ..rows.checksums import Checksums
-    from ..rows.database import open_database
     from ..settings import ServiceSettings
 
     settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
     root = Files(settings.data_dir)
     root.prepare()
-    with closing(open_database(settings.database)) as database:
+    with closing(open_folder_database(root, settings.database)) as database:
         checksums = Checksums(database)
         inner = open_store(settings.storage_url, root.root, database, settings.cache_bytes)
         files = Files(settings.data_dir, CheckedStore(inner, root.root, checksums))

@@ -74,6 +74,11 @@ class Files:
         files.prepare()
         return files
 
+    def used(self) -> bool:
+        """Whether the folder has files of tenants, or a record of their requests."""
+        paths = (path for pattern in ("tenants/*/*/*", "audit/*") for path in self.root.glob(pattern))
+        return next(paths, None) is not None
+
     def give_to_local(self) -> None:
         """Move data of versions without tenants to the tenant ``local``; the folder must be locked."""
         old = [self.root / name for name in KINDS if (self.root / name).is_dir()]

@@ -42,7 +42,8 @@ def open_store(
             raise InvalidInput(FIELD, f"{url}, which contains other objects", "an unused prefix")
         if metadata is not None and metadata.get("database") != mark:
             found = f"{url}, used by another database than BENTRAY_DATABASE_URL"
-            raise InvalidInput(FIELD, found, "a separate prefix for every database")
+            accepted = "the database that it was used with (see `bentray restore`), or a separate prefix"
+            raise InvalidInput(FIELD, found, accepted)
         # Written even if present, to verify write access.
         bucket.put_metadata(MARK, {"database": mark})
     except StorageUnavailable as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import time
 from collections.abc import Callable, Iterator
@@ -10,22 +9,19 @@ from pathlib import Path
 
 from sqlalchemy import select, update
 
-from bentray_workers.files.atomic import write_bytes
-
 from ..rows.database import Database
 from ..rows.database_id import mark_of
 from ..rows.live_ids import LiveIds
 from ..rows.schema import about
 from ..rows.tenants import Tenant
 from .data_folder import Files
+from .folder_database import read_stamp, write_stamp
 from .tenant_files import KEPT
 
 log = logging.getLogger("bentray.storage")
 
 # Exports and resumable uploads.
 BESIDE = ("exports", "uploads")
-# The file with the id of the database that used the data folder last, and its number of starts.
-STAMP = "database.json"
 # Minimum time for which a file must be orphaned while the service runs, s: new files wait for their row.
 SAFE_S = 3600.0
 
@@ -100,24 +96,16 @@ class Orphans:
         with self._database.write() as connection:
             begun = int(connection.execute(select(about.c.begun).with_for_update()).scalar_one()) + 1
             connection.execute(update(about).values(begun=begun))
-        stamp(self._files.root, mark_of(self._database), begun)
+        write_stamp(self._files.root, mark_of(self._database), begun)
         self._agreed = True
 
     def _used_together(self) -> bool:
         with self._database.read() as connection:
             begun = int(connection.execute(select(about.c.begun)).scalar_one())
-        try:
-            content = json.loads((self._files.root / STAMP).read_bytes())
-            return bool(content["database"] == mark_of(self._database) and content["begun"] <= begun)
-        except (OSError, ValueError, KeyError, TypeError):
-            return False
+        stamp = read_stamp(self._files.root)
+        return stamp is not None and stamp.database == mark_of(self._database) and stamp.begun <= begun
 
     def _stored_files(self) -> Iterator[Path]:
         for folder in self._files.root.glob("tenants/*/*"):
             if folder.name in self._kinds and folder.is_dir():
                 yield from (path for path in folder.iterdir() if path.suffix != ".partial")
-
-
-def stamp(root: Path, mark: str, begun: int) -> None:
-    """Record in a data folder the id of its database, and the number of starts."""
-    write_bytes(root / STAMP, json.dumps({"database": mark, "begun": begun}).encode())

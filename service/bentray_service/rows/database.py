@@ -8,10 +8,11 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Engine, Select, create_engine, event, exc, insert, inspect, select, update
-from sqlalchemy.engine import make_url
+from sqlalchemy.engine import URL, make_url
 from sqlalchemy.pool import QueuePool
 
 from bentray_kernels.errors import InvalidInput
@@ -100,24 +101,33 @@ class Database:
         self._writer.dispose()
 
 
-def open_database(address: str) -> Database:
+def open_database(address: str, way_back: str | None = None) -> Database:
     """Open the database, create its tables if it is new, and migrate an older schema.
 
+    Args:
+        address: of the database.
+        way_back: for a database that must not be new: what is accepted in place of an empty one.
+
     Raises:
-        InvalidInput: when it cannot be opened, or was created by a later version of Bentray.
+        InvalidInput: when it cannot be opened, belongs to another program, or was created by a later version
+            of Bentray.
     """
     shown = address
     try:
         shown = make_url(address).render_as_string(hide_password=True)
+        if way_back is not None:
+            _check_file(make_url(address), way_back)
         engine = engine_of(address, ("foreign_keys=ON",))
         with engine.begin() as connection:
-            current = _make_or_check(connection, shown)
+            current = _make_or_check(connection, shown, way_back)
         if not current:
             _update(address, shown)
     except (exc.SQLAlchemyError, ImportError) as error:
         reason = str(getattr(error, "orig", None) or error).splitlines()[0]
         raise InvalidInput(
-            "database_url", f"{shown} ({reason})", "the SQLAlchemy address of a database that can be written"
+            "database_url",
+            f"{shown} ({reason})",
+            way_back or "the SQLAlchemy address of a database that can be written",
         ) from error
     return Database(engine)
 
@@ -204,9 +214,24 @@ def _begin_sqlite(connection: Connection) -> None:
     connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")
 
 
-def _make_or_check(connection: Connection, shown: str) -> bool:
+def _check_file(url: URL, way_back: str) -> None:
+    """Reject a file of SQLite that is missing or empty, which opening would create."""
+    path = Path(url.database or "")
+    if url.get_backend_name() == "sqlite" and not (path.is_file() and path.stat().st_size):
+        raise InvalidInput(
+            "database_url", f"{path}, {'without content' if path.exists() else 'missing'}", way_back
+        )
+
+
+def _make_or_check(connection: Connection, shown: str, way_back: str | None) -> bool:
     """Create the tables of a new database; returns whether the schema is current."""
-    if not inspect(connection).has_table(schema.about.name):
+    tables = inspect(connection).get_table_names()
+    if schema.about.name not in tables:
+        # A server may hold the tables of several programs in one database, a file belongs to one.
+        others = connection.dialect.name == "sqlite" and tables
+        if way_back is not None or others:
+            found = f"with tables of another program ({tables[0]})" if tables else "without tables"
+            raise InvalidInput("database_url", f"{shown}, {found}", way_back or "a database of its own")
         schema.metadata.create_all(connection)
         connection.execute(insert(schema.about).values(version=schema.VERSION, probed=time.time()))
         return True

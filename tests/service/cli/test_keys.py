@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import Result
 
+from bentray_service.files.folder_database import GUARDED
 from bentray_service.rows.api_key import ApiKey
 
 Run = Callable[..., Result]
@@ -37,6 +38,24 @@ def test_made_listed_and_revoked(bentray: Run, tmp_path: Path) -> None:
     assert (revoked.exit_code, revoked.stdout) == (0, f"{key['id']} of clinic revoked\n")
     listed = bentray("keys", "list", "--data", tmp_path, "--tenant", "clinic", "--json")
     assert json.loads(listed.stdout)[0]["state"] == "revoked"
+
+
+def test_a_lost_database_is_not_replaced_by_a_key(bentray: Run, tmp_path: Path) -> None:
+    made(bentray, tmp_path)
+    assert "delete this file" in (tmp_path / GUARDED).read_text()
+    (tmp_path / "bentray.sqlite").unlink()
+    for command in (("keys", "create", "--name", "two"), ("keys", "list"), ("projects", "list"), ("verify",)):
+        refused = bentray(*command, "--data", tmp_path)
+        assert (refused.exit_code, "bentray restore" in refused.stderr) == (2, True), command
+    assert not (tmp_path / "bentray.sqlite").exists()
+
+
+@pytest.mark.parametrize("tenant", ["user-" + "0" * 40, "project-0123456789abcdef0123"])
+def test_the_tenant_of_a_user_or_project_has_no_keys(bentray: Run, tmp_path: Path, tenant: str) -> None:
+    refused = bentray("keys", "create", "--name", "one", "--data", tmp_path, "--tenant", tenant)
+    assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+    assert "BENTRAY_OIDC_TENANTS" in refused.stderr
+    assert not (tmp_path / GUARDED).exists()
 
 
 def test_only_the_key_is_on_stdout(bentray: Run, tmp_path: Path) -> None:
