@@ -246,6 +246,26 @@ def test_compiled_kernels_are_copied_once_to_the_numba_cache(tmp_path: Path) -> 
         (cache / "folder" / "kernel.nbc").write_text("compiled since")
 
 
+def test_a_cache_that_cannot_be_written_is_in_a_temporary_folder(tmp_path: Path) -> None:
+    (tmp_path / "compiled").mkdir()
+    (tmp_path / "compiled" / "kernel.nbc").write_text("compiled with the image")
+    (tmp_path / "file").touch()
+    away = tmp_path / "file" / "cache"
+    environment = {
+        **os.environ,
+        "BENTRAY_COMPILED": str(tmp_path / "compiled"),
+        "NUMBA_CACHE_DIR": str(away),
+        "TMPDIR": str(tmp_path),
+    }
+    words = [str(DEPLOY / "entrypoint.sh"), "sh", "-c", "echo $NUMBA_CACHE_DIR $XDG_CACHE_HOME $MPLCONFIGDIR"]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
+    cache, home, drawing = done.stdout.split()
+    assert Path(cache).parent == tmp_path
+    assert (Path(cache) / "kernel.nbc").read_text() == "compiled with the image"
+    assert (home, drawing) == (cache, f"{cache}/matplotlib")
+    assert done.stderr == f"bentray: {away} cannot be written; compiled kernels are in {cache}\n"
+
+
 @pytest.mark.parametrize(
     ("version", "memory", "said"),
     [
