@@ -13,6 +13,8 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from .cache_folder import VARIABLE, cache_folder
+
 ROOT = Path(__file__).parent
 
 # ``from ..rays.descent import STEP, trace_ray``, also over several lines in brackets.
@@ -69,17 +71,17 @@ def _without_docstrings(text: bytes) -> str:
     return ast.dump(tree)
 
 
-def _memory_file() -> Path:
+def _memory_file() -> Path | None:
     """In the folder of numba's cache if one is configured, as in the image; else in the user's cache."""
-    folder = os.environ.get("NUMBA_CACHE_DIR")
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return (Path(folder) if folder else home / "bentray") / MEMORY
+    folder = os.environ.get(VARIABLE) or cache_folder()
+    return Path(folder, MEMORY) if folder else None
 
 
 @cache
 def _memory() -> dict[str, str]:
-    with suppress(OSError, RuntimeError, ValueError):
-        found = json.loads(_memory_file().read_text(encoding="ascii"))
+    file = _memory_file()
+    with suppress(OSError, ValueError):
+        found = json.loads(file.read_text(encoding="ascii")) if file else None
         if isinstance(found, dict):
             return {str(key): str(value) for key, value in found.items()}
     return {}
@@ -87,8 +89,10 @@ def _memory() -> dict[str, str]:
 
 def _keep(memory: dict[str, str]) -> None:
     """Write the file atomically; entries that another process adds meanwhile are parsed again."""
-    with suppress(OSError, RuntimeError):
-        file = _memory_file()
+    file = _memory_file()
+    if file is None:
+        return
+    with suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
         newest = dict(list(memory.items())[-MAX_ENTRIES:])
         with tempfile.NamedTemporaryFile("w", dir=file.parent, delete=False, encoding="ascii") as partial:

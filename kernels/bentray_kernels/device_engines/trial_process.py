@@ -1,8 +1,7 @@
 """Trial of a device, run as a child process, because drivers may abort or hang.
 
-``python -m bentray_kernels.device_engines.trial_process INDEX LABEL ENGINE…`` prints one line of JSON for
-each engine, ``{"engine", "fault", "timings"}``: see ``opencl.trial``. A device that ends the process omits
-the line.
+``python -m bentray_kernels.device_engines.trial_process INDEX LABEL ENGINE`` prints one line of JSON,
+``{"engine", "fault", "timings"}``: see ``opencl.trial``. A device that ends the process omits it.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from ..opencl.devices import WISH
 from .comparison import measured
 from .problems import trial_problems
 
-REPEATS = 3
+REPEATS = 2
 
 
 def answer(engine: str) -> dict[str, Any]:
@@ -39,15 +38,13 @@ def _fault(engine: str, fault: str) -> dict[str, Any]:
 
 
 def main(arguments: list[str]) -> None:
-    """Try the engines named on the command line on one device."""
-    index, label, *engines = arguments
+    """Try the engine named on the command line on one device."""
+    index, label, engine = arguments
     os.environ[WISH] = index
     choice = choose()
     if choice.device is None or choice.device.label != label:
         raise SystemExit(choice.reason or f"{label} is no longer OpenCL device {index}")
-    for engine in engines:
-        sys.stdout.write(json.dumps(answer(engine)) + "\n")
-        sys.stdout.flush()
+    sys.stdout.write(json.dumps(answer(engine)) + "\n")
 
 
 if __name__ == "__main__":

@@ -5,10 +5,11 @@ from .devices import VARIABLE, WISH, Device, find_devices
 from .lost_device import DeviceLostError, computed, computing_on, on_cpu, with_cpu_retry
 from .placement import DeviceRequest, Work, check_available, place, requested
 from .session import Session
-from .trial import Trial, trial_of
+from .trial import ENGINES, Trial, trial_of
 from .verdict import Verdict, verdict_on
 
 __all__ = [
+    "ENGINES",
     "VARIABLE",
     "WISH",
     "Choice",

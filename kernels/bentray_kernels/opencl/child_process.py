@@ -34,7 +34,7 @@ def answers_of(
             ).returncode
             ending = f"ended by signal {-code}" if code < 0 else f"ended with exit code {code}"
         except subprocess.TimeoutExpired:
-            ending = f"no answer in {time_out_s:g} s"
+            ending = f"no answer in {time_out_s:.2g} s"
         out.seek(0)
         errors.seek(0)
         said = errors.read().strip().splitlines() or [""]

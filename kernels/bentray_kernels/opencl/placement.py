@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import threading
+import time
 from functools import cache
 from typing import Literal, NamedTuple, get_args
 
@@ -11,8 +14,10 @@ from .choice import choose, open_session
 from .devices import VARIABLE, WISH, Device, find_devices, hidden, select_devices
 from .lost_device import DeviceLostError, cpu_only
 from .session import Session
-from .trial import stored_trial, trial_of
-from .verdict import stored_verdict
+from .trial import ENGINES, MOST_ATTEMPTS, Trial, stored_trial, try_engine
+from .verdict import stored_verdict, verdict_on
+
+log = logging.getLogger(__name__)
 
 DeviceRequest = Literal["auto", "cpu", "opencl"]
 REQUESTS: tuple[str, ...] = get_args(DeviceRequest)
@@ -21,6 +26,12 @@ DESCRIPTION = (
     "Where to compute what exists for OpenCL devices too. auto: on the device where a trial on this machine "
     "was faster; cpu: never on a device; opencl: on the device, an error without one."
 )
+
+
+# Most seconds that ``auto`` waits for the test and the trial of a card, and the least that are worth a start.
+AUTO_S, LEAST_S = 10.0, 1.0
+# One thread tests or tries at a time.
+_TRYING = threading.Lock()
 
 
 class Work(NamedTuple):
@@ -60,7 +71,7 @@ def place(work: Work, device: str = "auto") -> Session | None:
     """The open device that computes a problem; None: compiled code does.
 
     A processor is also an OpenCL device, but ``auto`` tests GPUs only: a processor is considered once
-    ``bentray devices`` has tested it.
+    ``bentray devices`` has tested it. A test and a trial, which are stored, take ``AUTO_S`` together at most.
 
     Args:
         work: the problem.
@@ -76,7 +87,9 @@ def place(work: Work, device: str = "auto") -> Session | None:
         return None
     if request == "auto":
         candidate = _tested_device()
-        if candidate is None or misfit(work, candidate) or not trial_of(candidate).faster(*work[:2]):
+        if candidate is None or misfit(work, candidate):
+            return None
+        if not _trial_of(candidate, work.engine).faster(work.size):
             return None
         session = open_session(candidate)
         return None if session.lost else session
@@ -128,12 +141,54 @@ def _required() -> Device:
 def _tested_device() -> Device | None:
     """The device that ``auto`` may use."""
     devices = _devices(os.environ.get(WISH), hidden())
-    if any(device.kind in ("gpu", "accelerator") for device in devices):
-        return choose().device
+    if any(_is_card(device) for device in devices):
+        with _TRYING:
+            return _passing(devices)[0]
     for device in devices:
-        if stored_verdict(device) is not None and stored_trial(device) is not None:
+        if stored_verdict(device) is not None and any(stored_trial(device, one) for one in ENGINES):
             return device
     return None
+
+
+def _is_card(device: Device) -> bool:
+    return device.kind in ("gpu", "accelerator")
+
+
+@cache
+def _passing(devices: tuple[Device, ...]) -> tuple[Device | None, float]:
+    """The first device that passes its self-test, once per process, and the seconds left for its trial."""
+    end = time.monotonic() + AUTO_S
+    for device in devices:
+        if (left := end - time.monotonic()) < LEAST_S:
+            break
+        if stored_verdict(device) is None:
+            log.warning("%s is tested once, for at most %.0f s", device.name, left)
+        if verdict_on(device, left).usable:
+            return device, end - time.monotonic()
+    return None, 0.0
+
+
+def _trial_of(device: Device, engine: str) -> Trial:
+    """The stored trial of a device; a new one of a card, once per process."""
+    with _TRYING:
+        stored = stored_trial(device, engine)
+        final = stored is not None and (not stored.fault or stored.attempts >= MOST_ATTEMPTS)
+        if final or not _is_card(device):
+            return stored or Trial()
+        return _tried(device, engine)
+
+
+@cache
+def _tried(device: Device, engine: str) -> Trial:
+    left = _passing(_devices(os.environ.get(WISH), hidden()))[1]
+    if left < LEAST_S:
+        return Trial()
+    log.warning("%s is tried for %s once, for at most %.0f s", device.name, engine, left)
+    trial = try_engine(device, engine, left)
+    if trial.fault:
+        instead = "compiled code computes; `bentray devices` tries it for longer"
+        log.warning("%s was tried for %s: %s; %s", device.name, engine, trial.fault, instead)
+    return trial
 
 
 @cache

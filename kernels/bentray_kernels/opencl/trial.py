@@ -1,12 +1,10 @@
-"""Trial of a device: the time of each engine on it beside compiled code, cached as the verdict is."""
+"""Trial of a device: the time of an engine on it beside compiled code, cached as the self-test is."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,11 +18,15 @@ from .records import read_record, record_file, write_record
 ENGINES = ("eikonal", "wave", "sart", "reflection", "refraction", "field")
 MODULE = "bentray_kernels.device_engines.trial_process"
 
-# Of all engines; the first run of an installation compiles kernels too.
-TIME_OUT_S = 600.0
+# Of `bentray devices`, for one engine; the first run of an installation compiles kernels too.
+TIME_OUT_S = 300.0
 
-# Takes a device, engines and a time-out; returns the answers of the trial, and how it ended.
-Child = Callable[[Device, Sequence[str], float], tuple[list[dict[str, Any]], str]]
+# Failed trials of an engine after which it is tried only by `bentray devices`: the first ones may end while
+# kernels are compiled, which are in the cache the next time.
+MOST_ATTEMPTS = 3
+
+# Takes a device, an engine and a time-out; returns the answers of the trial, and how it ended.
+Child = Callable[[Device, str, float], tuple[list[dict[str, Any]], str]]
 
 
 class Timing(NamedTuple):
@@ -43,23 +45,24 @@ class Timing(NamedTuple):
 
 @dataclass(frozen=True)
 class Trial:
-    """The times of a device.
+    """The times of an engine on a device.
 
     Attributes:
-        timings: by engine, a small problem and a large one.
-        faults: by engine, why it may not compute on the device.
+        timings: a small problem and a large one; none with a fault.
+        fault: why the engine may not compute on the device; empty if it may.
+        attempts: failed trials before and with this one.
     """
 
-    timings: Mapping[str, tuple[Timing, ...]]
-    faults: Mapping[str, str]
+    timings: tuple[Timing, ...] = ()
+    fault: str = ""
+    attempts: int = 0
 
-    def faster(self, engine: str, size: float) -> bool:
+    def faster(self, size: float) -> bool:
         """Whether the device takes less time than compiled code for a problem of that size."""
-        timings = self.timings.get(engine, ())
-        if not timings or self.faults.get(engine):
+        if not self.timings:
             return False
-        compiled = _seconds([(one.size, one.compiled_s) for one in timings], size)
-        return _seconds([(one.size, one.device_s) for one in timings], size) < compiled
+        compiled = _seconds([(one.size, one.compiled_s) for one in self.timings], size)
+        return _seconds([(one.size, one.device_s) for one in self.timings], size) < compiled
 
 
 def _seconds(known: Sequence[tuple[float, float]], size: float) -> float:
@@ -70,61 +73,48 @@ def _seconds(known: Sequence[tuple[float, float]], size: float) -> float:
     return start + each * size
 
 
-@cache
-def trial_of(device: Device) -> Trial:
-    """The trial, in a child process or from the cache."""
-    stored = stored_trial(device)
-    if stored is not None:
-        return stored
-    trial = examine(device, in_a_child)
-    if not trial.faults:
-        with suppress(OSError, RuntimeError):
-            write_record(_file(device), asdict(trial))
+def stored_trial(device: Device, engine: str) -> Trial | None:
+    """The trial in the cache; None if it is absent or damaged."""
+    content = read_record(_file(device, engine))
+    try:
+        timings = tuple(Timing(*map(float, one)) for one in content["timings"])
+        trial = Trial(timings, str(content["fault"]), int(content["attempts"]))
+    except (ValueError, KeyError, TypeError):
+        return None
+    numbers = [number for one in timings for number in one]
+    whole = all(math.isfinite(number) and number > 0.0 for number in numbers)
+    return trial if whole and bool(timings) != bool(trial.fault) else None
+
+
+def try_engine(device: Device, engine: str, time_out_s: float = TIME_OUT_S) -> Trial:
+    """Try an engine in a child process, and store the trial."""
+    trial = examine(device, engine, in_a_child, time_out_s)
+    write_record(_file(device, engine), asdict(trial))
     return trial
 
 
-def stored_trial(device: Device) -> Trial | None:
-    """The trial in the cache; None if it is absent or damaged."""
-    try:
-        content = read_record(_file(device))
-        timings = {
-            engine: tuple(Timing(*map(float, one)) for one in content["timings"][engine])
-            for engine in ENGINES
-        }
-        faults = {str(engine): str(fault) for engine, fault in content["faults"].items()}
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError):
-        return None
-    numbers = [number for engine in timings.values() for one in engine for number in one]
-    whole = all(timings.values()) and all(math.isfinite(number) and number > 0.0 for number in numbers)
-    return Trial(timings, faults) if whole else None
+def trial_of(device: Device, engine: str) -> Trial:
+    """The trial in the cache, or a new one without haste; a failed one is repeated."""
+    stored = stored_trial(device, engine)
+    return stored if stored is not None and not stored.fault else try_engine(device, engine)
 
 
-def examine(device: Device, child: Child) -> Trial:
-    """Try every engine; if one ends or stops the child, the rest is tried in another one."""
-    timings: dict[str, tuple[Timing, ...]] = {}
-    faults: dict[str, str] = {}
-    left = list(ENGINES)
-    while left:
-        answers, ending = child(device, left, TIME_OUT_S)
-        for answer in answers:
-            engine = answer.get("engine")
-            if engine not in left:
-                continue
-            left.remove(engine)
-            if answer["fault"]:
-                faults[engine] = str(answer["fault"])
-            else:
-                timings[engine] = tuple(Timing(*map(float, one)) for one in answer["timings"])
-        if left:
-            faults[left.pop(0)] = ending
-    return Trial(timings, faults)
+def examine(device: Device, engine: str, child: Child, time_out_s: float) -> Trial:
+    """Try an engine; a device that ends or stops the child has a fault."""
+    answers, ending = child(device, engine, time_out_s)
+    answer = next((one for one in answers if one.get("engine") == engine), {"fault": ending})
+    if not answer["fault"]:
+        return Trial(tuple(Timing(*map(float, one)) for one in answer["timings"]))
+    before = stored_trial(device, engine)
+    return Trial((), str(answer["fault"]), 1 + (before.attempts if before else 0))
 
 
-def in_a_child(device: Device, engines: Sequence[str], time_out_s: float) -> tuple[list[dict[str, Any]], str]:
+def in_a_child(device: Device, engine: str, time_out_s: float) -> tuple[list[dict[str, Any]], str]:
     """Run ``device_engines.trial_process`` in a process of its own."""
-    return answers_of(MODULE, device, engines, time_out_s)
+    return answers_of(MODULE, device, (engine,), time_out_s)
 
 
-def _file(device: Device) -> Path:
+def _file(device: Device, engine: str) -> Path | None:
     sources = sorted((Path(__file__).parent / "sources").rglob("*.cl"))
-    return record_file("trial", device, (digest(MODULE).encode(), *(file.read_bytes() for file in sources)))
+    contents = (digest(MODULE).encode(), *(file.read_bytes() for file in sources))
+    return record_file(f"trial-{engine}", device, contents)

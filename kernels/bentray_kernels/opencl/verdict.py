@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -42,16 +42,17 @@ class Verdict:
 
 
 @cache
-def verdict_on(device: Device) -> Verdict:
-    """The verdict, from a self-test in a child process or from the cache."""
+def verdict_on(device: Device, time_out_s: float = TIME_OUT_S) -> Verdict:
+    """The verdict, from the cache or from a self-test in a child process, which has so many seconds."""
     if not device.double_precision:
         return Verdict("it has no double precision", (), {})
     stored = _kept(device)
     if stored is not None:
         return stored
-    verdict = examine(device, in_a_child)
+    verdict = examine(device, in_a_child, time_out_s)
     if verdict.usable:
-        _keep(device, verdict)
+        # A failure may be due to a busy machine.
+        write_record(_file(device), asdict(verdict))
     return verdict
 
 
@@ -60,18 +61,19 @@ def stored_verdict(device: Device) -> Verdict | None:
     return _kept(device) if device.double_precision else None
 
 
-def examine(device: Device, child: Child) -> Verdict:
-    """Run all stages; if the device ends or stops the child, run the rest in another one."""
+def examine(device: Device, child: Child, time_out_s: float = TIME_OUT_S) -> Verdict:
+    """Run all stages; if the device ends or stops the child, run the rest in another one, if in time."""
     faults: dict[str, str] = {}
     left = list(STAGES)
+    end = time.monotonic() + time_out_s
     while left:
-        answers, ending = child(device, left, TIME_OUT_S)
+        answers, ending = child(device, left, end - time.monotonic())
         answers = {stage: answers[stage] for stage in left if stage in answers}
         faults.update(answers)
         left = [stage for stage in left if stage not in answers]
         if left:
             faults[left.pop(0)] = ending
-        if any(faults.get(stage) for stage in NEEDED):
+        if any(faults.get(stage) for stage in NEEDED) or time.monotonic() >= end:
             break
     reason = next((f"{stage}: {faults[stage]}" for stage in NEEDED if faults.get(stage)), "")
     widths = tuple(w for w in WIDTHS if faults.get(f"double{w}") == "")
@@ -89,7 +91,7 @@ def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tupl
     return {str(answer["stage"]): str(answer["fault"]) for answer in known}, ending
 
 
-def _file(device: Device) -> Path:
+def _file(device: Device) -> Path | None:
     package = Path(__file__).parent
     names = ("self_test.py", "blocks.py", "session.py", "program.py", "pocl.py", "link/shared_library.py")
     sources = (*(package / name for name in names), *sorted((package / "sources").rglob("*.cl")))
@@ -101,12 +103,5 @@ def _kept(device: Device) -> Verdict | None:
         content = read_record(_file(device))
         widths = tuple(int(width) for width in content["widths"])
         return Verdict("", widths, {str(k): str(v) for k, v in content["faults"].items()})
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError):
         return None
-
-
-def _keep(device: Device, verdict: Verdict) -> None:
-    """Store only success: a failure may be due to a busy machine."""
-    # Without a home there is no folder.
-    with suppress(OSError, RuntimeError):
-        write_record(_file(device), asdict(verdict))

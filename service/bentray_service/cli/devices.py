@@ -33,7 +33,7 @@ def devices(
 
     Example:  bentray devices --bench
     """
-    from bentray_kernels.opencl import choose, find_devices, requested, trial_of, verdict_on
+    from bentray_kernels.opencl import ENGINES, choose, find_devices, requested, trial_of, verdict_on
 
     if quick and not bench:
         raise InvalidInput("--quick", "given without --bench", "--bench --quick")
@@ -42,13 +42,16 @@ def devices(
     verdicts: list[Verdict] = []
     with progress_bar("Testing OpenCL devices") as step:
         for device in records:
-            step(len(verdicts), len(records) + 1, device.name)
+            step(len(verdicts), len(records) + len(ENGINES), device.name)
             verdicts.append(verdict_on(device))
         choice = choose()
-        trial = None if choice.device is None else trial_of(choice.device)
+        trials: dict[str, Trial] = {}
+        for engine in ENGINES if choice.device is not None else ():
+            step(len(records) + len(trials), len(records) + len(ENGINES), engine)
+            trials[engine] = trial_of(choice.device, engine)
     compared = _compared(quick=quick) if bench and choice.device is not None else []
     if as_json:
-        print_json(_figures(records, verdicts, choice, trial, compared) | {"device": request})
+        print_json(_figures(records, verdicts, choice, trials, compared) | {"device": request})
         return
     if records:
         columns = ("index", "platform", "device", "kind", "memory", "driver", "verdict", "remarks")
@@ -67,8 +70,8 @@ def devices(
         ]
         print_table("OpenCL devices", columns, cells)
         print_lines(f"device {device.index} comes from {_source(device)}" for device in records)
-    if trial is not None:
-        _print_trial(trial)
+    if trials:
+        _print_trials(trials)
     if compared and choice.device is not None:
         _print_compared(compared, choice.device)
     print_lines(_summary(choice, bool(records)))
@@ -89,10 +92,9 @@ def _figures(
     records: tuple[Device, ...],
     verdicts: list[Verdict],
     choice: Choice,
-    trial: Trial | None,
+    trials: dict[str, Trial],
     compared: list[Comparison],
 ) -> dict[str, object]:
-    timings = {} if trial is None else trial.timings
     return {
         "chosen": None if choice.device is None else choice.device.index,
         "reason": choice.reason,
@@ -101,8 +103,8 @@ def _figures(
             {**asdict(device), "usable": verdict.usable, **asdict(verdict)}
             for device, verdict in zip(records, verdicts, strict=True)
         ],
-        "trial": {name: [one._asdict() for one in pair] for name, pair in timings.items()},
-        "trial_faults": {} if trial is None else dict(trial.faults),
+        "trial": {name: [one._asdict() for one in trial.timings] for name, trial in trials.items()},
+        "trial_faults": {name: trial.fault for name, trial in trials.items() if trial.fault},
         "bench": [
             {
                 "engine": one.engine.name,
@@ -118,20 +120,20 @@ def _figures(
     }
 
 
-def _print_trial(trial: Trial) -> None:
-    """The trial, and what ``auto`` concludes from it."""
+def _print_trials(trials: dict[str, Trial]) -> None:
+    """The trials, and what ``auto`` concludes from them."""
     cells: list[tuple[Any, ...]] = [
         (
             engine,
             f"{one.size:,.0f}",
             f"{1e3 * one.compiled_s:.3g} ms",
             f"{1e3 * one.device_s:.3g} ms",
-            "device" if trial.faster(engine, one.size) else "compiled",
+            "device" if trial.faster(one.size) else "compiled",
         )
-        for engine, pair in trial.timings.items()
-        for one in pair
+        for engine, trial in trials.items()
+        for one in trial.timings
     ]
-    cells += [(engine, "", "", fault, "compiled") for engine, fault in trial.faults.items()]
+    cells += [(engine, "", "", trial.fault, "compiled") for engine, trial in trials.items() if trial.fault]
     print_table("Trial", ("engine", "size", "compiled", "device", "auto takes"), cells)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bentray_kernels.opencl import Device, Session, choice, placement, trial, verdict
+from bentray_kernels.opencl import Device, Session, choice, placement, verdict
 
 GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True)
 
@@ -38,11 +38,12 @@ def fresh(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     monkeypatch.delenv("BENTRAY_DEVICE", raising=False)
     remembered = (
         verdict.verdict_on,
-        trial.trial_of,
         choice._found,
         choice._opened,
         choice._warn_once,
         placement._devices,
+        placement._passing,
+        placement._tried,
     )
     for function in remembered:
         function.cache_clear()

@@ -1,17 +1,27 @@
 """Where an engine computes: requests, the machine's variable, the trial, and the memory of the device."""
 
+import time
 from dataclasses import replace
 
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.opencl import Choice, DeviceLostError, Session, Verdict, Work, placement, requested
+from bentray_kernels.opencl import (
+    Choice,
+    DeviceLostError,
+    Session,
+    Verdict,
+    Work,
+    placement,
+    requested,
+    trial,
+)
 from bentray_kernels.opencl.lost_device import on_cpu
 from bentray_kernels.opencl.placement import misfit, place
 from bentray_kernels.opencl.trial import Timing, Trial
 
 # Faster on the device from 100 units on.
-TRIAL = Trial({"field": (Timing(10.0, 0.1, 1.0), Timing(1000.0, 10.0, 1.0))}, {})
+TRIAL = Trial((Timing(10.0, 0.1, 1.0), Timing(1000.0, 10.0, 1.0)))
 SMALL, LARGE = Work("field", 50.0), Work("field", 200.0)
 
 
@@ -29,9 +39,15 @@ def machine(monkeypatch, gpu, fresh):
     """A GPU that passes its tests; the fixture gives what was asked of it."""
     asked = []
     sessions = {}
+
+    def tried(device, engine, time_out_s):
+        asked.append("trial")
+        return TRIAL if engine == "field" else Trial((), "it computes wrong results", 1)
+
     monkeypatch.setattr(placement, "find_devices", lambda: asked.append("devices") or (gpu,))
     monkeypatch.setattr(placement, "choose", lambda: asked.append("verdict") or Choice(gpu, ()))
-    monkeypatch.setattr(placement, "trial_of", lambda device: asked.append("trial") or TRIAL)
+    monkeypatch.setattr(placement, "verdict_on", lambda *_: asked.append("verdict") or Verdict("", (1,), {}))
+    monkeypatch.setattr(placement, "try_engine", tried)
     monkeypatch.setattr(placement, "open_session", lambda device: sessions.setdefault(device, Opened(device)))
     return asked
 
@@ -39,7 +55,7 @@ def machine(monkeypatch, gpu, fresh):
 def test_auto_takes_what_is_faster_for_the_size(machine, gpu):
     assert place(SMALL) is None
     assert place(LARGE).device == gpu
-    assert place(Work("eikonal", 1e9)) is None, "an engine that was not tried"
+    assert place(Work("eikonal", 1e9)) is None, "an engine that is wrong there"
 
 
 def test_cpu_asks_for_no_device(machine, monkeypatch):
@@ -98,15 +114,78 @@ def test_what_does_not_fit_the_memory_is_computed_here_or_refused_by_number(mach
 def test_auto_does_not_test_a_processor_by_itself(monkeypatch, three, fresh):
     cpu = three[0]
     monkeypatch.setattr(placement, "find_devices", lambda: (cpu,))
-    monkeypatch.setattr(placement, "choose", lambda: pytest.fail("tested"))
+    for name in ("choose", "verdict_on", "try_engine"):
+        monkeypatch.setattr(placement, name, lambda *_: pytest.fail("tested"))
     assert place(LARGE) is None
     # Once `bentray devices` has tested it, it is as good as another.
     monkeypatch.setattr(placement, "stored_verdict", lambda device: Verdict("", (1,), {}))
-    monkeypatch.setattr(placement, "stored_trial", lambda device: TRIAL)
-    monkeypatch.setattr(placement, "trial_of", lambda device: TRIAL)
+    monkeypatch.setattr(placement, "stored_trial", lambda device, engine: TRIAL)
     monkeypatch.setattr(placement, "open_session", Opened)
     assert place(LARGE).device == cpu
     assert place(SMALL) is None
+
+
+@pytest.fixture
+def slow_card(monkeypatch, gpu, fresh, tmp_path):
+    """A card whose self-test passes and whose trials take a minute; gives the engines that were tried."""
+    engines = tmp_path / "tried"
+    (tmp_path / "slow_trial.py").write_text(
+        f"import sys, time\nopen({str(engines)!r}, 'a').write(sys.argv[3] + ' ')\ntime.sleep(60)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(trial, "MODULE", "slow_trial")
+    monkeypatch.setattr(trial, "digest", lambda module: module)
+    monkeypatch.setattr(placement, "find_devices", lambda: (gpu,))
+    monkeypatch.setattr(placement, "verdict_on", lambda *_: Verdict("", (1,), {}))
+    monkeypatch.setattr(placement, "AUTO_S", 0.6)
+    monkeypatch.setattr(placement, "LEAST_S", 0.1)
+    return lambda: engines.read_text().split() if engines.exists() else []
+
+
+def forget():
+    """As another process."""
+    placement._passing.cache_clear()
+    placement._tried.cache_clear()
+
+
+def test_auto_waits_for_a_slow_trial_ten_seconds_and_says_so(slow_card, caplog, monkeypatch):
+    assert trial.TIME_OUT_S > 60.0
+    begun = time.monotonic()
+    assert place(LARGE) is None
+    assert place(LARGE) is None, "once per process"
+    assert 0.5 < time.monotonic() - begun < 10.0
+    lines = [record.getMessage() for record in caplog.records]
+    assert lines == [
+        "GPU 9000 is tested once, for at most 1 s",
+        "GPU 9000 is tried for field once, for at most 1 s",
+        "GPU 9000 was tried for field: no answer in 0.6 s; compiled code computes; "
+        "`bentray devices` tries it for longer",
+    ]
+    # Further processes try again, as kernels that were compiled meanwhile are in the cache; but not for ever.
+    for _ in range(4):
+        forget()
+        assert place(LARGE) is None
+    assert slow_card() == ["field"] * 3
+    assert place(Work("sart", 1e9)) is None
+    assert slow_card() == ["field"] * 3 + ["sart"]
+
+
+def test_the_wait_for_a_card_is_ten_seconds_at_most():
+    assert vars(placement)["AUTO_S"] <= 10.0
+
+
+def test_a_slow_self_test_leaves_no_time_for_a_trial(slow_card, monkeypatch):
+    given = []
+
+    def slow(device, time_out_s):
+        given.append(time_out_s)
+        time.sleep(time_out_s)
+        return Verdict("", (1,), {})
+
+    monkeypatch.setattr(placement, "verdict_on", slow)
+    assert place(LARGE) is None
+    assert given == [pytest.approx(0.6, abs=0.1)]
+    assert slow_card() == []
 
 
 def test_a_lost_device_is_not_used_again(machine, gpu):

@@ -5,24 +5,21 @@ from dataclasses import replace
 import pytest
 
 from bentray_kernels.opencl import trial
-from bentray_kernels.opencl.trial import ENGINES, Timing, Trial, examine, stored_trial, trial_of
+from bentray_kernels.opencl.trial import ENGINES, Timing, Trial, examine, stored_trial, trial_of, try_engine
 
 # The device needs 1 s to start and a fifth of the time for each unit.
 SLOW_START = (Timing(10.0, 0.1, 1.02), Timing(1000.0, 10.0, 3.0))
 
 
-def child_of(bad=()):
-    """A child process of a device that ends it at the engines in ``bad``."""
+def child_of(fault="", ending="ended with exit code 0"):
+    """A child process of a device; with a fault of its own, or that ends before it answers."""
     calls = []
 
-    def child(device, engines, time_out_s):
-        calls.append(tuple(engines))
-        answers = []
-        for engine in engines:
-            if engine in bad:
-                return answers, "ended by signal 6"
-            answers.append({"engine": engine, "fault": "", "timings": [list(one) for one in SLOW_START]})
-        return answers, "ended with exit code 0"
+    def child(device, engine, time_out_s):
+        calls.append((engine, time_out_s))
+        timings = [] if fault else [list(one) for one in SLOW_START]
+        answers = [{"driver": "a remark"}, {"engine": engine, "fault": fault, "timings": timings}]
+        return answers if ending == "ended with exit code 0" else [], ending
 
     child.calls = calls
     return child
@@ -30,88 +27,89 @@ def child_of(bad=()):
 
 @pytest.mark.parametrize(("size", "faster"), [(1.0, False), (100.0, False), (126.0, True), (1e6, True)])
 def test_the_faster_engine_depends_on_the_size(size, faster):
-    assert Trial({"field": SLOW_START}, {}).faster("field", size) is faster
+    assert Trial(SLOW_START).faster(size) is faster
 
 
 def test_an_engine_that_was_not_tried_or_is_wrong_is_not_preferred():
-    assert not Trial({}, {}).faster("field", 1e9)
-    assert not Trial({"field": SLOW_START}, {"field": "wrong"}).faster("field", 1e9)
+    assert not Trial().faster(1e9)
+    assert not Trial((), "wrong", 1).faster(1e9)
 
 
 def test_times_never_become_negative_or_shrink_with_the_size():
     noisy = (Timing(10.0, 1.0, 0.5), Timing(100.0, 0.4, 0.6))
-    assert Trial({"field": noisy}, {}).faster("field", 1.0)
-    assert not Trial({"field": noisy}, {}).faster("field", 1e6)
+    assert Trial(noisy).faster(1.0)
+    assert not Trial(noisy).faster(1e6)
 
 
-def test_an_engine_that_ends_the_process_costs_only_itself(gpu):
-    child = child_of({"wave"})
-    found = examine(gpu, child)
-    assert found.faults == {"wave": "ended by signal 6"}
-    assert set(found.timings) == set(ENGINES) - {"wave"}
-    assert child.calls == [ENGINES, ENGINES[2:]]
-
-
-def test_wrong_results_are_a_fault(gpu):
-    def child(device, engines, time_out_s):
-        return [{"engine": name, "fault": "differs by 0.1", "timings": []} for name in engines], ""
-
-    assert examine(gpu, child) == Trial({}, dict.fromkeys(ENGINES, "differs by 0.1"))
+@pytest.mark.parametrize(
+    ("child", "fault"),
+    [
+        (child_of("differs by 0.1"), "differs by 0.1"),
+        (child_of(ending="ended by signal 6"), "ended by signal 6"),
+        (child_of(ending="no answer in 7 s"), "no answer in 7 s"),
+    ],
+)
+def test_wrong_results_and_a_process_that_ends_are_faults(gpu, fresh, child, fault):
+    assert examine(gpu, "wave", child, 7.0) == Trial((), fault, 1)
+    assert child.calls == [("wave", 7.0)]
 
 
 def test_a_trial_is_remembered_until_the_driver_or_the_sources_change(gpu, monkeypatch, fresh):
     child = child_of()
     monkeypatch.setattr(trial, "in_a_child", child)
-    first = trial_of(gpu)
-    trial_of.cache_clear()
-    assert trial_of(gpu) == first == stored_trial(gpu)
+    first = trial_of(gpu, "field")
+    assert trial_of(gpu, "field") == first == stored_trial(gpu, "field")
     assert len(child.calls) == 1
-    trial_of(replace(gpu, driver="1.2.4"))
+    assert stored_trial(gpu, "wave") is None, "each engine has its own"
+    trial_of(replace(gpu, driver="1.2.4"), "field")
     assert len(child.calls) == 2
     monkeypatch.setattr(trial, "digest", lambda module: "of another version")
-    trial_of.cache_clear()
-    trial_of(gpu)
+    trial_of(gpu, "field")
     assert len(child.calls) == 3
 
 
 @pytest.mark.parametrize(
     "content",
-    ["", "[]", "{}", '{"timings": {}, "faults": {}}', '{"timings": 1, "faults": 1}', "\x00\xff", "null"],
+    ["", "[]", "{}", '{"timings": [], "fault": "", "attempts": 0}', '{"timings": 1, "fault": 1}', "null"],
 )
 def test_a_damaged_cache_is_ignored_and_rebuilt(gpu, monkeypatch, fresh, content):
     monkeypatch.setattr(trial, "in_a_child", child_of())
-    whole = trial_of(gpu)
+    whole = trial_of(gpu, "field")
     (file,) = fresh.iterdir()
-    file.write_text(content, encoding="latin-1")
-    assert stored_trial(gpu) is None
-    trial_of.cache_clear()
-    assert trial_of(gpu) == whole == stored_trial(gpu)
+    for damaged in (content, "\x00\xff"):
+        file.write_text(damaged, encoding="latin-1")
+        assert stored_trial(gpu, "field") is None
+    assert trial_of(gpu, "field") == whole == stored_trial(gpu, "field")
 
 
 def test_times_that_no_clock_gives_are_ignored(gpu, monkeypatch, fresh):
     monkeypatch.setattr(trial, "in_a_child", child_of())
-    trial_of(gpu)
+    trial_of(gpu, "field")
     (file,) = fresh.iterdir()
     text = file.read_text()
     for number in ("-1.02", "NaN", "0.0"):
         file.write_text(text.replace("1.02", number))
-        assert stored_trial(gpu) is None
+        assert stored_trial(gpu, "field") is None
 
 
-def test_a_faulty_trial_is_not_remembered_on_disk(gpu, monkeypatch, fresh):
-    monkeypatch.setattr(trial, "in_a_child", child_of({"field"}))
-    assert trial_of(gpu).faults == {"field": "ended by signal 6"}
-    assert not fresh.exists()
+def test_failed_trials_are_counted_and_repeated_on_request(gpu, monkeypatch, fresh):
+    monkeypatch.setattr(trial, "in_a_child", child_of("wrong"))
+    for attempts in (1, 2):
+        assert try_engine(gpu, "field").attempts == attempts
+    assert trial_of(gpu, "field") == stored_trial(gpu, "field") == Trial((), "wrong", 3)
+    monkeypatch.setattr(trial, "in_a_child", child_of())
+    assert trial_of(gpu, "field") == Trial(SLOW_START)
 
 
 @pytest.mark.opencl
 @pytest.mark.slow
-@pytest.mark.parametrize("engines", [("eikonal", "field"), pytest.param(ENGINES, marks=pytest.mark.nightly)])
-def test_the_child_process_times_engines(opencl_session, engines):
-    answers, ending = trial.in_a_child(opencl_session.device, engines, 500.0)
+@pytest.mark.parametrize(
+    "engine", ["field", *(pytest.param(one, marks=pytest.mark.nightly) for one in ENGINES if one != "field")]
+)
+def test_the_child_process_times_engines(opencl_session, engine):
+    (answer,), ending = trial.in_a_child(opencl_session.device, engine, 300.0)
     assert ending == "ended with exit code 0" or ending.startswith("ended with exit code 0 (")
-    assert [(one["engine"], one["fault"]) for one in answers] == [(name, "") for name in engines]
-    for one in answers:
-        (small, large) = (Timing(*times) for times in one["timings"])
-        assert small.size < large.size
-        assert min(*small, *large) > 0.0
+    assert (answer["engine"], answer["fault"]) == (engine, "")
+    (small, large) = (Timing(*times) for times in answer["timings"])
+    assert small.size < large.size
+    assert min(*small, *large) > 0.0

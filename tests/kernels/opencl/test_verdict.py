@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from bentray_kernels import cache_folder
 from bentray_kernels.opencl import records, verdict
 from bentray_kernels.opencl.self_test import STAGES
 from bentray_kernels.opencl.verdict import Verdict, examine, in_a_child, verdict_on
@@ -139,10 +140,11 @@ def test_damaged_cache_does_not_pass_a_device(gpu, monkeypatch, fresh, content):
 def test_a_refusal_is_not_remembered_on_disk(gpu, monkeypatch, fresh):
     monkeypatch.setattr(verdict, "in_a_child", child_of({"solve": None}))
     assert not verdict_on(gpu).usable
-    assert not fresh.exists()
+    assert not list(fresh.iterdir())
 
 
 def test_verdict_holds_without_a_cache_folder(gpu, monkeypatch, fresh):
     fresh.write_text("a file where the folder should be")
     monkeypatch.setattr(verdict, "in_a_child", child_of({}))
+    monkeypatch.setattr(cache_folder, "_SAID", ["once"])
     assert verdict_on(gpu).usable
