@@ -21,52 +21,78 @@ class CacheFolderWarning(UserWarning):
 
 
 def cache_folder() -> Path | None:
-    """The user's cache folder of this program, else a temporary one of this user, else None.
+    """The user's cache folder of this program, in a temporary folder if need be; None if none can be written.
+
+    In the temporary case ``XDG_CACHE_HOME`` of this process and its children names it, so that the caches of
+    libraries are there, too.
 
     Warns:
         CacheFolderWarning: once, where it is not the user's.
     """
-    wanted = _user_folder()
-    found, reason = _writable(wanted)
-    if reason:
-        _say_once(f"the cache folder {wanted} cannot be written ({reason})", str(found), "XDG_CACHE_HOME")
-    return found
+    # Without a home the path is relative.
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111
+    wanted = Path(home, "bentray")
+    reason = _fault_of(wanted)
+    if not reason:
+        return wanted
+    temporary = _temporary_folder()
+    _say(f"the cache folder {wanted} cannot be written ({reason})", temporary, "XDG_CACHE_HOME")
+    if temporary is None:
+        return None
+    os.environ["XDG_CACHE_HOME"] = str(temporary)
+    return temporary / "bentray"
+
+
+def use_writable_folder(variable: str, name: str, usual: Path | None = None) -> Path | None:
+    """Name a folder that can be written in the environment variable of a library, if its own cannot.
+
+    Children of this process get the variable, too.
+
+    Args:
+        variable: names the folder.
+        name: of the folder in ``cache_folder()`` that takes its place.
+        usual: folder without the variable; None: beside ``cache_folder()``.
+
+    Returns:
+        The folder whose place was taken; None where it can be written, or there is no other one.
+
+    Warns:
+        CacheFolderWarning: once, where the named folder or the cache folder cannot be written.
+    """
+    named = os.environ.get(variable, "")
+    found = cache_folder()
+    wanted = Path(named).absolute() if named else usual or found
+    reason = _fault_of(wanted) if wanted else ""
+    if not reason:
+        return None
+    if named:
+        _say(f"{variable}={named} cannot be written ({reason})", found, variable)
+    if found is None:
+        return None
+    os.environ[variable] = str(found / name)
+    return wanted
 
 
 def use_writable_kernel_cache(sources: Path) -> None:
     """Let numba keep compiled kernels where it can write: in ``NUMBA_CACHE_DIR``, or beside them.
 
-    Otherwise ``NUMBA_CACHE_DIR`` of this process and its children becomes a folder in ``cache_folder()``,
-    with links to the kernels that exist in the other place. Without any folder every process compiles.
+    Another folder gets links to the kernels that exist there. Without any folder every process compiles.
 
     Args:
         sources: folder of the package with the kernels.
 
     Warns:
-        CacheFolderWarning: once, where ``NUMBA_CACHE_DIR`` or the cache folder cannot be written.
+        CacheFolderWarning: as ``use_writable_folder``.
     """
-    named = os.environ.get(VARIABLE, "")
-    compiled = sources / "__pycache__"
-    if named:
-        reason = _fault_of(Path(named).absolute())
-        if not reason:
-            return
-        found = _writable(_user_folder())[0]
-        _say_once(f"{VARIABLE}={named} cannot be written ({reason})", str(found), VARIABLE)
-    elif os.access(compiled if compiled.exists() else sources, os.W_OK):
-        return
-    else:
-        found = cache_folder()
-    if found is not None:
-        folder = found / "kernels"
-        links = _links_of_folder(Path(named).absolute()) if named else _links_beside(sources)
+    replaced = use_writable_folder(VARIABLE, "kernels", sources / "__pycache__")
+    if replaced is not None:
+        beside = replaced == sources / "__pycache__"
         with suppress(OSError):
-            for relative, file in links:
-                link = folder / relative
+            for relative, file in _links_beside(sources) if beside else _links_of_folder(replaced):
+                link = Path(os.environ[VARIABLE], relative)
                 if not os.path.lexists(link):
                     link.parent.mkdir(parents=True, exist_ok=True)
                     link.symlink_to(file)
-        os.environ[VARIABLE] = str(folder)
 
 
 def _links_of_folder(existing: Path) -> Iterator[tuple[Path, Path]]:
@@ -83,29 +109,20 @@ def _links_beside(sources: Path) -> Iterator[tuple[Path, Path]]:
             yield Path(name, file.name), file
 
 
-def _user_folder() -> Path:
-    # Without a home the path is relative.
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111
-    return Path(home, "bentray")
-
-
-@cache
-def _writable(wanted: Path) -> tuple[Path | None, str]:
-    """A folder, or a temporary one of this user, or None; and why it is not the folder."""
-    reason = _fault_of(wanted)
-    if not reason:
-        return wanted, ""
+def _temporary_folder() -> Path | None:
+    """A temporary folder that only this user can write, the same in every process."""
     try:
         folder = Path(tempfile.gettempdir(), f"bentray-{os.getuid()}")
         folder.mkdir(mode=0o700, exist_ok=True)
         state = folder.lstat()
-        # Compiled code of another user must not run.
-        own = stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and not state.st_mode & 0o022
-        return (None if not own or _fault_of(folder) else folder), reason
     except OSError:
-        return None, reason
+        return None
+    # Compiled code of another user must not run.
+    own = stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and not state.st_mode & 0o022
+    return folder if own and not _fault_of(folder / "bentray") else None
 
 
+@cache
 def _fault_of(folder: Path) -> str:
     """Why a folder cannot be made or written; empty if it can."""
     if not folder.is_absolute():
@@ -118,11 +135,7 @@ def _fault_of(folder: Path) -> str:
     return ""
 
 
-_SAID: list[str] = []
-
-
-def _say_once(trouble: str, instead: str, variable: str) -> None:
-    if not _SAID:
-        _SAID.append(trouble)
-        goes_on = "kernels are compiled again in every process" if instead == "None" else f"{instead} is used"
-        warnings.warn(f"{trouble}: {goes_on}; {variable} names another one", CacheFolderWarning, stacklevel=3)
+@cache
+def _say(trouble: str, instead: Path | None, variable: str) -> None:
+    goes_on = "nothing is kept" if instead is None else f"{instead} takes its place"
+    warnings.warn(f"{trouble}: {goes_on}; {variable} names another one", CacheFolderWarning, stacklevel=4)

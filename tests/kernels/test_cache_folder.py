@@ -12,7 +12,12 @@ import numba
 import pytest
 
 from bentray_kernels import cache_folder as module
-from bentray_kernels.cache_folder import CacheFolderWarning, cache_folder, use_writable_kernel_cache
+from bentray_kernels.cache_folder import (
+    CacheFolderWarning,
+    cache_folder,
+    use_writable_folder,
+    use_writable_kernel_cache,
+)
 from bentray_kernels.compiled import kernel
 from bentray_kernels.opencl.records import read_record, record_file, write_record
 
@@ -20,17 +25,19 @@ from bentray_kernels.opencl.records import read_record, record_file, write_recor
 @pytest.fixture(autouse=True)
 def fresh(monkeypatch, tmp_path):
     """Nothing said or known yet; temporary files below ``tmp_path``."""
-    for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
+    for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR", "MPLCONFIGDIR"):
         # Set first, so that what the code sets is taken back.
         monkeypatch.setenv(name, "")
         monkeypatch.delenv(name)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    monkeypatch.setattr(module, "_SAID", [])
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()
-    module._writable.cache_clear()
+    known = module._fault_of, module._say
+    for function in known:
+        function.cache_clear()
     yield
-    module._writable.cache_clear()
+    for function in known:
+        function.cache_clear()
     monkeypatch.undo()
     numba.config.reload_config()
 
@@ -43,6 +50,7 @@ def occupied(tmp_path):
 
 
 def own(tmp_path):
+    """The temporary folder of this user."""
     return tmp_path / "temporary" / f"bentray-{os.getuid()}"
 
 
@@ -57,10 +65,11 @@ def test_a_private_temporary_folder_takes_the_place_of_one_that_cannot_be_writte
     monkeypatch, tmp_path, occupied, variable
 ):
     monkeypatch.setenv(variable, str(occupied))
-    with pytest.warns(CacheFolderWarning, match=f"{occupied}.* cannot be written .*{own(tmp_path)} is used"):
-        assert cache_folder() == own(tmp_path)
+    with pytest.warns(CacheFolderWarning, match=f"{occupied}.* cannot be written .*{own(tmp_path)} takes"):
+        assert cache_folder() == own(tmp_path) / "bentray"
     assert own(tmp_path).stat().st_mode & 0o777 == 0o700
-    assert cache_folder() == own(tmp_path), "said once"
+    assert cache_folder() == own(tmp_path) / "bentray", "said once"
+    assert os.environ["XDG_CACHE_HOME"] == str(own(tmp_path)), "libraries and children use it too"
 
 
 def test_without_a_home_nothing_is_written_below_the_working_folder(monkeypatch, tmp_path):
@@ -68,7 +77,7 @@ def test_without_a_home_nothing_is_written_below_the_working_folder(monkeypatch,
     monkeypatch.setattr(os.path, "expanduser", lambda path: path)
     monkeypatch.chdir(tmp_path)
     with pytest.warns(CacheFolderWarning, match="no home folder"):
-        assert cache_folder() == own(tmp_path)
+        assert cache_folder() == own(tmp_path) / "bentray"
     assert not (tmp_path / "~").exists()
 
 
@@ -85,7 +94,7 @@ def test_nothing_is_kept_where_others_could_write(monkeypatch, tmp_path, occupie
         own(tmp_path).touch()
     else:
         monkeypatch.setattr(tempfile, "tempdir", str(occupied))
-    with pytest.warns(CacheFolderWarning, match="compiled again in every process"):
+    with pytest.warns(CacheFolderWarning, match="nothing is kept"):
         assert cache_folder() is None
 
 
@@ -118,9 +127,8 @@ def test_kernels_of_a_read_only_package_are_used_and_new_ones_kept_elsewhere(mon
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "image"))
         numba.config.reload_config()
     imported(package)(1)
-    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    read_only = str(tmp_path / "image" if named else package / "__pycache__")
     real = module._fault_of
-    read_only = str(tmp_path / ("image" if named else "package"))
     monkeypatch.setattr(
         module, "_fault_of", lambda path: "Read-only file system" if str(path) == read_only else real(path)
     )
@@ -130,7 +138,7 @@ def test_kernels_of_a_read_only_package_are_used_and_new_ones_kept_elsewhere(mon
     kept = tmp_path / "home" / ".cache" / "bentray" / "kernels"
     lines = [str(one.message) for one in said]
     reason = f"NUMBA_CACHE_DIR={read_only} cannot be written (Read-only file system)"
-    where = f"{tmp_path}/home/.cache/bentray is used; NUMBA_CACHE_DIR names another one"
+    where = f"{tmp_path}/home/.cache/bentray takes its place; NUMBA_CACHE_DIR names another one"
     assert lines == ([f"{reason}: {where}"] if named else [])
     assert os.environ["NUMBA_CACHE_DIR"] == str(kept)
     numba.config.reload_config()
@@ -142,6 +150,15 @@ def test_kernels_of_a_read_only_package_are_used_and_new_ones_kept_elsewhere(mon
     assert {path: path.read_bytes() for path in before} == before
     assert Path(twice.stats.cache_path).is_relative_to(kept)
     assert any(not path.is_symlink() for path in kept.rglob("*.nbc"))
+
+
+def test_other_libraries_get_a_folder_only_if_theirs_cannot_be_written(monkeypatch, tmp_path, occupied):
+    assert use_writable_folder("MPLCONFIGDIR", "matplotlib") is None
+    assert "MPLCONFIGDIR" not in os.environ
+    monkeypatch.setenv("MPLCONFIGDIR", str(occupied))
+    with pytest.warns(CacheFolderWarning, match=f"MPLCONFIGDIR={occupied} cannot be written"):
+        assert use_writable_folder("MPLCONFIGDIR", "matplotlib") == occupied
+    assert os.environ["MPLCONFIGDIR"] == str(tmp_path / "home" / ".cache" / "bentray" / "matplotlib")
 
 
 def test_a_package_that_can_be_written_keeps_its_kernels(tmp_path):

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ..cache_folder import use_writable_folder
 from .library import files_of
 
 # Folder of the system's drivers, unless one of these variables names another one.
@@ -31,6 +32,8 @@ def platforms() -> list[Any]:
     import pyopencl as cl
 
     with _ASKING:
+        # PoCL is no platform without a folder for its programs.
+        use_writable_folder("POCL_CACHE_DIR", "pocl")
         _register_intel()
         return list(cl.get_platforms())
 

@@ -46,9 +46,10 @@ def devices(
             verdicts.append(verdict_on(device))
         choice = choose()
         trials: dict[str, Trial] = {}
-        for engine in ENGINES if choice.device is not None else ():
-            step(len(records) + len(trials), len(records) + len(ENGINES), engine)
-            trials[engine] = trial_of(choice.device, engine)
+        if choice.device is not None:
+            for engine in ENGINES:
+                step(len(records) + len(trials), len(records) + len(ENGINES), engine)
+                trials[engine] = trial_of(choice.device, engine)
     compared = _compared(quick=quick) if bench and choice.device is not None else []
     if as_json:
         print_json(_figures(records, verdicts, choice, trials, compared) | {"device": request})

@@ -146,5 +146,6 @@ def test_a_refusal_is_not_remembered_on_disk(gpu, monkeypatch, fresh):
 def test_verdict_holds_without_a_cache_folder(gpu, monkeypatch, fresh):
     fresh.write_text("a file where the folder should be")
     monkeypatch.setattr(verdict, "in_a_child", child_of({}))
-    monkeypatch.setattr(cache_folder, "_SAID", ["once"])
-    assert verdict_on(gpu).usable
+    monkeypatch.setattr(cache_folder, "_temporary_folder", lambda: None)
+    with pytest.warns(cache_folder.CacheFolderWarning):
+        assert verdict_on(gpu).usable
