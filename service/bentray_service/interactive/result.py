@@ -458,7 +458,8 @@ def result_of(
     """
     if isinstance(image, Volume):
         values: dict[str, NDArray[Any]] = {VALUE: image.values}
-        units, known = {VALUE: unit}, {"title": image.title} if image.title else {}
+        stated = {"title": image.title, "axes": image.grid.tilt}
+        units, known = {VALUE: unit}, {name: value for name, value in stated.items() if value}
     else:
         held = {name: image.image(name) for name in QUANTITIES}
         values = {name: one.values for name, one in held.items() if one is not None}

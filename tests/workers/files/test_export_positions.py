@@ -24,6 +24,7 @@ from bentray_workers.files.truth_file import read_truth
 from bentray_workers.files.volume import Volume, read_volume, write_volume
 from bentray_workers.files.volume_export import FORMATS, export_image
 from bentray_workers.files.volume_formats import import_volume
+from bentray_workers.images.slice import volume_slice_png
 
 from .reconstructions import made
 
@@ -219,6 +220,16 @@ def test_a_file_that_another_program_saved_lands_where_it_was(
     np.testing.assert_allclose(back.grid.affine(), image.grid.affine(), atol=2e-8)
     write_volume(tmp_path / "v.h5", back)
     np.testing.assert_array_equal(read_volume(tmp_path / "v.h5").grid.affine(), back.grid.affine())
+
+
+def test_pictures_of_an_oblique_volume_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    notes = []
+    drawn = "bentray_workers.images.slice.plane_png"
+    monkeypatch.setattr(drawn, lambda *_, note, **__: notes.append(note) or b"")
+    for number, degrees in enumerate((0.0, 7.0)):
+        write_volume(tmp_path / f"{number}.h5", solid(turned(0.0, 0.0, degrees)))
+        volume_slice_png(tmp_path / f"{number}.h5")
+    assert notes == ["", "turned by 7.00 degrees against x, y and z"]
 
 
 def test_an_oblique_truth_is_refused_with_its_angle(tmp_path: Path) -> None:

@@ -48,6 +48,13 @@ class Grid:
         """True if an axis of the array is not along the axis of space of the same name."""
         return not np.array_equal(self.direction, np.eye(3))
 
+    @property
+    def tilt(self) -> str:
+        """The largest angle between axes of the array and of space, in words; empty unless oblique."""
+        cosine = float(np.diag(self.direction).min())
+        angle = math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
+        return f"turned by {angle:.2f} degrees against x, y and z" if self.oblique else ""
+
     def affine(self, unit_m: float = 1.0) -> Floats:
         """(4, 4) from nodes to positions, RAS; a plane lies at z = 0, as thick as its spacing along x.
 
@@ -72,9 +79,7 @@ class PositionedImage(NamedTuple):
 def check_aligned(grid: Grid, field: str, accepted: str) -> None:
     """Raise InvalidInput for an oblique grid, with its angle."""
     if grid.oblique:
-        cosine = float(np.diag(grid.direction).min())
-        angle = math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
-        raise InvalidInput(field, f"a grid turned by {angle:.2f} degrees against x, y and z", accepted)
+        raise InvalidInput(field, f"a grid {grid.tilt}", accepted)
 
 
 def reorient(values: NDArray[Any], affine: Floats, field: str) -> tuple[NDArray[Any], Grid]:

@@ -81,7 +81,8 @@ def volume_slice_png(
     limits = requested_limits(robust_limits([plane.image]), low, high)
     caption = plane.caption()
     title = caption[0].upper() + caption[1:]
-    return plane_png(plane, limits, chosen, title=title, unit="value", note=volume.title[:80])
+    note = ", ".join(filter(None, (volume.title[:80], volume.grid.tilt)))
+    return plane_png(plane, limits, chosen, title=title, unit="value", note=note)
 
 
 def usual_limits(quantity: str, image: Floats, coverage: Floats | None) -> Limits:
