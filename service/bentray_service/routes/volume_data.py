@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import FREQUENCY_HZ
 from bentray_workers.files.quantities import QuantityName
 from bentray_workers.files.reconstruction import shape_of_quantity
-from bentray_workers.files.volume_export import FORMATS, Selection, largest_bytes
+from bentray_workers.files.volume_export import FORMATS, REVISION, Selection, largest_bytes
 
 from .. import __version__
 from ..errors import UnknownId
@@ -101,11 +101,11 @@ async def volume_data(
         else f"{quantity}-{attenuation.partition('/')[0]}-{selection.frequency_hz}."
     )
     seed = repr((seed, which)) if which else seed
-    tag = tag_of(path, repr((__version__, seed)))
+    tag = tag_of(path, repr((__version__, REVISION, seed)))
     if (response := unchanged(request, tag)) is not None:
         return response
     name = f"{volume['id']}-{quantity if 'job_id' in volume else 'values'}.{chosen.extension}"
-    made = files.export(volume["id"], f"{which}{chosen.extension}")
+    made = files.export(volume["id"], f"{which}{REVISION}.{chosen.extension}")
     if not made.exists():
         if request.method == "HEAD":
             headers = {"Accept-Ranges": "bytes", "Content-Disposition": f'attachment; filename="{name}"'}

@@ -166,6 +166,16 @@ def test_files_are_not_made_in_the_memory_of_the_service(start):
             assert peak < 8 * 2**20
 
 
+@pytest.mark.parametrize("name", ["npy", "nrrd"])
+def test_an_export_of_an_earlier_version_is_made_again(http, result, name):
+    """Those of NRRD, MetaImage and DICOM lay turned."""
+    volume_id = result.split("/")[3]
+    stored = http.app.state.parts.files.of(LOCAL).export(volume_id, name)
+    stored.write_bytes(b"earlier")
+    assert len(http.get(f"{result}?format={name}").content) > len(b"earlier")
+    stored.unlink()
+
+
 def test_formats_have_tags_of_their_own(http, result):
     assert len({http.head(f"{result}?format={name}").headers["etag"] for name in FORMATS}) == len(FORMATS)
 

@@ -102,6 +102,8 @@ class Format:
     write: Callable[[Path, Content], None]
 
 
+# Of what is written here; a service sends no stored export of another one. 2: positions in RAS or LPS.
+REVISION = 2
 # Size of a number, and of headers.
 NUMBER_BYTES, HEADER_BYTES = 8, 64 * 2**10
 # Of the description of a slice in DICOM, and of a chunk of OME-Zarr.
