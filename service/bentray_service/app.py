@@ -64,18 +64,17 @@ from .routes import (
 )
 from .routes.uploads import direct_uploads, tus
 from .rows.accounts import Accounts
-from .rows.ages import ExpiryMarks
+from .rows.ages import ExpiryMarks, ObservedTime
 from .rows.batches import Batches
 from .rows.checksums import Checksums
-from .rows.claimed_tenants import ClaimedTenants
 from .rows.deliveries import Deliveries
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
 from .rows.keys import Keys
-from .rows.observed_time import ObservedTime
 from .rows.projects import Projects
 from .rows.sessions import Sessions
 from .rows.stored_tables import Datasets, GeometryFields, Meshes, UploadedTable, Volumes
+from .rows.tenants import ClaimedTenants
 from .rows.uploads import Uploads
 from .settings import ServiceSettings
 from .web import errors

@@ -17,8 +17,7 @@ from .files.deletion import Deletion, StoredItem
 from .files.direct_uploads import DirectUploads
 from .files.orphans import Orphans
 from .ingest.append import UploadLocks, remove
-from .rows.ages import ExpiredItem, ExpiryMarks
-from .rows.observed_time import ObservedTime
+from .rows.ages import ExpiredItem, ExpiryMarks, ObservedTime
 from .rows.tenants import Tenant
 from .rows.typed_rows import UploadRow
 from .rows.uploads import Uploads

@@ -14,8 +14,8 @@ from starlette.datastructures import Headers
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import Forbidden, NotAuthenticated
-from ..rows.claimed_tenants import ClaimedTenants
 from ..rows.sessions import PENDING_S, PendingSignIn, Sessions
+from ..rows.tenants import ClaimedTenants
 from ..settings import ServiceSettings
 from ..web.addresses import names_loopback
 from .caller import Caller

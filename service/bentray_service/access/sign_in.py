@@ -14,11 +14,10 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import Forbidden, NotAuthenticated, RateLimited
 from ..rows.accounts import Accounts
 from ..rows.api_key import PREFIX, ApiKey
-from ..rows.claimed_tenants import ClaimedTenants
 from ..rows.keys import Keys
 from ..rows.projects import ROLES, Projects, membership
 from ..rows.sessions import Sessions
-from ..rows.tenants import LOCAL, Tenant
+from ..rows.tenants import LOCAL, ClaimedTenants, Tenant
 from ..settings import ServiceSettings
 from ..web.addresses import is_loopback, names_loopback, networks, within
 from .browser_sessions import BrowserSessions

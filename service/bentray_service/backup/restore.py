@@ -24,8 +24,7 @@ from ..files.open_store import open_store
 from ..files.private import private_files
 from ..files.tenant_files import KEPT
 from ..rows import schema
-from ..rows.database import Database, open_database
-from ..rows.database_id import new_mark
+from ..rows.database import Database, new_mark, open_database
 from ..rows.table_copies import copy_to, has_tables, remove_database, snapshot
 from ..settings import ServiceSettings
 from .archive import DATABASE, Description, copy_file, digest_of_file, read_description, read_sums

@@ -9,8 +9,7 @@ from typing import NamedTuple
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import write_bytes
 
-from ..rows.database import Database, open_database
-from ..rows.database_id import mark_of
+from ..rows.database import Database, mark_of, open_database
 from .data_folder import Files
 
 # The file with the id of the database that used the data folder last, and its number of starts.

@@ -7,8 +7,7 @@ from pathlib import Path
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import StorageUnavailable
-from ..rows.database import Database
-from ..rows.database_id import mark_of
+from ..rows.database import Database, mark_of
 from ..rows.live_ids import LiveIds
 from .bucket import Bucket
 from .bucket_store import MARK, BucketStore

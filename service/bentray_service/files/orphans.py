@@ -9,8 +9,7 @@ from pathlib import Path
 
 from sqlalchemy import select, update
 
-from ..rows.database import Database
-from ..rows.database_id import mark_of
+from ..rows.database import Database, mark_of
 from ..rows.live_ids import LiveIds
 from ..rows.schema import about
 from ..rows.tenants import Tenant

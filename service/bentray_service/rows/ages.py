@@ -1,14 +1,15 @@
-"""Marks of items past their maximum age; an item is deleted only after it stayed expired for long enough."""
+"""Ages of items: the observed running time of services, and marks of items past their maximum age."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import time
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
-from sqlalchemy import delete, insert, select
+from sqlalchemy import delete, insert, select, update
 
 from .database import Database
-from .schema import too_old
+from .schema import about, too_old
 from .tenants import Tenant
 
 
@@ -56,3 +57,32 @@ class ExpiryMarks:
         """Remove all marks, after the system clock was found to be wrong."""
         with self._database.write() as connection:
             connection.execute(delete(too_old))
+
+
+class ObservedTime:
+    """Counts the running time of services in the database, in seconds of the monotonic clock.
+
+    With several services the count does not run faster than real time: each adds its own elapsed time to the
+    count at its last call, and the largest value is stored.
+    """
+
+    def __init__(self, database: Database, clock: Callable[[], float] = time.monotonic) -> None:
+        """Args:
+        database: stores the count.
+        clock: monotonic seconds.
+        """
+        self._database = database
+        self._clock = clock
+        self._last: tuple[float, float] | None = None
+
+    def count(self) -> float:
+        """Add the time since the last call; returns the count, s."""
+        with self._database.write() as connection:
+            total = float(connection.execute(select(about.c.observed_s).with_for_update()).scalar_one())
+            now = self._clock()
+            if self._last is not None:
+                counted, then = self._last
+                total = max(total, counted + now - then)
+            connection.execute(update(about).values(observed_s=total))
+        self._last = total, now
+        return total

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
+import secrets
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -260,3 +261,18 @@ def _update(address: str, shown: str) -> None:
 
 def version_of(connection: Connection) -> int:
     return int(connection.execute(select(schema.about.c.version)).scalar_one())
+
+
+def new_mark() -> str:
+    """A new random id."""
+    return secrets.token_hex(16)
+
+
+def mark_of(database: Database) -> str:
+    """The id of a database, created on first use."""
+    with database.write() as connection:
+        database_id = connection.execute(select(schema.bucket_mark.c.database)).scalar_one_or_none()
+        if database_id is None:
+            database_id = new_mark()
+            connection.execute(insert(schema.bucket_mark).values(database=database_id))
+        return str(database_id)

@@ -14,10 +14,9 @@ from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from .api_key import ApiKey
-from .claimed_tenants import is_claimed, keep_from_claims
 from .database import Database
 from .schema import keys
-from .tenants import GIVEN, Tenant
+from .tenants import GIVEN, Tenant, is_claimed, keep_from_claims
 from .typed_rows import KeyRow
 
 log = logging.getLogger("bentray.access")

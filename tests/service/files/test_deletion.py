@@ -15,11 +15,10 @@ from bentray_service.files.orphans import Orphans
 from bentray_service.housekeeping import DAY_S, Housekeeper
 from bentray_service.ingest.append import UploadLocks
 from bentray_service.rows import schema
-from bentray_service.rows.ages import ExpiryMarks
+from bentray_service.rows.ages import ExpiryMarks, ObservedTime
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id, volume_of
 from bentray_service.rows.jobs import Jobs
-from bentray_service.rows.observed_time import ObservedTime
 from bentray_service.rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads

@@ -8,7 +8,6 @@ from sqlalchemy import create_engine, inspect, select, text
 from sqlalchemy.exc import IntegrityError
 
 from bentray_service.rows import migration, schema
-from bentray_service.rows.claimed_tenants import ClaimedTenants
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import WebhookSecrets
 from bentray_service.rows.ids import new_id, volume_of
@@ -16,7 +15,7 @@ from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.stored_tables import Datasets, Volumes
-from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.tenants import LOCAL, ClaimedTenants, Tenant
 from bentray_service.rows.usage import Usage, usage_of
 
 # The tables of version 1, word for word as SQLite kept them.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bentray_service.rows.observed_time import ObservedTime
+from bentray_service.rows.ages import ObservedTime
 
 
 class Clock:
