@@ -17,7 +17,7 @@ if ! writable "$NUMBA_CACHE_DIR"; then
   done
 fi
 if [ -d "$compiled" ] && writable "$NUMBA_CACHE_DIR" && [ -z "$(ls -A "$NUMBA_CACHE_DIR")" ]; then
-  cp -R --preserve=timestamps "$compiled/." "$NUMBA_CACHE_DIR" ||
+  cp -R --preserve=timestamps "$compiled"/* "$NUMBA_CACHE_DIR" ||
     echo "bentray: not all compiled kernels fit into $NUMBA_CACHE_DIR; the others are compiled when they are needed" >&2
 fi
 exec "$@"
