@@ -76,8 +76,8 @@ def merged_nearly(vertices: Floats, faces: Ints) -> Repaired:
 def without_flat_faces(vertices: Floats, faces: Ints) -> Repaired:
     """Leave out faces without area, so that the surface stays the same and stays closed.
 
-    A face whose corners are at one place or two disappears. One whose corners are on a line is given to the
-    neighbour across its longest side, which its middle corner divides in two.
+    A face whose corners are at one place or two disappears, and so does one on a line that closes nothing.
+    Other faces on a line are given to the neighbour across the longest side, which the middle corner divides.
 
     Returns:
         The faces, of which some may still be thinner than ``THINNEST``, and the number of those left out.
@@ -119,7 +119,10 @@ def _divided(vertices: Floats, faces: Ints, flat: Flags) -> Repaired | None:
         first = np.zeros(len(thin), bool)
         first[np.flatnonzero(gives)[np.unique(one[gives], return_index=True)[1]]] = True
         gives &= first
-    gone = gives | (count[edge] == 1)
+    # No edge opens without a face none of whose sides has two faces.
+    loose = (count[side_edge.reshape(-1, 3)[thin]] != 2).all(axis=1)
+    gives &= ~loose
+    gone = gives | loose | (count[edge] == 1)
     if not gone.any():
         return None
     neighbour = faces[across[gives]]

@@ -181,6 +181,10 @@ DEFECTS = {
         lambda v, f: ([*v, v[f[0][0]] + 1e-12], [*f, (f[0][0], len(v), f[0][1])]),
         {"flat": 1},
     ),
+    "a hair on an edge": (
+        lambda v, f: ([*v, 0.5 * (v[f[0][0]] + v[f[0][1]])], [*f, (f[0][0], len(v), f[0][1])]),
+        {"flat": 1},
+    ),
     "a face twice": (lambda v, f: (v, [*f, f[0]]), {"repeated": 1}),
     "a face three times, turned": (lambda v, f: (v, [*f, np.roll(f[0], 1), f[0][::-1]]), {"repeated": 2}),
     "both sides": (lambda v, f: (v, [*f, *f[:, ::-1]]), {"repeated": len(BALL.faces)}),
