@@ -204,6 +204,23 @@ def test_links_of_every_page_resolve() -> None:
             assert (ROOT / path).exists(), f"{page.name}: {path}"
 
 
+def test_every_variable_that_the_code_reads_is_in_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS))
+    from from_code.service_settings import settings_table
+
+    words = r'"((?:BENTRAY|DASK|NUMBA|XDG|SSL|MPL|POCL|OCL|OPENCL_VENDOR|OTEL|AWS)[A-Z_]*[A-Z])"'
+    read = {
+        name
+        for package in ("kernels", "workers", "service")
+        for file in (ROOT / package).rglob("*.py")
+        for name in re.findall(words, file.read_text())
+    }
+    # It is set for the linker of PoCL, not read from the user.
+    read.remove("BENTRAY_PYTHON")
+    assert {"NUMBA_CACHE_DIR", "SSL_CERT_FILE", "BENTRAY_KEY"} <= read
+    assert read <= set(re.findall(r"`([A-Z_]+)`", settings_table()))
+
+
 def test_every_page_is_in_the_contents() -> None:
     listed = re.findall(r"^((?:[\w-]+/)?[\w-]+)$", (DOCS / "index.md").read_text(), re.MULTILINE)
     pages = {str(page.relative_to(DOCS).with_suffix("")) for page in PAGES} - {"index"}

@@ -170,7 +170,8 @@ def _aws_files() -> dict[str, str]:
     known: dict[str, str] = {}
     for name, file in (("AWS_SHARED_CREDENTIALS_FILE", "credentials"), ("AWS_CONFIG_FILE", "config")):
         parser = configparser.RawConfigParser()
-        parser.read(os.environ.get(name, Path("~/.aws", file).expanduser()))
+        # Without a home the path does not exist.
+        parser.read(os.environ.get(name) or os.path.expanduser(f"~/.aws/{file}"))  # noqa: PTH111
         for section in (profile, f"profile {profile}"):
             known |= dict(parser[section]) if parser.has_section(section) else {}
     stated = {name for name, variable in AWS_SETTINGS.items() if variable in os.environ}

@@ -185,3 +185,13 @@ def test_certificates_of_an_embedded_cluster_must_be_there(tmp_path: Path) -> No
     with pytest.raises(InvalidInput, match="without authority"):
         deploy("embedded", ClusterRequest(workers=1, tls=tmp_path))
     assert security_of(None).require_encryption is False
+
+
+def test_workers_without_shared_memory_are_one_line(monkeypatch):
+    def read_only(*_, **__):
+        raise OSError(30, "Read-only file system")
+
+    # What a lock is made of.
+    monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", read_only)
+    with pytest.raises(InvalidInput, match="/dev/shm: found Read-only file system; accepted: a writable"):
+        deploy("embedded", ClusterRequest(workers=1))

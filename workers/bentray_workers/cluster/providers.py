@@ -6,6 +6,7 @@ import importlib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -66,6 +67,8 @@ def embedded(request: ClusterRequest) -> DeployedCluster:
     count = request.workers if request.workers is not None else len(os.sched_getaffinity(0))
     if request.template is not None:
         raise InvalidInput("cluster_template", request.template, "none with an embedded cluster")
+    if request.processes:
+        _check_semaphores()
     secured = request.tls is not None or request.processes
     security = own_security() if request.tls is None else security_of(request.tls)
     local: DeployedCluster = (SupervisedCluster if request.processes else LocalCluster)(
@@ -83,6 +86,19 @@ def embedded(request: ClusterRequest) -> DeployedCluster:
         local_directory=None if request.local_directory is None else str(request.local_directory),
     )
     return local
+
+
+def _check_semaphores() -> None:
+    """Check that processes of this machine can share semaphores.
+
+    Raises:
+        InvalidInput: naming the folder of shared memory.
+    """
+    try:
+        get_context("spawn").Lock()
+    except OSError as error:
+        accepted = "a writable folder, as a tmpfs of a read-only container"
+        raise InvalidInput("/dev/shm", error.strerror or error, accepted) from error  # noqa: S108
 
 
 def slurm(request: ClusterRequest) -> DeployedCluster:
