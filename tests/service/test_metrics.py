@@ -13,7 +13,6 @@ from bentray_service.metrics import TENANTS
 from bentray_service.rows import usage
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.keys import Keys
-from bentray_service.rows.projects import Projects
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 NAME = re.compile(r"bentray_[a-z]+(_[a-z]+)*")
@@ -132,15 +131,6 @@ def test_only_the_tenants_that_use_most_have_labels(http):
             usage.store(connection, Tenant(f"tenant-{number:02d}"), "x", 100 + number)
     found = [s.labels["tenant"] for s in read(http)["bentray_tenant_used_bytes"].samples]
     assert found == [f"tenant-{number:02d}" for number in range(TENANTS + 4, 4, -1)]
-
-
-def test_the_bytes_of_a_project_are_those_of_its_tenant(http):
-    parts = http.app.state.parts
-    project = Projects(parts.database).add(LOCAL, "Trial", None)["id"]
-    with parts.database.write() as connection:
-        usage.store(connection, Tenant(project), "x", 7)
-        usage.store(connection, LOCAL, "x", 5)
-    assert value(http, "bentray_tenant_used_bytes", tenant="local") == 12
 
 
 def test_the_end_of_the_certificates(start, work, monkeypatch, tmp_path):

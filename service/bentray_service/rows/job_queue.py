@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import secrets
 import time
+from collections import Counter
 from collections.abc import Collection
 from typing import Any, cast
 
 from sqlalchemy import ColumnElement, Connection, and_, case, func, insert, or_, select, update
 
 from . import schema, usage
+from .accounts import Account, account_in
 from .database import Database
 from .job_states import RUNNING, change
-from .schema import ENDED, jobs, projects, volumes
+from .schema import ENDED, jobs, volumes
 from .tenants import Tenant
 from .turns import turns_of
 from .typed_rows import JobRow, Plain
@@ -70,19 +72,18 @@ class Queue:
                 found[name] = before[0] + int(own), before[1] + int(everyone)
         return found
 
-    def longest(self, most: int) -> dict[tuple[Tenant, str], int]:
-        """Unfinished jobs by tenant, with its projects, and state; of the tenants with most."""
-        owner = func.coalesce(projects.c.tenant, jobs.c.tenant).label("owner")
-        joined = jobs.outerjoin(projects, projects.c.id == jobs.c.tenant)
-        query = select(owner, jobs.c.state, func.count()).select_from(joined)
-        query = query.where(jobs.c.state.not_in(ENDED)).group_by(owner, jobs.c.state)
+    def longest(self, most: int) -> dict[tuple[Account, str], int]:
+        """Unfinished jobs by account and state, of the accounts that have most."""
+        unfinished = select(account_in(jobs.c.tenant).label("account"), jobs.c.state)
+        each = unfinished.where(jobs.c.state.not_in(ENDED)).subquery()
+        query = select(each.c.account, each.c.state, func.count()).group_by(each.c.account, each.c.state)
         with self._database.read() as connection:
-            rows = [(Tenant(tenant), str(state), int(n)) for tenant, state, n in connection.execute(query)]
-        totals: dict[Tenant, int] = {}
-        for tenant, _, number in rows:
-            totals[tenant] = totals.get(tenant, 0) + number
-        kept = sorted(totals, key=lambda tenant: (-totals[tenant], tenant))[:most]
-        return {(tenant, state): number for tenant, state, number in rows if tenant in kept}
+            numbers = {(Account(one), str(state)): int(n) for one, state, n in connection.execute(query)}
+        totals: Counter[Account] = Counter()
+        for (account, _), number in numbers.items():
+            totals[account] += number
+        kept = sorted(totals, key=lambda account: (-totals[account], account))[:most]
+        return {key: number for key, number in numbers.items() if key[0] in kept}
 
     def unfinished(self) -> set[str]:
         """The ids of all jobs that have not ended."""

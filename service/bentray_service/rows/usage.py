@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from sqlalchemy import ColumnElement, Connection, delete, func, insert, not_, or_, select, update
 
 from ..errors import QuotaExceeded
-from .accounts import account_of, family_of
-from .schema import projects, storage
+from .accounts import Account, account_in, account_of, family_of
+from .schema import storage
 from .tenants import Tenant
 
 
@@ -48,14 +48,12 @@ def usage_of(connection: Connection, tenant: Tenant, besides: str = "") -> Usage
     return Usage(sizes.get(False, 0), sizes.get(True, 0))
 
 
-def largest(connection: Connection, most: int) -> dict[Tenant, int]:
-    """Bytes stored and reserved by the tenants that use most, with their projects."""
-    owner = func.coalesce(projects.c.tenant, storage.c.tenant).label("owner")
-    joined = storage.outerjoin(projects, projects.c.id == storage.c.tenant)
-    size = func.sum(storage.c.bytes)
-    query = select(owner, size).select_from(joined).where(_counted()).group_by(owner)
-    rows = connection.execute(query.order_by(size.desc(), owner).limit(most))
-    return {Tenant(tenant): int(total) for tenant, total in rows}
+def largest(connection: Connection, most: int) -> dict[Account, int]:
+    """Bytes stored and reserved by the accounts that use most."""
+    each = select(account_in(storage.c.tenant).label("account"), storage.c.bytes).where(_counted()).subquery()
+    size = func.sum(each.c.bytes)
+    query = select(each.c.account, size).group_by(each.c.account).order_by(size.desc(), each.c.account)
+    return {Account(account): int(total) for account, total in connection.execute(query.limit(most))}
 
 
 def reserve(

@@ -7,8 +7,10 @@ import time
 import pytest
 
 from bentray_service.errors import UnknownId
+from bentray_service.rows import usage
 from bentray_service.rows.ids import volume_of
 from bentray_service.rows.job_queue import LEASE_S, Queue
+from bentray_service.rows.projects import Projects
 from bentray_service.rows.stored_tables import Volumes
 from bentray_service.rows.tenants import LOCAL, Tenant
 
@@ -127,6 +129,21 @@ def test_a_service_takes_over_the_jobs_of_its_data_folder_at_once_and_no_others(
     assert [again.state(job) for job in made.values()] == ["queued", "running", "running"]
     assert again.claim()["id"] == made["one"]
     assert again.recover(PROBLEM) == 0, "its own job is at work"
+
+
+def test_the_longest_queues_are_those_of_accounts_with_their_projects(database, jobs, queue, dataset):
+    project = Projects(database).add(LOCAL, "Trial", None)["id"]
+    for tenant, number in ((LOCAL, 2), (project, 2), ("b", 3), ("c", 1)):
+        for _ in range(number):
+            jobs.add(tenant, "reconstruction", {}, dataset)
+    queue.claim()
+    found = queue.longest(2)
+    assert {account for account, _ in found} == {LOCAL, "b"}
+    assert sum(number for (account, _), number in found.items() if account == LOCAL) == 4
+    with database.write() as connection:
+        for tenant, size in ((LOCAL, 5), (project, 7), ("b", 20), ("c", 1)):
+            usage.store(connection, Tenant(tenant), "x", size)
+        assert usage.largest(connection, 2) == {"b": 20, LOCAL: 1 + 5 + 7}, "with the dataset"
 
 
 def test_second_service_claims_only_expired_jobs(database, jobs, queue, dataset, monkeypatch):
