@@ -113,8 +113,9 @@ class SignIn:
         if scheme.lower() == "bearer" and credentials.strip().startswith(PREFIX):
             return self._caller_with_key(credentials.strip())
         users = headers.getlist(self._user_header) if within(address, self._trusted) else []
-        if len(users) == 1 and users[0].strip():
-            user = users[0].strip()
+        if len(users) == 1 and users[0].strip(" \t"):
+            # Bytes of UTF-8 may be spaces of Latin-1; without them the name would be that of another user.
+            user = users[0].strip(" \t")
             if len(user) > LONGEST_USER:
                 raise NotAuthenticated(
                     self._user_header, f"{len(user)} characters", f"at most {LONGEST_USER}"
