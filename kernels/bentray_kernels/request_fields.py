@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, fields, is_dataclass
 from functools import cache
@@ -20,6 +21,7 @@ MAX_RAYS = MAX_PIXELS**2
 Use = Mapping[str, "tuple[Any, ...] | Range"]
 Uses = tuple[Use, ...]
 ALWAYS: Uses = ({},)
+ABOVE_ZERO = Range(0.0, math.inf, above=True)
 # Under this key a field's metadata holds its ``Uses``, and the values that ask for nothing.
 USED_WHEN, NEUTRAL = "used_when", "neutral"
 # What a scan may have, in words.
@@ -208,6 +210,8 @@ def _meets(value: Any, accepted: tuple[Any, ...] | Range) -> bool:
 def _in_words(name: str, accepted: tuple[Any, ...] | Range, known: Mapping[str, Declared]) -> str:
     if name in FACTS:
         return FACTS[name]
+    if accepted == ABOVE_ZERO:
+        return f"{known[name].place} is above 0"
     *others, last = [accepted.words] if isinstance(accepted, Range) else map(_word, accepted)
     return (
         f"{known[name].place} is {', '.join(others)} or {last}"

@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 from fastapi import Depends, Query, Request
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.request_fields import check_used
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.refraction_view import RefractionView
 
@@ -17,7 +18,9 @@ View = TypeVar("View")
 
 
 def view_dependency(kind: type[View]) -> Callable[..., View]:
-    """A dependency that builds a view from the query; it raises InvalidInput for unknown parameters.
+    """A dependency that builds a view from the query.
+
+    It raises InvalidInput for parameters that are unknown or have no effect beside the others.
 
     Args:
         kind: a dataclass whose fields have a ``description`` in their metadata.
@@ -28,7 +31,9 @@ def view_dependency(kind: type[View]) -> Callable[..., View]:
         for name in request.query_params:
             if name not in names:
                 raise InvalidInput(name, repr(request.query_params[name])[:80], "one of " + ", ".join(names))
-        return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
+        view = kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
+        checked: View = check_used(view)
+        return checked
 
     view_of.__signature__ = _signature(kind)  # type: ignore[attr-defined]
     return view_of

@@ -11,7 +11,8 @@ from schemathesis.generation.meta import CoverageScenario
 from schemathesis.openapi.checks import RejectedPositiveData
 from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 
-from bentray_workers.simulation.request import CONDITIONS
+from bentray_kernels.request_fields import effective_when
+from bentray_workers.simulation.request import PhantomScan
 
 # Pieces of uploads are bytes as they are.
 schemathesis.serializer.alias("application/offset+octet-stream", "application/octet-stream")
@@ -49,7 +50,7 @@ SETTINGS = {
         "speed_bounds_mps",
     ),
     # Settings that only some simulations have, or have in a narrower range; what is too large in all.
-    *CONDITIONS,
+    *effective_when(PhantomScan),
     *("coupling_mps", "elements", "nodes", "snr"),
 }
 DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {

@@ -9,7 +9,7 @@ from ..errors import InvalidInput
 from ..limits import SPEED_MPS, WATER_C
 from ..picker_names import DEFAULT_PICKER, PickerName
 from ..ranges import SEED, Range
-from ..request_fields import Uses, check, declared, setting
+from ..request_fields import ABOVE_ZERO, Uses, check, declared, setting
 from .numerics import Numerics
 
 # The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
@@ -22,7 +22,6 @@ SPEED = {"type": "number", **SPEED_MPS.schema}
 AUTOMATIC = Numerics()
 # When a setting has an effect: auto tries SART and Gauss-Newton, and waveform begins with its image.
 SART, GAUSS_NEWTON = ("sart", "auto", "waveform"), ("gauss-newton", "auto", "waveform")
-ABOVE_ZERO = Range(0.0, 10.0, above=True)
 LOSSES = {"attenuation": (True,), "scan_amplitudes": (True,)}
 ECHOES: Uses = ({"reflection": (True,)},)
 BY_SART: Uses = ({"method": SART}, {**LOSSES, "attenuation_solver": ("sart",)})
@@ -32,7 +31,7 @@ ON_DEVICES: Uses = (
     {**_SLICES, "eikonal": (DEVIATION,), "speed_range_mps": (None,)},
     {**_SLICES, "rays": ("straight",)},
     {"method": ("waveform",)},
-    {"method": ("auto",), "minutes": Range(0.0, 1e6, above=True)},
+    {"method": ("auto",), "minutes": ABOVE_ZERO},
     *ECHOES,
 )
 # No unknown names in JSON.

@@ -223,7 +223,7 @@ def _show(
         print_json(found)
         return
     low, high = volume.range()
-    surfaces = ", ".join(f"{iso:g} (index {n:g})" for iso, n in zip(view.iso, view.index, strict=True))
+    surfaces = ", ".join(f"{iso:g} (index {n:g})" for iso, n in zip(view.iso, view.indices, strict=True))
     rows = [
         ("volume", f"{' by '.join(map(str, volume.values.shape))} nodes, {low:g} to {high:g}"),
         ("surfaces", surfaces),

@@ -111,7 +111,8 @@ def test_a_file_that_exists_is_kept_without_force(
     ("words", "field"),
     [
         (("--iso", 7), "iso"),
-        (("--iso", 0.6, "--iso", 0.4), "index"),
+        (("--iso", 0.6, "--index", 1.1, "--index", 1.2), "index"),
+        (("--mode", "shaded", "--fresnel"), "fresnel"),
         (("--index", 0), "index"),
         (("--camera", "fisheye"), "camera"),
         (("--filter", "box"), "filter"),

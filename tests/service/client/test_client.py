@@ -136,5 +136,5 @@ def test_a_simulation_is_asked_for_with_its_settings(client):
     assert (job.kind, job.settings["elements"], job.settings["snr"]) == ("simulation", 16, 20.0)
     assert job.plan.result_bytes == 2 * 8 * 16 * 16
     assert client.simulate().settings["nodes"] == 128
-    with pytest.raises(ClientError, match="nothing, unless waveform is true"):
+    with pytest.raises(ClientError, match="null, unless waveform is true"):
         client.simulate({"side_m": 0.1})

@@ -62,7 +62,7 @@ def test_wrong_settings_are_named(simulated: bentray.Scan, settings: dict[str, A
             "elemnts: found 16; accepted: elements is spelt like it; a known setting: phantom, ",
         ),
         ({"phantom": "table8"}, "phantom: found 'table8'; accepted: 'table6', "),
-        ({"side_m": 0.1}, "side_m: found 0.1; accepted: nothing, unless waveform is true"),
+        ({"side_m": 0.1}, "side_m: found 0.1; accepted: null, unless waveform is true"),
     ],
 )
 def test_wrong_settings_of_a_simulation_are_named(settings: dict[str, Any], said: str) -> None:

@@ -56,7 +56,7 @@ def test_nan_is_out_of_every_range(name):
         ({"iso": (1.0, 1.0), "index": (1.1, 1.2)}, "iso"),
         ({"iso": (math.nan,)}, "iso"),
         ({"iso": tuple(map(float, range(9))), "index": (1.5,) * 9}, "iso"),
-        ({"iso": (1.0, 2.0)}, "index"),
+        ({"iso": (1.0, 2.0, 3.0), "index": (1.1, 1.2)}, "index"),
         ({"surroundings": -1}, "surroundings"),
         ({"surroundings": 2}, "surroundings"),
         ({"index": ()}, "index"),
@@ -97,6 +97,7 @@ def test_the_type_of_the_values_decides_on_smoothing():
 
 
 def test_water_may_lie_between_two_surfaces():
+    assert RefractionView(iso=(1.0, 2.0), index=(1.3,)).layers().indices == (1.0, 1.3, 1.3)
     layers = RefractionView(iso=(1.0, 2.0), index=(1.0, 0.9), outside=1.2, surroundings=1).layers()
     assert (layers.indices, layers.surroundings) == ((1.2, 1.0, 0.9), 1)
 

@@ -66,11 +66,17 @@ class FieldView:
     eye: Literal["nearest", "linear", "accurate", "exact", "uv-nearest", "uv-linear"] = setting(
         "exact", "The same for camera rays."
     )
-    index: float = setting(1.5, "Refractive index of glass.", Range(0.1, 10.0))
+    index: float = setting(
+        1.5,
+        "Refractive index of glass.",
+        Range(0.1, 10.0),
+        used_when=({"mode": ("refract", "refract-single")},),
+    )
     share: float = setting(
         0.85,
         "Share of reflected or refracted light; the rest is the colour of the mesh.",
         Range(0.0, 1.0),
+        used_when=({"mode": ("reflect", "refract", "refract-single", "self", "self-only")},),
     )
     camera: Literal["perspective", "orthographic"] = setting("perspective", "Kind of camera.")
     azimuth_deg: float = setting(

@@ -13,11 +13,14 @@ from bentray_kernels.isosurface.octree import MAX_ISOS
 from bentray_kernels.opencl.placement import DESCRIPTION, REQUESTS, DeviceRequest
 from bentray_kernels.ranges import Range
 from bentray_kernels.refraction import Layers
-from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
+from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, Uses, check, setting
 from bentray_kernels.splines import FILTERS
 from bentray_kernels.splines.prefilter import MAX_SMOOTHING
 
 INDEX = Range(0.01, 100.0)
+
+# When settings of glass have an effect.
+GLASS: Uses = ({"mode": ("refract",)},)
 
 # Of a B-spline through 8-bit integers: their steps, at every node, would scatter refracted rays.
 SMOOTHING_8_BIT = 30.0
@@ -51,12 +54,14 @@ class RefractionView:
         (1.5,),
         "Refractive index above each iso-value: one for each, or one.",
         schema={"items": {"type": "number", **INDEX.schema}, "minItems": 1, "maxItems": MAX_ISOS},
+        used_when=GLASS,
     )
-    outside: float = setting(1.0, "Refractive index below the first iso-value.", INDEX)
+    outside: float = setting(1.0, "Refractive index below the first iso-value.", INDEX, used_when=GLASS)
     surroundings: int = setting(
         0,
         "Layer that surrounds the volume: 0 the one below the first iso-value, 1 the next, ...",
         schema={"minimum": 0, "maximum": MAX_ISOS},
+        used_when=GLASS,
     )
     filter: str = setting(
         "bspline3",
@@ -81,27 +86,36 @@ class RefractionView:
     backdrop: Literal["checkerboard", "picture", "warped-checkerboard", "warped-picture"] = setting(
         "checkerboard",
         "What is behind the volume: a plane with a checkerboard or a picture, or the same on a wavy surface.",
+        used_when=GLASS,
     )
     squares: int = setting(
-        16, "Squares of the checkerboard across the shorter side of the picture.", Range(1, 512)
+        16,
+        "Squares of the checkerboard across the shorter side of the picture.",
+        Range(1, 512),
+        used_when=({"mode": ("refract",), "backdrop": ("checkerboard", "warped-checkerboard")},),
     )
     backdrop_distance: float = setting(
-        1.0, "Distance from the centre of the volume, in its diagonals.", Range(0.5, 100.0)
+        1.0, "Distance from the centre of the volume, in its diagonals.", Range(0.5, 100.0), used_when=GLASS
     )
     supersampling: Literal["none", "prss", "real"] = setting(
         "prss",
         "prss: more samples of the backdrop after refraction; real: more rays.",
     )
     degree: int = setting(
-        1, "prss: samples between pixels; real: rays along each side of a pixel.", Range(1, 8)
+        1,
+        "prss: samples between pixels; real: rays along each side of a pixel.",
+        Range(1, 8),
+        used_when=({"supersampling": ("real",)}, {"mode": ("refract",), "supersampling": ("prss",)}),
     )
     ray_spacing: int = setting(
         1,
-        "Pixels between rays along both sides, for a preview: where rays end is interpolated between them. 1 "
-        "with real supersampling; shaded pictures ignore it.",
+        "Pixels between rays along both sides, for a preview: where rays end is interpolated between them.",
         Range(1, 8),
+        used_when=({"mode": ("refract",), "supersampling": ("none", "prss")},),
     )
-    fresnel: bool = setting(False, "Attenuate light by the Fresnel reflection at each surface.")
+    fresnel: bool = setting(
+        False, "Attenuate light by the Fresnel reflection at each surface.", used_when=GLASS
+    )
     mode: Literal["refract", "shaded"] = setting("refract", "refract, or shaded: the first surface, lit.")
     width: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
     height: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
@@ -109,6 +123,7 @@ class RefractionView:
         16,
         "Largest number of surfaces on a ray; beyond it the picture is dark grey.",
         Range(1, 256),
+        used_when=GLASS,
     )
     device: DeviceRequest = setting("auto", DESCRIPTION)  # noqa: RUF009 - a string, by its alias
 
@@ -116,18 +131,19 @@ class RefractionView:
         check(self, CHOICES)
         if len(self.iso) > MAX_ISOS:
             raise InvalidInput("iso", f"{len(self.iso)} iso-values", f"at most {MAX_ISOS}")
-        if len(self.index) != max(len(self.iso), 1):
-            raise InvalidInput("index", self.index, f"{max(len(self.iso), 1)}: one for each iso-value")
+        if len(self.index) not in (1, max(len(self.iso), 1)):
+            raise InvalidInput(
+                "index", self.index, f"{max(len(self.iso), 1)}: one for each iso-value, or one"
+            )
         for index in self.index:
             INDEX.check("index", index)
-        if not 0 <= self.surroundings <= len(self.index):
-            raise InvalidInput("surroundings", self.surroundings, f"a layer, 0 to {len(self.index)}")
+        layers = max(len(self.iso), 1)
+        if not 0 <= self.surroundings <= layers:
+            raise InvalidInput("surroundings", self.surroundings, f"a layer, 0 to {layers}")
         if self.iso:
             self.layers()
         if self.smoothing and not self._smooths:
             raise InvalidInput("smoothing", self.smoothing, "0, unless the filter is a B-spline")
-        if self.ray_spacing > 1 and self.supersampling == "real":
-            raise InvalidInput("ray_spacing", self.ray_spacing, "1 with real supersampling")
         rays = self.width * self.height * self.times**2
         if rays > MAX_RAYS:
             raise InvalidInput("width, height, degree", f"{rays} rays", f"at most {MAX_RAYS}")
@@ -139,7 +155,12 @@ class RefractionView:
 
     def layers(self) -> Layers:
         """Iso-values and indices for the ray caster; raises InvalidInput unless the values increase."""
-        return Layers(self.iso, (self.outside, *self.index), self.surroundings)
+        return Layers(self.iso, (self.outside, *self.indices), self.surroundings)
+
+    @property
+    def indices(self) -> tuple[float, ...]:
+        """The refractive index above each iso-value."""
+        return self.index * len(self.iso) if len(self.index) == 1 else self.index
 
     def within(self, low: float, high: float) -> RefractionView:
         """The view for a volume with values from ``low`` to ``high``, with the default iso-value filled in.

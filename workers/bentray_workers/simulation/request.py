@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import Range, ranges_of
-from bentray_kernels.request_fields import check, setting
+from bentray_kernels.request_fields import ABOVE_ZERO, Uses, check, check_used, setting
 
 from .plane import SimulationSettings
 from .volume import VolumeSimulationSettings
@@ -40,18 +40,11 @@ def range_of(name: str) -> Range:
     )
 
 
-# Settings of some kinds of scan only, and their condition.
-CONDITIONS = {
-    "refinement": "waveform is false",
-    "noise_s": "phantom is table6, table6-vertical or detailed, and waveform is false",
-    "slices": "phantom is table7 and waveform is false",
-    "array": "phantom is table7 and waveform is false",
-    "three_d": "phantom is table7 and waveform is false",
-    "attenuation": "waveform is false",
-    "frequency_hz": "waveform is true",
-    "emissions": "waveform is true",
-    "side_m": "waveform is true",
-}
+# When settings of some kinds of scan only have an effect.
+TIMES: Uses = ({"waveform": (False,)},)
+TRACES: Uses = ({"waveform": (True,)},)
+VOLUMES: Uses = ({"waveform": (False,), "phantom": ("table7",)},)
+NOISE: Uses = ({"snr": ABOVE_ZERO}, {"noise_s": ABOVE_ZERO})
 
 
 @dataclass(frozen=True)
@@ -77,37 +70,56 @@ class PhantomScan:
     elements: int = setting(256, "Transducers of a ring; each sends and receives.", range_of("elements"))
     coupling_mps: float = setting(1500.0, "Speed of the water, m/s.", range_of("coupling_mps"))
     snr: float | None = setting(None, "Signal over noise, as 10; none without it.", range_of("snr"))
-    seed: int = setting(0, "Of the noise.", range_of("seed"))
+    seed: int = setting(0, "Of the noise.", range_of("seed"), used_when=NOISE)
     refinement: int | None = setting(
         None,
         "Travel times: how many times finer their grid is, 4 by default; at least 2 in space, else 4.",
         range_of("refinement"),
+        used_when=TIMES,
     )
-    attenuation: bool | None = setting(None, "Travel times: record amplitudes too.")
+    attenuation: bool | None = setting(None, "Travel times: record amplitudes too.", used_when=TIMES)
     noise_s: float | None = setting(
         None,
         "Travel times of a 2-D phantom: standard deviation of the noise on them, s; 0 by default.",
         range_of("noise_s"),
+        used_when=({"waveform": (False,), "phantom": ("table6", "table6-vertical", "detailed")},),
     )
     slices: int | None = setting(
-        None, "table7: heights of the ring, one node apart; 40 by default.", range_of("slices")
+        None,
+        "table7: heights of the ring, one node apart; 40 by default.",
+        range_of("slices"),
+        used_when=VOLUMES,
     )
     array: Literal["moved", "rings"] | None = setting(
-        None, "table7: one ring moved (the default), or rings at all heights that receive each other."
+        None,
+        "table7: one ring moved (the default), or rings at all heights that receive each other.",
+        used_when=VOLUMES,
     )
-    three_d: bool | None = setting(None, "table7: wave fronts in space, not in each slice by itself.")
+    three_d: bool | None = setting(
+        None, "table7: wave fronts in space, not in each slice by itself.", used_when=VOLUMES
+    )
     frequency_hz: float | None = setting(
-        None, "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000.", range_of("frequency_hz")
+        None,
+        "Waves: middle of the pulse, Hz; 500000 by default, of table7 100000.",
+        range_of("frequency_hz"),
+        used_when=TRACES,
     )
     emissions: int | None = setting(
-        None, "Waves: elements that send; 64 by default, or all if fewer.", range_of("emissions")
+        None,
+        "Waves: elements that send; 64 by default, or all if fewer.",
+        range_of("emissions"),
+        used_when=TRACES,
     )
     side_m: float | None = setting(
-        None, "Waves: side of the square with phantom and ring, m; 0.12 by default.", range_of("side_m")
+        None,
+        "Waves: side of the square with phantom and ring, m; 0.12 by default.",
+        range_of("side_m"),
+        used_when=TRACES,
     )
 
     def __post_init__(self) -> None:
         check(self, CHOICES)
+        check_used(self)
         self.chosen()
 
     def chosen(self) -> Simulated:
@@ -125,15 +137,10 @@ class PhantomScan:
         values = {
             one.name: getattr(self, one.name)
             for one in fields(self)
-            if one.name not in ("phantom", "waveform") and getattr(self, one.name) is not None
+            if one.name in known and getattr(self, one.name) is not None
         }
-        if kind is SimulationSettings:
-            values["phantom"] = self.phantom
         if "emissions" in known and self.elements is not None:
             values.setdefault("emissions", min(EMISSIONS, self.elements))
-        for name, value in values.items():
-            if name not in known:
-                raise InvalidInput(name, value, f"nothing, unless {CONDITIONS[name]}")
         return kind(**values)
 
     def plain(self) -> dict[str, Any]:

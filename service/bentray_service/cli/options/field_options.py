@@ -70,12 +70,14 @@ class FieldOptions:
 
     def view(self) -> FieldView:
         """The view; raises InvalidInput naming the first invalid field."""
+        from bentray_kernels.request_fields import check_used
         from bentray_workers.rendering.field_view import FieldView
 
         given: dict[str, Any] = {name: value for name, value in self.given.items() if name in VIEW}
         if "positions_m" in given:
             given["positions_m"] = tuple(given["positions_m"])
-        return FieldView(**given)
+        view: FieldView = check_used(FieldView(**given))
+        return view
 
 
 with_field_options = with_options(OPTIONS, FieldOptions)

@@ -70,13 +70,14 @@ class ViewOptions:
 
     def view(self) -> tuple[RefractionView, Path | None]:
         """The view, and the image file of its backdrop, if any; raises InvalidInput for an invalid field."""
+        from bentray_kernels.request_fields import check_used
         from bentray_workers.rendering.refraction_view import CHOICES, RefractionView
 
         given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in self.given.items()}
         backdrop, file = given.get("backdrop"), None
         if backdrop is not None and backdrop not in CHOICES["backdrop"]:
             given["backdrop"], file = "picture", Path(backdrop)
-        return RefractionView(**given), file
+        return check_used(RefractionView(**given)), file
 
 
 with_view_options = with_options(OPTIONS, ViewOptions)

@@ -4,7 +4,7 @@ import { inWords, request } from "../parts/api.js";
 import { make } from "../parts/dom.js";
 import { duration } from "../parts/job_words.js";
 import { show, showOnceNear, withKey } from "../parts/key.js";
-import { glassOf, queryOf } from "../parts/views.js";
+import { glassOf, queryOf, shownBy } from "../parts/views.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RAYS = { curved: "Bent rays", straight: "Straight rays" };
@@ -110,7 +110,7 @@ function turntable(job, words) {
 // The first picture of a turntable.
 function firstFrame(job) {
   const { frames, turn_deg: turn, format, ...view } = job.settings;
-  return `${job.links.volume}/refraction.png?${queryOf(view)}`;
+  return `${job.links.volume}/refraction.png?${queryOf(shownBy(view))}`;
 }
 
 function pictures(job, title) {

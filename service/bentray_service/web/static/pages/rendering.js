@@ -12,7 +12,7 @@ import { pictureStream, rateOf } from "../parts/picture_stream.js";
 import { planOf, queueInWords, timeInWords } from "../parts/plan_estimate.js";
 import { load, titleOf } from "../parts/titles.js";
 import { uploads } from "../parts/uploads.js";
-import { glassOf, queryOf } from "../parts/views.js";
+import { glassOf, queryOf, shownBy } from "../parts/views.js";
 import { localPreviews } from "../webgl/local_previews.js";
 
 // Sides of pictures, pixels: while the view moves, at rest, and of the picture that a link opens.
@@ -141,7 +141,7 @@ export async function open(root, { id, query }) {
     const sound = volume.water_speed_mps !== null;
     const suited = !sound ? { index: UPLOAD_INDEX } : iso || index ? {} : glassOf(volume);
     delete suited.elevation_deg;
-    return {
+    return shownBy({
       ...suited,
       ...(iso && { iso: Number(iso) }),
       ...(index && { index: Number(index) }),
@@ -151,7 +151,7 @@ export async function open(root, { id, query }) {
       ...(rest.mode === "refract" && { backdrop: rest.backdrop }),
       ...samplingOf(rest),
       ...Object.fromEntries(CAMERA.map((name) => [name, Number(rest[name])])),
-    };
+    });
   }
 
   function addressOf(more) {
@@ -178,7 +178,8 @@ export async function open(root, { id, query }) {
     // The default iso-value is known for the default filter and smoothing alone.
     const known = iso !== undefined || (!rest.filter && rest.smoothing === undefined && histogram?.iso != null);
     if (!known) return null;
-    return local.drawer(chosen(), { ...rest, iso: isoValues(), index: [index].flat() }, PREVIEW_PX);
+    const indices = [index].flat();
+    return local.drawer(chosen(), { ...rest, iso: isoValues(), index: isoValues().map((_, k) => indices[k] ?? indices[0]) }, PREVIEW_PX);
   }
 
   function markIso() {

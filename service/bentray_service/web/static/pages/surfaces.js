@@ -146,6 +146,9 @@ export async function open(root, { id, query }) {
 
   function view() {
     const { samples, ...given } = Object.fromEntries(new FormData(form));
+    // What the material shows nothing of, which the service refuses.
+    if (!given.mode.startsWith("refract")) delete given.index;
+    if (given.mode === "diffuse") delete given.share;
     const names = objects.flatMap((_, number) => [`x${number}`, `y${number}`]);
     const places = names.map((name) => Number(given[name]));
     for (const name of names) delete given[name];

@@ -19,6 +19,14 @@ export function glassOf({ water_speed_mps: water, value_range: [lowest, highest]
   };
 }
 
+// What a lit surface shows nothing of: the service refuses it beside one.
+const OF_GLASS = ["index", "outside", "surroundings", "backdrop", "backdrop_distance", "squares", "fresnel", "depth", "ray_spacing"];
+
+// A view without what it shows nothing of.
+export function shownBy(view) {
+  return Object.fromEntries(Object.entries(view).filter(([name]) => view.mode !== "shaded" || !OF_GLASS.includes(name)));
+}
+
 // Lists repeat their name; what is null is left to the service.
 export function queryOf(view) {
   const given = Object.entries(view).filter(([, value]) => value !== null);
