@@ -37,8 +37,6 @@ NO_BETTER = 0.9
 # Iterations after which the residuals are those of a fitted image.
 FITTED = 3
 
-CHECK = "check the units, the order of the elements, time zero and the speed of the water (bentray quality)"
-
 
 def fit_cautions(
     dataset: Dataset, settings: Settings, residuals: Ints, history: Sequence[Iteration]
@@ -70,7 +68,7 @@ def fit_cautions(
             "constant",
             f"One constant speed of {speed:.0f} m/s explains the times as well as the image: nine tenths of "
             f"the residuals of the image are within {words}, of the constant within {_time(constant)}. "
-            f"The image shows nothing of the object: {CHECK}, or try more iterations.",
+            f"The image shows nothing of the object; more iterations may.",
             doubtful=True,
         )
         return
@@ -79,7 +77,7 @@ def fit_cautions(
         yield Caution(
             "noise",
             f"The times contradict each other: their noise is {_time(noise)}, {100.0 * noise / time:.2g} % "
-            f"of the travel times; {CHECK}.",
+            f"of the travel times.",
             doubtful=True,
         )
     over = residual > max(OVER_NOISE * NORMAL * noise, OF_CONSTANT * constant, SMALL * time)
@@ -87,7 +85,7 @@ def fit_cautions(
         yield Caution(
             "residual",
             f"The image does not explain the times: nine tenths of the residuals are within {words}, where "
-            f"the noise is {_time(noise)}; {CHECK}, or try bent rays, more iterations and a weaker penalty.",
+            f"the noise is {_time(noise)}. Bent rays, more iterations or a weaker penalty may.",
             doubtful=True,
         )
 
@@ -115,7 +113,7 @@ def bound_cautions(
             f"The image is cut off: {100.0 * low:.1f} % of the nodes with rays are at the lowest speed "
             f"allowed, {bounds_mps[0]:g} m/s, and {100.0 * high:.1f} % at the highest, {bounds_mps[1]:g} "
             "m/s. "
-            f"If the object can be slower or faster, widen speed_bounds_mps; else {CHECK}.",
+            f"If the object can be slower or faster, widen speed_bounds_mps.",
             doubtful=True,
         )
 

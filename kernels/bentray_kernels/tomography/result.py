@@ -18,6 +18,7 @@ RESIDUAL_EDGES_S = np.concatenate((-_DECADES[::-1], _DECADES))
 
 # Begins the first line of a doubtful result, and the advice of its job.
 DOUBTFUL = "Doubtful result."
+CHECK = "Else check the scan (bentray quality): units, order of the elements, time zero, speed of the water."
 
 
 def residual_counts(residuals: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -214,7 +215,7 @@ class Reconstruction:
     def doubt(self) -> str:
         """Why the image is doubtful, in sentences; empty without a reason."""
         reasons = " ".join(one.text for one in self.cautions if one.doubtful)
-        return f"{DOUBTFUL} {reasons}" if reasons else ""
+        return f"{DOUBTFUL} {reasons} {CHECK}" if reasons else ""
 
     @property
     def residual_rms_s(self) -> float | None:

@@ -5,6 +5,7 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Caution, Reconstruction, Settings
+from bentray_kernels.tomography.result import CHECK
 from bentray_service.cli.output.exit_codes import DoubtfulResult, end_doubtful
 from bentray_service.cli.output.results import show_results, write_results
 
@@ -28,7 +29,7 @@ def test_a_doubt_is_the_first_line_and_other_cautions_follow(
     )
     found = write_results(tmp_path, result, scan, 1.0, draw=lambda: b"")
     show_results("Reconstruction", found, as_json=False)
-    lines = ["Doubtful result. Cut off.", "Water of 20 °C is assumed.", "May be too small."]
+    lines = [f"Doubtful result. Cut off. {CHECK}", "Water of 20 °C is assumed.", "May be too small."]
     assert capsys.readouterr().out.splitlines()[:3] == lines
     with pytest.raises(DoubtfulResult, match="the result is doubtful"):
         end_doubtful(1, 1, accepted=False)
