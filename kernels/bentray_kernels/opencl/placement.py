@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple, get_args
 
 from ..errors import InvalidInput
 from .choice import choose, open_session
-from .devices import VARIABLE, WISH, Device, find_devices, hidden, select_devices
+from .devices import NEVER, VARIABLE, WISH, Device, find_devices, hidden, select_devices
 from .lost_device import DeviceLostError, cpu_only
 from .session import Session
 from .trial import ENGINES, MOST_ATTEMPTS, Trial, stored_trial, try_engine
@@ -163,8 +163,10 @@ def _passing(devices: tuple[Device, ...]) -> tuple[Device | None, float]:
             break
         if stored_verdict(device) is None:
             log.warning("%s is tested once, for at most %.0f s", device.name, left)
-        if verdict_on(device, left).usable:
+        verdict = verdict_on(device, left)
+        if verdict.usable:
             return device, end - time.monotonic()
+        log.warning("%s was refused: %s; %s=%s skips the test", device.name, verdict.reason, VARIABLE, NEVER)
     return None, 0.0
 
 

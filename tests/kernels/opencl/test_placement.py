@@ -174,6 +174,14 @@ def test_the_wait_for_a_card_is_ten_seconds_at_most():
     assert vars(placement)["AUTO_S"] <= 10.0
 
 
+def test_a_card_that_is_refused_is_named(slow_card, monkeypatch, caplog):
+    monkeypatch.setattr(placement, "verdict_on", lambda *_: Verdict("double1: no answer in 10 s", (), {}))
+    assert place(LARGE) is None
+    words = "GPU 9000 was refused: double1: no answer in 10 s; BENTRAY_DEVICE=cpu skips the test"
+    assert caplog.records[-1].getMessage() == words
+    assert slow_card() == []
+
+
 def test_a_slow_self_test_leaves_no_time_for_a_trial(slow_card, monkeypatch):
     given = []
 
