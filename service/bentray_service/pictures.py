@@ -174,7 +174,8 @@ class Pictures:
         selection: volume_export.Selection,
     ) -> None:
         """Export a volume to another format, a key of ``volume_export.FORMATS``."""
-        what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.export_cost(VolumeFile.of(volume))
+        cost = picture_cost.export_cost(VolumeFile.of(volume), name)
+        what = "volume", f"shape {tuple(volume['shape'])}", cost
         how = {"target": target, "name": name, "selection": selection}
         await self._one(tenant, what, path, volume_export.export_volume, how)
 

@@ -29,6 +29,14 @@ class Received:
     sha256: str
 
 
+def check_announced(announced: int | None, limit: int, expected: str) -> None:
+    """Reject a body by its Content-Length, before anything is reserved or read; as ``receive``."""
+    if announced == 0:
+        raise EmptyBody("body", "0 bytes", expected)
+    if announced is not None and announced > limit:
+        raise TooLarge("body", f"{announced} bytes", f"at most {limit} bytes (BENTRAY_MAX_UPLOAD_BYTES)")
+
+
 async def receive(
     stream: AsyncIterator[bytes],
     announced: int | None,
@@ -50,11 +58,8 @@ async def receive(
     Raises:
         TooLarge, EmptyBody, StorageFull: as their names say.
     """
-    if announced == 0:
-        raise EmptyBody("body", "0 bytes", expected)
+    check_announced(announced, limit, expected)
     accepted = f"at most {limit} bytes (BENTRAY_MAX_UPLOAD_BYTES)"
-    if announced is not None and announced > limit:
-        raise TooLarge("body", f"{announced} bytes", accepted)
     digest = hashlib.sha256()
     growing = _GrowingReservation(announced or 0, limit, reserve)
     file = await run_in_threadpool(path.open, "xb", 0)

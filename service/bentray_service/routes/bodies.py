@@ -48,6 +48,10 @@ class SmallBody(APIRoute):
         handler = super().get_route_handler()
 
         async def read_then_answer(request: Request) -> Response:
+            # Of a body that would be rejected nothing is waited for.
+            announced = int(request.headers.get("content-length", 0))
+            if announced > LONGEST_JSON:
+                raise TooLarge("body", f"{announced} bytes", f"at most {LONGEST_JSON} bytes")
             body = bytearray()
             async for chunk in request.stream():
                 body += chunk

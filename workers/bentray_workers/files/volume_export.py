@@ -95,11 +95,18 @@ class Content:
 
 @dataclass(frozen=True)
 class Format:
-    """A file format: extension, media type and writer."""
+    """A file format: extension, media type and writer.
+
+    Attributes:
+        copies: memory while it is written, in sizes of the volume as it is read (measured).
+        library_bytes: memory of the libraries that it is written by.
+    """
 
     extension: str
     media_type: str
     write: Callable[[Path, Content], None]
+    copies: float = 2.0
+    library_bytes: int = 0
 
 
 # Of what is written here; a service sends no stored export of another one. 2: positions in RAS or LPS.
@@ -272,7 +279,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         "nrrd": Format("nrrd", "application/octet-stream", _on_grid(write_nrrd)),
         "mat": Format("mat", "application/x-matlab-data", _mat),
         "vti": Format("vti", "application/octet-stream", _vti),
-        "ome-zarr": Format("ome.zarr.zip", "application/zip", _ome_zarr),
-        "dicom": Format("dcm", "application/dicom", _dicom),
+        "ome-zarr": Format("ome.zarr.zip", "application/zip", _ome_zarr, library_bytes=96 * 2**20),
+        "dicom": Format("dcm", "application/dicom", _dicom, 3.0, 160 * 2**20),
     }
 )

@@ -15,7 +15,7 @@ from ...errors import Busy
 from ...ingest.canonical import IngestLimits, make_canonical
 from ...ingest.fair_queue import FairQueue
 from ...ingest.ingest_process import ACCEPTED
-from ...ingest.receive import Received, receive
+from ...ingest.receive import Received, check_announced, receive
 from ...rows.ids import new_id
 from ...rows.stored_tables import UploadedTable
 from ...rows.tenants import Tenant
@@ -54,6 +54,7 @@ async def receive_upload(
     what, upload_id = table.what, new_id(table.what)
     announced = request.headers.get("content-length")
     length = int(announced) if announced else None
+    check_announced(length, service.settings.max_upload_bytes, ACCEPTED[what])
     files, settings, quota = service.files.of(tenant), service.settings, service.quota
     path = files.incoming(upload_id)
     resize = partial(quota.resize, tenant, upload_id)

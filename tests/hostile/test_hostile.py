@@ -1,0 +1,15 @@
+"""The hostile list: the service holds against every attack; ``python -m tests.hostile`` prints the table."""
+
+from __future__ import annotations
+
+import pytest
+
+from .hostile_list import LISTS, run_list
+
+pytestmark = pytest.mark.nightly
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_the_service_holds(tmp_path, name):
+    outcomes = run_list(name, tmp_path, print)
+    assert [(one.attack.name, one.seen) for one in outcomes if not one.held] == []
