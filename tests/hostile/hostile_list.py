@@ -39,6 +39,7 @@ def _on_service(folder: Path, say: Callable[[str], None]) -> list[Outcome]:
 def _on_parts(folder: Path, say: Callable[[str], None]) -> list[Outcome]:
     scan = _scan()
     write_dataset(folder / "scan.h5", scan)
+    (folder / "machine").mkdir()
     machine = Machine(folder / "machine")
     try:
         machine.wait_ready()
