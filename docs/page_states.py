@@ -50,7 +50,7 @@ def refused(page: Any) -> None:
 
 def corrected(page: Any) -> None:
     """Open the form of a corrected copy."""
-    page.get_by_role("button", name="Correct units or frequency").click()
+    page.get_by_role("button", name="Correct units, frequency or order").click()
 
 
 def correction_refused(page: Any) -> None:

@@ -12,6 +12,9 @@ from collections.abc import Sequence
 from .errors import InvalidInput
 from .ranges import Range
 
+# Share of the pairs of a scan that its examination may leave out, by default and as a setting.
+MAX_LEFT_OUT, LEFT_OUT = 0.334, Range(0.0, 1.0)
+
 # Counts. Pairs are of all slices together.
 ELEMENTS = Range(3, 65_536)
 EMISSIONS = RECEIVERS = Range(1, 65_536)

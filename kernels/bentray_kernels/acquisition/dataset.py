@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import refuse_mask
 from ..errors import InvalidInput
 from ..limits import (
     ATTENUATION_NP_M,
@@ -19,6 +21,7 @@ from ..limits import (
 )
 from ..ranges import check_ranges, ranged
 from . import rules
+from .impossible_times import Geometry, without_impossible
 from .simulation.phantom_truth import Truth
 from .water import speed_from_temperature
 from .waveform import Waveform
@@ -30,6 +33,10 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 POSITION = "geometry/element_position_m"
+
+# Positions beyond are refused when a scan is checked; their distances may overflow before.
+FARTHEST_M = 1e9
+
 ARRAY_TYPES = ("ring", "rings", "free")
 
 
@@ -50,6 +57,11 @@ class Dataset:
         log_ratio_np: ln(A_water / A_object), Np.
         valid: pairs that may be used; NaN pairs are never used.
         water_temperature_assumed: whether nobody stated the speed or the temperature of the water.
+        impossible_times: numbers of travel times that no sound can have and that became NaN, by their kind:
+            0 or less, infinite, masked, placeholders such as -9999, and a difference of 0 where the other
+            direction says otherwise; see ``impossible_times``.
+
+    Masked arrays are taken: masked pairs are missing.
 
     Raises:
         InvalidInput: naming the field as in the file format.
@@ -83,8 +95,10 @@ class Dataset:
     title: str = ""
     source: str = ""
     license: str = field(default="")
+    impossible_times: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self._fill_masks()
         for place, shape in self.shapes().items():
             check_size(place, shape)
         position = self.element_position_m
@@ -115,7 +129,55 @@ class Dataset:
                 )
         check_ranges(self)
         self._check_description()
+        self._leave_out_impossible()
         self._check_pairs()
+
+    def _fill_masks(self) -> None:
+        """Replace masked arrays by plain ones: masked pairs are missing or not valid."""
+        for name in ("sigma_s", "log_ratio_np"):
+            array = getattr(self, name)
+            if isinstance(array, np.ma.MaskedArray):
+                object.__setattr__(self, name, np.ma.filled(array.astype(np.float64), np.nan))
+        for name in ("valid", "roi"):
+            array = getattr(self, name)
+            if isinstance(array, np.ma.MaskedArray):
+                object.__setattr__(self, name, np.ma.filled(array, False))
+        for place, array in (
+            (POSITION, self.element_position_m),
+            ("acquisition/tx", self.tx),
+            ("acquisition/rx", self.rx),
+            ("acquisition/wavelet", self.wavelet),
+            ("slice/z_m", self.slice_z_m),
+            ("geometry/element_normal", self.element_normal),
+        ):
+            if array is not None:
+                refuse_mask(place, array)
+
+    def _leave_out_impossible(self) -> None:
+        """Replace travel times that no sound can have by NaN, and count them."""
+        if np.abs(self.element_position_m).max() > FARTHEST_M:
+            return
+        pairs = (*(() if self.slice_z_m is None else self.slice_z_m.shape), len(self.tx), len(self.rx))
+        geometry = Geometry(self.element_position_m, self.tx, self.rx, self.water_speed_mps)
+        counts = dict(self.impossible_times)
+        for name in ("tof_s", "delta_tof_s"):
+            times = getattr(self, name)
+            # Another shape is refused below.
+            if times is None or times.shape != pairs:
+                continue
+            kept, found = without_impossible(times, geometry, absolute=name == "tof_s")
+            if kept is not times:
+                object.__setattr__(self, name, kept)
+            for kind, count in found.items():
+                counts[kind] = counts.get(kind, 0) + count
+        object.__setattr__(self, "impossible_times", counts)
+        if self.sigma_s is not None and self.picked and self.sigma_s.shape == pairs:
+            # What a missing time deviates by is of no interest.
+            times = self.delta_tof_s if self.delta_tof_s is not None else self.tof_s
+            assert times is not None
+            unknown = ~np.isfinite(times) & ~np.isnan(self.sigma_s)
+            if unknown.any():
+                object.__setattr__(self, "sigma_s", np.where(unknown, np.nan, self.sigma_s))
 
     def _check_description(self) -> None:
         if self.array_type not in ARRAY_TYPES:

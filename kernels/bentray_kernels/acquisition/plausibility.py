@@ -1,4 +1,4 @@
-"""Plausibility of SI units in a scan: array width, and travel times against the distances of the pairs."""
+"""Plausibility of a scan: width of the array, travel times against distances, and the order of elements."""
 
 from __future__ import annotations
 
@@ -8,13 +8,18 @@ from ..arrays import Flags, Floats
 from ..errors import InvalidInput
 from ..limits import DEVIATION_S, LOG_RATIO_NP, PLACE_M, PRESSURE, RADIUS_M, TIME_S, WIDTH_M
 from . import rules
+from .arrangement import FASTEST_MPS, SLOWEST_MPS, Arrangement, Mismatch, find_mismatch
 from .dataset import POSITION, Dataset
+from .impossible_times import impossible_words, lost_pairs
 
 # Apparent sound speed of most pairs: fat has 1,400 m/s, bone 4,000.
-BULK_MPS = (300.0, 6_000.0)
+BULK_MPS = (SLOWEST_MPS, FASTEST_MPS)
 
 # A scan is plausible if at least this fraction of its pairs is: single picks may be arbitrarily wrong.
-MAX_PAIRS = 0.5
+MIN_PLAUSIBLE = 2.0 / 3.0
+
+# Differences look like arrival times if at least this fraction of them does.
+MIN_ARRIVALS = 0.5
 
 # Differences within this fraction of the whole time through water are arrival times: as differences, they
 # would mean an object with less than 0.6 of the speed of the water.
@@ -46,13 +51,29 @@ class ImplausibleUnit(InvalidInput):
         super().__init__(field, value, f"{plain}{hint}")
 
 
+class WrongArrangement(InvalidInput):
+    """Travel times that do not belong to the stated positions of their elements.
+
+    Attributes:
+        plain: what is accepted, without the proposal.
+        proposal: the arrangement that explains the times; None where no single one does.
+    """
+
+    def __init__(self, field: str, mismatch: Mismatch) -> None:
+        self.proposal: Arrangement | None = mismatch.proposal
+        self.plain = "times in the order of the elements in tx and rx, and positions of these elements in m"
+        hint = "" if self.proposal is None else f"; it looks like {self.proposal.words}"
+        super().__init__(field, f"times that do not fit the positions: {mismatch.found}", self.plain + hint)
+
+
 def check_plausible(dataset: Dataset) -> None:
-    """Reject a scan whose lengths or times are in another unit, or physically impossible.
+    """Reject a scan whose lengths or times are in another unit, impossible, or those of other elements.
 
     Traces are not read: they may remain in the file.
 
     Raises:
-        InvalidInput: naming the field and its value; ``ImplausibleUnit`` with the unit that is likely.
+        InvalidInput: naming the field and its value; ``ImplausibleUnit`` with the unit that is likely;
+            ``WrongArrangement`` with the arrangement that explains the times.
     """
     _check_places(dataset)
     for place, times in (
@@ -70,6 +91,41 @@ def check_plausible(dataset: Dataset) -> None:
     ):
         if values is not None:
             rules.within_or_nan(place, values, within)
+    _check_missing(dataset)
+    if dataset.picked:
+        check_arrangement(dataset)
+
+
+def check_arrangement(dataset: Dataset) -> None:
+    """Reject travel times that belong to other elements than the scan says, see ``find_mismatch``.
+
+    Args:
+        dataset: with travel times; of several slices the one with the most of them is compared.
+
+    Raises:
+        WrongArrangement: naming the travel times.
+    """
+    absolute = dataset.tof_s is not None
+    times = dataset.tof_s if absolute else dataset.delta_tof_s
+    assert times is not None
+    known = [int(np.isfinite(one).sum()) for one in (times if times.ndim == 3 else times[None])]
+    mismatch = find_mismatch(dataset.slice(int(np.argmax(known))))
+    if mismatch is not None:
+        raise WrongArrangement("traveltime/tof_s" if absolute else "traveltime/delta_tof_s", mismatch)
+
+
+def _check_missing(dataset: Dataset) -> None:
+    """Reject a scan of which most times were impossible."""
+    lost = lost_pairs(dataset.impossible_times)
+    times = dataset.tof_s if dataset.tof_s is not None else dataset.delta_tof_s
+    if times is None or not lost:
+        return
+    other = (dataset.tx[:, None] != dataset.rx[None, :]) & np.isfinite(times)
+    left = int(other.sum())
+    if left < lost:
+        place = "traveltime/tof_s" if dataset.tof_s is not None else "traveltime/delta_tof_s"
+        found = f"impossible times ({impossible_words(dataset.impossible_times)}) and only {left} others"
+        raise InvalidInput(place, found, "arrival times of most pairs, NaN for missing ones")
 
 
 def _check_places(dataset: Dataset) -> None:
@@ -113,11 +169,11 @@ def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
     def plausible(factor: float) -> bool:
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             speed = distance / (offset + factor * time)
-        return bool(np.mean((speed >= BULK_MPS[0]) & (speed <= BULK_MPS[1])) >= MAX_PAIRS)
+        return bool(np.mean((speed >= BULK_MPS[0]) & (speed <= BULK_MPS[1])) >= MIN_PLAUSIBLE)
 
     middle = np.argsort(time)[time.size // 2]
     value = f"{time[middle]:.4g} s between elements {distance[middle]:.3g} m apart, the median of all pairs"
-    if offset is in_water and np.mean(np.abs(time - in_water) <= ARRIVALS * in_water) >= MAX_PAIRS:
+    if offset is in_water and np.mean(np.abs(time - in_water) <= ARRIVALS * in_water) >= MIN_ARRIVALS:
         accepted = "arrival with the object minus arrival in water; these look like arrivals: write them to "
         raise InvalidInput(place, value, f"{accepted}traveltime/tof_s")
     if plausible(1.0):
@@ -141,7 +197,12 @@ def _sample_pairs(dataset: Dataset, times: Floats) -> tuple[Floats, Floats]:
     offset = place[dataset.tx[e]][:, None, :] - place[dataset.rx[r]][None, :, :]
     distance = np.broadcast_to(np.linalg.norm(offset, axis=-1), (len(z), len(e), len(r)))
     some = stacked[np.ix_(z, e, r)]
-    known: Flags = np.isfinite(some) & (distance > NEAR * distance.max(initial=0.0))
+    # A difference of 0, beside the object, is one in every unit.
+    known: Flags = (
+        np.isfinite(some)
+        & ((some != 0.0) | (times is dataset.tof_s))
+        & (distance > NEAR * distance.max(initial=0.0))
+    )
     if dataset.valid is not None:
         valid = dataset.valid if dataset.valid.ndim == 3 else dataset.valid[None]
         known &= valid[np.ix_(z, e, r)]

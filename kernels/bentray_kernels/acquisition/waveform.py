@@ -20,7 +20,7 @@ class Waveform:
 
     Attributes:
         object: (ntx, nrx, nt), with a leading nz axis for several slices; int16 or float32.
-        water: as ``object``, or None.
+        water: as ``object``, or None. Masked samples of both become NaN, which leaves out their traces.
         scale: pressure per count; the traces are ``scale * object`` in pascal (or any one unit).
         object_scale, water_scale: (ntx, nrx), optional further factor per trace.
     """
@@ -32,6 +32,17 @@ class Waveform:
     water_scale: Floats | None = None
 
     def __post_init__(self) -> None:
+        for name in ("object", "water", "object_scale", "water_scale"):
+            array = getattr(self, name)
+            if isinstance(array, np.ma.MaskedArray):
+                # A trace with a sample that is not finite is left out.
+                kind = (
+                    np.dtype(np.float32)
+                    if np.ma.is_masked(array) and array.dtype.kind in "iu"
+                    else array.dtype
+                )
+                empty = np.nan if kind.kind == "f" else 0
+                object.__setattr__(self, name, np.ma.filled(array.astype(kind), empty))
         if not SCALE.holds(abs(self.scale)):
             raise InvalidInput("waveform@scale", self.scale, f"in size {SCALE.words}")
         if self.object.ndim not in (3, 4) or 0 in self.object.shape:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, refuse_mask
 from ..errors import InvalidInput
 
 # A source closer to a node than this, in nodes, is treated as on it.
@@ -41,6 +41,7 @@ class SlownessGrid:
         Raises:
             InvalidInput: see ``bentray_kernels.eikonal.solve``.
         """
+        refuse_mask("speed", speed)
         speeds = np.asarray(speed, dtype=np.float64)
         if speeds.ndim not in (2, 3) or speeds.size == 0:
             raise InvalidInput("speed", f"shape {speeds.shape}", "a non-empty 2-D or 3-D array")
@@ -181,6 +182,7 @@ def placed(position: ArrayLike, shape: tuple[int, ...], spacing: float) -> Float
     Raises:
         InvalidInput: for a source that is not in the grid.
     """
+    refuse_mask("source", position)
     point = np.asarray(position, dtype=np.float64)
     if point.shape != (len(shape),):
         raise InvalidInput("source", f"shape {point.shape}", f"{len(shape)} coordinates in metres")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats
+from ..arrays import Floats, refuse_mask
 from ..errors import InvalidInput
 from .accurate import accurate
 from .fast_iterative import fast_iterative
@@ -182,6 +182,8 @@ def solve_many(
         InvalidInput: as ``solve``, and for batches that do not match.
     """
     chosen = _with_options(method, options)
+    refuse_mask("speeds", speeds)
+    refuse_mask("sources", sources)
     fields = np.asarray(speeds, dtype=np.float64)
     points = np.asarray(sources, dtype=np.float64)
     if fields.ndim not in (3, 4):

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats
+from ..arrays import Floats, refuse_mask
 from ..compiled import kernel
 from ..errors import InvalidInput
 from ..ray_gradient_names import RayGradient
@@ -53,6 +53,8 @@ class Fan(NamedTuple):
         Raises:
             InvalidInput: see ``bentray_kernels.rays.trace``.
         """
+        for name, array in (("tof", tof), ("receivers", receivers), ("source", source)):
+            refuse_mask(name, array)
         times = np.ascontiguousarray(tof, dtype=np.float64)
         if times.ndim not in (2, 3) or times.size == 0:
             raise InvalidInput("tof", f"shape {times.shape}", "a non-empty 2-D or 3-D array")

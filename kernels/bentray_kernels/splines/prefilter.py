@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import correlate1d
 
-from ..arrays import Floats
+from ..arrays import Floats, refuse_mask
 from ..compiled import kernel
 from ..errors import InvalidInput
 from .filters import bspline
@@ -41,6 +41,7 @@ def prefilter(values: ArrayLike, order: int, smoothing: float = 0.0) -> Floats:
     Raises:
         InvalidInput: for another order or smoothing.
     """
+    refuse_mask("values", values)
     if order not in range(1, 7):
         raise InvalidInput("order", order, "a whole number from 1 to 6")
     if not 0.0 <= smoothing <= MAX_SMOOTHING:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.fft import dctn
 from scipy.optimize import brentq
 
-from ..arrays import Floats
+from ..arrays import Floats, refuse_mask
 from ..errors import InvalidInput
 from .prefilter import MAX_SMOOTHING, sampled_bspline, symbols
 
@@ -38,6 +38,7 @@ def noise_of(volume: ArrayLike) -> float:
     Raises:
         InvalidInput: for fewer nodes.
     """
+    refuse_mask("volume", volume)
     nodes = np.asarray(volume)
     if min(nodes.shape, default=0) < 3:
         raise InvalidInput("volume", f"shape {nodes.shape}", "at least three nodes along each axis")
@@ -67,6 +68,7 @@ def smoothing_for_noise(volume: ArrayLike, order: int, sigma: float | None = Non
         InvalidInput: for a sigma that is not finite or below 0, another order, fewer nodes, and values that
             are not finite.
     """
+    refuse_mask("volume", volume)
     if order not in range(2, 7):
         raise InvalidInput("order", order, "a whole number from 2 to 6")
     nodes = np.asarray(volume, dtype=np.float64)

@@ -8,7 +8,7 @@ import numpy as np
 from numba.cpython.unsafe.tuple import tuple_setitem
 from numpy.typing import ArrayLike, DTypeLike
 
-from ..arrays import Floats
+from ..arrays import Floats, refuse_mask
 from ..compiled import kernel
 from ..errors import InvalidInput
 from .filters import Filter, bspline, filter_of
@@ -148,6 +148,7 @@ def _type_of(dtype: DTypeLike) -> np.dtype[Any]:
 
 
 def _checked(volume: ArrayLike) -> Floats:
+    refuse_mask("volume", volume)
     nodes = np.asarray(volume, dtype=np.float64)
     if nodes.ndim not in (1, 2, 3) or min(nodes.shape, default=0) < 2:
         raise InvalidInput(

@@ -13,7 +13,7 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import binary_erosion, binary_fill_holes, uniform_filter
 
 from ..acquisition import Truth
-from ..arrays import Flags, Floats
+from ..arrays import Flags, Floats, refuse_mask
 from ..errors import InvalidInput
 from .regions import RegionStatistics, region_statistics, round_nodes
 from .result import Reconstruction
@@ -309,6 +309,8 @@ def _check_range(value_range: float) -> None:
 def _checked(
     image: ArrayLike, truth: ArrayLike, region: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    for name, array in (("image", image), ("truth", truth), ("region", region)):
+        refuse_mask(name, array)
     a, b, where = np.asarray(image, np.float64), np.asarray(truth, np.float64), np.asarray(region, np.bool_)
     if a.shape != b.shape or where.shape != a.shape:
         raise InvalidInput(

@@ -14,6 +14,9 @@ import numpy as np
 from ..acquisition import Dataset
 from ..acquisition.element_pitch import element_pitch
 from ..acquisition.picking.amplitudes import with_log_ratios
+from ..acquisition.plausibility import check_plausible
+from ..acquisition.quality.finding import words
+from ..acquisition.quality.left_out import find_impossible
 from ..arrays import Floats
 from ..errors import InvalidInput
 from ..task_graph import ThreadPool, run
@@ -82,8 +85,9 @@ def reconstruct(
         The images and how they were computed. The same dataset and settings give the same bits.
 
     Raises:
-        InvalidInput: from the dataset or a setting that does not fit it.
+        InvalidInput: from the dataset, as ``check_plausible``, or a setting that does not fit it.
     """
+    check_plausible(dataset)
     dataset = dataset.in_water_of(settings.water_temperature_c)
     if settings.reads_amplitudes and dataset.waveform is not None:
         dataset = with_log_ratios(dataset, settings.attenuation.amplitudes)
@@ -112,6 +116,8 @@ def reconstruct(
         0 if recorded is None or recorded.water is None else recorded.object.shape[-1],
         echoes,
     )
+    if impossible := find_impossible(dataset.impossible_times):
+        result = replace(result, provenance={**result.provenance, "quality": words(impossible)})
     return with_settings_caution(result, requested, picks=False)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import refuse_mask
 from ..errors import InvalidInput
 
 Bools = NDArray[np.bool_]
@@ -138,6 +139,7 @@ def region_statistics(
     Raises:
         InvalidInput: for a region without a value.
     """
+    refuse_mask("values", values)
     image = np.asarray(values, np.float64)
     known = np.isfinite(image)
     inside = region & known

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal
 
 from ..errors import InvalidInput
-from ..limits import SPEED_MPS, WATER_C
+from ..limits import LEFT_OUT, MAX_LEFT_OUT, SPEED_MPS, WATER_C
 from ..picker_names import DEFAULT_PICKER, PickerName
 from ..ranges import SEED, Range
 from ..request_fields import ABOVE_ZERO, Uses, check, declared, setting
@@ -139,6 +139,13 @@ class PickingSettings:
         "corrected, dead elements, broken traces and contradicting times are left out, and the result states "
         "both. An unusable scan is rejected.",
         label="Check the scan first",
+    )
+    max_left_out: float = setting(
+        MAX_LEFT_OUT,
+        "Largest share of the pairs that the check may leave out; a scan of which more is left out is "
+        "rejected. 1: whatever is left is used.",
+        LEFT_OUT,
+        label="Pairs that may be left out",
     )
 
     def __post_init__(self) -> None:

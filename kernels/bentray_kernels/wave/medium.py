@@ -9,7 +9,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, refuse_mask
 from ..errors import InvalidInput
 from .cache_lines import missing, zeros
 from .memory import check_memory
@@ -85,6 +85,7 @@ class Medium:
             InvalidInput: for an invalid speed or attenuation, an edge without a node, a time step beyond
                 the limit of stability, or more memory than the limit.
         """
+        refuse_mask("speed", speed)
         speed = np.asarray(speed, dtype=np.float64)
         if speed.ndim not in (2, 3) or 0 in speed.shape or not (np.isfinite(speed) & (speed > 0.0)).all():
             raise InvalidInput("speed", f"shape {speed.shape}", "(nx, ny[, nz]) of finite numbers > 0 m/s")
@@ -101,6 +102,7 @@ class Medium:
         rim = np.concatenate(faces).mean()
         damping = _sponge(speed.shape, edge_nodes) * rim / spacing
         if attenuation is not None:
+            refuse_mask("attenuation", attenuation)
             loss = np.asarray(attenuation, dtype=np.float64)
             if loss.shape != speed.shape or not (np.isfinite(loss) & (loss >= 0.0)).all():
                 raise InvalidInput(

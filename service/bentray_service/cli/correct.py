@@ -1,4 +1,4 @@
-"""`bentray correct`: a corrected copy of a dataset file with wrong units or a wrong frequency."""
+"""`bentray correct`: a corrected copy of a dataset file with wrong units, frequency or order of elements."""
 
 from __future__ import annotations
 
@@ -31,10 +31,18 @@ def correct(
         float | None, typer.Option("--sampling-rate", help="Sampling rate of the traces, Hz.")
     ] = None,
     frequency_hz: Annotated[float | None, typer.Option("--frequency", help="Centre frequency, Hz.")] = None,
+    arrangement: Annotated[
+        str | None,
+        typer.Option(
+            "--arrangement",
+            help="Fault in the order of the elements or in their positions, as the refusal of the scan names "
+            "it, such as receivers-shifted-by-1, elements-grid-yx, positions-in-degrees.",
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a corrected copy of a dataset file whose units or frequency were stated wrongly.
+    """Write a corrected copy of a dataset file whose units, frequency or order of elements are wrong.
 
     The copy passes the checks of an upload and states the correction in its source. The times are travel
     times, their deviations, the time of the first sample and the sample interval.
@@ -47,7 +55,13 @@ def correct(
     from bentray_workers.files.dataset import Correction, correct_dataset
 
     correction = Correction(
-        times_in, times_read_as, positions_in, positions_read_as, sampling_rate_hz, frequency_hz
+        times_in,
+        times_read_as,
+        positions_in,
+        positions_read_as,
+        sampling_rate_hz,
+        frequency_hz,
+        arrangement,
     )
     dataset = correct_dataset(source, target, correction)
     if as_json:

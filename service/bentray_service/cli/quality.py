@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from bentray_kernels.limits import MAX_LEFT_OUT
 from bentray_kernels.picker_names import DEFAULT_PICKER
 
 from .options.paths import output_folder
@@ -38,12 +39,16 @@ def quality(
             show_default="no calibration",
         ),
     ] = None,
+    max_left_out: Annotated[
+        float, typer.Option(help="Largest share of the pairs that may be left out of a usable scan, 0 to 1.")
+    ] = MAX_LEFT_OUT,
     as_json: AsJson = False,
 ) -> None:
     """Check the data quality of a scan: report in OUTPUT/quality.json and .png, corrected scan in picked.h5.
 
     Finds dead elements, swapped and inverted channels, wrong time zeros, cycle skips, outliers and more;
-    they are left out or corrected in picked.h5. The exit code is 1 for an unusable scan.
+    they are left out or corrected in picked.h5. The exit code is 1 for an unusable scan, as one of which more
+    than a third of the pairs is left out.
     With --calibrate, also writes calibration.json; picked.h5 has the fitted positions and water speed.
 
     Example:  bentray quality scan.h5 -o report
@@ -58,9 +63,12 @@ def quality(
     calibration = None
     with dataset_file(source, given, folder) as scan, progress_bar("Examining") as step:
         if calibrate is None:
-            found = examine_file(scan, picker, step)
+            found = examine_file(scan, picker, step, max_left_out=max_left_out)
         else:
-            found, calibration = calibrate_file(scan, picker, step, fit_speed=calibrate is Water.fitted)
+            fitted_speed = calibrate is Water.fitted
+            found, calibration = calibrate_file(
+                scan, picker, step, fit_speed=fitted_speed, max_left_out=max_left_out
+            )
     paths = {kind: folder / f"quality.{kind}" for kind in ("json", "png")}
     if found.picked is not None:
         paths["h5"] = folder / "picked.h5"

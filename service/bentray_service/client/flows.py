@@ -79,8 +79,9 @@ def correct_dataset(
     positions_read_as: LengthUnit = "m",
     sampling_rate_hz: float | None = None,
     frequency_hz: float | None = None,
+    arrangement: str | None = None,
 ) -> Flow[DatasetRecord]:
-    """Make a corrected copy of a scan whose units or frequency were stated wrongly; the scan stays as it is.
+    """Make a corrected copy of a scan whose units, frequency or order of elements are wrong; the scan stays.
 
     Args:
         dataset: id or record of the scan.
@@ -89,6 +90,7 @@ def correct_dataset(
         positions_in, positions_read_as: the same of lengths.
         sampling_rate_hz: of the traces; None: follows the unit of times.
         frequency_hz: centre frequency.
+        arrangement: fault in the order of the elements or their positions, by ``proposed_corrections``.
 
     Returns:
         the record of the copy.
@@ -100,6 +102,7 @@ def correct_dataset(
         "positions_read_as": positions_read_as,
         "sampling_rate_hz": sampling_rate_hz,
         "frequency_hz": frequency_hz,
+        "arrangement": arrangement,
     }
     place = f"/v1/datasets/{id_of(dataset)}/corrections"
     response = yield RequestStep("POST", place, _once(plain_numbers(given)), repeatable=True)

@@ -47,6 +47,7 @@ class ReconstructionSettings(TypedDict, total=False):
     edge_mps: float
     picker: PickerName
     examine: bool
+    max_left_out: float
     attenuation: bool
     amplitudes: Literal["recorded", "ratio", "spectrum"]
     attenuation_solver: Literal["penalised", "sart"]

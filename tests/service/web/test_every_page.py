@@ -96,7 +96,7 @@ def opened(page, address, path, text):
     page.goto(f"{address}/#{path}")
     page.locator("main").get_by_text(text).first.wait_for()
     if path.startswith("/scans/"):
-        page.get_by_role("button", name="Correct units or frequency").click()
+        page.get_by_role("button", name="Correct units, frequency or order").click()
         page.get_by_role("button", name="Make a corrected copy").click()
         page.locator("#correct-error").get_by_text("changes nothing").wait_for()
 

@@ -363,7 +363,7 @@ def test_a_scan_in_wrong_units_is_corrected_as_the_page_proposes(page, address, 
     wrong = opened(page, address, stored(address, scan(in_microseconds)))
     proposed = page.locator("#proposed")
     expect(proposed).to_contain_text("Were times in ms read as µs?")
-    page.get_by_role("button", name="Correct units or frequency").click()
+    page.get_by_role("button", name="Correct units, frequency or order").click()
     form = page.locator("#correct-form")
     expect(form.get_by_label("Times in the original file")).to_be_focused()
     expect(form.get_by_label("Times in the original file")).to_have_value("ms")

@@ -137,7 +137,6 @@ WRONG = {
     "water runs backwards": attr("water", "sound_speed_mps", -1500.0),
     "water NaN": attr("water", "sound_speed_mps", np.nan),
     "delta shape": array("traveltime/delta_tof_s", np.zeros((24, 12))),
-    "delta infinite": array("traveltime/delta_tof_s", inf_delta),
     "delta is text": array("traveltime/delta_tof_s", [[b"x"] * 24] * 12),
     "delta is complex": array("traveltime/delta_tof_s", np.zeros((12, 24), complex)),
     "sigma negative": array("traveltime/sigma_s", np.full((12, 24), -1e-9)),

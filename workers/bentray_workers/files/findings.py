@@ -13,6 +13,7 @@ import numpy as np
 
 from bentray_kernels.acquisition.quality import Finding
 from bentray_kernels.acquisition.quality.finding import words
+from bentray_kernels.acquisition.quality.left_out import IMPOSSIBLE
 from bentray_kernels.acquisition.quality.recording import OF_TRACES, OF_WATER
 from bentray_kernels.arrays import Flags
 
@@ -39,9 +40,11 @@ class ScanFindings(NamedTuple):
 
     def words(self, *, stacked: bool) -> str:
         """Summary in one line; see ``finding.words``."""
-        if not self.examined and not self.findings:
-            return "travel times not examined, which needs a centre frequency; bentray quality checks them"
-        return words(self.findings, stacked=stacked)
+        found = words(self.findings, stacked=stacked) if self.findings or self.examined else ""
+        if self.examined or any(one.check != IMPOSSIBLE for one in self.findings):
+            return found
+        unchecked = "travel times not examined, which needs a centre frequency; bentray quality checks them"
+        return "; ".join(part for part in (found, unchecked) if part)
 
 
 def write_findings(path: Path, findings: ScanFindings, picked: Path | None = None) -> None:

@@ -25,6 +25,11 @@ from bentray_kernels.acquisition.quality.chords import examine_chords
 from bentray_kernels.acquisition.quality.correction import apply, stacked
 from bentray_kernels.acquisition.quality.estimated_water import estimate_from_pulses
 from bentray_kernels.acquisition.quality.examination import check_times
+from bentray_kernels.acquisition.quality.left_out import (
+    count_left_out,
+    find_impossible,
+    find_too_few,
+)
 from bentray_kernels.acquisition.quality.recording import Measured, check_traces
 from bentray_kernels.acquisition.reference import (
     ChordPulses,
@@ -34,6 +39,7 @@ from bentray_kernels.acquisition.reference import (
 )
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import MAX_LEFT_OUT
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 from bentray_kernels.tomography.guided_picking import predicted_delta
@@ -117,6 +123,7 @@ class PickingSource(NamedTuple):
         amplitudes: their source, see ``Settings``.
         waves: whether traces are compared with simulated ones after picking.
         water_temperature_c: in place of that of the file, °C.
+        max_left_out: share of the pairs beyond which the scan is refused, see ``Settings``.
     """
 
     path: Path
@@ -127,6 +134,7 @@ class PickingSource(NamedTuple):
     amplitudes: str = "recorded"
     waves: bool = False
     water_temperature_c: float | None = None
+    max_left_out: float = MAX_LEFT_OUT
 
     @property
     def dataset(self) -> Dataset:
@@ -368,7 +376,13 @@ def write_picked(
 ) -> None:
     """Task: write the picked dataset, unless it equals the scan, and then all findings."""
     whole = source.dataset
-    findings = tuple(replace(finding, slice=k) for k, (_, found) in enumerate(slices) for finding in found)
+    impossible = find_impossible(whole.impossible_times)
+    if source.examine:
+        counted = [count_left_out(whole.slice(k), found) for k, (_, found) in enumerate(slices)]
+        too_few = find_too_few(counted, whole.impossible_times, source.max_left_out)
+        _usable(source, 0, too_few)
+    of_slices = (replace(finding, slice=k) for k, (_, found) in enumerate(slices) for finding in found)
+    findings = (*impossible, *of_slices)
     corrected = any(finding.action != "reported" for finding in findings)
     changed = source.reads_amplitudes or not whole.picked or corrected
     if changed:

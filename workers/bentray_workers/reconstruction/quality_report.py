@@ -13,6 +13,7 @@ from bentray_kernels.acquisition.calibration import Calibration, calibrate, wate
 from bentray_kernels.acquisition.quality import Examined, Finding, Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.limits import MAX_LEFT_OUT
 from bentray_kernels.picker_names import DEFAULT_PICKER
 
 from ..cluster.task_cancellation import cancellation_check
@@ -48,7 +49,12 @@ LARGEST_BYTES = 2**30
 
 
 def calibrate_file(
-    path: Path, picker: str, progress: OnEmission | None = None, *, fit_speed: bool
+    path: Path,
+    picker: str,
+    progress: OnEmission | None = None,
+    *,
+    fit_speed: bool,
+    max_left_out: float = MAX_LEFT_OUT,
 ) -> tuple[Quality, Calibration | None]:
     """Examine a dataset file, and calibrate its array from the water shot of its first slice.
 
@@ -57,6 +63,7 @@ def calibrate_file(
         picker: for datasets without travel times.
         progress: of the examination.
         fit_speed: fit the speed of sound in water instead of the size of the array.
+        max_left_out: share of the pairs beyond which the scan is refused.
 
     Returns:
         The examination, with the elements and the water of the calibration in ``picked``; and the
@@ -66,7 +73,7 @@ def calibrate_file(
         InvalidInput: as ``examine_file``, and for a scan without a water shot.
     """
     whole = read_scan(path)
-    quality = _examined(path, whole, picker, progress)
+    quality = _examined(path, whole, picker, progress, max_left_out=max_left_out)
     if quality.picked is None:
         return quality, None
     with open_slice(path, whole, 0) as one:
@@ -83,6 +90,7 @@ def examine_file(
     water_temperature_c: float | None = None,
     *,
     draw: bool = True,
+    max_left_out: float = MAX_LEFT_OUT,
 ) -> Quality:
     """Examine a dataset file.
 
@@ -93,19 +101,27 @@ def examine_file(
         largest_bytes: of traces; None: no limit, since they are never all in memory.
         water_temperature_c: in place of that of the file, °C.
         draw: make the page, which takes longer than the report of a small scan.
+        max_left_out: share of the pairs beyond which the scan is refused.
 
     Raises:
         InvalidInput: from the file, for an unknown picker, or for more traces than allowed.
     """
     if largest_bytes is not None:
         _check_size(path, largest_bytes)
-    return _examined(path, read_scan(path).in_water_of(water_temperature_c), picker, progress, draw=draw)
+    scan = read_scan(path).in_water_of(water_temperature_c)
+    return _examined(path, scan, picker, progress, draw=draw, max_left_out=max_left_out)
 
 
 def _examined(
-    path: Path, whole: Dataset, picker: str, progress: OnEmission | None, *, draw: bool = True
+    path: Path,
+    whole: Dataset,
+    picker: str,
+    progress: OnEmission | None,
+    *,
+    draw: bool = True,
+    max_left_out: float,
 ) -> Quality:
-    examined = examine_slices(whole, _slices(path, whole), picker, progress)
+    examined = examine_slices(whole, _slices(path, whole), picker, progress, max_left_out)
     if frequency := _estimated_frequency(path):
         findings = (frequency, *examined.report.findings)
         examined = replace(examined, report=replace(examined.report, findings=findings))

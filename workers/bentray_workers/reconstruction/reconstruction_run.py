@@ -170,6 +170,7 @@ def _pick_with_guides(
         amplitudes,
         settings.method == "waveform",
         settings.water_temperature_c,
+        settings.picking.max_left_out,
     )
     path, findings = _pick(job, source, PickingFiles.of(job.folder), None, progress)
     rounds = 0 if source.dataset.picked else settings.numerics.guided_rounds

@@ -37,7 +37,8 @@ def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> di
     Raises:
         InvalidInput: as ``read_dataset``.
     """
-    recorded = read_dataset(path, traces=False)
+    # Also of a scan that an earlier version took, and that the checks of today would refuse.
+    recorded = read_dataset(path, traces=False, plausible=False)
     scan = recorded.in_water_of(water_temperature_c)
     measured = _measured_frequency(path, scan)
     frequency = scan.center_frequency_hz or measured
@@ -65,6 +66,7 @@ def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> di
         "water_in_file": stated_water(recorded),
         "pairs": pairs,
         "timed_pairs": int(np.isfinite(scan.differential_tof()).sum()) if scan.picked else None,
+        "impossible_times": dict(recorded.impossible_times),
         "proposed_corrections": [asdict(one) for one in propose(recorded, measured)],
     }
 

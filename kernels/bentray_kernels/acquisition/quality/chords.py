@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Flags, Floats
+from ...errors import InvalidInput
 from ..dataset import Dataset
 from ..reference import WaterChords, chord_offset, find_water_chords
 from .correction import apply, exchange_order
@@ -12,6 +13,7 @@ from .drift import find_drift
 from .elements import CLOCK, find_element_errors
 from .finding import Finding
 from .measures import Measures
+from .order import ORDER, find_wrong_order
 from .shadow import find_scatterer
 from .swapped import find_swapped
 
@@ -34,6 +36,8 @@ def examine_chords(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
     """
     assert dataset.center_frequency_hz is not None
     period, strongest = 1.0 / dataset.center_frequency_hz, measures.unclipped_s
+    if mismatch := find_wrong_order(dataset, strongest):
+        raise InvalidInput(ORDER, mismatch[0].found, mismatch[0].accepted)
     chords = find_water_chords(dataset, strongest, period)
     findings = find_swapped(dataset, strongest, _expected(dataset, chords))
     if findings:

@@ -10,6 +10,8 @@ import numpy as np
 
 from ...arrays import Flags, Floats
 from ...errors import InvalidInput
+from ...limits import LEFT_OUT as SHARE
+from ...limits import MAX_LEFT_OUT
 from ...picker_names import DEFAULT_PICKER
 from ..dataset import Dataset
 from ..picking.first_arrivals import pick
@@ -19,10 +21,19 @@ from .correction import apply, stacked
 from .dead import find_dead
 from .estimated_water import WATER_SHOT, estimate_water
 from .finding import Finding, Report
+from .left_out import (
+    IMPOSSIBLE,
+    LEFT_OUT,
+    Pairs,
+    count_left_out,
+    find_impossible,
+    find_too_few,
+)
+from .order import ORDER, find_wrong_order
 from .recording import Measured, check_traces
 from .time_zero import find_time_shift
 
-OF_TIMES = ("time zero of the object scan", "cycle jumps", "outliers", "reciprocity")
+OF_TIMES = (ORDER, "time zero of the object scan", "cycle jumps", "outliers", "reciprocity")
 
 
 @dataclass(frozen=True)
@@ -39,7 +50,10 @@ class Examined:
 
 
 def examine(
-    dataset: Dataset, picker: str = DEFAULT_PICKER, progress: Callable[[int, int], None] | None = None
+    dataset: Dataset,
+    picker: str = DEFAULT_PICKER,
+    progress: Callable[[int, int], None] | None = None,
+    max_left_out: float = MAX_LEFT_OUT,
 ) -> Examined:
     """Check a scan, correct what can be corrected, pick its times where it has none, and check those.
 
@@ -49,11 +63,13 @@ def examine(
         dataset: with traces or travel times.
         picker: method for missing times.
         progress: called with (emissions done, total); emissions count once for every pass over their traces.
+        max_left_out: share of the pairs beyond which a scan is refused, 0 to 1.
 
     Raises:
-        InvalidInput: for an unknown picker.
+        InvalidInput: for an unknown picker, and a share outside 0 to 1.
     """
-    return examine_slices(dataset, (dataset.slice(k) for k in range(dataset.slices)), picker, progress)
+    slices = (dataset.slice(k) for k in range(dataset.slices))
+    return examine_slices(dataset, slices, picker, progress, max_left_out)
 
 
 def examine_slices(
@@ -61,19 +77,22 @@ def examine_slices(
     slices: Iterable[Dataset],
     picker: str = DEFAULT_PICKER,
     progress: Callable[[int, int], None] | None = None,
+    max_left_out: float = MAX_LEFT_OUT,
 ) -> Examined:
     """As ``examine``, with slices from an iterator.
 
     Args:
         dataset: the scan; without traces if they are only in ``slices``.
         slices: all slices in order; each is released before the next one; traces may be ``Emissions``.
-        picker, progress: as ``examine`` takes them.
+        picker, progress, max_left_out: as ``examine`` takes them.
 
     Raises:
         InvalidInput: as ``examine``.
     """
-    findings: list[Finding] = []
+    SHARE.check("max_left_out", max_left_out)
+    findings = find_impossible(dataset.impossible_times)
     parts: list[Dataset | None] = []
+    counted: list[Pairs] = []
     checked: tuple[str, ...] = ()
     numbers = count(1)
     for k, one in enumerate(slices):
@@ -84,11 +103,16 @@ def examine_slices(
                 progress(next(numbers), total)
 
         of_slice, part, checked = _slice(one, picker, step)
+        counted.append(count_left_out(one, of_slice))
         findings += [replace(finding, slice=k) for finding in of_slice]
         parts.append(part)
     whole = [part for part in parts if part is not None]
     picked = None
-    if len(whole) == len(parts):
+    too_few = (
+        find_too_few(counted, dataset.impossible_times, max_left_out) if len(whole) == len(parts) else []
+    )
+    findings += too_few
+    if len(whole) == len(parts) and not too_few:
         # A single slice keeps its truth and position; several lose them when sliced.
         combined = whole[0] if dataset.slice_z_m is None else stacked(dataset, whole)
         picked = replace(combined, truth=dataset.truth, waveform=None)
@@ -97,7 +121,7 @@ def examine_slices(
     name = "" if dataset.picked else picker
     findings += find_limited_angle(dataset)
     excluded = inapplicable(dataset, checked)
-    done = (*(name for name in checked if name not in excluded), COVERAGE)
+    done = (IMPOSSIBLE, *(name for name in checked if name not in excluded), COVERAGE, LEFT_OUT)
     return Examined(Report(tuple(findings), done, int(other), usable, name, excluded), picked)
 
 
@@ -125,7 +149,8 @@ def _slice(
         try:
             estimated, reference = estimate_water(dataset, measured.object)
         except InvalidInput as error:
-            return [*findings, Finding(WATER_SHOT, error.value, error.accepted, "refused")], None, checked
+            name = ORDER if error.field == ORDER else WATER_SHOT
+            return [*findings, Finding(name, error.value, error.accepted, "refused")], None, checked
         findings += estimated
         if any(finding.action == "refused" for finding in estimated):
             return findings, None, checked
@@ -141,10 +166,14 @@ def _slice(
 
 def check_times(dataset: Dataset) -> list[Finding]:
     """Findings of the travel times of one slice, in the order in which they are applied."""
-    findings: list[Finding] = []
+    findings = find_wrong_order(dataset)
+    if findings:
+        return findings
     if dataset.waveform is None and dataset.valid is None:
         findings += find_dead(dataset, _detected(dataset, dataset.differential_tof()))
     findings += find_time_shift(dataset, dataset.differential_tof())
+    if any(finding.action == "refused" for finding in findings):
+        return findings
     corrected = apply(replace(dataset, waveform=None), findings)
     later = find_contradictions(corrected, corrected.differential_tof())
     if not np.isfinite(apply(corrected, later).differential_tof()).any():

@@ -17,6 +17,7 @@ from .drift import DRIFT, find_drift
 from .elements import CLOCK, DISPLACED, find_element_errors
 from .finding import Finding
 from .measures import Measures
+from .order import ORDER, find_wrong_order
 from .polarity import find_inverted, water_signs
 from .positions import find_displaced
 from .sampling import frequency, sampling
@@ -28,6 +29,7 @@ from .water_speed import WATER_SPEED, find_water_speed
 
 OF_TRACES = ("values", "constant traces", "clipping", "dead elements")
 OF_WATER = (
+    ORDER,
     "sampling rate",
     WATER_SPEED,
     "centre frequency",
@@ -123,6 +125,8 @@ def _of_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], Flo
 
 def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
     """Faults of the water shot with respect to the geometry."""
+    if mismatch := find_wrong_order(dataset, strongest):
+        return mismatch
     line = WaterLine.of(dataset, strongest)
     if line is None:
         return [Finding("water shot", "almost no pulses", "pulses that crossed the water", "refused")]

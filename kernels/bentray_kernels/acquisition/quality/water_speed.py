@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...errors import InvalidInput
 from ..dataset import Dataset
+from ..reference.water_chords import FASTEST_MPS, SLOWEST_MPS
 from ..water import describe_assumption, speed_from_temperature, stated_deviation, temperature_from_speed
 from .finding import Action, Finding
 
@@ -36,6 +37,12 @@ def find_water_speed(dataset: Dataset, speed_mps: float, sigma_mps: float) -> li
             return []
         action: Action = "corrected"
         accepted = "the temperature of the water in the file"
+        if not SLOWEST_MPS <= speed_mps <= FASTEST_MPS:
+            action = "refused"
+            accepted = (
+                f"{SLOWEST_MPS:g} to {FASTEST_MPS:g} m/s for water that the scan does not state; check the "
+                "positions of the elements and their order, or state the speed of the medium"
+            )
     else:
         allowed = (
             stated_deviation(dataset.water_speed_mps, dataset.water_temperature_c) + AGREEING * sigma_mps

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import refuse_mask
 from ...errors import InvalidInput
 from ...limits import PLACE_M, SPACING_M, TRUE_SPEED_MPS
 from .. import rules
@@ -25,6 +26,8 @@ class Truth:
     axes: str = "x,y"
 
     def __post_init__(self) -> None:
+        refuse_mask("truth/sound_speed_mps", self.sound_speed_mps)
+        refuse_mask("truth/attenuation_np_m", self.attenuation_np_m)
         speed, ndim = self.sound_speed_mps, self.sound_speed_mps.ndim
         if ndim not in (2, 3) or 0 in speed.shape:
             raise InvalidInput(

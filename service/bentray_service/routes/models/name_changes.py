@@ -67,6 +67,13 @@ class ScanCorrection(BaseModel):
     frequency_hz: float | None = Field(
         None, ge=FREQUENCY_HZ.least, le=FREQUENCY_HZ.most, strict=True, description="Centre frequency, Hz."
     )
+    arrangement: str | None = Field(
+        None,
+        max_length=80,
+        pattern=TEXT,
+        description="Fault in the order of the elements or in their positions, as proposed corrections of "
+        "the scan name it: `receivers-shifted-by-1`, `elements-grid-yx`, `positions-in-degrees` and others.",
+    )
 
 
 class JobChanges(BaseModel):

@@ -48,10 +48,13 @@ class QualityRecord(ShownRecord):
 class ProposedCorrection(BaseModel):
     """A correction that the numbers of a scan suggest."""
 
-    what: Literal["times", "positions", "frequency"]
-    unit: str = Field(description="Likely unit in the original file; empty for a frequency.")
-    read_as: str = Field(description="Unit in which it was then read; empty for a frequency.")
-    frequency_hz: float | None = Field(description="Centre frequency of the traces; null for units.")
+    what: Literal["times", "positions", "frequency", "arrangement"]
+    unit: str = Field(description="Likely unit in the original file; empty for other corrections.")
+    read_as: str = Field(description="Unit in which it was then read; empty for other corrections.")
+    frequency_hz: float | None = Field(description="Centre frequency of the traces; null otherwise.")
+    arrangement: str | None = Field(
+        None, description="Fault in the order of the elements or their positions; null otherwise."
+    )
     reason: str
 
 
@@ -79,9 +82,12 @@ class GeometryRecord(BaseModel):
     timed_pairs: int | None = Field(
         description="Pairs with a valid travel time in the file; null for a scan with traces alone."
     )
+    impossible_times: dict[str, int] = Field(
+        {}, description="Travel times that no sound can have and that are missing, by their kind."
+    )
     proposed_corrections: list[ProposedCorrection] = Field(
-        description="Units and frequency that the numbers of the scan suggest in place of its own; see "
-        "`POST /v1/datasets/{dataset_id}/corrections`."
+        description="Units, frequency and order of the elements that the numbers of the scan suggest in "
+        "place of its own; see `POST /v1/datasets/{dataset_id}/corrections`."
     )
 
 

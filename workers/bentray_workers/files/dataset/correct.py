@@ -1,4 +1,4 @@
-"""Correction of a stored scan whose units or frequency were stated wrongly: a corrected copy of its file."""
+"""Correction of a stored scan whose units, frequency or order of elements are wrong: a corrected copy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.plausibility import ImplausibleUnit, check_plausible
+from bentray_kernels.acquisition.arrangement import rearranged
+from bentray_kernels.acquisition.plausibility import ImplausibleUnit, WrongArrangement, check_plausible
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import FREQUENCY_HZ, SAMPLING_HZ
 
@@ -32,6 +33,8 @@ class Correction:
         positions_in: unit of its lengths: positions, heights, radius, and the grid of the truth.
         positions_read_as: unit in which they were read.
         sampling_rate_hz, frequency_hz: of the traces, and centre frequency of the pulse, whatever is stored.
+        arrangement: the fault in the order of the elements or in their positions, as the refusal of the scan
+            names it, such as ``receivers-shifted-by-1``; see ``acquisition.arrangement``.
 
     Raises:
         InvalidInput: for unknown units, frequencies out of range, and a correction that changes nothing.
@@ -43,6 +46,7 @@ class Correction:
     positions_read_as: str = "m"
     sampling_rate_hz: float | None = None
     frequency_hz: float | None = None
+    arrangement: str | None = None
 
     def __post_init__(self) -> None:
         for what, units in (("times", TIME_UNITS), ("positions", POSITION_UNITS)):
@@ -57,9 +61,13 @@ class Correction:
         if (
             self.time_factor == self.length_factor == 1.0
             and self.sampling_rate_hz is self.frequency_hz is None
+            and self.arrangement is None
         ):
             shown = ", ".join(f"{name} {value}" for name, value in asdict(self).items() if value is not None)
-            accepted = "times_in or positions_in other than the unit read, sampling_rate_hz or frequency_hz"
+            accepted = (
+                "times_in or positions_in other than the unit read, sampling_rate_hz, frequency_hz or "
+                "arrangement"
+            )
             raise InvalidInput("correction", f"{shown}, which changes nothing", accepted)
 
     @property
@@ -84,6 +92,8 @@ class Correction:
         for what, value in (("sampling rate", self.sampling_rate_hz), ("frequency", self.frequency_hz)):
             if value is not None:
                 parts.append(f"{what} {value:g} Hz")
+        if self.arrangement is not None:
+            parts.append(f"{self.arrangement.replace('-', ' ')} before")
         return ", ".join(parts)
 
 
@@ -123,7 +133,9 @@ def correct_dataset(
 
 
 def corrected(dataset: Dataset, correction: Correction, origin: str) -> Dataset:
-    """A dataset with its units and frequencies corrected; see ``correct_dataset``."""
+    """A dataset with its units, frequencies and elements corrected; see ``correct_dataset``."""
+    if correction.arrangement is not None:
+        dataset = rearranged(dataset, correction.arrangement)
     factor = correction.length_factor
     changes = _scaled(dataset, TIMES, correction.time_factor) | _scaled(dataset, LENGTHS, factor)
     if dataset.truth is not None:
@@ -153,8 +165,9 @@ def corrected(dataset: Dataset, correction: Correction, origin: str) -> Dataset:
                 "more than twice the frequency; state sampling_rate_hz if it was right",
             )
     except InvalidInput as error:
-        # A unit that is proposed there is that of the corrected values.
-        accepted = error.plain if isinstance(error, ImplausibleUnit) else error.accepted
+        # A unit or an order that is proposed there is that of the corrected values.
+        known = ImplausibleUnit | WrongArrangement
+        accepted = error.plain if isinstance(error, known) else error.accepted
         raise InvalidInput(error.field, f"{error.value}, after the correction", accepted) from error
     return made
 

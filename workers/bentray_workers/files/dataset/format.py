@@ -20,5 +20,8 @@ NUMBERS = (
     ("amplitude", "frequency_hz", "Hz", "amplitude_frequency_hz"),
 )
 
+# Text attribute of the travel times: numbers of impossible ones that became NaN, by kind, as JSON.
+IMPOSSIBLE = "impossible_times"
+
 # Text attributes of the root, by the same names in Dataset.
 TEXTS = ("title", "source", "license")

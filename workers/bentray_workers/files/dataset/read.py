@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -17,12 +18,12 @@ from bentray_kernels.acquisition import (
     speed_from_temperature,
     temperature_from_speed,
 )
-from bentray_kernels.acquisition.plausibility import ImplausibleUnit, check_plausible
+from bentray_kernels.acquisition.plausibility import ImplausibleUnit, WrongArrangement, check_plausible
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import COUNTED, OVER_NODES, OVER_PAIRS, check_size
 
 from ..hdf5_reading import Limits, Reader, opened
-from .format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
+from .format import FORMAT, IMPOSSIBLE, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
 from .units import POSITION_UNITS, TIME_UNITS
 
 NUMERIC = "iuf"
@@ -31,20 +32,23 @@ SIZED = (*(place for place in COUNTED if place not in OVER_PAIRS), *OVER_PAIRS, 
 TRACES = "real numbers, traces over (ntx, nrx, nt)"
 
 
-def read_dataset(path: Path, *, traces: bool = True, limits: Limits | None = None) -> Dataset:
+def read_dataset(
+    path: Path, *, traces: bool = True, limits: Limits | None = None, plausible: bool = True
+) -> Dataset:
     """Read and check a dataset file.
 
     Args:
         path: of the HDF5 file.
         traces: false: leave the traces, which may be large, in the file; they are checked but not read.
         limits: of reading; None: the defaults of ``Limits``.
+        plausible: false: units and order of the elements may be wrong, to be corrected.
 
     Raises:
         InvalidInput: naming the first missing or wrong field by its path in the file (``file`` for the file
             as a whole), the value found and the accepted values; and as ``check_plausible``.
     """
     with opened(Path(path), limits or Limits()) as reader:
-        return dataset_of(reader, _waveform if traces else None)
+        return dataset_of(reader, _waveform if traces else None, plausible=plausible)
 
 
 def dataset_of(
@@ -105,6 +109,7 @@ def dataset_of(
         picker=reader.text("traveltime", "picker") or "",
         waveform=waveform(reader) if waveform is not None and traces_in(reader) else None,
         truth=_truth(reader),
+        impossible_times=_impossible_times(reader),
         **fields,
     )
     if plausible:
@@ -112,10 +117,26 @@ def dataset_of(
     return dataset
 
 
+def _impossible_times(reader: Reader) -> dict[str, int]:
+    """Numbers of impossible times that an earlier reading of the scan left out, by their kind."""
+    stated = reader.text("traveltime", IMPOSSIBLE) or "{}"
+    try:
+        counts = json.loads(stated)
+        return {str(kind): int(count) for kind, count in counts.items()}
+    except (ValueError, AttributeError, TypeError):
+        accepted = "numbers of left out times by kind, as JSON"
+        raise InvalidInput(f"traveltime@{IMPOSSIBLE}", repr(stated)[:60], accepted) from None
+
+
 def _check_plausible(dataset: Dataset) -> None:
-    """As ``check_plausible``; for a likely unit the error also states the command that corrects it."""
+    """As ``check_plausible``; for a likely unit or order the error also states the correcting command."""
     try:
         check_plausible(dataset)
+    except WrongArrangement as error:
+        if error.proposal is None:
+            raise
+        hint = f"; correct a copy: bentray correct SCAN -o COPY --arrangement {error.proposal.name}"
+        raise InvalidInput(error.field, error.value, error.accepted + hint) from None
     except ImplausibleUnit as error:
         unit = error.unit.replace("µ", "u")
         if unit not in (*TIME_UNITS, *POSITION_UNITS):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from bentray_kernels.acquisition.impossible_times import impossible_words
+
 from .counts import DatasetCounts
 
 if TYPE_CHECKING:
@@ -16,7 +18,7 @@ def record_of(dataset: Dataset) -> dict[str, Any]:
     """Fields of the record by name; ``counts`` is for plans."""
     return {
         "title": text(dataset.title),
-        "source": text(dataset.source),
+        "source": text("; ".join(part for part in (left_out(dataset), dataset.source) if part)),
         "license": text(dataset.license),
         "dimension": int(dataset.element_position_m.shape[1]),
         "elements": len(dataset.element_position_m),
@@ -29,6 +31,12 @@ def record_of(dataset: Dataset) -> dict[str, Any]:
         "water_speed_mps": float(dataset.water_speed_mps),
         "counts": DatasetCounts.of(dataset).to_dict(),
     }
+
+
+def left_out(dataset: Dataset) -> str:
+    """What became a missing value, in words; empty for nothing."""
+    words = impossible_words(dataset.impossible_times)
+    return f"impossible times left out: {words}" if words else ""
 
 
 def text(value: str) -> str:

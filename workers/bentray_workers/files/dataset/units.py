@@ -1,4 +1,4 @@
-"""Units of times and lengths in which a scan may have been read, and the one that its numbers suggest."""
+"""Corrections that the numbers of a scan suggest: units of times and lengths, frequency, order."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.plausibility import USUAL_M
+from bentray_kernels.acquisition.plausibility import USUAL_M, WrongArrangement, check_arrangement
 
 TIME_UNITS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 POSITION_UNITS: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
@@ -29,10 +29,11 @@ class Proposal:
     """A correction that the numbers of a scan suggest, as ``Correction`` has it.
 
     Attributes:
-        what: ``times``, ``positions`` or ``frequency``.
+        what: ``times``, ``positions``, ``frequency`` or ``arrangement``.
         unit: of the original file; empty for a frequency.
         read_as: unit in which it was read.
         frequency_hz: of the traces; None for units.
+        arrangement: the fault in the order of the elements; None otherwise.
         reason: in words.
     """
 
@@ -41,6 +42,7 @@ class Proposal:
     unit: str = ""
     read_as: str = ""
     frequency_hz: float | None = None
+    arrangement: str | None = None
 
 
 def propose(dataset: Dataset, measured_hz: float | None) -> list[Proposal]:
@@ -50,7 +52,12 @@ def propose(dataset: Dataset, measured_hz: float | None) -> list[Proposal]:
         dataset: the scan, without traces.
         measured_hz: centre frequency of its traces; None without traces.
     """
-    found = [_positions(dataset), _times(dataset), _frequency(dataset, measured_hz)]
+    found = [
+        _positions(dataset),
+        _times(dataset),
+        _frequency(dataset, measured_hz),
+        _arrangement(dataset),
+    ]
     return [one for one in found if one is not None]
 
 
@@ -82,6 +89,16 @@ def _times(dataset: Dataset) -> Proposal | None:
         f"{1e6 * largest / longest:.2g} millionths of the time through the water"
     )
     return Proposal("times", reason, unit, read_as)
+
+
+def _arrangement(dataset: Dataset) -> Proposal | None:
+    try:
+        if dataset.picked:
+            check_arrangement(dataset)
+    except WrongArrangement as error:
+        if error.proposal is not None:
+            return Proposal("arrangement", f"Found {error.value}", arrangement=error.proposal.name)
+    return None
 
 
 def _frequency(dataset: Dataset, measured_hz: float | None) -> Proposal | None:

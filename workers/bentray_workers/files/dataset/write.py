@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable
 from dataclasses import fields
 from pathlib import Path
@@ -16,7 +17,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..hdf5_reading import printable
 from ..hdf5_writing import atomic_hdf5
-from .format import FORMAT, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
+from .format import FORMAT, IMPOSSIBLE, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
 
 # Below this many bytes chunks take more than compression saves.
 PACK_FROM_BYTES = 4096
@@ -95,6 +96,8 @@ def _write(file: h5py.File, dataset: Dataset, pieces: Pieces | None) -> None:
             write_array(file.require_group(group), leaf, getattr(dataset, name))
     if dataset.picker:
         file.require_group("traveltime").attrs["picker"] = printable(dataset.picker)
+    if dataset.impossible_times:
+        file.require_group("traveltime").attrs[IMPOSSIBLE] = json.dumps(dict(dataset.impossible_times))
     for leaf, array in (("valid", dataset.valid), ("roi", dataset.roi)):
         if array is not None:
             write_array(file.require_group("mask"), leaf, array)

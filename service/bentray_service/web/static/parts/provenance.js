@@ -30,7 +30,7 @@ const UNITS = { mps: "m/s", s: "s", m: "m", hz: "Hz", deg: "°", c: "°C", nodes
 
 const NAMES = {
   sart: "SART", gauss_newton: "Gauss–Newton", roi: "Only the region of interest", eikonal: "Eikonal solver", side_m: "Side of the image",
-  minutes: "Time budget of full waveform (minutes)", examine: "Scan is checked first", enabled: "Reconstructed", attenuation_solver: "Solver",
+  minutes: "Time budget of full waveform (minutes)", examine: "Scan is checked first", max_left_out: "Pairs that may be left out", enabled: "Reconstructed", attenuation_solver: "Solver",
   nodes: "Nodes per side", smoothing_nodes: "Smoothing of updates", edge_mps: "Edges above",
   pixel_m: "Pixel spacing", pair_angle_deg: "Largest angle of a pair", delays: "Travel times in", gain: "Compensated",
 };

@@ -20,7 +20,7 @@ function unitFields(name, words, units, si) {
 
 const FORM = `
   <div class="links"><button id="edit" type="button" class="quiet" aria-expanded="false" aria-controls="edit-form">Edit name, notes and water</button>
-    <button id="correct" type="button" class="quiet" aria-expanded="false" aria-controls="correct-form">Correct units or frequency</button>
+    <button id="correct" type="button" class="quiet" aria-expanded="false" aria-controls="correct-form">Correct units, frequency or order</button>
     <button id="delete-scan" type="button" class="quiet">Delete</button></div>
   <p id="delete-error" class="error" role="alert" hidden></p>
   <p id="scan-notes" class="notes" hidden></p>
@@ -48,6 +48,8 @@ const FORM = `
       <input name="sampling" type="number" min="0.001" max="100000" step="any" placeholder="by the times"></label>
     <label class="short"><span class="caption">Centre frequency (kHz)</span>
       <input name="frequency" type="number" min="1" max="10000000" step="any" placeholder="as stored"></label>
+    <label class="short"><span class="caption">Fault in the order of the elements</span>
+      <input name="arrangement" type="text" maxlength="80" placeholder="none"></label>
     <div class="actions"><button type="submit">Make a corrected copy</button> <button id="correct-cancel" type="button" class="quiet">Cancel</button></div>
     <p id="correct-error" class="error" role="alert" hidden></p>
   </form>`;
@@ -133,6 +135,7 @@ function corrector(scan) {
     }
     if (fields.sampling.value) correction.sampling_rate_hz = 1e6 * fields.sampling.value;
     if (fields.frequency.value) correction.frequency_hz = 1e3 * fields.frequency.value;
+    if (fields.arrangement.value) correction.arrangement = fields.arrangement.value;
     const submit = form.querySelector("[type=submit]");
     submit.disabled = true;
     const body = JSON.stringify(correction);
@@ -150,17 +153,19 @@ function corrector(scan) {
   return (corrections) => {
     at("proposed").hidden = !corrections.length;
     at("proposed").textContent = corrections.map(proposalInWords).join(" ");
-    for (const { what, unit, read_as: readAs, frequency_hz: hertz } of corrections) {
+    for (const { what, unit, read_as: readAs, frequency_hz: hertz, arrangement } of corrections) {
       if (what === "frequency") fields.frequency.value = 1e-3 * hertz;
+      else if (what === "arrangement") fields.arrangement.value = arrangement;
       else [fields[`${what}_in`].value, fields[`${what}_read_as`].value] = [unit, readAs];
     }
   };
 }
 
-function proposalInWords({ what, unit, read_as: readAs, frequency_hz: hertz, reason }) {
+function proposalInWords({ what, unit, read_as: readAs, frequency_hz: hertz, arrangement, reason }) {
+  if (what === "arrangement") return `${reason}. Are ${arrangement.replaceAll("-", " ")}?`;
   if (what === "frequency") return `${reason}. Was the frequency ${1e-3 * hertz} kHz?`;
   const [words, units] = what === "times" ? ["times", TIMES] : ["lengths", LENGTHS];
-  return `${reason}. Were ${words} in ${units[unit]} read as ${units[readAs]}? The form “Correct units or frequency” is filled in with this.`;
+  return `${reason}. Were ${words} in ${units[unit]} read as ${units[readAs]}? The form “Correct units, frequency or order” is filled in with this.`;
 }
 
 // A button beside the fact "Water" that opens the form.
