@@ -128,7 +128,12 @@ def test_the_quality_report_names_a_limited_angle_and_what_does_not_apply(name):
     assert report.usable > 0.98 * report.pairs
     apart = name in ("lines", "apart")
     assert ("no elements both emit and receive" in report.not_checked.values()) == apart
-    assert set(report.not_checked) | set(report.checked) == {*OF_TIMES, "angular coverage"}
+    assert set(report.not_checked) | set(report.checked) == {
+        *OF_TIMES,
+        "impossible times",
+        "angular coverage",
+        "pairs left out",
+    }
     assert not set(report.not_checked) & set(report.checked)
 
 
