@@ -146,6 +146,7 @@ class PickingSettings:
         "rejected. 1: whatever is left is used.",
         LEFT_OUT,
         label="Pairs that may be left out",
+        used_when=({"examine": (True,)},),
     )
 
     def __post_init__(self) -> None:
