@@ -27,7 +27,7 @@ SAMPLES: Mapping[str, Any] = {
 }  # fmt: skip
 # Of the pipeline of files: whether travel times are examined. Of the array: one of a single height has
 # slices. Of the machine: the device. The method is part of every case.
-ELSEWHERE = {"method", "examine", "decomposition", "device"}
+ELSEWHERE = {"method", "examine", "max_left_out", "decomposition", "device"}
 CASES: Mapping[str, dict[str, Any]] = {
     "SART": {"method": "sart", "reflection": True},
     "SART, straight rays": {"method": "sart", "rays": "straight"},

@@ -42,6 +42,7 @@ CHOICES = [
     (["--edge", "7"], "edge_mps", 7.0),
     (["--picker", "threshold"], "picker", "threshold"),
     (["--no-examine"], "examine", False),
+    (["--max-left-out", "0.5"], "max_left_out", 0.5),
     (["--no-attenuation"], "attenuation", False),
     (["--amplitudes", "ratio"], "amplitudes", "ratio"),
     (["--attenuation-solver", "sart"], "attenuation_solver", "sart"),
