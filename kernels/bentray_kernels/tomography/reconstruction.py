@@ -85,9 +85,11 @@ def reconstruct(
         The images and how they were computed. The same dataset and settings give the same bits.
 
     Raises:
-        InvalidInput: from the dataset, as ``check_plausible``, or a setting that does not fit it.
+        InvalidInput: from the dataset, unless ``examine`` is false as ``check_plausible``, or a setting that
+            does not fit it.
     """
-    check_plausible(dataset)
+    if settings.picking.examine:
+        check_plausible(dataset)
     dataset = dataset.in_water_of(settings.water_temperature_c)
     if settings.reads_amplitudes and dataset.waveform is not None:
         dataset = with_log_ratios(dataset, settings.attenuation.amplitudes)
