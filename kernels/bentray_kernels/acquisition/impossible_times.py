@@ -32,6 +32,9 @@ CERTAIN = 5.0
 # zeros lies on one side of the diagonal.
 MIN_BOTH, ONE_TRIANGLE = 30, 0.9
 
+# Half a matrix of arrivals has at least this part of its times impossible.
+HALF = 0.35
+
 # Directions agree if they deviate by less than this part of the large differences.
 AGREEING = 0.1
 
@@ -133,8 +136,11 @@ def _impossible(times: Floats, geometry: Geometry, *, absolute: bool) -> Iterato
     if least <= -nearest:
         early = _at_once(times, geometry, absolute=absolute)
         if early.any() and early.sum() <= MOST * np.isfinite(times).sum():
-            half = np.stack([_is_half(flags, one, geometry) for flags, one in zip(early, times, strict=True)])
-            once = early & half[:, None, None]
+            half = [
+                flags.sum() >= HALF * np.isfinite(one).sum() and _is_half(flags, one, geometry)
+                for flags, one in zip(early, times, strict=True)
+            ]
+            once = early & np.array(half)[:, None, None]
             yield ONE_WAY, once
             yield (AT_ZERO if absolute else TOO_EARLY), early & ~once
             times = np.where(early, np.nan, times)
