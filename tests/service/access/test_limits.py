@@ -31,7 +31,7 @@ from bentray_service.rows.jobs import Jobs
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.sessions import Sessions
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.tenants import ClaimedTenants, Tenant
 from bentray_service.rows.uploads import MAX_INCOMPLETE, Uploads
 from bentray_service.rows.usage import reserve
 from bentray_service.settings import ServiceSettings
@@ -58,7 +58,7 @@ class World:
     def sign_in(self) -> SignIn:
         settings = ServiceSettings(requests_per_minute=7, renders_per_minute=5)
         rows = Keys(self.database), Sessions(self.database), Projects(self.database)
-        return SignIn(settings, *rows, self.accounts)
+        return SignIn(settings, *rows, self.accounts, ClaimedTenants(self.database))
 
     def caller(self, tenant: Tenant) -> Caller:
         return Caller(tenant, "key", "0", frozenset(("read", "write")))
