@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Flags, Floats, Ints
 from ..errors import InvalidInput
 from .dataset import Dataset
+from .impossible_times import AT_ZERO
 
 # Emissions and receivers that are compared: to search among all orders, and to judge the best of them.
 SEARCHED, JUDGED = (6, 64), (48, 192)
@@ -114,13 +115,24 @@ def rearranged(dataset: Dataset, name: str) -> Dataset:
     """
     for one in arrangements(dataset):
         if one.name == name:
-            return replace(dataset, tx=one.tx, rx=one.rx, element_position_m=one.position_m)
+            counts = _without_own(dataset, one)
+            changes = {"tx": one.tx, "rx": one.rx, "element_position_m": one.position_m}
+            return replace(dataset, **changes, impossible_times=counts)  # type: ignore[arg-type]
     accepted = (
         "emitters-, receivers- or elements- with reversed, shifted-by-N, reversed-shifted-by-N, grid-…, "
         "by-angle or odd-even, or positions-in-degrees, positions-in-radians, positions-transposed; as the "
         "refusal of the scan proposes it"
     )
     raise InvalidInput("arrangement", repr(name)[:60], accepted)
+
+
+def _without_own(dataset: Dataset, one: Arrangement) -> dict[str, int]:
+    """Numbers of impossible times without those of an element to itself, which are rightly 0."""
+    counts = dict(dataset.impossible_times)
+    if dataset.tof_s is not None and AT_ZERO in counts:
+        own = one.tx[:, None] == one.rx[None, :]
+        counts[AT_ZERO] -= int((own & np.isnan(dataset.tof_s)).sum())
+    return {kind: count for kind, count in counts.items() if count > 0}
 
 
 def arrangements(dataset: Dataset) -> Iterator[Arrangement]:

@@ -29,6 +29,8 @@ def test_a_file_in_a_wrong_order_is_refused_proposed_and_corrected(tmp_path):
     assert "receivers shifted by 1 before" in made.source
     again = read_dataset(copy)
     np.testing.assert_array_equal(again.rx, np.roll(np.arange(32), 1))
+    # Times of elements to themselves looked like failed picks before.
+    assert again.impossible_times == {}
     with pytest.raises(InvalidInput, match="arrangement"):
         correct_dataset(path, copy, Correction(arrangement="receivers-inside-out"))
 
