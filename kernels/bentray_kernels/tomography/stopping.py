@@ -8,16 +8,15 @@ import numpy as np
 
 from ..acquisition import Dataset
 from ..acquisition.noise import noise_level
-from .result import Trial
 from .settings import Settings
 
 # A misfit of this many times the noise explains the times (the factor of Morozov's principle).
 EXPLAINED = 1.1
 
 
-def stop_at_noise(settings: Settings, chosen: Trial, noise_s: float) -> Settings:
-    """The settings with the misfit to stop at, unless the chosen trial shows that there is less noise."""
-    if settings.numerics.stop_rms_s is None and noise_s <= EXPLAINED * chosen.held_out_rms_s:
+def stop_at_noise(settings: Settings, misfit_s: float, noise_s: float) -> Settings:
+    """The settings with the misfit to stop at, unless a held-out one, s, shows that there is less noise."""
+    if settings.numerics.stop_rms_s is None and noise_s <= EXPLAINED * misfit_s:
         return settings.changed(stop_rms_s=EXPLAINED * noise_s)
     return settings
 

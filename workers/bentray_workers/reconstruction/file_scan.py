@@ -12,7 +12,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.tomography import Problem, Settings
 from bentray_kernels.tomography.grid_schedule import stages
-from bentray_kernels.tomography.model_selection.held_out import Part, part_of
+from bentray_kernels.tomography.model_selection.held_out import Part
 from bentray_kernels.tomography.reconstruction import problem_of
 from bentray_kernels.tomography.waveform.preparation import prepare
 from bentray_kernels.tomography.waveform.waveform_problem import WaveProblem
@@ -102,8 +102,8 @@ def _problems(scan: FileScan, indices: tuple[int, ...], stage: int) -> tuple[Pro
 
 
 def _new_problem(scan: FileScan, index: int, stage: int) -> Problem:
-    dataset = part_of(read_once(scan.path, scan.stamp, scan.settings.water_temperature_c), scan.part)
-    return problem_of(dataset, scan.stages()[stage], index)
+    dataset = read_once(scan.path, scan.stamp, scan.settings.water_temperature_c)
+    return problem_of(dataset, scan.stages()[stage], index, scan.part)
 
 
 @lru_cache(maxsize=2)

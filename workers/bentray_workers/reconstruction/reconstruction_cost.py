@@ -13,8 +13,7 @@ from types import MappingProxyType
 
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import WIDE
 from bentray_kernels.tomography.model_selection.selection import (
-    CHEAPEST,
-    SHARPER,
+    CANDIDATES,
     candidate_settings,
     final_settings,
 )
@@ -103,8 +102,8 @@ def _rays_seconds(scan: Summary, settings: Settings) -> float:
     if not settings.selects_model:
         return _method_seconds(scan, settings)
     wide = scan.period and settings.decomposition != "volume"
-    # The usual trials where bent rays are chosen; the most costly reconstruction is the final one.
-    candidates = (*WIDE, WIDE[1]) if wide else (*CHEAPEST, *SHARPER)
+    # With a known frequency the usual trials; the most costly reconstruction is the final one.
+    candidates = (*WIDE, WIDE[1]) if wide else CANDIDATES
     if settings.rays == "straight":
         candidates = tuple(one for one in candidates if one["rays"] == "straight")
     final = final_settings(settings, {"rays": settings.rays, "method": "gauss-newton"})

@@ -19,29 +19,55 @@ class CandidateGraph(ReconstructionGraph):
     Args:
         scan: of the training pairs.
         index: of the slice.
-        held_out: of the held-out pairs.
+        held_out: of the held-out pairs, in one part or two.
     """
 
-    def __init__(self, scan: Scan, index: int, held_out: Scan) -> None:
+    def __init__(self, scan: Scan, index: int, *held_out: Scan) -> None:
         self._held_out = held_out
         super().__init__(scan, index)
 
     def _evaluated(self) -> list[Evaluation]:
-        at, emitters = (self._held_out, self._index), self._held_out.problem(self._index).active_emitters
-        return [Evaluation(at, trace_final_rays, misfit, emitters)]
+        return [
+            Evaluation((part, self._index), *tasks, part.problem(self._index).active_emitters)
+            for part, tasks in zip(self._held_out, TASKS, strict=False)
+        ]
 
     @property
     def held_out_rms_s(self) -> float:
-        """Root mean square misfit of the held-out pairs, s."""
-        return float(self.value_of(misfit)[0])
+        """Root mean square misfit of all held-out pairs, s."""
+        return self._misfit(TASKS)[0]
 
     @property
     def held_out_mean_s(self) -> float:
-        """Mean absolute misfit of the held-out pairs, s."""
-        return float(self.value_of(misfit)[1])
+        """Mean absolute misfit of all held-out pairs, s."""
+        return self._misfit(TASKS)[1]
+
+    @property
+    def first_part_rms_s(self) -> float:
+        """Root mean square misfit of the first part, s."""
+        return self._misfit(TASKS[:1])[0]
+
+    def _misfit(self, tasks: Sequence[tuple[object, object]]) -> tuple[float, float]:
+        sums = [self.value_of(evaluate) for _, evaluate in tasks[: len(self._held_out)]]
+        count, absolute, squares = np.sum(sums, axis=0)
+        return math.sqrt(squares / count), float(absolute / count)
 
 
-def misfit(_scan: Scan, _index: int, _slowness: Floats, rows: Sequence[Rows]) -> Floats:
-    """Task: root mean square and mean absolute residual, s."""
+def sum_misfits(_scan: Scan, _index: int, _slowness: Floats, rows: Sequence[Rows]) -> Floats:
+    """Task: number of pairs, sum of absolute residuals, s, and of their squares, s²."""
     residual = np.concatenate([part.residual for part in rows])
-    return np.array([math.sqrt(float((residual**2).mean())), float(np.abs(residual).mean())])
+    return np.array([residual.size, np.abs(residual).sum(), (residual**2).sum()])
+
+
+def trace_rays_of_views(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:
+    """Task: as ``trace_final_rays``, of the second part."""
+    return trace_final_rays(scan, index, slowness, batch)
+
+
+def sum_misfits_of_views(scan: Scan, index: int, slowness: Floats, rows: Sequence[Rows]) -> Floats:
+    """Task: as ``sum_misfits``, of the second part."""
+    return sum_misfits(scan, index, slowness, rows)
+
+
+# Of the first and of the second part; a graph knows its tasks by their functions.
+TASKS = ((trace_final_rays, sum_misfits), (trace_rays_of_views, sum_misfits_of_views))

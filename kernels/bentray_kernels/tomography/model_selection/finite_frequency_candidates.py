@@ -51,16 +51,18 @@ def finite_frequency_candidates(dataset: Dataset, settings: Settings) -> list[di
 
 
 def choose_finite_frequency(trials: Sequence[Trial], mean_time_s: float) -> Trial | None:
-    """The better trial with finite-frequency rays; None if thin rays are far better still.
+    """The better trial with finite-frequency rays; None without any, and if thin rays are far better still.
 
     By the mean absolute misfit, because picks of weak first arrivals are wrong by whole periods. Where both
     explain the times, straight rays must be clearly better than bent ones.
 
     Args:
-        trials: of ``finite_frequency_candidates``.
+        trials: of ``finite_frequency_candidates``, of all or only of straight rays.
         mean_time_s: mean absolute travel time difference, s.
     """
     fat = {t.settings["rays"]: t for t in trials if "ray_width_m" in t.settings}
+    if len(fat) < len(WIDE):
+        return next(iter(fat.values()), None)
     straight, bent = fat["straight"], fat["curved"]
     part = STRAIGHT if mean_misfit(bent) < EXPLAINED_PART * mean_time_s else 1.0
     best = straight if mean_misfit(straight) < part * mean_misfit(bent) else bent

@@ -10,17 +10,17 @@ import numpy as np
 from ...acquisition import Dataset
 from ...arrays import Flags, Ints
 
-Part = Literal["all", "shown", "held-out", "shown-views", "held-out-views"]
+Part = Literal["all", "shown", "held-out", "views", "shown-sparse", "views-sparse"]
 
 # One pair in so many is held out, both directions together.
 HELD_OUT = 10
 
-# Scattered pairs are those of at least this many emitters and receivers, where the scan has twice as many:
-# candidates have half the nodes along a side, so that a quarter of the pairs are as many for each of these.
+# Pairs are those of at least this many emitters and receivers, where the scan has twice as many: candidates
+# have half the nodes along a side, so that a quarter of the pairs are as many for each of these.
 ELEMENTS = 128
 
-# The same of views: finite-frequency rays are so wide that these pairs show as much as all.
-ELEMENTS_OF_VIEWS = 64
+# The same of sparse parts: finite-frequency rays are so wide that these pairs show as much as all.
+ELEMENTS_OF_SPARSE = 64
 
 # Views: all pairs between two sectors of the array, an eighth of it each. These three pairs of sectors
 # lie across the object and hold three pairs in thirty-two.
@@ -31,17 +31,19 @@ VIEWS = ((0, 3), (1, 6), (2, 5))
 def part_of(dataset: Dataset, part: Part) -> Dataset:
     """The dataset with the pairs of one part only, the others invalid.
 
-    A pair and its reverse belong to the same part, in all slices. ``held-out`` are scattered pairs whose
-    neighbours are in the training part, so any smooth model predicts them well; ``held-out-views`` are whole
-    views, without neighbours in the training part. Of a scan with twice ``ELEMENTS``
-    or more, both scattered parts leave out every second element or more, for speed; so do views from twice
-    ``ELEMENTS_OF_VIEWS``.
+    A pair and its reverse belong to the same part, in all slices. ``views`` are whole views, without
+    neighbours in the training part; ``held-out`` are scattered pairs outside these, whose neighbours are in
+    the training part, so any smooth model predicts them well; ``shown`` are all others. ``shown-sparse`` are
+    all pairs but those of ``views-sparse``. Of a scan with twice ``ELEMENTS`` or more, all parts leave out
+    every second element or more, for speed; sparse ones from twice ``ELEMENTS_OF_SPARSE``.
     """
     if part == "all":
         return dataset
-    held = _views(dataset) if part.endswith("views") else _scattered(dataset)
-    selected = held if part.startswith("held-out") else ~held
-    least = ELEMENTS_OF_VIEWS if part.endswith("views") else ELEMENTS
+    views, sparse = _views(dataset), part.endswith("sparse")
+    scattered = np.zeros_like(views) if sparse else _scattered(dataset) & ~views
+    parts = {"shown": ~(views | scattered), "held-out": scattered, "views": views}
+    least = ELEMENTS_OF_SPARSE if sparse else ELEMENTS
+    selected = parts[part.removesuffix("-sparse")]
     selected &= np.logical_and.outer(_thinned(dataset.tx, least), _thinned(dataset.rx, least))
     shape = selected.shape if dataset.slice_z_m is None else (dataset.slices, *selected.shape)
     valid = np.broadcast_to(selected, shape)

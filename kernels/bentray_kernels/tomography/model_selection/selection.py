@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -26,42 +25,29 @@ from .finite_frequency_candidates import (
 )
 from .held_out import Part
 
-PAIRS: tuple[Part, Part] = ("shown", "held-out")
-VIEWS: tuple[Part, Part] = ("shown-views", "held-out-views")
+# Training part, then held-out parts: of thin rays, and of finite-frequency rays.
+PARTS: tuple[Part, ...] = ("shown", "held-out", "views")
+SPARSE_PARTS: tuple[Part, ...] = ("shown-sparse", "views-sparse")
 
-# Candidates with thin rays: bent ones lose where picked times are not solutions of the Eikonal equation. The
-# cheapest of each kind are tried first.
-CHEAPEST: tuple[dict[str, Any], ...] = (
+# Candidates with thin rays. Bent ones lose where picked times are not solutions of the Eikonal equation;
+# exact times allow a weaker penalty, flat parts sharper edges. Bent SART is none of them: where bent rays are
+# right, bent Gauss-Newton predicts held-out pairs better, and its image is better.
+CANDIDATES: tuple[dict[str, Any], ...] = (
     {"rays": "straight", "method": "sart"},
-    {"rays": "curved", "method": "sart"},
-)
-OTHER_BENT: tuple[dict[str, Any], ...] = (
-    {"rays": "curved", "method": "sart", "front_smoothing_nodes": 4.0},
+    {"rays": "straight", "method": "gauss-newton"},
     {"rays": "curved", "method": "gauss-newton"},
-)
-
-# Not where the frequency is known and finite-frequency rays do not explain the times: Gauss-Newton predicts
-# scattered pairs better than SART, which fits less closely, but its image is worse (33 against 27 m/s).
-STRAIGHT_LINES: tuple[dict[str, Any], ...] = ({"rays": "straight", "method": "gauss-newton"},)
-
-# Tried where bent rays are clearly better: exact times allow a weaker penalty, phantoms of flat parts sharper
-# edges. These cost several times as much as SART.
-SHARPER: tuple[dict[str, Any], ...] = (
     {"rays": "curved", "method": "gauss-newton", "penalty_strength": 0.1},
     {"rays": "curved", "method": "gauss-newton", "edge_mps": 7.0},
 )
-CANDIDATES = (*CHEAPEST, *STRAIGHT_LINES, *OTHER_BENT, *SHARPER)
 
 # Candidates are reconstructed on half the nodes, but not fewer than this.
 TRIAL_NODES = 48
 
-# Bent rays must predict held-out pairs this much better than straight ones, the simpler model, and sharper
-# images than smoother ones. On a wave simulation whose bent image was 2 m/s worse than the straight one the
-# ratio was 0.95; on Eikonal times from 0.9 (water faster than a fat ring) down to 0.35.
-CLEARLY = 0.92
-
 # Thin bent rays start on coarser grids, each of half the nodes of the next, down to this many nodes.
 COARSEST_NODES = 32
+
+# Candidates and their graphs.
+Graphs = list[tuple[dict[str, Any], CandidateGraph]]
 
 # Without enough pairs to hold some out.
 UNVALIDATED: dict[str, Any] = {"rays": "curved", "method": "sart"}
@@ -114,7 +100,8 @@ def select_model(
 
     Where the frequency is known, finite-frequency rays are tried first, straight and bent, on held-out views,
     see ``choose_finite_frequency``. Otherwise, or where these rays do not explain the times, thin rays are
-    tried on held-out pairs, see ``next_candidates`` and ``choose``.
+    tried on scattered pairs and views; the lowest root mean square misfit is chosen. All candidates
+    predict the same times, so that the noise of these adds the same to each mean square.
     The reconstruction then stops at the noise of the times (discrepancy principle of Morozov), unless the
     candidate shows that the noise is lower.
 
@@ -133,103 +120,56 @@ def select_model(
     Raises:
         InvalidInput: for a slice without pairs.
     """
-    wide = finite_frequency_candidates(dataset, settings)
     rest = passes_to_come(dataset, settings) + after
-    trials: list[Trial] = []
-    chosen, before = None, 0
+    before = 0
 
-    def graphs_of(candidates: Sequence[dict[str, Any]], parts: tuple[Part, Part]) -> list[CandidateGraph]:
-        return _graphs(settings, candidates, index, parts, scan_of)
+    def graphs_of(candidates: Sequence[dict[str, Any]], parts: Sequence[Part]) -> Graphs:
+        """The candidates with the requested rays; none without training or held-out pairs."""
+        first = candidate_settings(settings)[0]
+        held = [part for part in parts[1:] if _has_pairs(scan_of(first, part), index)]
+        if not held or not _has_pairs(scan_of(first, parts[0]), index):
+            return []
+        tried = [one for one in candidates if settings.rays == "curved" or one["rays"] == "straight"]
+        plans = zip(tried, candidate_settings(settings, tried), strict=True)
+        return [
+            (one, CandidateGraph(scan_of(plan, parts[0]), index, *(scan_of(plan, part) for part in held)))
+            for one, plan in plans
+        ]
 
-    def run(
-        candidates: Sequence[dict[str, Any]], graphs: Sequence[CandidateGraph], later: int
-    ) -> list[Trial]:
+    def run(tried: Graphs, later: int = 0) -> list[Trial]:
         nonlocal before
+        graphs = [graph for _, graph in tried]
         run_graphs(graphs, before, later + rest)
         before += sum(graph.total for graph in graphs)
-        return _trials(candidates, graphs)
+        return [
+            Trial(one, graph.held_out_rms_s, graph.history[-1].residual_rms_s, graph.held_out_mean_s)
+            for one, graph in tried
+        ]
 
-    missing = _missing_part(PAIRS, settings, index, scan_of)
-    allowed = [one for one in CANDIDATES if settings.rays == "curved" or one["rays"] == "straight"]
-    thin = dict(zip(map(label, allowed), graphs_of(allowed, PAIRS), strict=True)) if not missing else {}
-
-    if wide and not _missing_part(VIEWS, settings, index, scan_of):
-        tried = wide if settings.rays != "straight" else wide[:1]
-        trials = run(tried, graphs_of(tried, VIEWS), sum(graph.total for graph in thin.values()))
-        chosen = trials[0] if len(trials) == 1 else choose_finite_frequency(trials, mean_time(dataset))
+    thin = graphs_of(CANDIDATES, PARTS)
+    chosen = None
+    wide = finite_frequency_candidates(dataset, settings)
+    if wide and (tried := graphs_of(wide, SPARSE_PARTS)):
+        trials = run(tried, sum(graph.total for _, graph in thin))
+        chosen = choose_finite_frequency(trials, mean_time(dataset))
     if chosen is None:
-        if missing:
+        if not thin:
             return final_settings(settings, {**UNVALIDATED, "rays": settings.rays}), (), before
-        trials = []
-        while following := next_candidates(trials, settings.rays, known_frequency=bool(wide)):
-            graphs = [thin.pop(label(one)) for one in following]
-            trials += run(following, graphs, sum(graph.total for graph in thin.values()))
-        chosen = choose(trials)
+        tried, trials = thin, run(thin)
+        chosen = min(trials, key=lambda trial: trial.held_out_rms_s)
     others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
     selected = final_settings(settings, chosen.settings)
-    return stop_at_noise(selected, chosen, travel_time_noise(dataset)), (chosen, *others), before
+    # Scattered pairs, if there are any: errors of the model are larger in views.
+    misfit = next(graph.first_part_rms_s for one, graph in tried if one is chosen.settings)
+    return stop_at_noise(selected, misfit, travel_time_noise(dataset)), (chosen, *others), before
 
 
-def next_candidates(
-    trials: Sequence[Trial], rays: str, *, known_frequency: bool
-) -> tuple[dict[str, Any], ...]:
-    """The candidates that can still be chosen, the cheap ones before the costly ones; empty at the end.
-
-    Where bent SART has no lower misfit than straight SART, bent Gauss-Newton decides whether bent rays are
-    tried further: in water that is faster than a thick layer of fat, few iterations of SART do not find the
-    ways around it. Otherwise the sharper candidates are next, which were the best on every scan with times
-    of the Eikonal equation; others only if those are not clearly better than bent and straight rays.
-
-    Args:
-        trials: so far.
-        rays: ``straight`` if straight rays are requested: bent ones are not tried.
-        known_frequency: whether SART is the only method with straight rays.
-    """
-    lines = () if known_frequency else STRAIGHT_LINES
-    rounds: tuple[tuple[dict[str, Any], ...], ...] = ((*CHEAPEST[:1], *lines),)
-    if rays != "straight":
-        rounds = (CHEAPEST,)
-        if trials:
-            straight, bent = (_trial_of(one, trials).held_out_rms_s for one in CHEAPEST)
-            if bent >= straight:
-                lowest = min(_rms(trial) for trial in trials if not _bent(trial))
-                further = any(t.settings == OTHER_BENT[-1] and _rms(t) < lowest for t in trials)
-                rounds = (lines, OTHER_BENT[-1:], SHARPER if further else ())
-            elif bent >= CLEARLY * straight:
-                rounds = (lines, SHARPER, OTHER_BENT)
-            else:
-                rounds = (SHARPER, (*lines, *OTHER_BENT))
-            if choose(trials).settings in SHARPER:
-                return ()
-    return next((part for part in rounds if not _tried(part, trials)), ())
-
-
-def _tried(candidates: Sequence[dict[str, Any]], trials: Sequence[Trial]) -> bool:
-    """Whether there is a trial of each."""
-    return all(any(trial.settings == one for trial in trials) for one in candidates)
-
-
-def _trial_of(candidate: dict[str, Any], trials: Sequence[Trial]) -> Trial:
-    return next(trial for trial in trials if trial.settings == candidate)
-
-
-def _graphs(
-    settings: Settings,
-    candidates: Sequence[dict[str, Any]],
-    index: int,
-    parts: tuple[Part, Part],
-    scan_of: Callable[[Settings, Part], Scan],
-) -> list[CandidateGraph]:
-    training, held_out = parts
-    plans = candidate_settings(settings, candidates)
-    return [CandidateGraph(scan_of(plan, training), index, scan_of(plan, held_out)) for plan in plans]
-
-
-def _trials(candidates: Sequence[dict[str, Any]], graphs: Sequence[CandidateGraph]) -> list[Trial]:
-    return [
-        Trial(changes, graph.held_out_rms_s, graph.history[-1].residual_rms_s, graph.held_out_mean_s)
-        for changes, graph in zip(candidates, graphs, strict=True)
-    ]
+def _has_pairs(scan: Scan, index: int) -> bool:
+    try:
+        scan.problem(index)
+    except InvalidInput:
+        return False
+    return True
 
 
 def passes_to_come(dataset: Dataset, settings: Settings) -> int:
@@ -241,44 +181,6 @@ def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     each += settings.resolution_check + settings.uncertainty
     problems = range(pairs.count(dataset, settings))
     return each * sum(len(pairs.of(dataset, settings, index).emitters) for index in problems)
-
-
-def _missing_part(
-    parts: Sequence[Part], settings: Settings, index: int, scan_of: Callable[[Settings, Part], Scan]
-) -> Part | None:
-    """The first part without any pair of the slice; None if every part has some."""
-    for part in parts:
-        try:
-            scan_of(candidate_settings(settings)[0], part).problem(index)
-        except InvalidInput:
-            return part
-    return None
-
-
-def choose(trials: Sequence[Trial]) -> Trial:
-    """The trial with the lowest misfit; straight rays unless bent ones are clearly better.
-
-    Sharper candidates must be clearly better than other bent rays, and than straight rays twice as clearly:
-    noise in the times becomes structure more easily with these.
-    """
-    sharper = [trial for trial in trials if trial.settings in SHARPER]
-    simple = [trial for trial in trials if trial not in sharper]
-    best, straight = min(simple, key=_rms), min((t for t in simple if not _bent(t)), key=_rms)
-    bent = min((_rms(trial) for trial in simple if _bent(trial)), default=math.inf)
-    if sharper:
-        sharpest = min(sharper, key=_rms)
-        if _rms(sharpest) < CLEARLY * min(bent, CLEARLY * _rms(straight)):
-            return sharpest
-    return best if _rms(best) < CLEARLY * _rms(straight) else straight
-
-
-def _bent(trial: Trial) -> bool:
-    return bool(trial.settings["rays"] != "straight")
-
-
-def _rms(trial: Trial) -> float:
-    """Root mean square misfit of the held-out pairs, s."""
-    return trial.held_out_rms_s
 
 
 def explain_trials(trials: Sequence[Trial]) -> str:
@@ -293,9 +195,8 @@ def explain_trials(trials: Sequence[Trial]) -> str:
         return f"auto chose {label(chosen.settings)}: the only candidate"
     gain = 1.0 - misfit(chosen) / min(map(misfit, others))
     if chosen.settings["rays"] == "straight":
-        reason = f"bent rays do not predict {what} better"
-        if gain < 0.0:
-            reason = f"bent rays must predict {what} {100.0 * (1.0 - CLEARLY):.0f} % better"
+        # Earlier versions kept straight rays unless bent ones were better by some per cent.
+        reason = f"bent rays do not predict {what} {'better' if gain >= 0.0 else 'clearly better'}"
     else:
         reason = f"{100.0 * gain:.0f} % better than straight rays at predicting {what}"
         if gain < 0.0:
@@ -317,19 +218,16 @@ def trial_table(trials: Sequence[Trial]) -> list[tuple[str, str, str]]:
 
 
 def rejection(trial: Trial, trials: Sequence[Trial]) -> str:
-    """Why a candidate with a lower misfit than the chosen one, the first, was not chosen; else empty."""
+    """Why a candidate with a lower misfit than the chosen one, the first, was not chosen; else empty.
+
+    It is among finite-frequency rays alone: of thin rays the lowest misfit is chosen.
+    """
     chosen, misfit = trials[0], _misfit_of(trials)
-    if trial is chosen or misfit(trial) >= misfit(chosen):
+    if trial is chosen or misfit(trial) >= misfit(chosen) or "ray_width_m" not in chosen.settings:
         return ""
-    bent, wide = _bent(trial), "ray_width_m" in chosen.settings
-    if wide and "ray_width_m" not in trial.settings:
+    part, why = STRAIGHT, "straight rays fit smooth times with a wrong image"
+    if "ray_width_m" not in trial.settings:
         part, why = EXACT, "thin rays fit wrong picks too"
-    elif not bent:
-        part, why = STRAIGHT, "straight rays fit smooth times with a wrong image"
-    elif trial.settings in SHARPER:
-        return "not clearly lower: sharper images also show the noise"
-    else:
-        part, why = CLEARLY, "the simpler model is kept"
     return f"must be below {1e9 * part * misfit(chosen):.0f} ns: {why}"
 
 

@@ -13,7 +13,6 @@ from ...acquisition import Dataset
 from .. import pairs
 from ..attenuation import EXPERIMENTAL
 from ..cautions import bound_cautions
-from ..model_selection.selection import CLEARLY
 from ..numerics import recorded
 from ..reconstruction_graph import Run, progress_of
 from ..result import Reconstruction
@@ -26,6 +25,9 @@ from .refinement_graph import RefinementGraph, WaveScan
 from .validation import ValidationGraph, evaluations, validation_settings
 from .waveform_cost import advice
 from .waveform_settings import WaveSettings
+
+# ``auto`` gives the refined image if its misfit of held-out emitters is below this part of that before.
+CLEARLY = 0.92
 
 # Creates the scan from which the tasks of one slice read their data.
 WaveScanOf = Callable[[WaveSettings, int], WaveScan]
