@@ -10,6 +10,7 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.acquisition.noise import with_noise
+from bentray_kernels.phantoms import DetailedBreast, EllipsePhantom
 from bentray_kernels.tomography import Problem, Reconstruction
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_workers.images.truth_on_grid import on_grid
@@ -71,7 +72,7 @@ def unseen_scans(context: BenchmarkContext) -> Iterator[UnseenScan]:
         yield UnseenScan(f"{name}, frequency unknown", unknown, object_error(recorded))
 
 
-def _inside(phantom: object) -> ErrorOn:
+def _inside(phantom: DetailedBreast | EllipsePhantom) -> ErrorOn:
     """Root mean square error inside a phantom that is centred on 0, m/s."""
 
     def error_on(image: Reconstruction) -> ImageError:

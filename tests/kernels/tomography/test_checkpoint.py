@@ -105,7 +105,8 @@ def test_the_graph_of_a_candidate_keeps_its_misfit(dataset):
     plan = PLANS["sart"].changed(attenuation=False, resolution_check=False)
 
     def make():
-        return CandidateGraph(MemoryScan(dataset, plan, "shown"), 0, MemoryScan(dataset, plan, "held-out"))
+        shown, *held = (MemoryScan(dataset, plan, part) for part in ("shown", "held-out", "views"))
+        return CandidateGraph(shown, 0, *held)
 
     whole, tasks = run(make)
     again = make()
