@@ -35,32 +35,28 @@ class CandidateGraph(ReconstructionGraph):
     @property
     def held_out_rms_s(self) -> float:
         """Root mean square misfit of all held-out pairs, s."""
-        return _rms(self.sums)
+        return self._misfit(TASKS)[0]
 
     @property
     def held_out_mean_s(self) -> float:
         """Mean absolute misfit of all held-out pairs, s."""
-        return float(self.sums[:, 1].sum() / self.sums[:, 0].sum())
+        return self._misfit(TASKS)[1]
 
     @property
     def first_part_rms_s(self) -> float:
         """Root mean square misfit of the first part, s."""
-        return _rms(self.value_of(sum_misfits))
+        return self._misfit(TASKS[:1])[0]
 
-    @property
-    def sums(self) -> Floats:
-        """As ``sum_misfits``, of one part after the other."""
-        return np.concatenate([self.value_of(evaluate) for _, evaluate in TASKS[: len(self._held_out)]])
+    def _misfit(self, tasks: Sequence[tuple[object, object]]) -> tuple[float, float]:
+        sums = [self.value_of(evaluate) for _, evaluate in tasks[: len(self._held_out)]]
+        count, absolute, squares = np.sum(sums, axis=0)
+        return math.sqrt(squares / count), float(absolute / count)
 
 
 def sum_misfits(_scan: Scan, _index: int, _slowness: Floats, rows: Sequence[Rows]) -> Floats:
-    """Task: of each emitter the number of pairs, and the sums of |residual|, s, and residual², s²."""
-    residuals = [one.residual for part in rows for one in part.by_emitter()]
-    return np.array([(one.size, np.abs(one).sum(), (one**2).sum()) for one in residuals])
-
-
-def _rms(sums: Floats) -> float:
-    return math.sqrt(float(sums[:, 2].sum() / sums[:, 0].sum()))
+    """Task: number of pairs, sum of absolute residuals, s, and of their squares, s²."""
+    residual = np.concatenate([part.residual for part in rows])
+    return np.array([residual.size, np.abs(residual).sum(), (residual**2).sum()])
 
 
 def trace_rays_of_views(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-
 from ...acquisition import Dataset
-from ...arrays import Floats
 from ...errors import InvalidInput
 from .. import pairs
 from ..grid_schedule import stages
@@ -43,9 +39,6 @@ CANDIDATES: tuple[dict[str, Any], ...] = (
     {"rays": "curved", "method": "gauss-newton", "penalty_strength": 0.1},
     {"rays": "curved", "method": "gauss-newton", "edge_mps": 7.0},
 )
-
-# Straight rays must predict held-out pairs better than bent ones by this many standard errors.
-STANDARD_ERRORS = 2.0
 
 # Candidates are reconstructed on half the nodes, but not fewer than this.
 TRIAL_NODES = 48
@@ -107,7 +100,8 @@ def select_model(
 
     Where the frequency is known, finite-frequency rays are tried first, straight and bent, on held-out views,
     see ``choose_finite_frequency``. Otherwise, or where these rays do not explain the times, thin rays are
-    tried on scattered pairs and views, see ``choose_thin``.
+    tried on scattered pairs and views; the lowest root mean square misfit is chosen. All candidates
+    predict the same times, so that the noise of these adds the same to each mean square.
     The reconstruction then stops at the noise of the times (discrepancy principle of Morozov), unless the
     candidate shows that the noise is lower.
 
@@ -162,31 +156,12 @@ def select_model(
         if not thin:
             return final_settings(settings, {**UNVALIDATED, "rays": settings.rays}), (), before
         tried, trials = thin, run(thin)
-        chosen = trials[choose_thin([(one["rays"], graph.sums[:, 2]) for one, graph in thin])]
+        chosen = min(trials, key=lambda trial: trial.held_out_rms_s)
     others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
     selected = final_settings(settings, chosen.settings)
     # Scattered pairs, if there are any: errors of the model are larger in views.
     misfit = next(graph.first_part_rms_s for one, graph in tried if one is chosen.settings)
     return stop_at_noise(selected, misfit, travel_time_noise(dataset)), (chosen, *others), before
-
-
-def choose_thin(squares: Sequence[tuple[str, Floats]]) -> int:
-    """The number of the candidate with the lowest misfit; a bent one unless straight rays are clearly better.
-
-    All candidates predict the same times, so that the noise of these adds the same to each sum of squares.
-    Clearly is more than ``STANDARD_ERRORS`` of the sum of the paired differences, whose emitters are taken
-    as independent. Undecided times are left to bent rays, because sound bends.
-
-    Args:
-        squares: rays and squared residuals of held-out pairs of each candidate, summed over each emitter.
-    """
-    ranked = sorted(range(len(squares)), key=lambda k: float(squares[k][1].sum()))
-    bent = next((k for k in ranked if squares[k][0] != "straight"), None)
-    if bent is None or bent == ranked[0]:
-        return ranked[0]
-    excess = squares[bent][1] - squares[ranked[0]][1]
-    error = math.sqrt(excess.size) * float(np.std(excess, ddof=1)) if excess.size > 1 else math.inf
-    return ranked[0] if excess.sum() > STANDARD_ERRORS * error else bent
 
 
 def _has_pairs(scan: Scan, index: int) -> bool:
@@ -224,10 +199,8 @@ def explain_trials(trials: Sequence[Trial]) -> str:
         reason = f"bent rays do not predict {what} {'better' if gain >= 0.0 else 'clearly better'}"
     else:
         reason = f"{100.0 * gain:.0f} % better than straight rays at predicting {what}"
-        if gain < 0.0 and wide:
+        if gain < 0.0:
             reason = f"straight rays must predict {what} {100.0 * (1.0 - STRAIGHT):.0f} % better"
-        elif gain < 0.0:
-            reason = f"straight rays do not predict {what} clearly better"
     return f"auto chose {label(chosen.settings)}: {reason}"
 
 
@@ -245,21 +218,17 @@ def trial_table(trials: Sequence[Trial]) -> list[tuple[str, str, str]]:
 
 
 def rejection(trial: Trial, trials: Sequence[Trial]) -> str:
-    """Why a candidate with a lower misfit than the chosen one, the first, was not chosen; else empty."""
+    """Why a candidate with a lower misfit than the chosen one, the first, was not chosen; else empty.
+
+    It is among finite-frequency rays alone: of thin rays the lowest misfit is chosen.
+    """
     chosen, misfit = trials[0], _misfit_of(trials)
-    if trial is chosen or misfit(trial) >= misfit(chosen):
+    if trial is chosen or misfit(trial) >= misfit(chosen) or "ray_width_m" not in chosen.settings:
         return ""
-    if "ray_width_m" not in chosen.settings:
-        clearly = f", by {STANDARD_ERRORS:g} standard errors" if _bent(chosen) else ""
-        return f"not clearly lower{clearly}"
     part, why = STRAIGHT, "straight rays fit smooth times with a wrong image"
     if "ray_width_m" not in trial.settings:
         part, why = EXACT, "thin rays fit wrong picks too"
     return f"must be below {1e9 * part * misfit(chosen):.0f} ns: {why}"
-
-
-def _bent(trial: Trial) -> bool:
-    return bool(trial.settings["rays"] != "straight")
 
 
 def _misfit_of(trials: Sequence[Trial]) -> Callable[[Trial], float]:

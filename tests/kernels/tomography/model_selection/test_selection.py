@@ -21,7 +21,6 @@ from bentray_kernels.tomography.model_selection.selection import (
     CANDIDATES,
     advice_of,
     candidate_settings,
-    choose_thin,
     explain_trials,
     final_settings,
     rejection,
@@ -263,17 +262,12 @@ def test_the_reason_is_one_and_the_table_names_what_differs():
         ("straight rays", "100 ns", "chosen"),
         ("bent rays, sharp edges", "120 ns", ""),
     ]
-    # Of times that do not decide.
-    undecided = [replace(more, held_out_rms_s=101e-9), plain]
-    reason = "auto chose bent rays: straight rays do not predict held-out pairs clearly better"
-    assert explain_trials(undecided) == reason
-    assert rejection(plain, undecided) == "not clearly lower, by 2 standard errors"
     # A result of an earlier version, which asked bent rays for more than the lowest misfit.
     earlier = [plain, replace(more, held_out_rms_s=95e-9)]
     assert explain_trials(earlier) == (
         "auto chose straight rays: bent rays do not predict held-out pairs clearly better"
     )
-    assert rejection(earlier[1], earlier) == "not clearly lower"
+    assert rejection(earlier[1], earlier) == ""
 
 
 def test_the_table_says_why_a_lower_misfit_of_finite_frequency_rays_was_not_chosen():
@@ -287,42 +281,6 @@ def test_the_table_says_why_a_lower_misfit_of_finite_frequency_rays_was_not_chos
         "must be below 80 ns: straight rays fit smooth times with a wrong image",
         "must be below 60 ns: thin rays fit wrong picks too",
     ]
-
-
-def squares(model_ns, noise, emitters=64, pairs=8):
-    """Squared residuals summed over each emitter: errors of a model, ns, and the noise of the times, ns."""
-    model = model_ns * np.random.default_rng(len(noise)).normal(size=(emitters, pairs))
-    return ((model + noise[:emitters, :pairs]) ** 2).sum(axis=1)
-
-
-@pytest.mark.parametrize(
-    ("straight", "bent", "noise", "chosen"),
-    [
-        (20.0, 60.0, 0.0, 0),
-        (60.0, 20.0, 0.0, 2),
-        (50.0, 50.0, 0.0, 2),
-        (80.0, 30.0, 240.0, 2),
-        (20.0, 30.0, 240.0, 2),
-        (30.0, 160.0, 240.0, 0),
-    ],
-    ids=["straight", "bent", "equal", "bent, noisy", "undecided", "straight, noisy"],
-)
-def test_straight_rays_are_chosen_where_they_are_better_by_more_than_the_noise(straight, bent, noise, chosen):
-    """The same noise in all residuals: ratios of misfits say little where it is most of them."""
-    times = noise * np.random.default_rng(5).normal(size=(64, 8))
-    offered = [
-        ("straight", squares(straight, times)),
-        ("straight", squares(straight + 40.0, times)),
-        ("curved", squares(bent, times)),
-        ("curved", squares(bent + 40.0, times)),
-    ]
-    assert choose_thin(offered) == chosen
-
-
-def test_of_few_pairs_bent_rays_are_chosen():
-    assert choose_thin([("straight", np.array([1.0])), ("curved", np.array([3.0]))]) == 1
-    assert choose_thin([("straight", np.array([1.0, 1.0])), ("curved", np.array([1.0, 5.0]))]) == 1
-    assert choose_thin([("straight", np.array([3.0])), ("straight", np.array([2.0]))]) == 1
 
 
 def test_noise_does_not_select_straight_rays_for_times_of_bent_ones(scan):
