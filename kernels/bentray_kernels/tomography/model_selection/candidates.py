@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from ...arrays import Floats
 from ..gauss_newton.linearisation import Rows
 from ..reconstruction_graph import Evaluation, ReconstructionGraph, trace_final_rays
 from ..stage_graphs import Scan
+
+# The functions that trace the rays of a batch of emitters, and that evaluate all of them.
+Tasks = tuple[Callable[..., Rows], Callable[..., Floats]]
 
 
 class CandidateGraph(ReconstructionGraph):
@@ -47,7 +50,7 @@ class CandidateGraph(ReconstructionGraph):
         """Root mean square misfit of the first part, s."""
         return self._misfit(TASKS[:1])[0]
 
-    def _misfit(self, tasks: Sequence[tuple[object, object]]) -> tuple[float, float]:
+    def _misfit(self, tasks: Sequence[Tasks]) -> tuple[float, float]:
         sums = [self.value_of(evaluate) for _, evaluate in tasks[: len(self._held_out)]]
         count, absolute, squares = np.sum(sums, axis=0)
         return math.sqrt(squares / count), float(absolute / count)
@@ -70,4 +73,4 @@ def sum_misfits_of_views(scan: Scan, index: int, slowness: Floats, rows: Sequenc
 
 
 # Of the first and of the second part; a graph knows its tasks by their functions.
-TASKS = ((trace_final_rays, sum_misfits), (trace_rays_of_views, sum_misfits_of_views))
+TASKS: tuple[Tasks, Tasks] = ((trace_final_rays, sum_misfits), (trace_rays_of_views, sum_misfits_of_views))
