@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -37,15 +38,21 @@ def robust_deviation(values: Floats) -> float:
     return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
-def noise_level(delta: Floats) -> float:
+def root_mean_square(values: Floats) -> float:
+    """Standard deviation of values around 0, outliers included."""
+    return math.sqrt(float((values * values).mean()))
+
+
+def noise_level(delta: Floats, deviation: Callable[[Floats], float] = root_mean_square) -> float:
     """Noise estimate from fourth differences of neighbouring pairs, unit of the data.
 
     Fourth differences along emitters, receivers and both diagonals remove what is smooth over five elements,
-    the object, and keep the noise, including wrong picks. The largest of the four directions is used, because
+    the object, and keep the noise. The largest of the four directions is used, because
     noise may be correlated along one. With a coarse array part of the object remains.
 
     Args:
         delta: (..., ntx, nrx) around a ring, NaN where there is none.
+        deviation: of the differences, around 0; by default wrong picks count.
 
     Returns:
         0 where no five neighbours have values.
@@ -59,5 +66,5 @@ def noise_level(delta: Floats) -> float:
         left = left[np.isfinite(left)]
         if left.size:
             # 1² + 4² + 6² + 4² + 1²
-            levels.append(math.sqrt(float((left * left).mean()) / 70.0))
+            levels.append(deviation(left) / math.sqrt(70.0))
     return max(levels)

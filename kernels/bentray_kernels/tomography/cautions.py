@@ -12,7 +12,7 @@ from ..acquisition import Dataset
 from ..arrays import Floats, Ints
 from ..request_fields import declared, unused, value_at
 from .directivity import within_opening
-from .pairs import reciprocal_noise
+from .pairs import reciprocal_differences
 from .result import Caution, Iteration, Reconstruction, residual_within
 from .settings import Settings
 from .stopping import travel_time_noise
@@ -31,8 +31,14 @@ CUT_OFF, NEAR = 0.01, 1e-3
 # of them, 1.5 m/s, errors of picks and grids exceed the noise.
 OVER_NOISE, OF_CONSTANT, TOO_LARGE, SMALL = 2.0, 0.5, 0.02, 1e-3
 
-# The image is no better than a constant if it leaves more than this part of its residual.
+# The image is no better than a constant if it leaves more than this part of its residual. Pairs measured both
+# ways contradict each other if they differ by more than this part of it: noise without an object by 1.0,
+# emitters in a wrong order by 0.9, at a signal-to-noise ratio of 3 by up to 0.75.
 NO_BETTER = 0.9
+CONTRADICTS = 0.8
+
+# A constant this near to the speed of the water is the water.
+WATER = 2e-3
 
 # Iterations after which the residuals are those of a fitted image.
 FITTED = 3
@@ -64,20 +70,26 @@ def fit_cautions(
     speed, constant = _best_constant(delta[used], np.broadcast_to(distance, delta.shape)[used], dataset)
     words = f"{_time(residual)}, {100.0 * residual / time:.2g} % of the travel times"
     if residual > SMALL * time and residual > NO_BETTER * constant:
+        water = abs(speed / dataset.water_speed_mps - 1.0) < WATER
+        alone = ", as in a scan of water alone" if water else ""
         yield Caution(
             "constant",
             f"One constant speed of {speed:.0f} m/s explains the times as well as the image: nine tenths of "
             f"the residuals of the image are within {words}, of the constant within {_time(constant)}. "
-            f"The image shows nothing of the object; more iterations may.",
+            f"The image shows nothing of the object{alone}; more iterations may.",
             doubtful=True,
         )
         return
-    noise = _noise(dataset, delta)
-    if noise > TOO_LARGE * time:
+    both_ways = _difference_both_ways(dataset, delta)
+    stated = dataset.sigma_s is not None
+    noise = (0.0 if stated else both_ways / NORMAL) or _estimated_noise(dataset)
+    contradicts = both_ways > max(CONTRADICTS * constant, SMALL * time)
+    if contradicts or noise > TOO_LARGE * time:
+        less = f", and one constant speed of {speed:.0f} m/s leaves no more" if contradicts else ""
         yield Caution(
             "noise",
             f"The times contradict each other: their noise is {_time(noise)}, {100.0 * noise / time:.2g} % "
-            f"of the travel times.",
+            f"of the travel times{less}. Another picker or more averaging may help.",
             doubtful=True,
         )
     over = residual > max(OVER_NOISE * NORMAL * noise, OF_CONSTANT * constant, SMALL * time)
@@ -145,13 +157,16 @@ def with_settings_caution(result: Reconstruction, requested: Settings, *, picks:
     return replace(result, cautions=(*result.cautions, Caution("settings", " ".join(sentences))))
 
 
-def _noise(dataset: Dataset, delta: Floats) -> float:
-    """Standard deviation of the times, s: as stated, else of pairs measured both ways, else estimated."""
-    both_ways = 0.0
-    if dataset.sigma_s is None:
-        slices = delta.reshape(-1, *delta.shape[-2:])
-        both_ways = max(reciprocal_noise(dataset.tx, dataset.rx, one) for one in slices)
-    return both_ways or travel_time_noise(dataset)
+def _difference_both_ways(dataset: Dataset, delta: Floats) -> float:
+    """What nine tenths of the times of pairs measured both ways are off by, s; 0 without such pairs."""
+    slices = delta.reshape(-1, *delta.shape[-2:])
+    differences = np.concatenate([reciprocal_differences(dataset.tx, dataset.rx, one) for one in slices])
+    return float(np.quantile(np.abs(differences), TYPICAL)) / math.sqrt(2.0) if differences.size else 0.0
+
+
+def _estimated_noise(dataset: Dataset) -> float:
+    """Standard deviation of the times, s: as stated, else of the roughness of nine tenths of them."""
+    return travel_time_noise(dataset, lambda rough: float(np.quantile(np.abs(rough), TYPICAL)) / NORMAL)
 
 
 def _best_constant(delta: Floats, distance: Floats, dataset: Dataset) -> tuple[float, float]:

@@ -173,10 +173,15 @@ def reciprocal_noise(tx: Ints, rx: Ints, delta: Floats) -> float:
     Args:
         tx, rx: elements of the rows and columns; delta: (ntx, nrx), s, NaN where there is none.
     """
+    known = reciprocal_differences(tx, rx, delta)
+    return robust_deviation(known) / math.sqrt(2.0) if known.size else 0.0
+
+
+def reciprocal_differences(tx: Ints, rx: Ints, delta: Floats) -> Floats:
+    """Differences of the two times of each pair measured both ways, s; arguments as ``reciprocal_noise``."""
     elements, full = _by_element(tx, rx, delta)
     differences = (full - full.T)[np.triu_indices(len(elements), 1)]
-    known = differences[np.isfinite(differences)]
-    return robust_deviation(known) / math.sqrt(2.0) if known.size else 0.0
+    return np.asarray(differences[np.isfinite(differences)])
 
 
 def _with_reverses(tx: Ints, rx: Ints, delta: Floats) -> tuple[Ints, Ints, Floats]:

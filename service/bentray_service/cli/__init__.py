@@ -46,7 +46,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Refraction-corrected ultrasound computed tomography: sound speed, and attenuation (experimental).",
-    epilog="Start with: bentray demo. Exit codes: 0 success, 1 failure, 2 invalid input.",
+    epilog="Start with: bentray demo. Exit codes: 0 success, 1 failure, 2 invalid input, 3 doubtful result.",
 )
 
 for command in (

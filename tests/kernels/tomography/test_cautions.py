@@ -58,6 +58,10 @@ GOOD = {
     "noise": (noisy(DISC, 10.0), {}),
     "more noise than the goals": (noisy(DISC, 3.0), {}),
     "wrong picks": (changed(DISC, lambda d: np.where(ORDER[:, None] == ORDER[None, ::-1], 2e-6, d)), {}),
+    "wrong picks of one way": (
+        changed(DISC, lambda d: np.where(np.tri(32), np.nan, d + 5e-5 * (ORDER[:, None] * ORDER == 99))),
+        {},
+    ),
     "water": (changed(DISC, lambda d: 0.0 * d), {}),
     "noisy water": (changed(DISC, lambda d: np.random.default_rng(0).normal(0.0, 3e-8, d.shape)), {}),
     "an arc": (replace(DISC, valid=np.add.outer(np.arange(32), np.zeros(32, int)) < 20), {}),
@@ -70,6 +74,13 @@ BAD = {
     "another order": (changed(DISC, lambda d: d[np.ix_(ORDER, ORDER)]), {}, {"constant"}),
     "another water": (changed(DISC, lambda d: WAY * (1.0 / 1485.0 - 1.0 / WATER)), {}, {"constant"}),
     "water not subtracted": (changed(DISC, lambda d: d + WAY / WATER), {}, {"bounds"}),
+    "emitters in another order": (changed(DISC, lambda d: d[ORDER]), {}, {"constant", "noise"}),
+    "emitters one on": (changed(DISC, lambda d: np.roll(d, 1, 0)), {}, {"constant", "noise"}),
+    "noise": (
+        changed(DISC, lambda d: np.random.default_rng(0).normal(0.0, 5e-7, d.shape)),
+        {},
+        {"constant", "noise"},
+    ),
     "one receiver on": (
         changed(DISC, lambda d: np.roll(d + WAY / WATER, 1, 1) - WAY / WATER),
         {},

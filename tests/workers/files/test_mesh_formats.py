@@ -111,6 +111,19 @@ def test_a_long_comment_may_come_before_an_obj():
     assert read_mesh(b"# by hand\n" * 10_000 + exported("obj")).format == "obj"
 
 
+def test_corners_of_an_obj_may_count_back_from_their_face():
+    corners = torus(8, 5).corners
+    text = "".join(
+        "".join(f"v {x} {y} {z}\n" for x, y, z in face) + "f -3//-1 -2//-1 -1//-1\n" for face in corners
+    )
+    found = read_mesh(text.encode()).surface
+    assert (len(found.mesh.faces), found.genus, found.merged) == (80, 1, 200)
+
+
+def test_an_stl_may_be_written_in_capitals():
+    assert len(read_mesh(exported("stl_ascii").upper()).surface.mesh.faces) == 80
+
+
 @given(
     st.sampled_from(FORMATS),
     st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4),
@@ -140,6 +153,8 @@ def lone(place, accepted="three"):
         (b"\x00\x01\x02 something else", "a file of another kind .it begins with"),
         (b"PK\x03\x04" + b"v 0 0 0" * 9, "a file of another kind"),
         (lone("0 1 0", "9"), "file: found OBJ data that are truncated, damaged"),
+        (lone("0 1 0", "0"), "faces: found 'f 1 2 0' in line 4; accepted: vertices from 1, or from -1 to -3"),
+        (lone("0 1 0", "-4"), "faces: found 'f 1 2 -4' in line 4"),
         (lone("nan 1 0", "3"), "not finite"),
         (lone("inf 1 0", "3"), "not finite"),
         (lone("2 0 0", "3"), "1 without area"),

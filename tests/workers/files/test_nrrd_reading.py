@@ -240,6 +240,8 @@ def test_every_statement_of_positions_counts(tmp_path, more, steps, origin):
         ("thicknesses: 1 2 6\n", "spacings"),
         ("space: RAS\nspace directions: none (0,2,0) (0,0,5)\n", "space directions"),
         ("space: RAS\nspace directions: (1,0,0) (0,2,0)\n", "space directions"),
+        ("space dimension: 2\nspace directions: (1,0) (0,2) (0,0)\n", "space directions"),
+        ("space: RAST\nspace directions: (1,0,0,0) (0,2,0,0) (0,0,5,0)\n", "space directions"),
         ("space: 3D-left-handed\n", "space"),
         ("space: up-down-sideways\n", "space"),
         ("kinds: complex domain domain\n", "kinds"),
@@ -247,3 +249,14 @@ def test_every_statement_of_positions_counts(tmp_path, more, steps, origin):
 )
 def test_positions_that_are_stated_in_part_or_twice_are_refused(tmp_path, more, field):
     assert refused(write(tmp_path / "v", PLAIN + more)).field == field
+
+
+def test_an_order_of_bytes_is_not_guessed(tmp_path):
+    path = write(tmp_path / "v", PLAIN.replace("uint8", "short"), ramp().astype("<i2").tobytes("F"))
+    assert refused(path).field == "endian"
+
+
+def test_values_right_after_the_header_may_be_said_so(tmp_path):
+    np.testing.assert_array_equal(
+        import_volume(write(tmp_path / "v", PLAIN + "byte skip: 0\n")).values, ramp()
+    )

@@ -21,7 +21,7 @@ from bentray_kernels.meshes.defects import SoundMesh, sound
 
 from .damage import first_bytes, rejecting_damage
 from .gltf_checks import check_gltf
-from .obj_checks import check_obj
+from .obj_checks import plain_obj
 from .off_checks import HEADERS, check_off
 
 ACCEPTED = "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB"
@@ -77,7 +77,8 @@ def read_mesh(data: bytes) -> ReadMesh:
     if kind == "off":
         check_off(data)
     if kind == "obj":
-        check_obj(data)
+        with _whole(kind):
+            data = plain_obj(data)
     with _whole(kind):
         loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
         mesh = loaded.to_mesh()
@@ -102,8 +103,8 @@ def _kind(data: bytes) -> str:
     as_stl = 84 + 50 * struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
     if as_stl and as_stl == len(data):
         return "stl"
-    if start.startswith(b"solid") and b"facet" in data[:4096]:
-        if b"endsolid" not in data:
+    if start.lower().startswith(b"solid") and b"facet" in data[:4096].lower():
+        if b"endsolid" not in data.lower():
             raise InvalidInput("file", "an STL of words without its end (endsolid)", "a whole STL file")
         return "stl"
     text = b"\0" not in data[: 2**16]

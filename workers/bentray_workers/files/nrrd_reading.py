@@ -89,7 +89,7 @@ def nrrd_image(file: IO[bytes], check: ShapeCheck = any_shape, least: int = 2) -
         header: Any = nrrd.read_header(_named_fields(start[: min(ends)]))
         # A detached data file could be any file of this machine; its name is not repeated.
         for field in ELSEWHERE:
-            if field in header:
+            if header.get(field):
                 raise InvalidInput(field, "values elsewhere", "values in the same file, after the header")
         kinds = set(header.get("kinds", ())) - {"domain", "space", "none", "???"}
         if kinds:
@@ -97,7 +97,10 @@ def nrrd_image(file: IO[bytes], check: ShapeCheck = any_shape, least: int = 2) -
         dtype = next((np.dtype(code) for code, names in NRRD_TYPES.items() if header["type"] in names), None)
         if dtype is None:
             raise InvalidInput("type", repr(header["type"]), "a type of numbers")
-        dtype = dtype.newbyteorder(">" if header.get("endian") == "big" else "<")
+        endian = str(header.get("endian", "little" if dtype.itemsize == 1 else None)).lower()
+        if endian not in ("little", "big"):
+            raise InvalidInput("endian", "none" if endian == "none" else repr(endian), "little or big")
+        dtype = dtype.newbyteorder(">" if endian == "big" else "<")
         shape = tuple(int(n) for n in header["sizes"])
         stored = (*shape, 1) if least == 1 and len(shape) == 2 else shape
         count = declared("sizes", stored, dtype, check, least)
@@ -169,6 +172,9 @@ def _affine(header: Any, shape: Sequence[int]) -> Floats:
 
 def _check_directions(header: Any, directions: Floats) -> None:
     """Reject directions that are absent along an axis, or that another field contradicts."""
+    numbers = directions.shape[1]
+    if numbers not in (len(directions), 3):
+        raise InvalidInput("space directions", f"vectors of {numbers} numbers", "vectors of three")
     absent = [k for k in range(len(directions)) if np.isnan(directions[k]).all()]
     if absent:
         raise InvalidInput("space directions", f"none along axis {absent[0]}", "a vector for each axis")

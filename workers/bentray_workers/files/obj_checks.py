@@ -1,4 +1,4 @@
-"""Checks of OBJ files: faces and vertices, with the line number of the first error."""
+"""Checks of OBJ files: faces and vertices, with the line number of the first error; relative indices."""
 
 from __future__ import annotations
 
@@ -13,16 +13,25 @@ SHOWN = 60
 CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
 SHORT_FACE = re.compile(rb"^[ \t]*f(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
 SHORT_VERTEX = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
+# Vertices, and faces with their corners; a corner is a vertex, and after a slash texture and normal.
+RECORD = re.compile(rb"^[ \t]*(?:(v)[ \t]|f[ \t]+([^\r\n#]*))", re.MULTILINE)
+# A corner that counts vertices back from its face, or from 0.
+RELATIVE = re.compile(rb"^[ \t]*f[^\r\n#]*[ \t](?:-|0+(?![0-9]))", re.MULTILINE)
 
 
-def check_obj(data: bytes) -> None:
-    """Reject an OBJ with an incomplete face, which readers skip, or an incomplete vertex.
+def plain_obj(data: bytes) -> bytes:
+    """An OBJ whose faces count vertices from 1, without what readers take for other vertices.
 
     Args:
         data: the whole file.
 
+    Returns:
+        The same text, where faces count vertices back from their line (-1: the last one so far) with the
+        vertices alone: readers count back from the end of the file.
+
     Raises:
-        InvalidInput: ``faces`` or ``vertices``, with the line.
+        InvalidInput: ``faces`` or ``vertices``, with the line: an incomplete face, which readers skip, an
+            incomplete vertex, or a face of a vertex that is not there.
     """
     text = CONTINUED.sub(b" ", data)
     for field, pattern, accepted in (
@@ -34,3 +43,23 @@ def check_obj(data: bytes) -> None:
             line = text.count(b"\n", 0, match.start()) + 1
             shown = match[0].strip()[:SHOWN].decode(errors="replace")
             raise InvalidInput(field, f"{shown!r} in line {line}", accepted)
+    return _absolute(text) if RELATIVE.search(text) else data
+
+
+def _absolute(text: bytes) -> bytes:
+    """Replace relative indices of vertices."""
+    before = 0
+
+    def replaced(record: re.Match[bytes]) -> bytes:
+        nonlocal before
+        if record[1]:
+            before += 1
+            return record[0]
+        numbers = [int(corner.partition(b"/")[0]) for corner in record[2].split()]
+        if 0 in numbers or -min(numbers) > before:
+            line = text.count(b"\n", 0, record.start()) + 1
+            found = f"{record[0].strip()[:SHOWN].decode(errors='replace')!r} in line {line}"
+            raise InvalidInput("faces", found, f"vertices from 1, or from -1 to -{before} back from the face")
+        return b"f " + b" ".join(b"%d" % (n if n > 0 else before + 1 + n) for n in numbers)
+
+    return RECORD.sub(replaced, text)
