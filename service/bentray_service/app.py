@@ -214,7 +214,7 @@ def _open(
         ClaimedTenants(database),
     )
     stack.callback(access_control.close)
-    check_authentication(files.root, required=not access_control.open())
+    check_authentication(files.root, required=access_control.required())
     if cluster is None:
         cluster = stack.enter_context(
             open_cluster(

@@ -89,6 +89,10 @@ class SignIn:
         if self.browsers is not None:
             self.browsers.close()
 
+    def required(self) -> bool:
+        """Whether authentication is required, as the database has it now."""
+        return self._guarded or self._keys.any()
+
     def open(self) -> bool:
         """Whether authentication is not required; a new key is noticed after a second."""
         if self._guarded or self._no_keys_until == math.inf:
