@@ -144,7 +144,9 @@ def with_settings_caution(result: Reconstruction, requested: Settings, *, picks:
     sentences = []
     if idle:
         without = "; ".join(f"{place}, unless {lacking}" for place, (_, lacking) in idle.items())
-        sentences.append(f"Settings without effect on this result: {without}.")
+        chosen = result.settings.method
+        by = "" if chosen == requested.method else f" by {chosen}, which {requested.method} chose"
+        sentences.append(f"Settings without effect on this result{by}: {without}.")
     changes = []
     for one in declared(Settings).values():
         value, used = (value_at(settings, one.place) for settings in (requested, result.settings))
