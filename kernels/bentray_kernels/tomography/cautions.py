@@ -93,7 +93,7 @@ def fit_cautions(
             doubtful=True,
         )
     over = residual > max(OVER_NOISE * NORMAL * noise, OF_CONSTANT * constant, SMALL * time)
-    if over or residual > TOO_LARGE * time:
+    if over or residual > NORMAL * TOO_LARGE * time:
         yield Caution(
             "residual",
             f"The image does not explain the times: nine tenths of the residuals are within {words}, where "

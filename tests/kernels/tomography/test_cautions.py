@@ -57,6 +57,7 @@ GOOD = {
     "a slow disc": (ring(1400.0), {}),
     "noise": (noisy(DISC, 10.0), {}),
     "more noise than the goals": (noisy(DISC, 3.0), {}),
+    "a large object in noise": (noisy(ring(1400.0, 0.06), 3.0), {}),
     "wrong picks": (changed(DISC, lambda d: np.where(ORDER[:, None] == ORDER[None, ::-1], 2e-6, d)), {}),
     "wrong picks of one way": (
         changed(DISC, lambda d: np.where(np.tri(32), np.nan, d + 5e-5 * (ORDER[:, None] * ORDER == 99))),
