@@ -12,8 +12,8 @@ from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.phantoms import DetailedBreast, EllipsePhantom
 from bentray_kernels.tomography import Problem, Reconstruction
+from bentray_kernels.tomography.comparison import on_grid
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
-from bentray_workers.images.truth_on_grid import on_grid
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
