@@ -107,9 +107,11 @@ def test_simulation_resumes_from_finished_emissions(machine, tmp_path):
 
 
 def keep_busy(machine, dataset, jobs):
-    """Queue more jobs, each with a seed of its own, until at least three are not at their end."""
+    """Queue more jobs, those by SART with a seed of their own, until at least three are not at their end."""
     while sum(machine.job(job)["state"] in ("queued", "running") for job in jobs) < 3:
-        plan = {**PLANS[len(jobs) % len(PLANS)], "seed": len(jobs)}
+        plan = PLANS[len(jobs) % len(PLANS)]
+        if plan["method"] != "gauss-newton":
+            plan = {**plan, "seed": len(jobs)}
         jobs[machine.submit(dataset, **plan)] = plan
 
 

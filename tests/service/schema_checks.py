@@ -78,8 +78,14 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
     # As an upload, a scan that is plausible after the correction; what the scan has; not what it was before.
     "POST /v1/datasets/{dataset_id}/corrections": {
         422: {
-            *("times_in", "times_read_as", "positions_in", "positions_read_as", "sampling_rate_hz"),
-            *("frequency_hz", "correction", "traveltime/delta_tof_s", "geometry/element_position_m"),
+            *("times_in", "times_read_as", "positions_in", "positions_read_as", "arrangement"),
+            *(
+                "sampling_rate_hz",
+                "frequency_hz",
+                "correction",
+                "traveltime/delta_tof_s",
+                "geometry/element_position_m",
+            ),
             *("acquisition/sampling_rate_hz", "acquisition/center_frequency_hz", "acquisition/t0_s"),
         }
     },

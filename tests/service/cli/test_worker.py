@@ -155,7 +155,7 @@ def test_the_lane_of_opencl_is_offered_where_a_device_passed(
         monkeypatch.setattr(opencl, "choose", lambda found=found: opencl.Choice(found, ()))
         assert bentray("worker", "--scheduler", "tcp://head:8786", "--workers", 3).exit_code == 0
     assert [dict(one.resources) for one in asked] == [
-        {"recon": 1, "render": 1, "opencl": 1},
+        {"recon": 1, "render": 1, "short": 1, "opencl": 1},
         {"recon": 1, "render": 1, "short": 1},
     ]
     assert asked[0].workers == 3

@@ -15,6 +15,7 @@ JOB = {
     "id": "job-1",
     "kind": "reconstruction",
     "settings": {},
+    "doubtful": False,
     "progress": {"done": 0, "total": 0, "phase": ""},
     "history": [],
     "created": 0.0,

@@ -114,7 +114,6 @@ REFUSED: dict[str, tuple[spoil.Build, str]] = {
     # Values.
     "a place that is none": (spoil.stored(POSITION, (3, 0), np.nan), POSITION),
     "an endless place": (spoil.stored(POSITION, (3, 1), -np.inf), POSITION),
-    "an endless time": (spoil.stored(PLACE, (0, 0), np.inf), PLACE),
     "a negative index": (spoil.stored("acquisition/tx", (1,), -1), "acquisition/tx"),
     "an index too far": (spoil.stored("acquisition/rx", (1,), 24), "acquisition/rx"),
     "fractional indices": (spoil.replaced("acquisition/tx", data=np.linspace(0, 1, 12)), "acquisition/tx"),

@@ -19,12 +19,12 @@ from bentray_workers.cluster.tls import own_security
 from ...listening import beyond_loopback, listening, pages
 
 
-def test_embedded_cluster_has_both_resources(cluster):
+def test_embedded_cluster_has_all_lanes(cluster):
     facts = cluster.describe()
     assert facts["embedded"] is True
     assert facts["workers"] == 2
-    assert facts["threads"] == 4
-    assert facts["lanes"] == {"recon": 2.0, "render": 2.0}
+    assert facts["threads"] == 6
+    assert facts["lanes"] == {"recon": 2.0, "render": 2.0, "short": 2.0}
 
 
 def test_given_scheduler_is_joined_and_survives_leaving(cluster):

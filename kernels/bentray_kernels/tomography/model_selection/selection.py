@@ -13,7 +13,7 @@ from ..reconstruction_graph import Run
 from ..result import Reconstruction, Trial
 from ..settings import Settings
 from ..stage_graphs import Scan
-from ..stopping import stop_at_noise, travel_time_noise
+from ..stopping import stop_at_noise
 from .candidates import CandidateGraph
 from .finite_frequency_candidates import (
     EXACT,
@@ -161,7 +161,7 @@ def select_model(
     selected = final_settings(settings, chosen.settings)
     # Scattered pairs, if there are any: errors of the model are larger in views.
     misfit = next(graph.first_part_rms_s for one, graph in tried if one is chosen.settings)
-    return stop_at_noise(selected, misfit, travel_time_noise(dataset)), (chosen, *others), before
+    return stop_at_noise(selected, misfit, dataset), (chosen, *others), before
 
 
 def _has_pairs(scan: Scan, index: int) -> bool:

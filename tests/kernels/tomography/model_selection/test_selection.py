@@ -210,12 +210,20 @@ def trial(rays, held_out):
     return Trial({"rays": rays}, held_out, held_out)
 
 
-def test_the_reconstruction_stops_at_the_noise():
-    assert stop_at_noise(PLAN, 100e-9, 90e-9).numerics.stop_rms_s == pytest.approx(99e-9)
-    # What predicts better than the noise estimate shows that there is less of it.
-    assert stop_at_noise(PLAN, 100e-9, 120e-9).numerics.stop_rms_s is None
-    asked = PLAN.changed(stop_rms_s=5e-9)
-    assert stop_at_noise(asked, 100e-9, 90e-9) == asked
+@pytest.mark.parametrize(
+    ("method", "both_ways", "stop_s"),
+    [("gauss-newton", True, 99e-9 / np.sqrt(2)), ("gauss-newton", False, 99e-9), ("sart", True, 99e-9)],
+)
+def test_the_reconstruction_stops_at_the_noise_of_what_it_fits(scan, method, both_ways, stop_s):
+    """Gauss-Newton fits the mean of the two times of a pair, SART each time."""
+    delta = scan.delta_tof_s if both_ways else np.where(np.tri(len(scan.tx)), scan.delta_tof_s, np.nan)
+    stated = replace(scan, delta_tof_s=delta, sigma_s=np.full(delta.shape, 90e-9))
+    plan = PLAN.changed(method=method)
+    assert stop_at_noise(plan, 100e-9, stated).numerics.stop_rms_s == pytest.approx(stop_s)
+    # What predicts better than the noise shows that there is less of it.
+    assert stop_at_noise(plan, 50e-9, stated).numerics.stop_rms_s is None
+    asked = plan.changed(stop_rms_s=5e-9)
+    assert stop_at_noise(asked, 100e-9, stated) == asked
 
 
 def test_the_noise_is_stated_or_estimated(scan):
