@@ -93,7 +93,7 @@ REFUSED: dict[str, tuple[bytes, str]] = {
     # OBJ.
     "no faces": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "faces"),
     "an index beyond": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999\n", "file"),
-    "an index of nothing": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 0 0\n", "vertices"),
+    "an index of nothing": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 0 0\n", "faces"),
     "an endless place": (b"v inf 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertices"),
     "a library of looks": (b"mtllib /etc/passwd\nv 0 0 0\nv x y z\nf 1 2 3\n", "file"),
     # OFF.
