@@ -8,6 +8,7 @@ from bentray_kernels.ranges import Range
 from .tables import table
 
 MEANING = {
+    "LEFT_OUT": "share of the pairs that an examination may leave out",
     "ELEMENTS": "elements",
     "EMISSIONS": "emissions of a slice",
     "RECEIVERS": "receivers of an emission",
