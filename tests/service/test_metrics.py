@@ -96,7 +96,8 @@ def test_an_operator_sees_who_waits_what_repeats_and_how_long_it_takes(
     dataset = uploaded(http)
     work.hold.clear()
     jobs = [submitted(http, dataset)["id"] for _ in range(3)]
-    until(http, jobs[0], "running")
+    for job in jobs[:2]:
+        until(http, job, "running")
     assert value(http, "bentray_tenant_jobs", tenant="local", state="queued") == 1
     assert (
         0

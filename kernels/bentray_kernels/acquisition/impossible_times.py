@@ -32,6 +32,9 @@ CERTAIN = 5.0
 # zeros lies on one side of the diagonal.
 MIN_BOTH, ONE_TRIANGLE = 30, 0.9
 
+# Rounding of a placeholder.
+SAME = 1e-6
+
 # Half a matrix of arrivals has at least this part of its times impossible.
 HALF = 0.35
 
@@ -131,7 +134,7 @@ def _impossible(times: Floats, geometry: Geometry, *, absolute: bool) -> Iterato
             )
         else:
             return
-    times = np.where(flags, np.nan, times)
+        times = np.where(flags, np.nan, times)
     nearest = 0.0 if absolute else _nearest(geometry)
     if least <= -nearest:
         early = _at_once(times, geometry, absolute=absolute)
@@ -189,10 +192,12 @@ def _placeholders(times: Floats) -> Flags:
     for unit in UNITS:
         for number in PLACEHOLDERS:
             value = number * unit
-            if not known.min() <= value <= known.max():
+            low, high = sorted((value * (1.0 - SAME), value * (1.0 + SAME)))
+            # Without arrays of floating-point numbers, since scans are large and most have no placeholder.
+            if ((known >= low) & (known <= high)).sum() < REPEATED:
                 continue
-            same = np.isclose(times, value, rtol=1e-6, atol=0.0)
-            if same.sum() < REPEATED or same.sum() == known.size:
+            same = (times >= low) & (times <= high)
+            if same.sum() == known.size:
                 continue
             others = times[np.isfinite(times) & ~same & ~flags]
             low, high = np.percentile(others, OUTSIDE)
@@ -226,8 +231,8 @@ def _is_half(flags: Flags, times: Floats, geometry: Geometry) -> bool:
 def _one_way(times: Floats, geometry: Geometry) -> Flags:
     """(ntx, nrx): differences of 0 of pairs whose other direction says otherwise."""
     none = np.zeros(times.shape, dtype=bool)
-    zero = times == 0.0
-    if not zero.any() or zero.all():
+    zero = (times == 0.0) & (geometry.tx[:, None] != geometry.rx[None, :])
+    if not zero.any() or not (times != 0.0).any():
         return none
     reverse = _reverse(times, geometry)
     off = np.where(np.isfinite(times) & np.isfinite(reverse), times - reverse, np.nan)

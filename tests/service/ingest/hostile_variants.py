@@ -148,7 +148,7 @@ MESHES: dict[str, tuple[bytes, str]] = {
     "OBJ with an empty vertex": (CORNERS + b"v\nf 1 2 3\n", "vertices"),
     "OBJ beyond all numbers": (b"v 1e400 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertices"),
     "OBJ with words in a face": (CORNERS + b"f a b c\n", "file"),
-    "OBJ with a face before the first vertex": (CORNERS + b"f -9 -8 -7\n", "file"),
+    "OBJ with a face before the first vertex": (CORNERS + b"f -9 -8 -7\n", "faces"),
     "PLY with a face of two": (face(2, "0 1"), "faces"),
     "PLY with a face of one": (face(1, "0"), "faces"),
     "glTF nodes in a circle": (nodes([1], [0]), "nodes"),

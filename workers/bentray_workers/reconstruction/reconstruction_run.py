@@ -101,7 +101,7 @@ def reconstruct(
     if settings.picking.examine or findings.findings:
         estimated["quality"] = findings.words(stacked=result.speed.ndim == 3)
     result = replace(result, provenance={**result.provenance, **estimated})
-    header = read_dataset(dataset_path, traces=False)
+    header = read_dataset(dataset_path, traces=False, plausible=False)
     picks = header.tof_s is None and header.delta_tof_s is None
     return with_settings_caution(result, requested, picks=picks)
 
@@ -110,7 +110,7 @@ def _estimated(
     job: _Job, findings: ScanFindings, water_temperature_c: float | None, *, attenuation: bool
 ) -> dict[str, str]:
     """Entries of the provenance about the scan: frequency, what was estimated of the pulse, and the water."""
-    scan = read_dataset(job.scan, traces=False)
+    scan = read_dataset(job.scan, traces=False, plausible=False)
     estimated = {}
     frequency = scan.amplitude_frequency_hz or scan.center_frequency_hz
     spectrum = spectrum_of(job.scan, scan)

@@ -13,16 +13,17 @@ from .read import read_dataset
 from .traces import emissions_in
 
 
-def read_scan(path: Path) -> Dataset:
+def read_scan(path: Path, *, plausible: bool = True) -> Dataset:
     """A dataset without its traces; a missing centre frequency is estimated from them.
 
     Args:
         path: of the HDF5 file.
+        plausible: as ``read_dataset`` takes it.
 
     Raises:
         InvalidInput: as ``read_dataset``, and for traces without a pulse where the frequency is missing.
     """
-    dataset = read_dataset(path, traces=False)
+    dataset = read_dataset(path, traces=False, plausible=plausible)
     spectrum = spectrum_of(path, dataset)
     if spectrum is None:
         return dataset
