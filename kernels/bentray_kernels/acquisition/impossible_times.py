@@ -245,7 +245,7 @@ def _one_way(times: Floats, geometry: Geometry) -> Flags:
             # Directions disagree anyway: the order of the elements is wrong, or noise is strong.
             return none
         # Times in coarse steps differ by one or two of them.
-        allowed = max(CERTAIN * deviation, 2.5 * _step(times[np.isfinite(times) & ~zero]))
+        allowed = max(CERTAIN * deviation, 2.5 * _step(times[np.isfinite(times) & (times != 0.0)]))
     elif not _is_half(contrary, times, geometry):
         return none
     return np.asarray(contrary & (np.abs(off) > allowed))
