@@ -26,15 +26,15 @@ class Task(NamedTuple):
     Attributes:
         keep_on_worker: only other tasks need the result, so it may stay where it was computed;
             ``TaskGraph.after`` then gets a handle, which replaces the value in arguments of later tasks.
-        together: takes a list of arguments of tasks with the same ``together`` and returns a list of their
-            results, which are the same as one by one; None: each task runs by itself. For devices, which are
-            faster with many tasks at a time.
+        batch_function: runs tasks with the same ``batch_function``: takes a list of their arguments and
+            returns a list of their results, which are the same as one by one; None: each task runs by itself.
+            For devices, which are faster with many tasks at a time.
     """
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...] = ()
     keep_on_worker: bool = False
-    together: Callable[[list[tuple[Any, ...]]], list[Any]] | None = None
+    batch_function: Callable[[list[tuple[Any, ...]]], list[Any]] | None = None
 
 
 class TaskGraph(Protocol):
@@ -95,7 +95,7 @@ class Pool(Protocol):
     """Where tasks run: threads of this process, or workers of a cluster."""
 
     def devices(self) -> int:
-        """Over how many calls tasks with ``together`` are distributed, at least 1."""
+        """Over how many calls tasks with ``batch_function`` are distributed, at least 1."""
 
     def may_submit(self, running: int, ready: int) -> bool:
         """Whether to submit another task.
@@ -141,23 +141,23 @@ def run(
     try:
         while ready or running:
             while pool.may_submit(len(running), len(ready)):
-                some = _taken(ready, pool)
-                running[pool.submit(_joint(some))] = some
+                group = _next_group(ready, pool)
+                running[pool.submit(_batched_task(group))] = group
             finished = pool.finished(list(running))
             while finished:
                 handle = finished.pop(0)
-                some = running.pop(handle)
+                group = running.pop(handle)
                 retry, result = pool.result(handle)
                 # While anything refers to a result, a cluster computes it again if its worker dies.
                 del handle
                 if retry is not None:
-                    running[retry] = some
+                    running[retry] = group
                     continue
-                results = [result] if some[0][1].together is None else result
+                results = [result] if group[0][1].batch_function is None else result
                 del result
-                for name, task in some:
+                for name, task in group:
                     following = graphs[name].after(task, results.pop(0))
-                    ready.extendleft((name, one) for one in reversed(following))
+                    ready.extendleft((name, next_task) for next_task in reversed(following))
                     if on_result is not None:
                         on_result(name)
             if stop is not None and stop():
@@ -166,25 +166,29 @@ def run(
         pool.cancel(list(running))
 
 
-def _taken(ready: deque[tuple[str, Task]], pool: Pool) -> list[tuple[str, Task]]:
+def _next_group(ready: deque[tuple[str, Task]], pool: Pool) -> list[tuple[str, Task]]:
     """The next task, and those that run together with it; they are no longer ready."""
     first = ready.popleft()
-    if first[1].together is None:
+    if first[1].batch_function is None:
         return [first]
-    same = [first, *(one for one in ready if one[1].together is first[1].together)]
-    some = same[: -(-len(same) // pool.devices())]
+    same = [first, *(entry for entry in ready if entry[1].batch_function is first[1].batch_function)]
+    group = same[: -(-len(same) // pool.devices())]
     # By identity: arrays among arguments have no truth value.
-    taken = {id(one) for one in some}
-    left = [one for one in ready if id(one) not in taken]
+    taken = {id(entry) for entry in group}
+    left = [entry for entry in ready if id(entry) not in taken]
     ready.clear()
     ready.extend(left)
-    return some
+    return group
 
 
-def _joint(some: list[tuple[str, Task]]) -> Task:
-    """One task for several."""
-    task = some[0][1]
-    return task if task.together is None else Task(task.together, ([one.arguments for _, one in some],))
+def _batched_task(group: list[tuple[str, Task]]) -> Task:
+    """One task that runs a group of tasks."""
+    first = group[0][1]
+    return (
+        first
+        if first.batch_function is None
+        else Task(first.batch_function, ([task.arguments for _, task in group],))
+    )
 
 
 def run_resumable(
@@ -194,7 +198,7 @@ def run_resumable(
     on_result: Callable[[], None],
     stop: Callable[[], bool] | None = None,
 ) -> None:
-    """As ``run`` for graphs whose states are saved after each result and restored before the first task.
+    """Run graphs whose states are saved after each result and restored before the first task.
 
     ``on_result`` is called at the start too, unless all graphs are restored as finished.
     """

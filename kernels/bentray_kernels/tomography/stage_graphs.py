@@ -90,7 +90,7 @@ class SartStage(Stage):
 
     def first(self) -> list[Task]:
         arguments = (*self._at, self.state, self._batch)
-        return [Task(update_sart, arguments, together=self._together)]
+        return [Task(update_sart, arguments, batch_function=self._together)]
 
     def after(self, task: Task, result: Any) -> list[Task]:
         before = self.state.emitter

@@ -1,4 +1,4 @@
-"""Device memory of emitters in flight: tiles of emitters, and checkpoints where stored fields do not fit."""
+"""Device memory of a batch of shots: tiles of emitters, and checkpoints where stored fields do not fit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..errors import InvalidInput
 
 
 @dataclass(frozen=True)
-class FlightSize:
+class ShotSize:
     """Numbers of an emitter's arrays on the device.
 
     Attributes:
@@ -48,7 +48,7 @@ class FlightSize:
         return self.itemsize * max(self.field, self.held(segments) * self.image, self.samples, self.image)
 
 
-class FlightPlan(NamedTuple):
+class ShotPlan(NamedTuple):
     """How many emitters are in flight, and how their time loop is divided.
 
     Attributes:
@@ -60,7 +60,7 @@ class FlightPlan(NamedTuple):
     segments: int
 
     @classmethod
-    def of(cls, size: FlightSize, limit_bytes: float, array_bytes: float) -> FlightPlan:
+    def of(cls, size: ShotSize, limit_bytes: float, array_bytes: float) -> ShotPlan:
         """The plan with the fewest segments that holds an emitter.
 
         Args:

@@ -1,4 +1,4 @@
-"""A medium and its receivers on an OpenCL device, and how many emitters it has in flight."""
+"""A medium and its receivers on an OpenCL device, and how many emitters it has in batch."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..opencl.program import Program
 from .device_grid import ROWS, DeviceGrid, Gather, Group
-from .device_memory import FlightPlan, FlightSize
+from .device_memory import ShotPlan, ShotSize
 from .medium import Medium
 from .points import REACH, Points
 from .simulation import Unknown
@@ -99,14 +99,14 @@ class DeviceWaves:
             self.gathered = len(gather.node)
 
     @property
-    def size(self) -> FlightSize:
+    def size(self) -> ShotSize:
         """Numbers of an emitter's arrays."""
         samples = self.scan.steps * len(self.scan.receivers.first)
         image = self.grid.rows * self.grid.shape[-1]
-        return FlightSize(self.grid.plane, image, self.scan.slots, samples, self.kind.itemsize)
+        return ShotSize(self.grid.plane, image, self.scan.slots, samples, self.kind.itemsize)
 
-    def plan(self, memory_bytes: float = math.inf) -> FlightPlan:
-        """How many emitters are in flight.
+    def plan(self, memory_bytes: float = math.inf) -> ShotPlan:
+        """How many emitters are in batch.
 
         Args:
             memory_bytes: limit beside that of the device.
@@ -116,7 +116,7 @@ class DeviceWaves:
         """
         handle = self.session.handle
         limit = min(memory_bytes, MEMORY_SHARE * handle.global_mem_size)
-        plan = FlightPlan.of(self.size, limit, handle.max_mem_alloc_size)
+        plan = ShotPlan.of(self.size, limit, handle.max_mem_alloc_size)
         if not _is_processor(handle):
             return plan
         return plan._replace(emitters=min(plan.emitters, handle.max_compute_units, PROCESSOR_EMITTERS))

@@ -19,7 +19,7 @@ from .time_blocks import Poll, no_poll
 
 if TYPE_CHECKING:
     from ..opencl.session import Session
-    from .device_flight import Flight
+    from .device_shots import ShotBatch
 
 # What simulates the waves.
 Engine = Literal["compiled", "opencl"]
@@ -104,7 +104,7 @@ def simulate_emissions(
             yield simulate(medium, emitter, at, emissions.wavelet, poll, until)
         return
     from ..opencl.lost_device import computing_on
-    from .device_flight import Flight
+    from .device_shots import ShotBatch
     from .device_waves import DeviceWaves, Scan, tiles
 
     with computing_on(session):
@@ -112,9 +112,9 @@ def simulate_emissions(
         plan = waves.plan(memory_bytes)
         pulse, scale = _normalised(medium, emissions.wavelet)
         for tile in tiles(len(emissions.emitters), plan.emitters):
-            flight = Flight(waves, _some(sources, tile), pulse, 1, poll)
-            flight.forward()
-            for k, samples in enumerate(flight.traces(), tile.start):
+            batch = ShotBatch(waves, _some(sources, tile), pulse, 1, poll)
+            batch.forward()
+            for k, samples in enumerate(batch.traces(), tile.start):
                 yield _traces(emissions, k, samples, scale)
 
 
@@ -134,7 +134,7 @@ def emission_misfits(
         yield from (misfit(k, traces)[0] for k, traces in enumerate(simulated))
         return
     from ..opencl.lost_device import computing_on
-    from .device_flight import Flight
+    from .device_shots import ShotBatch
     from .device_waves import DeviceWaves, Scan, tiles
 
     sources, receivers = place_scan(medium, *emissions.elements, emissions.wavelet)
@@ -142,9 +142,9 @@ def emission_misfits(
         waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
         pulse, scale = _normalised(medium, emissions.wavelet)
         for tile in tiles(len(emissions.emitters), waves.plan(memory_bytes).emitters):
-            flight = Flight(waves, _some(sources, tile), pulse, 1, poll)
-            flight.forward()
-            yield from _compared(flight, observed, tile, scale)[0].tolist()
+            batch = ShotBatch(waves, _some(sources, tile), pulse, 1, poll)
+            batch.forward()
+            yield from _compared(batch, observed, tile, scale)[0].tolist()
 
 
 def misfit_gradients(
@@ -160,7 +160,7 @@ def misfit_gradients(
 ) -> Iterator[MisfitGradient]:
     """Misfit and gradient of each emission, in their order; see ``misfit_gradient``.
 
-    On a device an emission's gradient has the same bits on every run, however many emissions are in flight.
+    On a device an emission's gradient has the same bits on every run, however many emissions are in batch.
     It differs from that of compiled code by less than 1e-4 of its largest value in float32. Where the stored
     fields of one emission do not fit, checkpoints take their place, and most steps forwards are made twice.
 
@@ -191,7 +191,7 @@ def misfit_gradients(
             yield misfit_gradient(medium, emitter, at, emissions.wavelet, compare, every, by, poll, until)
         return
     from ..opencl.lost_device import computing_on
-    from .device_flight import Flight
+    from .device_shots import ShotBatch
     from .device_waves import DeviceWaves, Scan, tiles
 
     with computing_on(session):
@@ -199,36 +199,36 @@ def misfit_gradients(
         plan = waves.plan(memory_bytes)
         pulse, scale = _normalised(medium, emissions.wavelet)
         for tile in tiles(len(emissions.emitters), plan.emitters):
-            flight = Flight(waves, _some(sources, tile), pulse, plan.segments, poll)
-            flight.forward()
+            batch = ShotBatch(waves, _some(sources, tile), pulse, plan.segments, poll)
+            batch.forward()
             if observed is None:
-                values, factors = _compared_here(flight, emissions, misfit, tile, scale)
+                values, factors = _compared_here(batch, emissions, misfit, tile, scale)
             else:
-                values, divisors = _compared(flight, observed, tile, scale)
+                values, divisors = _compared(batch, observed, tile, scale)
                 # The residuals are derivatives by samples in the unit of the device.
                 factors = 1.0 / (divisors * scale)
-            for value, factor, image, light in zip(values, factors, *flight.backward(), strict=True):
+            for value, factor, image, light in zip(values, factors, *batch.backward(), strict=True):
                 summed = factor * image.astype(np.float64)
                 yield gradient_of(medium, scale, float(value), summed, light.astype(np.float64), every, by)
 
 
-def _compared(flight: Flight, observed: Observed, tile: slice, scale: float) -> tuple[Floats, Floats]:
+def _compared(batch: ShotBatch, observed: Observed, tile: slice, scale: float) -> tuple[Floats, Floats]:
     """Misfits of emissions in flight, and divisors of the residuals that have replaced their traces."""
     recorded, weight = zip(*(observed.traces(k) for k in range(tile.start, tile.stop)), strict=True)
-    return flight.compare(observed.program, np.stack(recorded), np.stack(weight), 1.0 / scale)
+    return batch.compare(observed.program, np.stack(recorded), np.stack(weight), 1.0 / scale)
 
 
 def _compared_here(
-    flight: Flight, emissions: Emissions, misfit: EmissionMisfit, tile: slice, scale: float
+    batch: ShotBatch, emissions: Emissions, misfit: EmissionMisfit, tile: slice, scale: float
 ) -> tuple[Floats, Floats]:
     """Misfits of emissions in flight, and factors of the residuals that have replaced their traces."""
-    traces = flight.traces()
+    traces = batch.traces()
     residuals, values, factors = np.zeros_like(traces), np.empty(len(traces)), np.empty(len(traces))
     for k, (samples, valid) in enumerate(zip(traces, emissions.valid[tile], strict=True)):
         values[k], residual = misfit(tile.start + k, _traces(emissions, tile.start + k, samples, scale))
         factors[k] = np.abs(residual).max(initial=0.0)
         residuals[k][:, valid] = (residual / (factors[k] or 1.0)).T
-    flight.replace_traces(residuals)
+    batch.replace_traces(residuals)
     return values, factors
 
 

@@ -165,7 +165,7 @@ class Runner:
             # Before the query: a job queued later wakes this thread again.
             self._wake.clear()
             try:
-                if self._begin():
+                if self._start_next():
                     continue
             except DatabaseUnavailable:
                 # Already logged; the thread continues.
@@ -175,10 +175,10 @@ class Runner:
                 log.exception("no job could be claimed; next attempt in %g s", IDLE_SECONDS)
             self._wake.wait(IDLE_SECONDS)
 
-    def _begin(self) -> bool:
+    def _start_next(self) -> bool:
         """Start the next job, if any; returns whether one was started."""
         running = len(self._running)
-        if running >= self._most or not self._has_room() or self._files.store.fault() is not None:
+        if running >= self._most or not self._has_free_space() or self._files.store.fault() is not None:
             return False
         job = self._queue.claim(idle_only=running >= self._at_once)
         if job is None:
@@ -202,7 +202,7 @@ class Runner:
             del self._running[threading.current_thread()]
             self._wake.set()
 
-    def _has_room(self) -> bool:
+    def _has_free_space(self) -> bool:
         return shutil.disk_usage(self._files.root).free >= self._min_free_bytes
 
     def _run(self, job: JobRow) -> None:
@@ -236,10 +236,10 @@ class Runner:
                 )
                 work_dir = files.work(job_id)
                 result = kind.run(JobRun(client, source, job["settings"], target, work_dir, control))
-            self._keep(target, reporter)
+            self._publish_result(target, reporter)
         except Cancelled:
             if not reporter.lost:
-                self._settle(job_id, lambda: self._stopped(job_id, files, reporter))
+                self._store_outcome(job_id, lambda: self._stopped(job_id, files, reporter))
                 self._count_end(job)
         except (*UNAVAILABLE, DatabaseUnavailable, StorageUnavailable) as error:
             kinds = (
@@ -249,19 +249,21 @@ class Runner:
             )
             away = next(name for kind, name in kinds if isinstance(error, kind))
             reason = f"no answer from the {away}; the job continues when available"
-            self._put_back(job_id, reason, error)
+            self._requeue(job_id, reason, error)
             self.metrics.count_retries(away)
             self._leaving.wait(IDLE_SECONDS)
         except Exception as error:
-            if isinstance(error, OSError) and error.errno in FULL and not self._has_room():
-                self._put_back(job_id, "the disk is full; the job continues once there is space", error)
+            if isinstance(error, OSError) and error.errno in FULL and not self._has_free_space():
+                self._requeue(job_id, "the disk is full; the job continues once there is space", error)
                 self.metrics.count_retries("disk")
                 return
             problem = explain(job_id, error).model_dump(exclude_none=True)
-            self._settle(job_id, lambda: self._failed(job_id, files, reporter, problem))
+            self._store_outcome(job_id, lambda: self._failed(job_id, files, reporter, problem))
             self._count_end(job)
         else:
-            self._settle(job_id, lambda: self._succeeded(job_id, files, reporter, kind, result, target))
+            self._store_outcome(
+                job_id, lambda: self._succeeded(job_id, files, reporter, kind, result, target)
+            )
             self._count_end(job)
 
     def _count_end(self, job: JobRow) -> None:
@@ -275,12 +277,12 @@ class Runner:
         else:
             self.metrics.count_retries("service")
 
-    def _put_back(self, job_id: str, reason: str, error: BaseException) -> None:
+    def _requeue(self, job_id: str, reason: str, error: BaseException) -> None:
         """Queue a job again for a reason outside of the job."""
         log.warning("%s waits: %s (%s)", job_id, reason, error)
-        self._settle(job_id, lambda: self._queue.release(job_id, reason))
+        self._store_outcome(job_id, lambda: self._queue.release(job_id, reason))
 
-    def _keep(self, target: Path, reporter: Reporter) -> None:
+    def _publish_result(self, target: Path, reporter: Reporter) -> None:
         """Publish a result in the store; repeated while the store is unavailable.
 
         Raises:
@@ -330,7 +332,7 @@ class Runner:
             self._queue.mark_cancelled(job_id)
         files.drop_work(job_id)
 
-    def _settle(self, job_id: str, write_the_end: Callable[[], None]) -> None:
+    def _store_outcome(self, job_id: str, write_the_end: Callable[[], None]) -> None:
         """Store the outcome of a job; repeated while the database is unavailable.
 
         After ``REFUSALS`` other errors of the database the job fails.

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.wave.device_memory import FlightPlan, FlightSize
+from bentray_kernels.wave.device_memory import ShotPlan, ShotSize
 
 SIZES = st.builds(
-    FlightSize,
+    ShotSize,
     st.integers(1, 10**6),
     st.integers(1, 10**6),
     st.integers(0, 300),
@@ -28,9 +28,9 @@ def test_a_plan_fits_or_there_is_none(size, limit, array):
     ]
     if not fitting:
         with pytest.raises(InvalidInput, match=f"at most {limit} bytes, {array} in one array"):
-            FlightPlan.of(size, limit, array)
+            ShotPlan.of(size, limit, array)
         return
-    plan = FlightPlan.of(size, limit, array)
+    plan = ShotPlan.of(size, limit, array)
     assert plan.segments == fitting[0]
     assert plan.emitters >= 1
     assert plan.emitters * size.bytes(plan.segments) <= limit
@@ -39,9 +39,9 @@ def test_a_plan_fits_or_there_is_none(size, limit, array):
 
 def test_a_volume_takes_checkpoints_of_a_few_dozen_fields():
     # 256 nodes a side with edges, 1000 steps, every fourth field: 250 stored ones would take 17 GB.
-    size = FlightSize(304**3, 256**3, 250, 1000 * 256, 4)
+    size = ShotSize(304**3, 256**3, 250, 1000 * 256, 4)
     assert size.bytes(1) > 17e9
-    plan = FlightPlan.of(size, 6e9, math.inf)
+    plan = ShotPlan.of(size, 6e9, math.inf)
     assert plan.emitters == 1
     assert 3 < plan.segments < 8
     assert size.bytes(plan.segments) < 6e9

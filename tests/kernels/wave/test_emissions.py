@@ -9,7 +9,7 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import OpenCLFallbackWarning, choice, session_or_warning
 from bentray_kernels.tomography.waveform import misfits
-from bentray_kernels.wave.device_flight import Flight
+from bentray_kernels.wave.device_shots import ShotBatch
 from bentray_kernels.wave.device_waves import OTHER_GROUP, PROCESSOR_GROUPS, DeviceWaves, Scan, tiles
 from bentray_kernels.wave.emissions import Observed, emission_misfits, misfit_gradients, simulate_emissions
 from bentray_kernels.wave.points import Points
@@ -169,10 +169,10 @@ def test_divided_time_loops_give_the_bits_of_whole_ones(every, segments):
     )
     found = []
     for number in (1, segments):
-        flight = Flight(waves, place_elements(host, EMITTERS[:2]), WAVELET / 3e4, number, no_poll)
+        batch = ShotBatch(waves, place_elements(host, EMITTERS[:2]), WAVELET / 3e4, number, no_poll)
         # The traces are the residuals.
-        flight.forward()
-        found.append((flight.traces(), *flight.backward()))
+        batch.forward()
+        found.append((batch.traces(), *batch.backward()))
     for whole, divided in zip(*found, strict=True):
         assert np.array_equal(whole, divided)
 
@@ -187,10 +187,10 @@ def test_groups_of_a_processor_and_of_a_gpu_give_the_same_bits(by):
     for group, tile in itertools.product((PROCESSOR_GROUPS[0], OTHER_GROUP), (slice(0, 5), slice(0, 2))):
         waves = DeviceWaves(session, host, scan, group)
         some = Points(sources.first[tile], sources.weights[tile])
-        flight = Flight(waves, some, WAVELET / np.abs(WAVELET).max(), 1, no_poll)
+        batch = ShotBatch(waves, some, WAVELET / np.abs(WAVELET).max(), 1, no_poll)
         # The traces are the residuals.
-        flight.forward()
-        found.append((flight.traces(), *flight.backward()))
+        batch.forward()
+        found.append((batch.traces(), *batch.backward()))
     for others in found[1:]:
         for expected, other in zip(found[0], others, strict=True):
             assert other.any()

@@ -5,7 +5,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import session_or_warning
-from bentray_kernels.wave.device_flight import Flight
+from bentray_kernels.wave.device_shots import ShotBatch
 from bentray_kernels.wave.device_waves import OTHER_GROUP, DeviceWaves, Scan
 from bentray_kernels.wave.emissions import Emissions, misfit_gradients, simulate_emissions
 from bentray_kernels.wave.medium import Medium
@@ -73,10 +73,10 @@ def test_divided_time_loops_give_the_bits_of_whole_ones(segments):
     found = []
     for group, number in ((None, 1), (OTHER_GROUP, segments)):
         waves = DeviceWaves(session_or_warning(""), host, scan, group)
-        flight = Flight(waves, place_elements(host, EMITTERS), WAVELET / 3e4, number, no_poll)
+        batch = ShotBatch(waves, place_elements(host, EMITTERS), WAVELET / 3e4, number, no_poll)
         # The traces are the residuals.
-        flight.forward()
-        found.append((flight.traces(), *flight.backward()))
+        batch.forward()
+        found.append((batch.traces(), *batch.backward()))
     for whole, divided in zip(*found, strict=True):
         assert whole.any()
         assert np.array_equal(whole, divided)

@@ -77,7 +77,7 @@ def test_tasks_that_run_together_get_their_own_results():
             self.name, self.results = name, []
 
         def first(self):
-            return [stage_graphs.Task(abs, (np.full(2, 3.0), self.name), together=self.run)]
+            return [stage_graphs.Task(abs, (np.full(2, 3.0), self.name), batch_function=self.run)]
 
         @staticmethod
         def run(calls):

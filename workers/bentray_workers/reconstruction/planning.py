@@ -45,7 +45,7 @@ from .memory.ray_memory import (
     state_bytes,
 )
 from .memory.reflection_memory import reflection_bytes, reflection_task_bytes, reflection_tasks
-from .memory.waveform_memory import budgeted, least_flight_bytes, wave_task_bytes, wave_tasks
+from .memory.waveform_memory import budgeted, least_batch_bytes, wave_task_bytes, wave_tasks
 from .reconstruction_cost import reconstruction_cost
 
 Decomposition = Literal["slices", "emitters", "volume"]
@@ -151,7 +151,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     check_reflection(settings, traces=scan.echoes is not None, in_space=scan.in_space)
     echoes = reflection_task_bytes(scan, settings)
     calls |= echoes
-    _check_device(scan, methods, least_flight_bytes(traces, scan.width_m, refining), fitting)
+    _check_device(scan, methods, least_batch_bytes(traces, scan.width_m, refining), fitting)
     limit = max((one.task_bytes for one in fitting), default=math.inf)
     name, size = max(calls.items(), key=lambda item: item[1])
     if size > limit:

@@ -123,7 +123,9 @@ def _place(checkpoint: Any) -> _Place | None:
         band, ends = checkpoint.band, checkpoint.ends
         if band is not None and band.frozen is None:
             grid = band.spacing, band.origin
-            return _Place(cast(int, band.state.base), False, len(ends), len(band.state.history), *grid)
+            return _Place(
+                cast(int, band.state.accepted_image), False, len(ends), len(band.state.history), *grid
+            )
         if ends:
             image, iteration = ends[-1].image, len(ends[-1].history)
             grid = image.spacing, image.origin

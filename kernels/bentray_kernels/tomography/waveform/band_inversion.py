@@ -20,7 +20,7 @@ from .waveform_settings import Steps, WaveSettings
 DARK = 0.1
 
 # Most times that a step which increases the misfit is shortened.
-MAX_SHORTENINGS = 4
+MAX_BACKTRACKS = 4
 
 # Cycle-skip guard: the band ends once the held-out misfit exceeds ``LEEWAY`` times its minimum in
 # ``PATIENCE`` consecutive images.
@@ -82,31 +82,31 @@ class InversionState:
     Attributes:
         image: (nx, ny), to be evaluated next. At the end the last accepted image; ``best`` if the band was
             skipped, and for the attenuation, which noise and errors of the speed affect first.
-        base: (nx, ny), the last accepted image, with its ``gradient`` (nx, ny).
-        misfit: of the base; infinite before the first evaluation.
-        way: (nx, ny), the step from the base to the image.
+        accepted_image: (nx, ny), the last one, with its ``gradient`` (nx, ny).
+        misfit: of the accepted image; infinite before the first evaluation.
+        step: (nx, ny), from the accepted image to the image.
         illumination: (nx, ny), of the first image; used in all steps of the band.
         steps, changes: (pairs, nx, ny), differences of images and of gradients.
         best: (nx, ny), the image with the lowest held-out misfit, ``best_held``.
-        risen: consecutive images with a higher held-out misfit.
-        shortenings: of the current step.
+        consecutive_increases: consecutive images with a higher held-out misfit.
+        backtracks: of the current step.
         skipped: whether the held-out misfit ended the band: cycles were skipped or noise was fitted.
         done: whether the band has ended.
         history: a record for each image.
     """
 
     image: Floats
-    base: Floats
+    accepted_image: Floats
     gradient: Floats
     misfit: float
-    way: Floats
+    step: Floats
     illumination: Floats
     steps: Floats
     changes: Floats
     best: Floats
     best_held: float
-    risen: int = 0
-    shortenings: int = 0
+    consecutive_increases: int = 0
+    backtracks: int = 0
     skipped: bool = False
     done: bool = False
     history: tuple[Evaluation, ...] = ()
@@ -157,10 +157,10 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: I
     here, observed = parts(used)
     misfit = 0.0
     gradient, illumination = np.zeros_like(model.speed), np.zeros_like(model.speed)
-    for one in misfit_gradients(medium, emissions(used), here, problem.every, by, poll, engine, observed):
-        misfit += one.misfit
-        gradient += one.gradient
-        illumination += one.illumination
+    for shot in misfit_gradients(medium, emissions(used), here, problem.every, by, poll, engine, observed):
+        misfit += shot.misfit
+        gradient += shot.gradient
+        illumination += shot.illumination
     return EmitterMisfit(misfit, held, gradient, illumination)
 
 
@@ -172,76 +172,76 @@ def step(
     held = sum(part.held for part in parts) / problem.held.size if problem.held.size else math.nan
     gradient = np.where(problem.region, sum(part.gradient for part in parts), 0.0) / problem.used.size
     if not state.history:
-        light = sum(part.illumination for part in parts)
-        state = replace(state, illumination=np.asarray(light))
+        illumination = sum(part.illumination for part in parts)
+        state = replace(state, illumination=np.asarray(illumination))
     accepted = misfit < state.misfit
     history = (*state.history, Evaluation(misfit, held, accepted))
     state = replace(state, history=history)
     if not accepted:
-        return _shortened(problem, settings.steps(problem.band.of), state, misfit)
+        return _backtracked(problem, settings.steps(problem.band.of), state, misfit)
     steps, changes = state.steps, state.changes
     if len(history) > 1:
         steps, changes = append_pair(
-            steps, changes, state.image - state.base, gradient - state.gradient, settings.memory
+            steps, changes, state.image - state.accepted_image, gradient - state.gradient, settings.memory
         )
-    risen = state.risen + 1 if held > LEEWAY * state.best_held else 0
+    consecutive_increases = state.consecutive_increases + 1 if held > LEEWAY * state.best_held else 0
     better = not problem.held.size or held < state.best_held
     best, best_held = (state.image, held) if better else (state.best, state.best_held)
     over = sum(record.accepted for record in history) > problem.band.iterations
-    skipped = risen >= PATIENCE
+    skipped = consecutive_increases >= PATIENCE
     state = replace(
         state,
-        base=state.image,
+        accepted_image=state.image,
         gradient=gradient,
         misfit=misfit,
         steps=steps,
         changes=changes,
         best=best,
         best_held=best_held,
-        risen=risen,
-        shortenings=0,
+        consecutive_increases=consecutive_increases,
+        backtracks=0,
         skipped=skipped,
     )
     if over or skipped or not gradient.any():
         return _ended(problem, state)
     limits = settings.steps(problem.band.of)
-    way = _search_direction(problem, limits, state)
-    return replace(state, way=way, image=np.clip(state.base + way, *limits.bounds))
+    direction = _search_direction(problem, limits, state)
+    return replace(state, step=direction, image=np.clip(state.accepted_image + direction, *limits.bounds))
 
 
 def _search_direction(problem: WaveProblem, limits: Steps, state: InversionState) -> Floats:
-    """The step from the base, (nx, ny): L-BFGS with the illumination as preconditioner."""
-    light = state.illumination
-    dim = 1.0 / np.sqrt(light + DARK * light[problem.region].mean())
+    """The step from the accepted image, (nx, ny): L-BFGS with the illumination as preconditioner."""
+    illumination = state.illumination
+    preconditioner = 1.0 / np.sqrt(illumination + DARK * illumination[problem.region].mean())
     width = problem.band.smoothing_m / problem.band.spacing_m
 
     def prior(image: Floats) -> Floats:
         # Symmetric, as a metric must be: the root of the illumination before the smoothing and after it.
-        smooth = gaussian_filter(np.where(problem.region, dim * image, 0.0), width)
-        return np.where(problem.region, dim * smooth, 0.0)
+        smooth = gaussian_filter(np.where(problem.region, preconditioner * image, 0.0), width)
+        return np.where(problem.region, preconditioner * smooth, 0.0)
 
-    way = -search_direction(state.gradient, state.steps, state.changes, prior)
-    size = float(np.sqrt((way[problem.region] ** 2).mean()))
+    direction = -search_direction(state.gradient, state.steps, state.changes, prior)
+    size = float(np.sqrt((direction[problem.region] ** 2).mean()))
     if not len(state.steps):
-        return way * (limits.first / size)
-    return way * min(1.0, limits.largest / size)
+        return direction * (limits.first / size)
+    return direction * min(1.0, limits.largest / size)
 
 
 def _ended(problem: WaveProblem, state: InversionState) -> InversionState:
     by_held_out = state.skipped or problem.band.of == "attenuation"
-    return replace(state, image=state.best if by_held_out else state.base, done=True)
+    return replace(state, image=state.best if by_held_out else state.accepted_image, done=True)
 
 
-def _shortened(problem: WaveProblem, limits: Steps, state: InversionState, misfit: float) -> InversionState:
+def _backtracked(problem: WaveProblem, limits: Steps, state: InversionState, misfit: float) -> InversionState:
     """A shorter step in the same direction, to the minimum of the parabola through both misfits."""
-    if state.shortenings == MAX_SHORTENINGS:
+    if state.backtracks == MAX_BACKTRACKS:
         return _ended(problem, state)
-    fall = float((state.gradient * state.way).sum())
+    fall = float((state.gradient * state.step).sum())
     bend = misfit - state.misfit - fall
     factor = min(max(-0.5 * fall / bend, 0.1), 0.5) if bend > 0.0 else 0.5
-    way = factor * state.way
-    moved = np.clip(state.base + way, *limits.bounds)
-    return replace(state, way=way, image=moved, shortenings=state.shortenings + 1)
+    direction = factor * state.step
+    moved = np.clip(state.accepted_image + direction, *limits.bounds)
+    return replace(state, step=direction, image=moved, backtracks=state.backtracks + 1)
 
 
 def given_by(history: Sequence[Evaluation], *, by_held_out: bool) -> int:

@@ -52,10 +52,10 @@ def test_the_first_step_has_the_set_size_and_reduces_the_misfit(problem):
 
 def test_step_that_increases_the_misfit_is_shortened_then_rejected(problem):
     state = first(problem)
-    sizes = [np.abs(state.way).max()]
+    sizes = [np.abs(state.step).max()]
     while not state.done:
         state = step(problem, SETTINGS, state, told(problem, 2.0, 1.0))
-        sizes.append(np.abs(state.way).max())
+        sizes.append(np.abs(state.step).max())
     assert len(state.history) == 2 + MAX_SHORTENINGS
     assert all(later < earlier for earlier, later in pairwise(sizes[:-1]))
     assert (state.image == WATER).all()
@@ -64,7 +64,7 @@ def test_step_that_increases_the_misfit_is_shortened_then_rejected(problem):
 
 def test_it_stops_when_the_held_out_misfit_rises(problem):
     state = step(problem, SETTINGS, first(problem), told(problem, 0.9, 0.9, 1))
-    liked = state.base
+    liked = state.accepted_image
     for k in range(PATIENCE):
         assert not state.done
         state = step(problem, SETTINGS, state, told(problem, 0.8 - 0.1 * k, 1.5, 2 + k))
@@ -121,7 +121,7 @@ def test_it_ends_after_its_iterations(problem):
         assert not state.done
         state = step(problem, SETTINGS, state, told(problem, 0.9 - 0.1 * k, 0.9, k + 1))
     assert state.done
-    assert np.array_equal(state.image, state.base)
+    assert np.array_equal(state.image, state.accepted_image)
 
 
 def test_bounds_hold(problem):

@@ -12,7 +12,7 @@ from bentray_kernels.tomography.waveform.band_grid import Extent
 from bentray_kernels.tomography.waveform.source_calibration import SHOTS
 from bentray_kernels.tomography.waveform.validation import validation_settings
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
-from bentray_kernels.wave.device_memory import FlightSize
+from bentray_kernels.wave.device_memory import ShotSize
 from bentray_kernels.wave.device_waves import PROCESSOR_EMITTERS
 
 from ...files.dataset.counts import Traces
@@ -101,7 +101,7 @@ def wave_task_bytes(traces: Traces | None, width_m: float, settings: Settings) -
     return sizes
 
 
-def least_flight_bytes(traces: Traces | None, width_m: float, settings: Settings) -> int:
+def least_batch_bytes(traces: Traces | None, width_m: float, settings: Settings) -> int:
     """Device memory of one emitter over all bands, with checkpoints where these help; 0: none."""
     if traces is None or wave_engine(settings) != "opencl":
         return 0
@@ -111,15 +111,15 @@ def least_flight_bytes(traces: Traces | None, width_m: float, settings: Settings
     least = 0
     for band in bands:
         extent = Extent.of(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
-        flight = _flight(traces, extent)
-        least = max(least, min(flight.bytes(segments) for segments in range(1, max(1, flight.slots) + 1)))
+        batch = _shot_size(traces, extent)
+        least = max(least, min(batch.bytes(segments) for segments in range(1, max(1, batch.slots) + 1)))
     return least
 
 
-def _flight(traces: Traces, extent: Extent) -> FlightSize:
+def _shot_size(traces: Traces, extent: Extent) -> ShotSize:
     """An emitter on a device."""
     stored, samples = -(-extent.steps // extent.every), traces.receivers * extent.steps
-    return FlightSize(int(FILLED * extent.padded), extent.nodes**2, stored, samples, 4)
+    return ShotSize(int(FILLED * extent.padded), extent.nodes**2, stored, samples, 4)
 
 
 def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) -> dict[str, int]:
@@ -136,10 +136,10 @@ def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) 
     in_flight = 4 * extent.nodes**2 * stored
     if wave_engine(settings) == "opencl":
         base += OBSERVED_BYTES * samples * looks
-        flight = _flight(traces, extent).bytes(1)
+        batch = _shot_size(traces, extent).bytes(1)
         # A processor as a device has its arrays in the memory of the worker; a GPU holds more emitters.
         in_flight = (
-            PROCESSOR_EMITTERS * flight + (OBSERVED_BYTES * samples + FOUND_BYTES * extent.nodes**2) * looks
+            PROCESSOR_EMITTERS * batch + (OBSERVED_BYTES * samples + FOUND_BYTES * extent.nodes**2) * looks
         )
     return {
         "start_band": base

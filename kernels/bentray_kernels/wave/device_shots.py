@@ -1,4 +1,4 @@
-"""Emitters in flight on an OpenCL device: time loops forwards and backwards, without host round trips."""
+"""Batches of shots on an OpenCL device: time loops forwards and backwards, without host round trips."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ BLOCK_STEPS = 64
 POINTS_GROUP = 64
 
 
-class Flight:
-    """Some emitters of a scan, simulated together.
+class ShotBatch:
+    """Shots of some emitters of a scan, simulated together.
 
-    An emitter's results have the same bits whichever emitters are in flight with it, and whether its time
+    An emitter's results have the same bits whichever shots are in its batch, and whether its time
     loop is divided or not.
 
     Args:
         waves: the medium on the device.
         sources: the emitters on its grid.
         pulse: (steps,), their source.
-        segments: of the time loop, see ``device_memory.FlightPlan``.
+        segments: of the time loop, see ``device_memory.ShotPlan``.
         poll: see ``time_blocks``.
     """
 
