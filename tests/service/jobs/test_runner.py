@@ -173,7 +173,7 @@ def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monk
         answers.append(room[0])
         return answers[-1]
 
-    monkeypatch.setattr(runner, "_has_room", has_room)
+    monkeypatch.setattr(runner, "_has_free_space", has_room)
     work.hold.clear()
     work.error = OSError(errno.ENOSPC, "full")
     job = submitted(http, dataset)

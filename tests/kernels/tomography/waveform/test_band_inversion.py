@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography.waveform.band_inversion import (
-    MAX_SHORTENINGS,
+    MAX_BACKTRACKS,
     PATIENCE,
     EmitterMisfit,
     begin,
@@ -56,7 +56,7 @@ def test_step_that_increases_the_misfit_is_shortened_then_rejected(problem):
     while not state.done:
         state = step(problem, SETTINGS, state, told(problem, 2.0, 1.0))
         sizes.append(np.abs(state.step).max())
-    assert len(state.history) == 2 + MAX_SHORTENINGS
+    assert len(state.history) == 2 + MAX_BACKTRACKS
     assert all(later < earlier for earlier, later in pairwise(sizes[:-1]))
     assert (state.image == WATER).all()
     assert not state.skipped
