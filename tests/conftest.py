@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from bentray_kernels.opencl import VARIABLE, Session, choose
+from bentray_kernels.opencl import VARIABLE, Session, select_device
 
 from . import opencl, postgresql
 from . import small_disk as small
@@ -154,7 +154,7 @@ def opencl_session() -> Session:
     """The device that passes its trial on this machine, open. Skips with the reason where none does."""
     if opencl.refusal():
         pytest.skip(opencl.refusal())
-    device = choose().device
+    device = select_device().device
     assert device is not None
     return Session(device)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import cache
 
 from bentray_kernels.eikonal import METHODS
-from bentray_kernels.opencl import choose
+from bentray_kernels.opencl import select_device
 
 
 @cache
 def refusal() -> str:
     """Why no device can be used here; empty where one passes its trial."""
-    reason = choose().reason
+    reason = select_device().reason
     return reason and f"no OpenCL device passes its trial here: {reason}"
 
 

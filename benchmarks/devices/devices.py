@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from bentray_kernels.device_engines import ENGINES_COMPARED, Comparison, compare
-from bentray_kernels.opencl import Device, choose
+from bentray_kernels.opencl import Device, select_device
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
@@ -22,7 +22,7 @@ THEIR_PROJECTION_MS, FRAMES_PER_S = 2.2, 60.0
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Rows for each engine: the speed over compiled code, the difference, a rate; and for whole runs."""
-    choice = choose()
+    choice = select_device()
     if choice.device is None:
         yield Row("D1 engines on a device", None, WORTH_OTHER, ">=", "", choice.reason)
         return

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from bentray_kernels import eikonal
-from bentray_kernels.opencl import choose
+from bentray_kernels.opencl import select_device
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
@@ -29,7 +29,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     otherwise should equal it, and what claims to be more accurate should stay below.
     """
     nodes = 128 if context.quick else 256
-    device = choose().device
+    device = select_device().device
     names = [name for name in eikonal.methods() if device or not eikonal.METHODS[name].on_device]
     makers = (breast_case, gradient_case)
     cases = []

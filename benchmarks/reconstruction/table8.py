@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bentray_kernels import eikonal
-from bentray_kernels.opencl import choose
+from bentray_kernels.opencl import select_device
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
@@ -116,7 +116,7 @@ def least_seconds(run: Callable[[], object]) -> float:
 
 def opencl() -> tuple[str, str]:
     """The device that ``fim-opencl`` runs on, empty where there is none, and why it is none."""
-    choice = choose()
+    choice = select_device()
     if choice.device is not None:
         return choice.device.label, ""
     return "", "; ".join(choice.refusals) or "this machine has none"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from bentray_kernels.opencl import OpenCLFallbackWarning, choose
+from bentray_kernels.opencl import OpenCLFallbackWarning, select_device
 from bentray_kernels.refraction import Picture, RenderSettings, Scene, render
 from bentray_kernels.refraction.caster_opencl import OpenCLCaster, on_the_device
 from bentray_kernels.splines import Spline
@@ -74,7 +74,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 def _targets(precision: str) -> tuple[tuple[str, float, str, str], ...]:
     """Label, goal, comparison and unit of the three rows of a precision."""
     name = f"V3 OpenCL {precision}, {PIXELS}²"
-    device = choose().device
+    device = select_device().device
     worth = WORTH_SAME if device is not None and device.kind == "cpu" else WORTH_OTHER
     return (
         (f"{name}, frames", INTERACTIVE, ">=", "1/s"),

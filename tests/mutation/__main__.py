@@ -16,11 +16,11 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from .device_benchmark import Outcome, copy_of, replace_text, run_tests
 from .equivalent_faults import EQUIVALENT
 from .nearest_tests import PACKAGE, near, wide
 from .planted_faults import Fault
 from .sampling import entry, key, sample
-from .trial import Outcome, copy_of, replace_text, run_tests
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -1,4 +1,4 @@
-"""Everything that exists for OpenCL devices, beside compiled code: example problems, comparison and trial."""
+"""Test problems that compare OpenCL engines with compiled code, and their benchmark on a device."""
 
 from .comparison import Comparison, compare
 from .engine import Engine

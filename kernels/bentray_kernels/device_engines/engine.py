@@ -15,7 +15,7 @@ class Engine:
     """A problem, solved here and on the device.
 
     Attributes:
-        engine: one of ``opencl.trial.ENGINES``, or another word where no trial decides.
+        engine: one of ``opencl.device_benchmark.ENGINES``, or another word where no benchmark decides.
         name: what is computed, and its size.
         here: solves it with compiled code.
         there: solves it on the device; None where the device computes this engine wrong.

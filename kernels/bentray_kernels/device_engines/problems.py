@@ -1,4 +1,4 @@
-"""The example problems of each engine, for the table of a device and for its trial."""
+"""The example problems of each engine, for the table of a device and for its benchmark."""
 
 from __future__ import annotations
 
@@ -86,8 +86,8 @@ def engines(quick: bool) -> Iterator[Engine]:
     yield field(64 if quick else 512)
 
 
-def trial_problems(engine: str) -> Iterator[Engine]:
-    """A small and a large problem of an engine of ``opencl.trial.ENGINES``."""
+def benchmark_problems(engine: str) -> Iterator[Engine]:
+    """A small and a large problem of an engine of ``opencl.device_benchmark.ENGINES``."""
     makers = {
         "eikonal": lambda size: projection((32, 256)[size], 1),
         "wave": lambda size: gradients(*((60, 60, 2), (212, 200, 8))[size]),

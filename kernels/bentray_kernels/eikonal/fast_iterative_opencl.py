@@ -48,7 +48,7 @@ def fast_iterative_opencl_many(
         raise InvalidInput("tolerance", tolerance, "a number >= 0")
     # Imported here, so that OpenCL is loaded only when it is used.
     from ..opencl.blocks import travel_times
-    from ..opencl.choice import session_or_warning
+    from ..opencl.device_selection import session_or_warning
     from ..opencl.lost_device import computing_on
 
     session = session_or_warning(instead="fim")

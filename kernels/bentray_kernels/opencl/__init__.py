@@ -1,37 +1,43 @@
-"""OpenCL devices: selection by name, self-test and trial in a child process, placement, sessions."""
+"""OpenCL devices: selection of device and engine, self-test and benchmark in a child process, sessions."""
 
-from .choice import Choice, OpenCLFallbackWarning, choose, scene_or_warning, session_or_warning
+from .device_benchmark import ENGINES, DeviceBenchmark, benchmark_of
+from .device_selection import (
+    DeviceSelection,
+    OpenCLFallbackWarning,
+    scene_or_warning,
+    select_device,
+    session_or_warning,
+)
 from .devices import VARIABLE, WISH, Device, find_devices
+from .engine_selection import DeviceRequest, Work, check_available, requested, select_engine
 from .lost_device import DeviceLostError, computed, computing_on, on_cpu, with_cpu_retry
-from .placement import DeviceRequest, Work, check_available, place, requested
+from .self_test_results import SelfTestResult, self_test_result
 from .session import Session
-from .trial import ENGINES, Trial, trial_of
-from .verdict import Verdict, verdict_on
 
 __all__ = [
     "ENGINES",
     "VARIABLE",
     "WISH",
-    "Choice",
     "Device",
+    "DeviceBenchmark",
     "DeviceLostError",
     "DeviceRequest",
+    "DeviceSelection",
     "OpenCLFallbackWarning",
+    "SelfTestResult",
     "Session",
-    "Trial",
-    "Verdict",
     "Work",
+    "benchmark_of",
     "check_available",
-    "choose",
     "computed",
     "computing_on",
     "find_devices",
     "on_cpu",
-    "place",
     "requested",
     "scene_or_warning",
+    "select_device",
+    "select_engine",
+    "self_test_result",
     "session_or_warning",
-    "trial_of",
-    "verdict_on",
     "with_cpu_retry",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ..opencl.placement import Work, check_available, may_place, place, requested
+from ..opencl.engine_selection import Work, check_available, may_select_device, requested, select_engine
 from .sart.device_slices import MEMORY_SHARE, TRIAL_EMITTERS, SliceSize
 from .settings import Settings
 from .solver_choice import sart_engine
@@ -36,7 +36,7 @@ def needs_decision(settings: Settings) -> bool:
     """Whether the device depends on the scan and on this machine; cheap where there is none."""
     if settings.device == "cpu" or (settings.method == "gauss-newton" and not settings.reflection.enabled):
         return False
-    return settings.device == "opencl" or may_place()
+    return settings.device == "opencl" or may_select_device()
 
 
 def device_work(scan: ScanSize, settings: Settings) -> Work | None:
@@ -86,7 +86,7 @@ def with_device(scan: ScanSize, settings: Settings) -> Settings:
     if settings.device == "opencl":
         check_available("opencl")
         return settings
-    session = place(work)
+    session = select_engine(work)
     # Compiled tasks take all cores of a processor; the trial measured one core beside all of the driver.
     if session is None or (session.device.kind == "cpu" and requested() == "auto"):
         return settings

@@ -85,7 +85,7 @@ def simulate_emissions(
         medium: 2-D or 3-D.
         emissions: what is simulated.
         poll: see ``time_blocks``.
-        engine: ``opencl`` for the device of ``opencl.choice``.
+        engine: ``opencl`` for the device of ``opencl.device_selection``.
         memory_bytes: limit of the fields of emissions in flight on a device, beside its own memory.
 
     Raises:
@@ -236,7 +236,7 @@ def _session(engine: Engine) -> Session | None:
     if engine == "compiled":
         return None
     # Imported here, so that OpenCL is loaded only when it is used.
-    from ..opencl.choice import session_or_warning
+    from ..opencl.device_selection import session_or_warning
 
     return session_or_warning(instead="compiled code")
 

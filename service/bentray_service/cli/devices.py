@@ -14,7 +14,7 @@ from .output.terminal import AsJson, print_json, print_lines, print_table, progr
 
 if TYPE_CHECKING:
     from bentray_kernels.device_engines import Comparison
-    from bentray_kernels.opencl import Choice, Device, Trial, Verdict
+    from bentray_kernels.opencl import Device, DeviceBenchmark, DeviceSelection, SelfTestResult
 
 
 def devices(
@@ -33,23 +33,30 @@ def devices(
 
     Example:  bentray devices --bench
     """
-    from bentray_kernels.opencl import ENGINES, choose, find_devices, requested, trial_of, verdict_on
+    from bentray_kernels.opencl import (
+        ENGINES,
+        benchmark_of,
+        find_devices,
+        requested,
+        select_device,
+        self_test_result,
+    )
 
     if quick and not bench:
         raise InvalidInput("--quick", "given without --bench", "--bench --quick")
     request = requested()
     records = find_devices()
-    verdicts: list[Verdict] = []
+    verdicts: list[SelfTestResult] = []
     with progress_bar("Testing OpenCL devices") as step:
         for device in records:
             step(len(verdicts), len(records) + len(ENGINES), device.name)
-            verdicts.append(verdict_on(device))
-        choice = choose()
-        trials: dict[str, Trial] = {}
+            verdicts.append(self_test_result(device))
+        choice = select_device()
+        trials: dict[str, DeviceBenchmark] = {}
         if choice.device is not None:
             for engine in ENGINES:
                 step(len(records) + len(trials), len(records) + len(ENGINES), engine)
-                trials[engine] = trial_of(choice.device, engine)
+                trials[engine] = benchmark_of(choice.device, engine)
     compared = _compared(quick=quick) if bench and choice.device is not None else []
     if as_json:
         print_json(_figures(records, verdicts, choice, trials, compared) | {"device": request})
@@ -91,9 +98,9 @@ def _compared(*, quick: bool) -> list[Comparison]:
 
 def _figures(
     records: tuple[Device, ...],
-    verdicts: list[Verdict],
-    choice: Choice,
-    trials: dict[str, Trial],
+    verdicts: list[SelfTestResult],
+    choice: DeviceSelection,
+    trials: dict[str, DeviceBenchmark],
     compared: list[Comparison],
 ) -> dict[str, object]:
     return {
@@ -121,7 +128,7 @@ def _figures(
     }
 
 
-def _print_trials(trials: dict[str, Trial]) -> None:
+def _print_trials(trials: dict[str, DeviceBenchmark]) -> None:
     """The trials, and what ``auto`` concludes from them."""
     cells: list[tuple[Any, ...]] = [
         (
@@ -135,7 +142,7 @@ def _print_trials(trials: dict[str, Trial]) -> None:
         for one in trial.timings
     ]
     cells += [(engine, "", "", trial.fault, "compiled") for engine, trial in trials.items() if trial.fault]
-    print_table("Trial", ("engine", "size", "compiled", "device", "auto takes"), cells)
+    print_table("DeviceBenchmark", ("engine", "size", "compiled", "device", "auto takes"), cells)
 
 
 def _print_compared(compared: list[Comparison], device: Device) -> None:
@@ -156,7 +163,7 @@ def _print_compared(compared: list[Comparison], device: Device) -> None:
     print_table(f"Engines on {device.label}", columns, cells)
 
 
-def _remarks(verdict: Verdict) -> str:
+def _remarks(verdict: SelfTestResult) -> str:
     unneeded = "; ".join(f"{stage}: {fault}" for stage, fault in verdict.faults.items())
     return verdict.reason or (f"failed optional tests: {unneeded}" if unneeded else "")
 
@@ -166,7 +173,7 @@ def _source(device: Device) -> str:
     return f"{device.package}: {library}" if device.package else library
 
 
-def _summary(choice: Choice, found: bool) -> list[str]:
+def _summary(choice: DeviceSelection, found: bool) -> list[str]:
     device = choice.device
     if device is not None:
         return [f"chosen: device {device.index}, {device.label}"]

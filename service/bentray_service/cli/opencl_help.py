@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bentray_kernels.opencl import Choice
+    from bentray_kernels.opencl import DeviceSelection
 
 
-def help_of(choice: Choice) -> str:
+def help_of(choice: DeviceSelection) -> str:
     """The command, with a comment after ``#``; empty if a device is chosen."""
     from bentray_kernels.opencl.devices import hidden
 

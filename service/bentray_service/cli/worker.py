@@ -110,8 +110,8 @@ def worker(
 
 
 def _has_device() -> bool:
-    from bentray_kernels.opencl import choose
+    from bentray_kernels.opencl import select_device
 
-    device = choose().device
+    device = select_device().device
     remark("No OpenCL device passed the tests." if device is None else f"OpenCL device: {device.label}.")
     return device is not None

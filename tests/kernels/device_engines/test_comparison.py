@@ -7,6 +7,7 @@ import pytest
 from bentray_kernels.device_engines.comparison import compare, copy_bytes_per_s, measured
 from bentray_kernels.device_engines.problems import (
     ENGINES_COMPARED,
+    benchmark_problems,
     engines,
     field,
     gradients,
@@ -15,10 +16,9 @@ from bentray_kernels.device_engines.problems import (
     sart,
     traces,
     traces_in_space,
-    trial_problems,
 )
-from bentray_kernels.opencl import choice
-from bentray_kernels.opencl.trial import ENGINES
+from bentray_kernels.opencl import device_selection
+from bentray_kernels.opencl.device_benchmark import ENGINES
 
 pytestmark = pytest.mark.opencl
 
@@ -65,18 +65,18 @@ def test_a_copy_measures_the_bandwidth(opencl_session):
 
 def test_every_engine_of_the_trial_has_a_small_and_a_large_problem():
     for name in ("eikonal", "wave"):
-        small, large = trial_problems(name)
+        small, large = benchmark_problems(name)
         assert small.engine == large.engine == name
         assert small.size < large.size
     assert set(ENGINES) == {"eikonal", "wave", "sart", "reflection", "refraction", "field"}
 
 
 def test_without_a_device_there_is_nothing_to_compare(monkeypatch):
-    monkeypatch.setattr(choice, "_found", lambda *_: "this machine has no OpenCL device")
-    choice._warn_once.cache_clear()
-    with pytest.warns(choice.OpenCLFallbackWarning):
+    monkeypatch.setattr(device_selection, "_found", lambda *_: "this machine has no OpenCL device")
+    device_selection._warn_once.cache_clear()
+    with pytest.warns(device_selection.OpenCLFallbackWarning):
         assert list(compare(True)) == []
-    choice._warn_once.cache_clear()
+    device_selection._warn_once.cache_clear()
 
 
 def test_the_number_of_engines_is_known_before_they_are_built():

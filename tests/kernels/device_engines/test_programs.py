@@ -6,11 +6,11 @@ from importlib import resources
 
 import pytest
 
+from bentray_kernels.device_engines.benchmark_process import answer
 from bentray_kernels.device_engines.programs import every_program
-from bentray_kernels.device_engines.trial_process import answer
 from bentray_kernels.opencl import Session
+from bentray_kernels.opencl.device_benchmark import ENGINES
 from bentray_kernels.opencl.program import Program
-from bentray_kernels.opencl.trial import ENGINES
 
 # In NVIDIA's headers these are functions, so no constant of a program may be initialised with them.
 PRELUDE = """

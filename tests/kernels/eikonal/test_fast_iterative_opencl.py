@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bentray_kernels import eikonal
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.opencl import OpenCLFallbackWarning, choice
+from bentray_kernels.opencl import OpenCLFallbackWarning, device_selection
 
 from ...effort import effort
 
@@ -71,13 +71,13 @@ def test_without_a_device_fim_runs_with_a_warning(monkeypatch):
     speeds, sources = rough_problems(9, (12, 15), 3)
     expected = eikonal.solve_many(speeds, 1.0, sources, "fim")
     monkeypatch.setattr(
-        choice, "_found", lambda *_: "Fast Platform:GPU 9000 was refused: double1: wrong sqrt"
+        device_selection, "_found", lambda *_: "Fast Platform:GPU 9000 was refused: double1: wrong sqrt"
     )
-    choice._warn_once.cache_clear()
+    device_selection._warn_once.cache_clear()
     with pytest.warns(
         OpenCLFallbackWarning, match="fim takes over: Fast Platform:GPU 9000 was refused"
     ) as caught:
         found = eikonal.solve_many(speeds, 1.0, sources, "fim-opencl")
     assert len(caught) == 1
     assert np.array_equal(found, expected)
-    choice._warn_once.cache_clear()
+    device_selection._warn_once.cache_clear()

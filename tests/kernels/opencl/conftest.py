@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bentray_kernels.opencl import Device, Session, choice, placement, verdict
+from bentray_kernels.opencl import Device, Session, device_selection, engine_selection, self_test_results
 
 GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True)
 
@@ -37,13 +37,13 @@ def fresh(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
     monkeypatch.delenv("BENTRAY_DEVICE", raising=False)
     remembered = (
-        verdict.verdict_on,
-        choice._found,
-        choice._opened,
-        choice._warn_once,
-        placement._devices,
-        placement._passing,
-        placement._tried,
+        self_test_results.self_test_result,
+        device_selection._found,
+        device_selection._opened,
+        device_selection._warn_once,
+        engine_selection._devices,
+        engine_selection._passing,
+        engine_selection._tried,
     )
     for function in remembered:
         function.cache_clear()

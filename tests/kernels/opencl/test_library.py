@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from bentray_kernels.opencl import choose
+from bentray_kernels.opencl import select_device
 from bentray_kernels.opencl.library import files_of, library_of, package_of
 
 
 @pytest.mark.opencl
 def test_a_device_names_the_file_that_it_was_loaded_from():
-    device = choose().device
+    device = select_device().device
     assert Path(device.library).is_file()
     assert ".so" in Path(device.library).name
     if "site-packages" in device.library:

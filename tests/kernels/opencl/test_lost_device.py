@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels import eikonal
-from bentray_kernels.opencl import DeviceLostError, Session, Work, choice, place
+from bentray_kernels.opencl import DeviceLostError, Session, Work, device_selection, select_engine
 from bentray_kernels.opencl.lost_device import computed, computing_on, cpu_only, on_cpu
 
 pytestmark = pytest.mark.opencl
@@ -20,7 +20,7 @@ def lost(fresh, opencl_session, monkeypatch):
     import pyopencl as cl
 
     session = Session(opencl_session.device)
-    monkeypatch.setattr(choice, "_found", lambda *_: session)
+    monkeypatch.setattr(device_selection, "_found", lambda *_: session)
     launch = session.launch
     launches = []
 
@@ -82,4 +82,4 @@ def test_a_thread_returns_to_the_device_after_an_error_on_the_cpu(lost):
     with pytest.raises(ZeroDivisionError):
         on_cpu(lambda: 1 // 0)
     assert not cpu_only()
-    assert place(Work("eikonal", 1.0), "cpu") is None
+    assert select_engine(Work("eikonal", 1.0), "cpu") is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels import eikonal
-from bentray_kernels.opencl import choose, self_test
+from bentray_kernels.opencl import select_device, self_test
 
 
 @pytest.mark.parametrize("shape", [(9, 8), (5, 4, 6), (1, 12)])
@@ -57,7 +57,7 @@ def test_wrong_times_are_found(session, monkeypatch, ndim, bad):
 
 @pytest.mark.opencl
 def test_the_program_answers_one_line_a_stage(capsys):
-    device = choose().device
+    device = select_device().device
     self_test.main([str(device.index), device.label, "double1", "solve"])
     answers = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert answers == [{"stage": "double1", "fault": ""}, {"stage": "solve", "fault": ""}]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bentray_kernels.opencl import OpenCLFallbackWarning, choice
+from bentray_kernels.opencl import OpenCLFallbackWarning, device_selection
 from bentray_kernels.refraction import Layers, Scene
 from bentray_kernels.refraction.caster_opencl import on_the_device
 from bentray_kernels.splines import Spline
@@ -11,9 +11,9 @@ from .solids import distance
 
 
 def test_without_a_device_there_is_no_caster(monkeypatch):
-    monkeypatch.setattr(choice, "_found", lambda *_: "this machine has no OpenCL device")
-    choice._warn_once.cache_clear()
+    monkeypatch.setattr(device_selection, "_found", lambda *_: "this machine has no OpenCL device")
+    device_selection._warn_once.cache_clear()
     ball = Scene.build(Spline(0.3 - distance(12)), Layers((0.0,), (1.0, 1.5)), 1.0 / 11)
     with pytest.warns(OpenCLFallbackWarning, match="takes over: this machine has no"):
         assert on_the_device(ball) is None
-    choice._warn_once.cache_clear()
+    device_selection._warn_once.cache_clear()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.opencl import OpenCLFallbackWarning, choice, session_or_warning
+from bentray_kernels.opencl import OpenCLFallbackWarning, device_selection, session_or_warning
 from bentray_kernels.tomography.waveform import misfits
 from bentray_kernels.wave.device_shots import ShotBatch
 from bentray_kernels.wave.device_waves import OTHER_GROUP, PROCESSOR_GROUPS, DeviceWaves, Scan, tiles
@@ -230,16 +230,16 @@ def test_a_poll_ends_it_between_blocks():
 
 
 def test_without_a_device_compiled_code_computes_with_a_warning(monkeypatch, recorded):
-    monkeypatch.setattr(choice, "find_devices", list)
-    choice._found.cache_clear()
-    choice._warn_once.cache_clear()
+    monkeypatch.setattr(device_selection, "find_devices", list)
+    device_selection._found.cache_clear()
+    device_selection._warn_once.cache_clear()
     misfit = compare(recorded)
     try:
         with pytest.warns(OpenCLFallbackWarning, match="compiled code"):
             found = gradients(medium(), misfit, "opencl")
     finally:
-        choice._found.cache_clear()
-        choice._warn_once.cache_clear()
+        device_selection._found.cache_clear()
+        device_selection._warn_once.cache_clear()
     for one, other in zip(found, gradients(medium(), misfit, "compiled"), strict=True):
         assert np.array_equal(one.gradient, other.gradient)
 

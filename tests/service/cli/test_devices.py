@@ -10,8 +10,14 @@ import pytest
 from typer.testing import Result
 
 from bentray_kernels import opencl
-from bentray_kernels.opencl import Choice, Device, OpenCLFallbackWarning, Trial, Verdict
-from bentray_kernels.opencl.trial import Timing
+from bentray_kernels.opencl import (
+    Device,
+    DeviceBenchmark,
+    DeviceSelection,
+    OpenCLFallbackWarning,
+    SelfTestResult,
+)
+from bentray_kernels.opencl.device_benchmark import Timing
 from bentray_service.cli import opencl_help
 from bentray_service.cli.output.terminal import show_warnings_on_one_line
 
@@ -30,14 +36,19 @@ def _nothing_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
 def machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """A GPU that computes wrongly and a processor that cannot do wide vectors."""
     verdicts = {
-        GPU: Verdict("solve: wrong travel times in 2-D", (1, 2), {"solve": "wrong travel times in 2-D"}),
-        CPU: Verdict("", (1, 2, 4), {"double8": "ended by signal 6"}),
+        GPU: SelfTestResult(
+            "solve: wrong travel times in 2-D", (1, 2), {"solve": "wrong travel times in 2-D"}
+        ),
+        CPU: SelfTestResult("", (1, 2, 4), {"double8": "ended by signal 6"}),
     }
     monkeypatch.setattr(opencl, "find_devices", lambda: (GPU, CPU))
-    monkeypatch.setattr(opencl, "verdict_on", verdicts.__getitem__)
-    monkeypatch.setattr(opencl, "choose", lambda: Choice(CPU, ("GPU 9000 was refused",)))
-    right, wrong = Trial((Timing(1e3, 0.01, 0.02), Timing(1e5, 1.0, 0.5))), Trial((), "ended by signal 6", 1)
-    monkeypatch.setattr(opencl, "trial_of", lambda device, engine: wrong if engine == "wave" else right)
+    monkeypatch.setattr(opencl, "self_test_result", verdicts.__getitem__)
+    monkeypatch.setattr(opencl, "select_device", lambda: DeviceSelection(CPU, ("GPU 9000 was refused",)))
+    right, wrong = (
+        DeviceBenchmark((Timing(1e3, 0.01, 0.02), Timing(1e5, 1.0, 0.5))),
+        DeviceBenchmark((), "ended by signal 6", 1),
+    )
+    monkeypatch.setattr(opencl, "benchmark_of", lambda device, engine: wrong if engine == "wave" else right)
 
 
 def test_each_device_has_its_verdict_and_reason(bentray: Callable[..., Result], machine: None) -> None:
@@ -77,7 +88,7 @@ def test_without_devices_a_remedy_is_shown(
     bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(opencl, "find_devices", tuple)
-    monkeypatch.setattr(opencl, "choose", lambda: Choice(None, ()))
+    monkeypatch.setattr(opencl, "select_device", lambda: DeviceSelection(None, ()))
     monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
     monkeypatch.setattr(opencl_help.shutil, "which", lambda name: f"/usr/bin/{name}")
     first, second = bentray("devices").stdout.splitlines()
@@ -98,11 +109,13 @@ def test_where_all_are_rejected_one_command_helps(
 ) -> None:
     monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
     monkeypatch.setattr(opencl, "find_devices", lambda: (CPU,))
-    refused = Verdict(
+    refused = SelfTestResult(
         "double1: unknown target CPU 'generic'", (), {"double1": "unknown target CPU 'generic'"}
     )
-    monkeypatch.setattr(opencl, "verdict_on", lambda device: refused)
-    monkeypatch.setattr(opencl, "choose", lambda: Choice(None, ("Slow Platform:Processor was refused",)))
+    monkeypatch.setattr(opencl, "self_test_result", lambda device: refused)
+    monkeypatch.setattr(
+        opencl, "select_device", lambda: DeviceSelection(None, ("Slow Platform:Processor was refused",))
+    )
     monkeypatch.setattr(opencl_help.shutil, "which", lambda name: None)
     monkeypatch.setattr(opencl_help.platform, "machine", lambda: machine)
     lines = bentray("devices").stdout.splitlines()
@@ -146,7 +159,7 @@ def test_that_another_method_takes_over_is_one_line_on_stderr(
     monkeypatch.setattr(warnings, "showwarning", lambda message, *more: others.append(message))
     show_warnings_on_one_line()
     warnings.showwarning(
-        "no OpenCL device can be used, fim takes over", OpenCLFallbackWarning, "choice.py", 1
+        "no OpenCL device can be used, fim takes over", OpenCLFallbackWarning, "device_selection.py", 1
     )
     warnings.showwarning("of a library", DeprecationWarning, "library.py", 2)
     assert capsys.readouterr().err == "bentray: warning: no OpenCL device can be used, fim takes over\n"

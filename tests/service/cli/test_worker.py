@@ -152,7 +152,7 @@ def test_the_lane_of_opencl_is_offered_where_a_device_passed(
     monkeypatch.setattr(local_workers, "join", lambda joined, say: asked.append(joined))
     device = opencl.Device(0, "PoCL", "cpu", "cpu", "", "", True)
     for found in (device, None):
-        monkeypatch.setattr(opencl, "choose", lambda found=found: opencl.Choice(found, ()))
+        monkeypatch.setattr(opencl, "select_device", lambda found=found: opencl.DeviceSelection(found, ()))
         assert bentray("worker", "--scheduler", "tcp://head:8786", "--workers", 3).exit_code == 0
     assert [dict(one.resources) for one in asked] == [
         {"recon": 1, "render": 1, "short": 1, "opencl": 1},

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.opencl import Device, choice, placement
+from bentray_kernels.opencl import Device, device_selection, engine_selection
 from bentray_kernels.tomography import Settings, device_choice
 from bentray_kernels.tomography.device_choice import ScanSize, device_work, with_device
 from bentray_workers.cluster import capacities
@@ -35,8 +35,8 @@ def trial(monkeypatch):
         asked.append(work)
         return answer[0]
 
-    monkeypatch.setattr(device_choice, "place", place)
-    monkeypatch.setattr(device_choice, "may_place", lambda: True)
+    monkeypatch.setattr(device_choice, "select_engine", place)
+    monkeypatch.setattr(device_choice, "may_select_device", lambda: True)
     monkeypatch.delenv("BENTRAY_DEVICE", raising=False)
     return asked, answer
 
@@ -120,5 +120,5 @@ def test_a_requested_device_that_is_missing_is_an_error(path, tmp_path, monkeypa
     monkeypatch.setenv("BENTRAY_DEVICE", "cpu")
     with pytest.raises(InvalidInput, match="because this machine has BENTRAY_DEVICE=cpu"):
         settled(None, tmp_path, path, SART.changed(device="opencl"))
-    assert choice.hidden()
-    assert not placement.may_place()
+    assert device_selection.hidden()
+    assert not engine_selection.may_select_device()

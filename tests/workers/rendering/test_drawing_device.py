@@ -12,7 +12,7 @@ from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.example_surfaces import torus
-from bentray_kernels.opencl import Session, choice, placement
+from bentray_kernels.opencl import Session, device_selection, engine_selection
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.rendering import field_picture, refraction
@@ -61,7 +61,7 @@ def failing(opencl_session, monkeypatch):
 
     def open_for(at):
         session = Session(opencl_session.device)
-        monkeypatch.setattr(placement, "open_session", lambda device: session)
+        monkeypatch.setattr(engine_selection, "open_session", lambda device: session)
         launch, launches = session.launch, []
 
         def broken(*arguments):
@@ -130,8 +130,8 @@ def test_the_processor_draws_once_more_what_a_lost_device_left(volume, field, fa
 
 def test_cpu_never_asks_for_devices(volume, field, monkeypatch):
     monkeypatch.delenv("BENTRAY_DEVICE", raising=False)
-    monkeypatch.setattr(placement, "find_devices", lambda: pytest.fail("asked"))
-    monkeypatch.setattr(choice, "find_devices", lambda: pytest.fail("asked"))
+    monkeypatch.setattr(engine_selection, "find_devices", lambda: pytest.fail("asked"))
+    monkeypatch.setattr(device_selection, "find_devices", lambda: pytest.fail("asked"))
     pictures = (
         refraction.picture_png(volume, replace(GLASS, device="cpu")),
         field_picture.picture_png(field, replace(MIRROR, device="cpu")),

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from distributed import Client, LocalCluster
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.opencl import choose
+from bentray_kernels.opencl import select_device
 from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.solver_choice import needs_device, tracks_on_device
 
@@ -122,9 +122,9 @@ async def probe_device(dask_worker: Any) -> bool:
 
 def device_resources() -> dict[str, float]:
     """The resources of a worker with the chosen device."""
-    device = choose().device
+    device = select_device().device
     return {**OPENCL, **({} if device is None else {OPENCL_MIB: device.memory_bytes // MIB})}
 
 
 def _has_device() -> bool:
-    return choose().device is not None
+    return select_device().device is not None

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from bentray_kernels.geometry_field.tracing.packed_scene import World
 from bentray_kernels.geometry_field.tracing.ray_tracer_opencl import OpenCLTracer
 from bentray_kernels.geometry_field.tracing.ray_tracer_opencl import work_of as work_of_world
-from bentray_kernels.opencl import Session, computed, computing_on, place
+from bentray_kernels.opencl import Session, computed, computing_on, select_engine
 from bentray_kernels.refraction import Scene
 from bentray_kernels.refraction.caster_opencl import OpenCLCaster
 from bentray_kernels.refraction.caster_opencl import work_of as work_of_scene
@@ -64,7 +64,7 @@ def caster_for(scene: Scene, rays: int, device: str) -> OpenCLCaster | None:
         InvalidInput, DeviceLostError: as ``opencl.place``.
     """
     work = work_of_scene(scene, rays)
-    session = place(work, device)
+    session = select_engine(work, device)
     if session is None:
         return None
     with computing_on(session):
@@ -85,7 +85,7 @@ def tracer_for(world: World, rays: int, device: str) -> OpenCLTracer | None:
         As ``caster_for``.
     """
     work = work_of_world(world, rays)
-    session = place(work, device)
+    session = select_engine(work, device)
     if session is None:
         return None
     with computing_on(session):

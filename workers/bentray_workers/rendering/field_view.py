@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables.reference_field import MAX_REFERENCE_SAMPLES
-from bentray_kernels.opencl.placement import DESCRIPTION, REQUESTS, DeviceRequest
+from bentray_kernels.opencl.engine_selection import DESCRIPTION, REQUESTS, DeviceRequest
 from bentray_kernels.ranges import Range
 from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.isosurface.octree import MAX_ISOS
-from bentray_kernels.opencl.placement import DESCRIPTION, REQUESTS, DeviceRequest
+from bentray_kernels.opencl.engine_selection import DESCRIPTION, REQUESTS, DeviceRequest
 from bentray_kernels.ranges import Range
 from bentray_kernels.refraction import Layers
 from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, Uses, check, setting

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import InvalidInput
-from ...opencl.choice import session_or_warning
+from ...opencl.device_selection import session_or_warning
 from ...opencl.lost_device import computing_on
 from ...opencl.session import Session
 from ..problem import Problem

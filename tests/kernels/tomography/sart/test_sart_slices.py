@@ -8,7 +8,7 @@ import pytest
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.opencl import Session, choice
+from bentray_kernels.opencl import Session, device_selection
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct
 from bentray_kernels.tomography.grid_schedule import initial_slowness
@@ -132,7 +132,7 @@ def test_a_lost_device_is_replaced_by_the_processor(fresh_choice, rings, caplog)
 def fresh_choice(opencl_session, monkeypatch):
     """The device, opened for this test alone."""
     session = Session(opencl_session.device)
-    monkeypatch.setattr(choice, "_found", lambda *_: session)
+    monkeypatch.setattr(device_selection, "_found", lambda *_: session)
     return session
 
 

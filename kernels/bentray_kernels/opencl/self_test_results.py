@@ -23,7 +23,7 @@ Child = Callable[[Device, Sequence[str], float], tuple[Answers, str]]
 
 
 @dataclass(frozen=True)
-class Verdict:
+class SelfTestResult:
     """The test result of a device.
 
     Attributes:
@@ -42,10 +42,10 @@ class Verdict:
 
 
 @cache
-def verdict_on(device: Device, time_out_s: float = TIME_OUT_S) -> Verdict:
+def self_test_result(device: Device, time_out_s: float = TIME_OUT_S) -> SelfTestResult:
     """The verdict, from the cache or from a self-test in a child process, which has so many seconds."""
     if not device.double_precision:
-        return Verdict("it has no double precision", (), {})
+        return SelfTestResult("it has no double precision", (), {})
     stored = _kept(device)
     if stored is not None:
         return stored
@@ -56,12 +56,12 @@ def verdict_on(device: Device, time_out_s: float = TIME_OUT_S) -> Verdict:
     return verdict
 
 
-def stored_verdict(device: Device) -> Verdict | None:
+def stored_self_test_result(device: Device) -> SelfTestResult | None:
     """The verdict in the cache, without a test; None without one."""
     return _kept(device) if device.double_precision else None
 
 
-def examine(device: Device, child: Child, time_out_s: float = TIME_OUT_S) -> Verdict:
+def examine(device: Device, child: Child, time_out_s: float = TIME_OUT_S) -> SelfTestResult:
     """Run all stages; if the device ends or stops the child, run the rest in another one, if in time."""
     faults: dict[str, str] = {}
     left = list(STAGES)
@@ -77,7 +77,7 @@ def examine(device: Device, child: Child, time_out_s: float = TIME_OUT_S) -> Ver
             break
     reason = next((f"{stage}: {faults[stage]}" for stage in NEEDED if faults.get(stage)), "")
     widths = tuple(w for w in WIDTHS if faults.get(f"double{w}") == "")
-    return Verdict(reason, widths, {stage: fault for stage, fault in faults.items() if fault})
+    return SelfTestResult(reason, widths, {stage: fault for stage, fault in faults.items() if fault})
 
 
 def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tuple[Answers, str]:
@@ -98,10 +98,10 @@ def _file(device: Device) -> Path | None:
     return record_file("opencl", device, (source.read_bytes() for source in sources))
 
 
-def _kept(device: Device) -> Verdict | None:
+def _kept(device: Device) -> SelfTestResult | None:
     try:
         content = read_record(_file(device))
         widths = tuple(int(width) for width in content["widths"])
-        return Verdict("", widths, {str(k): str(v) for k, v in content["faults"].items()})
+        return SelfTestResult("", widths, {str(k): str(v) for k, v in content["faults"].items()})
     except (ValueError, KeyError, TypeError, AttributeError):
         return None

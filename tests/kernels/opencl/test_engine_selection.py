@@ -7,21 +7,21 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import (
-    Choice,
     DeviceLostError,
+    DeviceSelection,
+    SelfTestResult,
     Session,
-    Verdict,
     Work,
-    placement,
+    device_benchmark,
+    engine_selection,
     requested,
-    trial,
 )
+from bentray_kernels.opencl.device_benchmark import DeviceBenchmark, Timing
+from bentray_kernels.opencl.engine_selection import misfit, select_engine
 from bentray_kernels.opencl.lost_device import on_cpu
-from bentray_kernels.opencl.placement import misfit, place
-from bentray_kernels.opencl.trial import Timing, Trial
 
 # Faster on the device from 100 units on.
-TRIAL = Trial((Timing(10.0, 0.1, 1.0), Timing(1000.0, 10.0, 1.0)))
+TRIAL = DeviceBenchmark((Timing(10.0, 0.1, 1.0), Timing(1000.0, 10.0, 1.0)))
 SMALL, LARGE = Work("field", 50.0), Work("field", 200.0)
 
 
@@ -42,49 +42,61 @@ def machine(monkeypatch, gpu, fresh):
 
     def tried(device, engine, time_out_s):
         asked.append("trial")
-        return TRIAL if engine == "field" else Trial((), "it computes wrong results", 1)
+        return TRIAL if engine == "field" else DeviceBenchmark((), "it computes wrong results", 1)
 
-    monkeypatch.setattr(placement, "find_devices", lambda: asked.append("devices") or (gpu,))
-    monkeypatch.setattr(placement, "choose", lambda: asked.append("verdict") or Choice(gpu, ()))
-    monkeypatch.setattr(placement, "verdict_on", lambda *_: asked.append("verdict") or Verdict("", (1,), {}))
-    monkeypatch.setattr(placement, "try_engine", tried)
-    monkeypatch.setattr(placement, "open_session", lambda device: sessions.setdefault(device, Opened(device)))
+    monkeypatch.setattr(engine_selection, "find_devices", lambda: asked.append("devices") or (gpu,))
+    monkeypatch.setattr(
+        engine_selection, "select_device", lambda: asked.append("verdict") or DeviceSelection(gpu, ())
+    )
+    monkeypatch.setattr(
+        engine_selection,
+        "self_test_result",
+        lambda *_: asked.append("verdict") or SelfTestResult("", (1,), {}),
+    )
+    monkeypatch.setattr(engine_selection, "benchmark_engine", tried)
+    monkeypatch.setattr(
+        engine_selection, "open_session", lambda device: sessions.setdefault(device, Opened(device))
+    )
     return asked
 
 
 def test_auto_takes_what_is_faster_for_the_size(machine, gpu):
-    assert place(SMALL) is None
-    assert place(LARGE).device == gpu
-    assert place(Work("eikonal", 1e9)) is None, "an engine that is wrong there"
+    assert select_engine(SMALL) is None
+    assert select_engine(LARGE).device == gpu
+    assert select_engine(Work("eikonal", 1e9)) is None, "an engine that is wrong there"
 
 
 def test_cpu_asks_for_no_device(machine, monkeypatch):
-    assert place(LARGE, "cpu") is None
+    assert select_engine(LARGE, "cpu") is None
     monkeypatch.setenv("BENTRAY_DEVICE", "cpu")
-    assert place(LARGE) is None
+    assert select_engine(LARGE) is None
     assert machine == []
 
 
 def test_opencl_takes_the_device_whatever_the_trial(machine, gpu):
-    assert place(SMALL, "opencl").device == gpu
+    assert select_engine(SMALL, "opencl").device == gpu
     assert "trial" not in machine
 
 
 def test_opencl_without_a_device_is_an_error_before_any_work(machine, monkeypatch):
-    monkeypatch.setattr(placement, "choose", lambda: Choice(None, ("GPU 9000 was refused: wrong sqrt",)))
+    monkeypatch.setattr(
+        engine_selection,
+        "select_device",
+        lambda: DeviceSelection(None, ("GPU 9000 was refused: wrong sqrt",)),
+    )
     with pytest.raises(InvalidInput, match="device: found 'opencl', but GPU 9000 was refused: wrong sqrt"):
-        place(SMALL, "opencl")
-    assert place(LARGE, "cpu") is None
+        select_engine(SMALL, "opencl")
+    assert select_engine(LARGE, "cpu") is None
 
 
 def test_the_machine_decides_what_auto_means(machine, monkeypatch, gpu):
     monkeypatch.setenv("BENTRAY_DEVICE", "opencl")
     assert requested() == "opencl"
-    assert place(SMALL).device == gpu
-    assert place(SMALL, "cpu") is None
+    assert select_engine(SMALL).device == gpu
+    assert select_engine(SMALL, "cpu") is None
     monkeypatch.setenv("BENTRAY_DEVICE", "cpu")
     with pytest.raises(InvalidInput, match="BENTRAY_DEVICE=cpu"):
-        place(SMALL, "opencl")
+        select_engine(SMALL, "opencl")
     monkeypatch.setenv("BENTRAY_DEVICE", "")
     assert requested() == "auto"
 
@@ -98,31 +110,33 @@ def test_other_words_are_rejected(monkeypatch, name, word):
 
 def test_what_does_not_fit_the_memory_is_computed_here_or_refused_by_number(machine, monkeypatch, gpu):
     small = replace(gpu, memory_bytes=1000, buffer_bytes=400)
-    monkeypatch.setattr(placement, "find_devices", lambda: (small,))
-    monkeypatch.setattr(placement, "choose", lambda: Choice(small, ()))
-    assert place(LARGE._replace(memory_bytes=1000, buffer_bytes=400)) is not None
+    monkeypatch.setattr(engine_selection, "find_devices", lambda: (small,))
+    monkeypatch.setattr(engine_selection, "select_device", lambda: DeviceSelection(small, ()))
+    assert select_engine(LARGE._replace(memory_bytes=1000, buffer_bytes=400)) is not None
     for work, words in (
         (LARGE._replace(memory_bytes=1001), "1001 bytes of device memory, and GPU 9000 has 1000"),
         (LARGE._replace(buffer_bytes=401), "401 bytes of one buffer, and GPU 9000 has 400"),
     ):
-        assert place(work) is None
+        assert select_engine(work) is None
         with pytest.raises(InvalidInput, match=words):
-            place(work, "opencl")
+            select_engine(work, "opencl")
     assert misfit(LARGE._replace(memory_bytes=10**15), gpu) == "", "a driver that does not say"
 
 
 def test_auto_does_not_test_a_processor_by_itself(monkeypatch, three, fresh):
     cpu = three[0]
-    monkeypatch.setattr(placement, "find_devices", lambda: (cpu,))
-    for name in ("choose", "verdict_on", "try_engine"):
-        monkeypatch.setattr(placement, name, lambda *_: pytest.fail("tested"))
-    assert place(LARGE) is None
+    monkeypatch.setattr(engine_selection, "find_devices", lambda: (cpu,))
+    for name in ("select_device", "self_test_result", "benchmark_engine"):
+        monkeypatch.setattr(engine_selection, name, lambda *_: pytest.fail("tested"))
+    assert select_engine(LARGE) is None
     # Once `bentray devices` has tested it, it is as good as another.
-    monkeypatch.setattr(placement, "stored_verdict", lambda device: Verdict("", (1,), {}))
-    monkeypatch.setattr(placement, "stored_trial", lambda device, engine: TRIAL)
-    monkeypatch.setattr(placement, "open_session", Opened)
-    assert place(LARGE).device == cpu
-    assert place(SMALL) is None
+    monkeypatch.setattr(
+        engine_selection, "stored_self_test_result", lambda device: SelfTestResult("", (1,), {})
+    )
+    monkeypatch.setattr(engine_selection, "stored_benchmark", lambda device, engine: TRIAL)
+    monkeypatch.setattr(engine_selection, "open_session", Opened)
+    assert select_engine(LARGE).device == cpu
+    assert select_engine(SMALL) is None
 
 
 @pytest.fixture
@@ -133,26 +147,26 @@ def slow_card(monkeypatch, gpu, fresh, tmp_path):
         f"import sys, time\nopen({str(engines)!r}, 'a').write(sys.argv[3] + ' ')\ntime.sleep(60)\n"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(trial, "MODULE", "slow_trial")
-    monkeypatch.setattr(trial, "digest", lambda module: module)
-    monkeypatch.setattr(placement, "find_devices", lambda: (gpu,))
-    monkeypatch.setattr(placement, "verdict_on", lambda *_: Verdict("", (1,), {}))
-    monkeypatch.setattr(placement, "AUTO_S", 0.6)
-    monkeypatch.setattr(placement, "LEAST_S", 0.1)
+    monkeypatch.setattr(device_benchmark, "MODULE", "slow_trial")
+    monkeypatch.setattr(device_benchmark, "digest", lambda module: module)
+    monkeypatch.setattr(engine_selection, "find_devices", lambda: (gpu,))
+    monkeypatch.setattr(engine_selection, "self_test_result", lambda *_: SelfTestResult("", (1,), {}))
+    monkeypatch.setattr(engine_selection, "AUTO_S", 0.6)
+    monkeypatch.setattr(engine_selection, "LEAST_S", 0.1)
     return lambda: engines.read_text().split() if engines.exists() else []
 
 
 def forget():
     """As another process."""
-    placement._passing.cache_clear()
-    placement._tried.cache_clear()
+    engine_selection._passing.cache_clear()
+    engine_selection._tried.cache_clear()
 
 
 def test_auto_waits_for_a_slow_trial_ten_seconds_and_says_so(slow_card, caplog, monkeypatch):
-    assert trial.TIME_OUT_S > 60.0
+    assert device_benchmark.TIME_OUT_S > 60.0
     begun = time.monotonic()
-    assert place(LARGE) is None
-    assert place(LARGE) is None, "once per process"
+    assert select_engine(LARGE) is None
+    assert select_engine(LARGE) is None, "once per process"
     assert 0.5 < time.monotonic() - begun < 10.0
     lines = [record.getMessage() for record in caplog.records]
     assert lines == [
@@ -164,19 +178,21 @@ def test_auto_waits_for_a_slow_trial_ten_seconds_and_says_so(slow_card, caplog, 
     # Further processes try again, as kernels that were compiled meanwhile are in the cache; but not for ever.
     for _ in range(4):
         forget()
-        assert place(LARGE) is None
+        assert select_engine(LARGE) is None
     assert slow_card() == ["field"] * 3
-    assert place(Work("sart", 1e9)) is None
+    assert select_engine(Work("sart", 1e9)) is None
     assert slow_card() == ["field"] * 3 + ["sart"]
 
 
 def test_the_wait_for_a_card_is_ten_seconds_at_most():
-    assert vars(placement)["AUTO_S"] <= 10.0
+    assert vars(engine_selection)["AUTO_S"] <= 10.0
 
 
 def test_a_card_that_is_refused_is_named(slow_card, monkeypatch, caplog):
-    monkeypatch.setattr(placement, "verdict_on", lambda *_: Verdict("double1: no answer in 10 s", (), {}))
-    assert place(LARGE) is None
+    monkeypatch.setattr(
+        engine_selection, "self_test_result", lambda *_: SelfTestResult("double1: no answer in 10 s", (), {})
+    )
+    assert select_engine(LARGE) is None
     words = "GPU 9000 was refused: double1: no answer in 10 s; BENTRAY_DEVICE=cpu skips the test"
     assert caplog.records[-1].getMessage() == words
     assert slow_card() == []
@@ -188,24 +204,24 @@ def test_a_slow_self_test_leaves_no_time_for_a_trial(slow_card, monkeypatch):
     def slow(device, time_out_s):
         given.append(time_out_s)
         time.sleep(time_out_s)
-        return Verdict("", (1,), {})
+        return SelfTestResult("", (1,), {})
 
-    monkeypatch.setattr(placement, "verdict_on", slow)
-    assert place(LARGE) is None
+    monkeypatch.setattr(engine_selection, "self_test_result", slow)
+    assert select_engine(LARGE) is None
     assert given == [pytest.approx(0.6, abs=0.1)]
     assert slow_card() == []
 
 
 def test_a_lost_device_is_not_used_again(machine, gpu):
-    place(LARGE).lost = "Fast Platform:GPU 9000 failed: OUT_OF_RESOURCES"
-    assert place(LARGE) is None
+    select_engine(LARGE).lost = "Fast Platform:GPU 9000 failed: OUT_OF_RESOURCES"
+    assert select_engine(LARGE) is None
     with pytest.raises(DeviceLostError, match="OUT_OF_RESOURCES"):
-        place(LARGE, "opencl")
-    assert on_cpu(lambda: place(LARGE, "opencl")) is None
+        select_engine(LARGE, "opencl")
+    assert on_cpu(lambda: select_engine(LARGE, "opencl")) is None
 
 
 @pytest.mark.opencl
 def test_the_device_of_this_machine_can_be_requested():
-    session = place(Work("eikonal", 1.0), "opencl")
+    session = select_engine(Work("eikonal", 1.0), "opencl")
     assert isinstance(session, Session)
     assert session.device.memory_bytes >= session.device.buffer_bytes > 0

@@ -1,7 +1,7 @@
-"""Trial of a device, run as a child process, because drivers may abort or hang.
+"""DeviceBenchmark of a device, run as a child process, because drivers may abort or hang.
 
-``python -m bentray_kernels.device_engines.trial_process INDEX LABEL ENGINE`` prints one line of JSON,
-``{"engine", "fault", "timings"}``: see ``opencl.trial``. A device that ends the process omits it.
+``python -m bentray_kernels.device_engines.benchmark_process INDEX LABEL ENGINE`` prints one line of JSON,
+``{"engine", "fault", "timings"}``: see ``opencl.device_benchmark``. A device that ends the process omits it.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import os
 import sys
 from typing import Any
 
-from ..opencl.choice import choose
+from ..opencl.device_selection import select_device
 from ..opencl.devices import WISH
 from .comparison import measured
-from .problems import trial_problems
+from .problems import benchmark_problems
 
 REPEATS = 2
 
@@ -22,7 +22,7 @@ REPEATS = 2
 def answer(engine: str) -> dict[str, Any]:
     """Times of a small and a large problem, or why the device may not compute this engine."""
     timings: list[tuple[float, float, float]] = []
-    for problem in trial_problems(engine):
+    for problem in benchmark_problems(engine):
         found = measured(problem, None, REPEATS)
         if found.compiled_s is None or found.device_s is None:
             return _fault(engine, "it computes wrong results")
@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> None:
     """Try the engine named on the command line on one device."""
     index, label, engine = arguments
     os.environ[WISH] = index
-    choice = choose()
+    choice = select_device()
     if choice.device is None or choice.device.label != label:
         raise SystemExit(choice.reason or f"{label} is no longer OpenCL device {index}")
     sys.stdout.write(json.dumps(answer(engine)) + "\n")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from bentray_kernels import cache_folder
-from bentray_kernels.opencl import records, verdict
+from bentray_kernels.opencl import records, self_test_results
 from bentray_kernels.opencl.self_test import STAGES
-from bentray_kernels.opencl.verdict import Verdict, examine, in_a_child, verdict_on
+from bentray_kernels.opencl.self_test_results import SelfTestResult, examine, in_a_child, self_test_result
 
 
 def child_of(bad):
@@ -29,7 +29,7 @@ def child_of(bad):
 
 def test_a_right_device_is_tried_once(gpu):
     child = child_of({})
-    assert examine(gpu, child) == Verdict("", (1, 2, 4, 8, 16), {})
+    assert examine(gpu, child) == SelfTestResult("", (1, 2, 4, 8, 16), {})
     assert child.calls == [STAGES]
 
 
@@ -81,7 +81,7 @@ def test_compiler_error_is_reported_as_the_reason(gpu, monkeypatch, tmp_path):
         "raise SystemExit(\"error: unknown target CPU 'generic'\\nDevice failed\\n(options: -DREAL)\")"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(verdict, "__package__", "refusing")
+    monkeypatch.setattr(self_test_results, "__package__", "refusing")
     answers, ending = in_a_child(gpu, STAGES, 60.0)
     assert answers == {}
     assert ending == "ended with exit code 1 (error: unknown target CPU 'generic')"
@@ -95,32 +95,32 @@ def test_an_aborting_child_is_survived(gpu, monkeypatch, tmp_path):
         'import os\nprint(\'{"stage": "double1", "fault": ""}\', flush=True)\nprint(\'remark\')\nos.abort()\n'
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(verdict, "__package__", "aborting")
+    monkeypatch.setattr(self_test_results, "__package__", "aborting")
     answers, ending = in_a_child(gpu, STAGES, 60.0)
     assert answers == {"double1": ""}
     assert ending.startswith("ended by signal 6")
 
 
 def test_device_without_double_precision_is_not_tested(gpu, monkeypatch, fresh):
-    monkeypatch.setattr(verdict, "in_a_child", None)
-    found = verdict_on(replace(gpu, double_precision=False))
+    monkeypatch.setattr(self_test_results, "in_a_child", None)
+    found = self_test_result(replace(gpu, double_precision=False))
     assert found.reason == "it has no double precision"
     assert found.widths == ()
 
 
 def test_a_pass_is_remembered_on_disk_until_the_driver_or_the_processor_changes(gpu, monkeypatch, fresh):
     child = child_of({"double8": None})
-    monkeypatch.setattr(verdict, "in_a_child", child)
-    first = verdict_on(gpu)
+    monkeypatch.setattr(self_test_results, "in_a_child", child)
+    first = self_test_result(gpu)
     tried = len(child.calls)
-    verdict_on.cache_clear()
-    assert verdict_on(gpu) == first
+    self_test_result.cache_clear()
+    assert self_test_result(gpu) == first
     assert len(child.calls) == tried
-    verdict_on(replace(gpu, driver="1.2.4"))
+    self_test_result(replace(gpu, driver="1.2.4"))
     assert len(child.calls) == 2 * tried
     monkeypatch.setattr(records, "processor", lambda: frozenset({"model name: another", "avx2"}))
-    verdict_on.cache_clear()
-    verdict_on(gpu)
+    self_test_result.cache_clear()
+    self_test_result(gpu)
     assert len(child.calls) == 3 * tried
 
 
@@ -128,24 +128,24 @@ def test_a_pass_is_remembered_on_disk_until_the_driver_or_the_processor_changes(
     "content", ["", "[]", "{}", '{"widths": 3, "faults": {}}', '{"widths": [1], "faults": 1}']
 )
 def test_damaged_cache_does_not_pass_a_device(gpu, monkeypatch, fresh, content):
-    monkeypatch.setattr(verdict, "in_a_child", child_of({}))
-    verdict_on(gpu)
+    monkeypatch.setattr(self_test_results, "in_a_child", child_of({}))
+    self_test_result(gpu)
     (file,) = fresh.iterdir()
     file.write_text(content)
-    verdict_on.cache_clear()
-    monkeypatch.setattr(verdict, "in_a_child", child_of({"solve": "wrong travel times in 2-D"}))
-    assert not verdict_on(gpu).usable
+    self_test_result.cache_clear()
+    monkeypatch.setattr(self_test_results, "in_a_child", child_of({"solve": "wrong travel times in 2-D"}))
+    assert not self_test_result(gpu).usable
 
 
 def test_a_refusal_is_not_remembered_on_disk(gpu, monkeypatch, fresh):
-    monkeypatch.setattr(verdict, "in_a_child", child_of({"solve": None}))
-    assert not verdict_on(gpu).usable
+    monkeypatch.setattr(self_test_results, "in_a_child", child_of({"solve": None}))
+    assert not self_test_result(gpu).usable
     assert not list(fresh.iterdir())
 
 
 def test_verdict_holds_without_a_cache_folder(gpu, monkeypatch, fresh):
     fresh.write_text("a file where the folder should be")
-    monkeypatch.setattr(verdict, "in_a_child", child_of({}))
+    monkeypatch.setattr(self_test_results, "in_a_child", child_of({}))
     monkeypatch.setattr(cache_folder, "_temporary_folder", lambda: None)
     with pytest.warns(cache_folder.CacheFolderWarning):
-        assert verdict_on(gpu).usable
+        assert self_test_result(gpu).usable

@@ -10,12 +10,12 @@ from functools import cache
 from typing import Literal, NamedTuple, get_args
 
 from ..errors import InvalidInput
-from .choice import choose, open_session
+from .device_benchmark import ENGINES, MOST_ATTEMPTS, DeviceBenchmark, benchmark_engine, stored_benchmark
+from .device_selection import open_session, select_device
 from .devices import NEVER, VARIABLE, WISH, Device, find_devices, hidden, select_devices
 from .lost_device import DeviceLostError, cpu_only
+from .self_test_results import self_test_result, stored_self_test_result
 from .session import Session
-from .trial import ENGINES, MOST_ATTEMPTS, Trial, stored_trial, try_engine
-from .verdict import stored_verdict, verdict_on
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +28,8 @@ DESCRIPTION = (
 )
 
 
-# Most seconds that ``auto`` waits for the test and the trial of a card, and the least that are worth a start.
+# Most seconds that ``auto`` waits for the self-test and the benchmark of a card, and the least that are worth
+# a start.
 AUTO_S, LEAST_S = 10.0, 1.0
 # One thread tests or tries at a time.
 _TRYING = threading.Lock()
@@ -38,8 +39,8 @@ class Work(NamedTuple):
     """A problem of one engine.
 
     Attributes:
-        engine: one of ``trial.ENGINES``.
-        size: in the unit of the engine's trial: nodes, node updates or rays.
+        engine: one of ``device_benchmark.ENGINES``.
+        size: in the unit of the engine's benchmark: nodes, node updates or rays.
         memory_bytes, buffer_bytes: device memory that it cannot do without, and the largest buffer of it.
     """
 
@@ -67,11 +68,12 @@ def requested(device: str = "auto") -> str:
     return here if device == "auto" else device
 
 
-def place(work: Work, device: str = "auto") -> Session | None:
+def select_engine(work: Work, device: str = "auto") -> Session | None:
     """The open device that computes a problem; None: compiled code does.
 
     A processor is also an OpenCL device, but ``auto`` tests GPUs only: a processor is considered once
-    ``bentray devices`` has tested it. A test and a trial, which are stored, take ``AUTO_S`` together at most.
+    ``bentray devices`` has tested it. A self-test and a benchmark, which are stored, take ``AUTO_S`` together
+    at most.
 
     Args:
         work: the problem.
@@ -89,7 +91,7 @@ def place(work: Work, device: str = "auto") -> Session | None:
         candidate = _tested_device()
         if candidate is None or misfit(work, candidate):
             return None
-        if not _trial_of(candidate, work.engine).faster(work.size):
+        if not _benchmark_of(candidate, work.engine).faster(work.size):
             return None
         session = open_session(candidate)
         return None if session.lost else session
@@ -102,7 +104,7 @@ def place(work: Work, device: str = "auto") -> Session | None:
     return session
 
 
-def may_place() -> bool:
+def may_select_device() -> bool:
     """Whether ``auto`` may find a device on this machine: False without one that it may use."""
     request = requested()
     return request == "opencl" or (request == "auto" and not cpu_only() and _tested_device() is not None)
@@ -112,7 +114,7 @@ def check_available(device: str) -> None:
     """Check, before any work, that a device that is requested exists and passes its self-test.
 
     Raises:
-        InvalidInput: as ``place``.
+        InvalidInput: as ``select_engine``.
     """
     if requested(device) == "opencl" and not cpu_only():
         _required()
@@ -131,7 +133,7 @@ def misfit(work: Work, device: Device) -> str:
 
 
 def _required() -> Device:
-    chosen = choose()
+    chosen = select_device()
     if chosen.device is None:
         found = f"'opencl', but {chosen.reason}"
         raise InvalidInput("device", found, "auto or cpu, or see `bentray devices`")
@@ -145,7 +147,9 @@ def _tested_device() -> Device | None:
         with _TRYING:
             return _passing(devices)[0]
     for device in devices:
-        if stored_verdict(device) is not None and any(stored_trial(device, one) for one in ENGINES):
+        if stored_self_test_result(device) is not None and any(
+            stored_benchmark(device, one) for one in ENGINES
+        ):
             return device
     return None
 
@@ -156,41 +160,41 @@ def _is_card(device: Device) -> bool:
 
 @cache
 def _passing(devices: tuple[Device, ...]) -> tuple[Device | None, float]:
-    """The first device that passes its self-test, once per process, and the seconds left for its trial."""
+    """The first device that passes its self-test, once per process, and the seconds left to benchmark it."""
     end = time.monotonic() + AUTO_S
     for device in devices:
         if (left := end - time.monotonic()) < LEAST_S:
             break
-        if stored_verdict(device) is None:
+        if stored_self_test_result(device) is None:
             log.warning("%s is tested once, for at most %.0f s", device.name, left)
-        verdict = verdict_on(device, left)
+        verdict = self_test_result(device, left)
         if verdict.usable:
             return device, end - time.monotonic()
         log.warning("%s was refused: %s; %s=%s skips the test", device.name, verdict.reason, VARIABLE, NEVER)
     return None, 0.0
 
 
-def _trial_of(device: Device, engine: str) -> Trial:
-    """The stored trial of a device; a new one of a card, once per process."""
+def _benchmark_of(device: Device, engine: str) -> DeviceBenchmark:
+    """The stored benchmark of a device; a new one of a card, once per process."""
     with _TRYING:
-        stored = stored_trial(device, engine)
+        stored = stored_benchmark(device, engine)
         final = stored is not None and (not stored.fault or stored.attempts >= MOST_ATTEMPTS)
         if final or not _is_card(device):
-            return stored or Trial()
+            return stored or DeviceBenchmark()
         return _tried(device, engine)
 
 
 @cache
-def _tried(device: Device, engine: str) -> Trial:
+def _tried(device: Device, engine: str) -> DeviceBenchmark:
     left = _passing(_devices(os.environ.get(WISH), hidden()))[1]
     if left < LEAST_S:
-        return Trial()
+        return DeviceBenchmark()
     log.warning("%s is tried for %s once, for at most %.0f s", device.name, engine, left)
-    trial = try_engine(device, engine, left)
-    if trial.fault:
+    result = benchmark_engine(device, engine, left)
+    if result.fault:
         instead = "compiled code computes; `bentray devices` tries it for longer"
-        log.warning("%s was tried for %s: %s; %s", device.name, engine, trial.fault, instead)
-    return trial
+        log.warning("%s was tried for %s: %s; %s", device.name, engine, result.fault, instead)
+    return result
 
 
 @cache

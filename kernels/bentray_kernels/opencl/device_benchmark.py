@@ -1,4 +1,4 @@
-"""Trial of a device: the time of an engine on it beside compiled code, cached as the self-test is."""
+"""Benchmark of a device: the time of an engine on it beside compiled code, cached as the self-test is."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from .records import read_record, record_file, write_record
 # The engines that are tried, and the module that tries them. It imports every engine, so it is started as a
 # process and never imported here.
 ENGINES = ("eikonal", "wave", "sart", "reflection", "refraction", "field")
-MODULE = "bentray_kernels.device_engines.trial_process"
+MODULE = "bentray_kernels.device_engines.benchmark_process"
 
 # Of `bentray devices`, for one engine; the first run of an installation compiles kernels too.
 TIME_OUT_S = 300.0
 
-# Failed trials of an engine after which it is tried only by `bentray devices`: the first ones may end while
-# kernels are compiled, which are in the cache the next time.
+# Failed benchmarks of an engine after which it is tried only by `bentray devices`: the first ones may end
+# while kernels are compiled, which are in the cache the next time.
 MOST_ATTEMPTS = 3
 
-# Takes a device, an engine and a time-out; returns the answers of the trial, and how it ended.
+# Takes a device, an engine and a time-out; returns the answers of the benchmark, and how it ended.
 Child = Callable[[Device, str, float], tuple[list[dict[str, Any]], str]]
 
 
@@ -44,13 +44,13 @@ class Timing(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Trial:
+class DeviceBenchmark:
     """The times of an engine on a device.
 
     Attributes:
         timings: a small problem and a large one; none with a fault.
         fault: why the engine may not compute on the device; empty if it may.
-        attempts: failed trials before and with this one.
+        attempts: failed benchmarks before and with this one.
     """
 
     timings: tuple[Timing, ...] = ()
@@ -73,44 +73,44 @@ def _seconds(known: Sequence[tuple[float, float]], size: float) -> float:
     return start + each * size
 
 
-def stored_trial(device: Device, engine: str) -> Trial | None:
-    """The trial in the cache; None if it is absent or damaged."""
+def stored_benchmark(device: Device, engine: str) -> DeviceBenchmark | None:
+    """The benchmark in the cache; None if it is absent or damaged."""
     content = read_record(_file(device, engine))
     try:
         timings = tuple(Timing(*map(float, one)) for one in content["timings"])
-        trial = Trial(timings, str(content["fault"]), int(content["attempts"]))
+        result = DeviceBenchmark(timings, str(content["fault"]), int(content["attempts"]))
     except (ValueError, KeyError, TypeError):
         return None
     numbers = [number for one in timings for number in one]
     whole = all(math.isfinite(number) and number > 0.0 for number in numbers)
-    return trial if whole and bool(timings) != bool(trial.fault) else None
+    return result if whole and bool(timings) != bool(result.fault) else None
 
 
-def try_engine(device: Device, engine: str, time_out_s: float = TIME_OUT_S) -> Trial:
-    """Try an engine in a child process, and store the trial."""
-    trial = examine(device, engine, in_a_child, time_out_s)
-    write_record(_file(device, engine), asdict(trial))
-    return trial
+def benchmark_engine(device: Device, engine: str, time_out_s: float = TIME_OUT_S) -> DeviceBenchmark:
+    """Try an engine in a child process, and store the benchmark."""
+    result = examine(device, engine, in_a_child, time_out_s)
+    write_record(_file(device, engine), asdict(result))
+    return result
 
 
-def trial_of(device: Device, engine: str) -> Trial:
-    """The trial in the cache, or a new one without haste; a failed one is repeated."""
-    stored = stored_trial(device, engine)
-    return stored if stored is not None and not stored.fault else try_engine(device, engine)
+def benchmark_of(device: Device, engine: str) -> DeviceBenchmark:
+    """The benchmark in the cache, or a new one without haste; a failed one is repeated."""
+    stored = stored_benchmark(device, engine)
+    return stored if stored is not None and not stored.fault else benchmark_engine(device, engine)
 
 
-def examine(device: Device, engine: str, child: Child, time_out_s: float) -> Trial:
+def examine(device: Device, engine: str, child: Child, time_out_s: float) -> DeviceBenchmark:
     """Try an engine; a device that ends or stops the child has a fault."""
     answers, ending = child(device, engine, time_out_s)
     answer = next((one for one in answers if one.get("engine") == engine), {"fault": ending})
     if not answer["fault"]:
-        return Trial(tuple(Timing(*map(float, one)) for one in answer["timings"]))
-    before = stored_trial(device, engine)
-    return Trial((), str(answer["fault"]), 1 + (before.attempts if before else 0))
+        return DeviceBenchmark(tuple(Timing(*map(float, one)) for one in answer["timings"]))
+    before = stored_benchmark(device, engine)
+    return DeviceBenchmark((), str(answer["fault"]), 1 + (before.attempts if before else 0))
 
 
 def in_a_child(device: Device, engine: str, time_out_s: float) -> tuple[list[dict[str, Any]], str]:
-    """Run ``device_engines.trial_process`` in a process of its own."""
+    """Run ``device_engines.benchmark_process`` in a process of its own."""
     return answers_of(MODULE, device, (engine,), time_out_s)
 
 

@@ -12,8 +12,8 @@ from typing import TypeVar
 
 from .devices import WISH, Device, find_devices, hidden, select_devices
 from .lost_device import DeviceLostError, cpu_only
+from .self_test_results import self_test_result
 from .session import Session
-from .verdict import verdict_on
 
 Placed = TypeVar("Placed")
 
@@ -23,7 +23,7 @@ class OpenCLFallbackWarning(UserWarning):
 
 
 @dataclass(frozen=True)
-class Choice:
+class DeviceSelection:
     """The device to use, and the devices rejected before it.
 
     Attributes:
@@ -44,7 +44,7 @@ class Choice:
         return "; ".join(self.refusals) or "this machine has no OpenCL device"
 
 
-def choose() -> Choice:
+def select_device() -> DeviceSelection:
     """The first device that passes its self-test: the one of ``BENTRAY_OPENCL_DEVICE``, or GPUs first.
 
     Raises:
@@ -52,11 +52,11 @@ def choose() -> Choice:
     """
     refusals: list[str] = []
     for device in select_devices(find_devices(), os.environ.get(WISH)):
-        verdict = verdict_on(device)
+        verdict = self_test_result(device)
         if verdict.usable:
-            return Choice(device, tuple(refusals))
+            return DeviceSelection(device, tuple(refusals))
         refusals.append(f"{device.label} was refused: {verdict.reason}")
-    return Choice(None, tuple(refusals))
+    return DeviceSelection(None, tuple(refusals))
 
 
 def session_or_warning(instead: str) -> Session | None:
@@ -68,7 +68,7 @@ def session_or_warning(instead: str) -> Session | None:
         instead: the method that takes over.
 
     Raises:
-        InvalidInput: as ``choose``.
+        InvalidInput: as ``select_device``.
         DeviceLostError: after the device failed in this process.
     """
     if cpu_only():
@@ -98,7 +98,7 @@ def scene_or_warning(build: Callable[[Session], Placed], instead: str) -> Placed
         instead: the function that replaces it.
 
     Raises:
-        InvalidInput: as ``choose``, and what ``build`` raises.
+        InvalidInput: as ``select_device``, and what ``build`` raises.
     """
     session = session_or_warning(instead)
     if session is None:
@@ -125,7 +125,7 @@ def _opened(device: Device) -> Session:
 @cache
 def _found(_selection: str | None, _hidden: str) -> Session | str:
     """The open device, or the reason for none; once per selection and process."""
-    choice = choose()
+    choice = select_device()
     return choice.reason if choice.device is None else _opened(choice.device)
 
 
