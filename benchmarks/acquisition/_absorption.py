@@ -45,7 +45,7 @@ class Absorbing:
     stay: float
 
     @classmethod
-    def of(
+    def from_speed(
         cls,
         speed: Floats,
         spacing: float,
@@ -68,7 +68,7 @@ class Absorbing:
             dtype: of the fields.
 
         Raises:
-            InvalidInput: as ``Medium.of``; for an invalid frequency, an attenuation beyond its bounds.
+            InvalidInput: as ``Medium.from_speed``, and for an invalid frequency or attenuation.
         """
         if not 0.0 < frequency_hz < np.inf:
             raise InvalidInput("frequency_hz", frequency_hz, "a finite frequency > 0 Hz")
@@ -84,7 +84,7 @@ class Absorbing:
         # (w/c0 - i a)^2 = (w/c)^2 (1 + D/2 - i D/2) at w T = 1.
         lost = 2.0 * loss * turn / speed
         fast = turn / np.sqrt((turn / speed) ** 2 - loss**2 - lost)
-        medium = Medium.of(fast, spacing, time_step_s, edge_nodes=edge_nodes, dtype=np.float64)
+        medium = Medium.from_speed(fast, spacing, time_step_s, edge_nodes=edge_nodes, dtype=np.float64)
         behind = np.subtract(medium.keep.shape, loss.shape) - medium.margin
         widths = [(medium.margin, int(width)) for width in behind]
         lagging = np.pad(2.0 * lost * (fast / turn) ** 2, widths, mode="edge")

@@ -41,13 +41,15 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
     part = settings.frequency_hz / TABLE6_HZ
     speed, loss = phantom.speed(nodes, TABLE6_SIDE_M), part * phantom.attenuation(nodes, TABLE6_SIDE_M)
     grid = settings.spacing_m, settings.step_s
-    water = Medium.of(np.full_like(speed, settings.coupling_mps), *grid, edge_nodes=EDGE_NODES)
+    water = Medium.from_speed(np.full_like(speed, settings.coupling_mps), *grid, edge_nodes=EDGE_NODES)
     tissue: Medium | Absorbing
     if proportional:
         centre = settings.frequency_hz
-        tissue = Absorbing.of(speed, *grid, attenuation=loss, frequency_hz=centre, edge_nodes=EDGE_NODES)
+        tissue = Absorbing.from_speed(
+            speed, *grid, attenuation=loss, frequency_hz=centre, edge_nodes=EDGE_NODES
+        )
     else:
-        tissue = Medium.of(speed, *grid, attenuation=loss, edge_nodes=EDGE_NODES)
+        tissue = Medium.from_speed(speed, *grid, attenuation=loss, edge_nodes=EDGE_NODES)
     places = settings.elements_m() + 0.5 * settings.side_m
     late = settings.step_s * settings.frequency_hz * np.arange(settings.samples * settings.skip) - BEFORE
     pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)

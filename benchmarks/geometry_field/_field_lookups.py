@@ -35,7 +35,7 @@ class Lookups:
     planes: PlaneTable
 
     @classmethod
-    def of(cls, chart: Chart, n: int) -> Lookups:
+    def from_chart(cls, chart: Chart, n: int) -> Lookups:
         """Build the field of a chart's mesh, and what the lookups need."""
         surface = surface_of(chart)
         field = build_outer_field(surface, n)

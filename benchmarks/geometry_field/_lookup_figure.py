@@ -26,7 +26,7 @@ NAMES = {
 def lookup_panels(pixels: int) -> list[Panel]:
     """The body in clay, by three lookups."""
     chart = parameterise(load_mesh()[1]).chart
-    image, lookups = geometry_image(chart, PIXELS), Lookups.of(chart, SAMPLES)
+    image, lookups = geometry_image(chart, PIXELS), Lookups.from_chart(chart, SAMPLES)
     camera = perspective(EYE, (0.45, 0.5, 0.5), (0.0, 1.0, 0.0), 38.0)
     place = (np.arange(2 * pixels) + 0.5) / (2 * pixels) - 0.5
     u, v = np.tile(place, 2 * pixels)[:, None], np.repeat(place, 2 * pixels)[:, None]

@@ -43,7 +43,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         seconds.append(time.perf_counter() - start)
     detail = f"{name}, n = {SAMPLES}, two threads, hierarchy included; theirs 420 to 672 s"
     yield Row("G1 outer field", min(seconds), 10.0, "<=", "s", detail)
-    lookups = Lookups.of(chart, SAMPLES)
+    lookups = Lookups.from_chart(chart, SAMPLES)
     context.progress(2, 6, "comparing with exact intersectors")
     peers, missing = available({peer: (module, adapt) for peer, (module, adapt) in PEERS.items()})
     exact = {peer: adapter(mesh) for peer, adapter in peers.items()} | {"ours": Ours(lookups.surface)}
@@ -144,7 +144,7 @@ def face_rows(n: int) -> Iterable[Row]:
     runs: dict = {}
     for faces in BALLS:
         mesh = bumpy_ball(faces).in_unit_cube()
-        lookups = Lookups.of(Chart(mesh, mesh.corners[..., :2]), n)
+        lookups = Lookups.from_chart(Chart(mesh, mesh.corners[..., :2]), n)
         ours = lookups.runs(rays)[0]
         runs |= {(way, faces): ours[way] for way in ("plane", "nearest uv", "walk")}
         runs["exact", faces] = Ours(lookups.surface).run(*rays)

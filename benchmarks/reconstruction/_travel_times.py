@@ -32,7 +32,7 @@ class TravelTimes:
     spacing: float
 
     @classmethod
-    def of(cls, dataset: Dataset, nodes: int, side_m: float) -> TravelTimes:
+    def from_dataset(cls, dataset: Dataset, nodes: int, side_m: float) -> TravelTimes:
         """The times of a ring whose elements all send and receive, in a square centred on 0.
 
         A pair measured both ways keeps the mean, in one of its places: twice the rays would cost twice the

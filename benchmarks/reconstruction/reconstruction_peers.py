@@ -129,7 +129,7 @@ def run_peer(peer: Peer, dataset: Dataset, tiny: Dataset) -> Found:
 
     def times(of: Dataset) -> TravelTimes:
         assert of.truth is not None
-        return TravelTimes.of(of, len(of.truth.sound_speed_mps), SIDE_M)
+        return TravelTimes.from_dataset(of, len(of.truth.sound_speed_mps), SIDE_M)
 
     peer(times(tiny))
     given = times(dataset)

@@ -127,7 +127,7 @@ class FatScan:
         for name in (*names, "water shot"):
             speed = speeds[name]
             if self.peer is None:
-                medium = Medium.of(speed, self.spacing_m, step, edge_nodes=EDGE_NODES, order=ORDER)
+                medium = Medium.from_speed(speed, self.spacing_m, step, edge_nodes=EDGE_NODES, order=ORDER)
                 shoot = partial(_shot, medium, ring, pulse, skip)
             else:
                 nodes = self._ring_nodes(self.ring_m())

@@ -79,7 +79,7 @@ def glass(
 ) -> Scene:
     """A volume, read by one of ``FILTERS``, as glass of 2 along its longest edge."""
     known, prefilter, smoothing = FILTERS[name]
-    spline = Spline.of(volume, known, prefilter=prefilter, smoothing=smoothing, dtype=np.float32)
+    spline = Spline.from_volume(volume, known, prefilter=prefilter, smoothing=smoothing, dtype=np.float32)
     return Scene.build(spline, Layers(tuple(isos), tuple(indices)), 2.0 / (max(volume.shape) - 1))
 
 

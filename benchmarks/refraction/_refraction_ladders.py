@@ -177,7 +177,7 @@ def filters(subject: Subject, repeats: int) -> Iterable[Row]:
     }[subject.name]
     for name, published in theirs.items():
         made = Scene.build(
-            Spline.of(subject.volume, name), Layers((subject.iso,), (1.0, 1.5)), bound="bernstein"
+            Spline.from_volume(subject.volume, name), Layers((subject.iso,), (1.0, 1.5)), bound="bernstein"
         )
         runs = {
             structure: lambda made=made, structure=structure: render(

@@ -114,7 +114,7 @@ class RingScan:
         """Simulates the emission of an element, (elements, steps)."""
         if self.peer is not None:
             return partial(_shot_of_peer, self.peer, speed, self.spacing_m, step, self.ring(), pulse)
-        medium = Medium.of(speed, self.spacing_m, step, edge_nodes=EDGE_NODES, order=OWN_ORDER)
+        medium = Medium.from_speed(speed, self.spacing_m, step, edge_nodes=EDGE_NODES, order=OWN_ORDER)
         return partial(_own_shot, medium, self.ring() * self.spacing_m, pulse)
 
     def dataset(self, traces: np.ndarray, water: np.ndarray, speed: Floats, roi: Flags | None) -> Dataset:

@@ -28,8 +28,8 @@ def picture() -> bytes:
     line = np.zeros(NODES)
     line[NODES // 2] = 1.0
     convolutions = [
-        ("trilinear", Spline.of(line, "trilinear"), "#b0b0b0", "-"),
-        ("Catmull-Rom", Spline.of(line, "catmull-rom"), "#d1495b", "-"),
+        ("trilinear", Spline.from_volume(line, "trilinear"), "#b0b0b0", "-"),
+        ("Catmull-Rom", Spline.from_volume(line, "catmull-rom"), "#d1495b", "-"),
     ]
     orders = [(f"B-spline {n}", Spline(line, n), COLOURS[n], "-") for n in range(2, 7)]
     raw = [
@@ -39,7 +39,7 @@ def picture() -> bytes:
         (f"B-spline 3, λ = {smoothing:g}", Spline(line, 3, smoothing=smoothing), colour, "-")
         for smoothing, colour in ((0.1, "#edae49"), (1.0, "#d1495b"), (10.0, "#7a2e1d"))
     ]
-    central = ("central difference", Spline.of(line, "central"), "#e08e45", "-")
+    central = ("central difference", Spline.from_volume(line, "central"), "#e08e45", "-")
     with drawing():
         figure = new_figure(9.2, 6.8)
         figure.suptitle("Frequency response of the interpolation filters")

@@ -30,7 +30,7 @@ def rings() -> dict[str, float]:
     field = MarschnerLobb()
     volume = sampled(field, RINGS_NODES)
     points = circle(RINGS_RADIUS)
-    found = {name: mean_angle(field, Spline.of(volume, name), points) for name in PREFILTERED}
+    found = {name: mean_angle(field, Spline.from_volume(volume, name), points) for name in PREFILTERED}
     found["half-node differences"] = half_node_differences(field, volume, points)
     return found
 
@@ -40,7 +40,7 @@ def ball() -> dict[str, float]:
     field = FringeSphere()
     volume = eight_bit(sampled(field, BALL_NODES), 0.0, 1.0)
     points = circle(field.iso_radius(BALL_ISO))
-    made: dict[str, Spline] = {name: Spline.of(volume, name) for name in PREFILTERED}
+    made: dict[str, Spline] = {name: Spline.from_volume(volume, name) for name in PREFILTERED}
     made |= {f"raw {order}": Spline(volume, order, prefilter=False) for order in range(2, 7)}
     made["smooth 1"] = Spline(volume, 3, smoothing=1.0)
     made["smooth noise"] = Spline(volume, 3, smoothing=smoothing_for_noise(volume, 3, ROUNDING))
@@ -59,7 +59,7 @@ def mean_angle(field: CubeField, spline: Spline, points: np.ndarray) -> float:
 
 def half_node_differences(field: CubeField, volume: np.ndarray, points: np.ndarray) -> float:
     """Another reading of central differences: of trilinear values half a node away, in the plane."""
-    linear, nodes = Spline.of(volume, "trilinear"), in_nodes(points, volume.shape[0])
+    linear, nodes = Spline.from_volume(volume, "trilinear"), in_nodes(points, volume.shape[0])
     steps = 0.5 * np.eye(3)[:2]
     found = np.stack([linear.value(nodes + step) - linear.value(nodes - step) for step in steps], axis=1)
     return between(found, field.gradient(points)[:, :2])

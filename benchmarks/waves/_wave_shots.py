@@ -96,7 +96,9 @@ class Shot:
     @cached_property
     def medium(self) -> Medium:
         """For ours."""
-        return Medium.of(self.speed, self.spacing, self.step, attenuation=self.loss, edge_nodes=EDGE_NODES)
+        return Medium.from_speed(
+            self.speed, self.spacing, self.step, attenuation=self.loss, edge_nodes=EDGE_NODES
+        )
 
     @cached_property
     def ring(self) -> np.ndarray:

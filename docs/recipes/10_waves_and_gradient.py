@@ -27,15 +27,15 @@ pulse = np.pi * frequency * (time - 1.2 / frequency)
 wavelet = (1 - 2 * pulse**2) * np.exp(-(pulse**2))  # Ricker
 emitter = np.array([0.006, 0.035])
 receivers = np.column_stack((np.full(41, 0.064), np.linspace(0.006, 0.064, 41)))
-recorded = simulate(Medium.of(inclusion, spacing, step), emitter, receivers, wavelet)
-simulated = simulate(Medium.of(water, spacing, step), emitter, receivers, wavelet)
+recorded = simulate(Medium.from_speed(inclusion, spacing, step), emitter, receivers, wavelet)
+simulated = simulate(Medium.from_speed(water, spacing, step), emitter, receivers, wavelet)
 
 # %%
 # The misfit is one minus the normalised correlation of each trace. Its gradient tells where to change the
 # speed: a step against it makes the inclusion faster. For one pair alone the gradient is the sensitivity of
 # a wave: wide, as a Fresnel zone, and not a thin ray.
 
-medium, weight = Medium.of(water, spacing, step), np.ones((1, 1))
+medium, weight = Medium.from_speed(water, spacing, step), np.ones((1, 1))
 
 
 def misfit_of(some):
@@ -67,7 +67,9 @@ plt.show()
 change = np.exp(-((x[:, None] - 0.035) ** 2 + (x[None] - 0.045) ** 2) / (2 * 0.004**2))
 faster, slower = (
     correlation(
-        simulate(Medium.of(water + s * change, spacing, step), emitter, receivers, wavelet), recorded, weight
+        simulate(Medium.from_speed(water + s * change, spacing, step), emitter, receivers, wavelet),
+        recorded,
+        weight,
     )[0]
     for s in (2.0, -2.0)
 )

@@ -27,7 +27,7 @@ settings = RenderSettings(rows=192, columns=192)
 # Trilinear interpolation, the cubic B-spline, and the cubic smoothing spline.
 
 filters = {
-    "trilinear": Spline.of(volume, "trilinear"),
+    "trilinear": Spline.from_volume(volume, "trilinear"),
     "cubic B-spline": Spline(volume, order=3),
     "cubic, smoothing 1": Spline(volume, order=3, smoothing=1.0),
 }

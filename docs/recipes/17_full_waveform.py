@@ -40,7 +40,7 @@ wavelet = (1 - 2 * pulse**2) * np.exp(-(pulse**2))  # Ricker
 angle = 2 * np.pi * np.arange(48) / 48
 ring = side / 2 + 0.021 * np.column_stack((np.cos(angle), np.sin(angle)))
 true = object_on(nodes)
-fine = Medium.of(object_on(2 * nodes - 1), finer, step)
+fine = Medium.from_speed(object_on(2 * nodes - 1), finer, step)
 recorded = [simulate(fine, ring[e], ring, wavelet) for e in range(0, 48, 4)]
 
 # %%
@@ -54,7 +54,7 @@ weight = np.ones((1, 1))
 def misfit(change):
     speed = np.full((nodes, nodes), water)
     speed[inside] += change
-    medium = Medium.of(speed, spacing, step)
+    medium = Medium.from_speed(speed, spacing, step)
     total, gradient = 0.0, np.zeros((nodes, nodes))
     for e, traces in zip(range(0, 48, 4), recorded, strict=True):
         found = misfit_gradient(

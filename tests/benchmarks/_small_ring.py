@@ -32,7 +32,7 @@ def dataset() -> Dataset:
 
 def ring() -> TravelTimes:
     """The same as a peer gets it."""
-    return TravelTimes.of(dataset(), NODES, SIDE_M)
+    return TravelTimes.from_dataset(dataset(), NODES, SIDE_M)
 
 
 def disc(times: TravelTimes, part: float) -> np.ndarray:

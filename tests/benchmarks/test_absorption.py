@@ -21,7 +21,7 @@ UNIFORM = np.full((50, 30), WATER)
 
 
 def traces(loss):
-    medium = Absorbing.of(
+    medium = Absorbing.from_speed(
         UNIFORM,
         1e-3,
         STEP_S,
@@ -58,7 +58,7 @@ def test_loss_and_delay_match_the_relaxation_model():
 
 
 def test_zero_loss_equals_the_lossless_simulation():
-    medium = Medium.of(UNIFORM, 1e-3, STEP_S, dtype=np.float64)
+    medium = Medium.from_speed(UNIFORM, 1e-3, STEP_S, dtype=np.float64)
     plain = simulate(medium, SOURCE, RECEIVERS, pulse(np.arange(300) * STEP_S, CENTRE_HZ))
     assert np.abs(traces(0.0) - plain).max() < 1e-12 * np.abs(plain).max()
 
@@ -70,7 +70,7 @@ def test_rough_media_are_reciprocal_and_decay(seed, most):
     speed = random.uniform(1400.0, 1600.0, (24, 26))
     loss = random.uniform(0.0, most, speed.shape)
     step = 0.5 * longest_step(1600.0, 1e-3)
-    medium = Absorbing.of(
+    medium = Absorbing.from_speed(
         speed, 1e-3, step, attenuation=loss, frequency_hz=CENTRE_HZ, edge_nodes=8, dtype=np.float64
     )
     wavelet = pulse(np.arange(400) * step, CENTRE_HZ)
@@ -97,4 +97,4 @@ def test_rough_media_are_reciprocal_and_decay(seed, most):
 def test_rejects_invalid_loss(changed, field):
     asked = {"time_step_s": STEP_S, "attenuation": np.zeros((50, 30)), "frequency_hz": CENTRE_HZ, **changed}
     with pytest.raises(InvalidInput, match=field):
-        Absorbing.of(UNIFORM, 1e-3, asked.pop("time_step_s"), **asked)
+        Absorbing.from_speed(UNIFORM, 1e-3, asked.pop("time_step_s"), **asked)

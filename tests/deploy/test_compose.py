@@ -220,7 +220,7 @@ def test_password_and_key_are_made_once_and_closed_to_others(tmp_path: Path) -> 
         subprocess.run([str(DEPLOY / "secrets.sh"), str(folder)], check=True, capture_output=True)
     found = [(folder / name).read_text() for name in ("database-password", "first-key")]
     assert re.fullmatch("[0-9a-f]{64}", found[0])
-    assert ApiKey.of(found[1]) is not None
+    assert ApiKey.from_text(found[1]) is not None
     assert folder.stat().st_mode & 0o777 == 0o700
     subprocess.run([str(DEPLOY / "secrets.sh"), str(tmp_path / "more")], check=True)
     for name, before in zip(("database-password", "first-key"), found, strict=True):

@@ -9,7 +9,7 @@ from bentray_workers.files.volume import Volume, write_volume
 def store_volume(http, values=None, spacing=(1e-3,) * 3):
     """Store it for the tenant of the service, by default a ball with a hole; returns its id."""
     parts, volume_id = http.app.state.parts, new_id("volume")
-    volume = Volume.of(sampled(ONE_HOLE, 12) if values is None else values, spacing)
+    volume = Volume.from_values(sampled(ONE_HOLE, 12) if values is None else values, spacing)
     write_volume(parts.files.of(LOCAL).volume(volume_id), volume)
     summary = {
         "title": "a ball",

@@ -70,7 +70,7 @@ class HeldCluster(FakeCluster):
 
 def put(parts, tenant, values, shape=None):
     """A volume as an upload leaves it; its row may tell of another shape."""
-    volume, volume_id = Volume.of(values, (1e-3,) * 3), new_id("volume")
+    volume, volume_id = Volume.from_values(values, (1e-3,) * 3), new_id("volume")
     path = parts.files.of(tenant).volume(volume_id)
     write_volume(path, volume)
     nodes = int(np.prod(shape or values.shape))

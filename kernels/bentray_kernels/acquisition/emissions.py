@@ -35,7 +35,7 @@ class Emissions:
     inverted: Flags
 
     @classmethod
-    def of(
+    def from_reader(
         cls, read: Callable[[int], NDArray[Any]], shape: tuple[int, int, int], dtype: np.dtype[Any]
     ) -> Emissions:
         """All recorded traces, unchanged."""

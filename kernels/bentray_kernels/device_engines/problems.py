@@ -146,7 +146,7 @@ def traces_in_space(nodes: int, steps: int) -> Engine:
     """Traces of one emitter in 3-D, float32; 256³ nodes with the absorbing edges of 210³."""
     spacing, step = 5e-4, 1e-7
     speed = np.random.default_rng(0).uniform(1400.0, 1600.0, (nodes,) * 3)
-    medium = Medium.of(speed, spacing, step, dtype=np.float32)
+    medium = Medium.from_speed(speed, spacing, step, dtype=np.float32)
     middle = 0.5 * spacing * (nodes - 1)
     places = np.array([[middle, middle, middle], [middle, middle, middle + 4.0 * spacing]])
     pulse = np.exp(-(((np.arange(steps) - 0.5 * steps) * 6.0 / steps) ** 2))
@@ -202,7 +202,7 @@ def wave_scan(nodes: int, steps: int, emitters: int) -> tuple[Medium, Emissions]
     """A random medium, and emitters on a ring of 64 receivers."""
     spacing, step = 5e-4, 1e-7
     speed = np.random.default_rng(0).uniform(1400.0, 1600.0, (nodes, nodes))
-    medium = Medium.of(speed, spacing, step, dtype=np.float32)
+    medium = Medium.from_speed(speed, spacing, step, dtype=np.float32)
     time = step * np.arange(steps)
     pulse = np.exp(-(((time - 6e-6) * 3e5) ** 2)) * np.sin(2e6 * np.pi * 0.3 * (time - 6e-6))
     angle = 2.0 * np.pi * np.arange(64) / 64

@@ -47,7 +47,7 @@ class BlockPlanes(NamedTuple):
     nodes: int
 
     @classmethod
-    def of(cls, start: int, stop: int, nodes: int) -> BlockPlanes:
+    def from_range(cls, start: int, stop: int, nodes: int) -> BlockPlanes:
         low, high = max(start - GUARD - BELOW, 0), min(stop + GUARD + ABOVE, nodes)
         return cls(start, stop, low, high, nodes)
 

@@ -57,7 +57,7 @@ class Spline:
         self._read(volume, bspline(int(order)), prefilter, smoothing, dtype)
 
     @classmethod
-    def of(
+    def from_volume(
         cls,
         volume: ArrayLike,
         filter: str,  # noqa: A002 - the word of the field

@@ -42,7 +42,7 @@ class DeviceGrid:
     filled: tuple[int, ...]
 
     @classmethod
-    def of(cls, medium: Medium, group: Group) -> DeviceGrid:
+    def from_medium(cls, medium: Medium, group: Group) -> DeviceGrid:
         """The grid of a medium."""
         shape = medium.speed.shape
         across, along = group
@@ -138,7 +138,7 @@ class Gather:
     weight: NDArray[Any]
 
     @classmethod
-    def of(cls, grid: DeviceGrid, receivers: Points) -> Gather:
+    def from_receivers(cls, grid: DeviceGrid, receivers: Points) -> Gather:
         """The taps of the receivers on a grid."""
         places = grid.taps(receivers)
         dims = len(grid.shape)

@@ -60,7 +60,7 @@ class ShotPlan(NamedTuple):
     segments: int
 
     @classmethod
-    def of(cls, size: ShotSize, limit_bytes: float, array_bytes: float) -> ShotPlan:
+    def for_memory(cls, size: ShotSize, limit_bytes: float, array_bytes: float) -> ShotPlan:
         """The plan with the fewest segments that holds an emitter.
 
         Args:

@@ -87,14 +87,14 @@ class DeviceWaves:
 
     def __init__(self, session: Session, medium: Medium, scan: Scan, group: Group | None = None) -> None:
         self.session, self.scan, self.kind = session, scan, medium.keep.dtype
-        self.grid = DeviceGrid.of(medium, group or _group(session, medium))
+        self.grid = DeviceGrid.from_medium(medium, group or _group(session, medium))
         self._fills = self.grid.group[1] > 1
         self._factors = [session.upload(self.grid.packed(factor)) for factor in medium.factors]
         self._taps = session.upload(weights(medium.order).astype(self.kind))
         self._receivers = self.uploaded(scan.receivers)
         self.drive, self.gather, self.gathered = self._factors[2], None, 0
         if scan.every:
-            gather = Gather.of(self.grid, scan.receivers)
+            gather = Gather.from_receivers(self.grid, scan.receivers)
             self.gather = [session.upload(part) for part in vars(gather).values()]
             self.gathered = len(gather.node)
 
@@ -116,7 +116,7 @@ class DeviceWaves:
         """
         handle = self.session.handle
         limit = min(memory_bytes, MEMORY_SHARE * handle.global_mem_size)
-        plan = ShotPlan.of(self.size, limit, handle.max_mem_alloc_size)
+        plan = ShotPlan.for_memory(self.size, limit, handle.max_mem_alloc_size)
         if not _is_processor(handle):
             return plan
         return plan._replace(emitters=min(plan.emitters, handle.max_compute_units, PROCESSOR_EMITTERS))
@@ -245,7 +245,7 @@ def uints(*values: int) -> tuple[np.uint32, ...]:
 def _group(session: Session, medium: Medium) -> Group:
     if not _is_processor(session.handle):
         return OTHER_GROUP
-    return min(PROCESSOR_GROUPS, key=lambda group: DeviceGrid.of(medium, group).filled[-1])
+    return min(PROCESSOR_GROUPS, key=lambda group: DeviceGrid.from_medium(medium, group).filled[-1])
 
 
 def _is_processor(handle: Any) -> bool:

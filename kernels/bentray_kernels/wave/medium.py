@@ -57,7 +57,7 @@ class Medium:
         return self.keep, self.fade, self.drive
 
     @classmethod
-    def of(
+    def from_speed(
         cls,
         speed: Floats,
         spacing: float,

@@ -209,7 +209,7 @@ class SignIn:
         return ANYONE
 
     def _caller_with_key(self, text: str) -> Caller:
-        token = ApiKey.of(text)
+        token = ApiKey.from_text(text)
         row = None if token is None else self._keys.owner(token)
         if row is None:
             raise NotAuthenticated(

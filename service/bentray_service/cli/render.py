@@ -147,7 +147,9 @@ def _sampled(phantom: SampledPhantom, nodes: int) -> Volume:
         SampledPhantom.TWO_HOLES: TWO_HOLES,
         SampledPhantom.MARSCHNER_LOBB: MarschnerLobb(),
     }
-    return Volume.of(sampled(fields[phantom], nodes), (PHANTOM_SIDE_M / (nodes - 1),) * 3, title=phantom)
+    return Volume.from_values(
+        sampled(fields[phantom], nodes), (PHANTOM_SIDE_M / (nodes - 1),) * 3, title=phantom
+    )
 
 
 def _drawn(

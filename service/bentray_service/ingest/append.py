@@ -40,7 +40,7 @@ class Checksum:
     digest: bytes
 
     @classmethod
-    def of(cls, header: str) -> Self:
+    def from_header(cls, header: str) -> Self:
         """Parse a header such as ``sha1 Kq5sNclPz7QV2+lfQIuc6R7oRu0=``.
 
         Raises:

@@ -124,7 +124,9 @@ def _dataset(source: Path, target: Path, given: dict[str, Any], on_size: OnSize)
         return record_of(correct_dataset(source, target, correction, origin=given["origin"], on_size=on_size))
     from bentray_workers.foreign_scans import ScanMetadata, convert_dataset
 
-    return record_of(convert_dataset(source, target, on_size=on_size, given=ScanMetadata.of(**given)))
+    return record_of(
+        convert_dataset(source, target, on_size=on_size, given=ScanMetadata.from_options(**given))
+    )
 
 
 def _volume(source: Path, target: Path, given: dict[str, Any], on_size: OnSize) -> dict[str, Any]:

@@ -161,7 +161,7 @@ def read(
     source = Path(path)
     if not source.exists():
         raise InvalidInput("file", f"{source} (no such file)", ACCEPTED)
-    given = ScanMetadata.of(
+    given = ScanMetadata.from_options(
         [f"{name}={variable}" for name, variable in (map or {}).items()],
         (unit,) if isinstance(unit, str) else unit,
         temperature_c,

@@ -89,7 +89,7 @@ async def correct_dataset(
     given = correction.model_dump(exclude_none=True)
     # A correction that changes nothing is rejected before any work.
     Correction(**given)
-    key = RequestKey.of(idempotency_key, ["correction", dataset_id, given])
+    key = RequestKey.from_header(idempotency_key, ["correction", dataset_id, given])
     made = await run_in_threadpool(service.datasets.made_by, tenant, key)
     if made is None:
         made = await _corrected(dataset_id, given, key, request, service, tenant)

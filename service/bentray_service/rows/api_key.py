@@ -33,7 +33,7 @@ class ApiKey:
         return cls(secrets.token_hex(6), secrets.token_hex(20))
 
     @classmethod
-    def of(cls, text: str) -> ApiKey | None:
+    def from_text(cls, text: str) -> ApiKey | None:
         """Parse ``text``; None if it does not have the format of a key."""
         match = PATTERN.fullmatch(text)
         return None if match is None else cls(match[1], match[2])
@@ -45,7 +45,7 @@ class ApiKey:
         Raises:
             InvalidInput: naming ``field``; the text itself is not shown, since it may contain a secret.
         """
-        key = cls.of(text)
+        key = cls.from_text(text)
         if key is None:
             raise InvalidInput(field, f"{len(text)} characters that are not a key", ACCEPTED)
         return key

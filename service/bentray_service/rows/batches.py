@@ -47,7 +47,7 @@ class Batches:
             KeyReused, QuotaExceeded, QueueFull, UnknownId: as for ``Jobs.add``.
         """
         called = [] if how.webhook is None else [how.webhook]
-        request = RequestKey.of(how.key, [name, settings, [one.dataset_id for one in new], *called])
+        request = RequestKey.from_header(how.key, [name, settings, [one.dataset_id for one in new], *called])
         with self._database.write() as connection:
             before = request.earlier(connection, batches, tenant)
             if before is None:

@@ -26,7 +26,7 @@ class RequestKey:
     digest: str
 
     @classmethod
-    def of(cls, key: str | None, request: object) -> RequestKey:
+    def from_header(cls, key: str | None, request: object) -> RequestKey:
         """The key of a request, given as what JSON can hold."""
         return cls(key, hashlib.sha256(json.dumps(request, sort_keys=True).encode()).hexdigest())
 

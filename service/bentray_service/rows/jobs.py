@@ -77,7 +77,7 @@ class Jobs(NamedTable[JobRow]):
         )
         how = Submission(None if reserve is None else reserve[1], most_queued, key, started_by, webhook)
         called = [] if webhook is None else [webhook]
-        request = RequestKey.of(key, [kind, settings, dataset_id, volume_id, mesh_id, *called])
+        request = RequestKey.from_header(key, [kind, settings, dataset_id, volume_id, mesh_id, *called])
         with self._database.write() as connection:
             before = request.earlier(connection, jobs, tenant)
             if before is None:

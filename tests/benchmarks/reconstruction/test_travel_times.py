@@ -15,7 +15,7 @@ def test_each_pair_comes_once_and_with_the_mean_of_both_ways() -> None:
     scan = dataset()
     assert scan.delta_tof_s is not None
     one_way = np.triu(np.full((ELEMENTS, ELEMENTS), 2e-8))
-    times = TravelTimes.of(replace(scan, delta_tof_s=scan.delta_tof_s + one_way), NODES, SIDE_M)
+    times = TravelTimes.from_dataset(replace(scan, delta_tof_s=scan.delta_tof_s + one_way), NODES, SIDE_M)
     emitter, receiver = times.pairs()
     assert len({frozenset(pair) for pair in zip(emitter, receiver, strict=True)}) == len(emitter)
     assert len(emitter) == ELEMENTS * (ELEMENTS - 1) // 2

@@ -32,7 +32,7 @@ def test_they_read_as_the_array_that_went_through_the_same(traces, done):
         asked.append(e)
         return traces[e]
 
-    whole, lazily = traces, Emissions.of(read, traces.shape, traces.dtype)
+    whole, lazily = traces, Emissions.from_reader(read, traces.shape, traces.dtype)
     for axis, how in done:
         if axis == 2:
             whole, lazily = invert_polarity(whole, how), invert_polarity(lazily, how)

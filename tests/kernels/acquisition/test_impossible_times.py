@@ -125,7 +125,7 @@ PLAIN = SPEED.filled(1500.0)
         lambda: eikonal.solve_many(SPEED[None], 1e-3, np.array([[1e-3, 4e-3]])),
         lambda: trace(SPEED, 1e-3, np.array([[1e-3, 1e-3]]), np.array([4e-3, 1e-3])),
         lambda: prefilter(SPEED, 3),
-        lambda: Medium.of(SPEED, 1e-3, 1e-8),
+        lambda: Medium.from_speed(SPEED, 1e-3, 1e-8),
         lambda: rmse(PLAIN, SPEED, PLAIN > 0.0),
     ],
 )

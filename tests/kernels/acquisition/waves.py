@@ -31,7 +31,7 @@ def wave_scan() -> Dataset:
     random = np.random.default_rng(5)
 
     def traces(speed: np.ndarray) -> np.ndarray:
-        medium, at = Medium.of(speed, SPACING_M, STEP_S, edge_nodes=20), place + SPACING_M * HALF
+        medium, at = Medium.from_speed(speed, SPACING_M, STEP_S, edge_nodes=20), place + SPACING_M * HALF
         clean = np.stack([simulate(medium, one, at, pulse)[:, ::SKIP] for one in at])
         usual = float(np.median(np.abs(clean).max(axis=-1)))
         return (clean / usual + NOISE * random.standard_normal(clean.shape)).astype(np.float32)

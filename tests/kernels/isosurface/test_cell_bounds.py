@@ -30,7 +30,7 @@ def test_no_bound_loses_a_value():
     def holds(seed, whole, name):
         random = np.random.default_rng(seed)
         nodes = random.normal(100.0, 40.0, SHAPE)
-        spline = Spline.of(np.round(nodes) if whole else nodes, name, prefilter=False)
+        spline = Spline.from_volume(np.round(nodes) if whole else nodes, name, prefilter=False)
         points = dense(7)
         values = spline.value(points.reshape(-1, 3)).reshape(points.shape[:2])
         isos = random.normal(100.0, 40.0, 2)
@@ -45,7 +45,7 @@ def test_no_bound_loses_a_value():
 @pytest.mark.parametrize("name", sorted(FILTERS))
 def test_the_exact_range_is_attained(name):
     nodes = np.random.default_rng(3).normal(0.0, 1.0, SHAPE)
-    spline = Spline.of(nodes, name, prefilter=False)
+    spline = Spline.from_volume(nodes, name, prefilter=False)
     # Iso-values this dense make every cell a candidate.
     ranges = cell_ranges(spline, np.linspace(-4.0, 4.0, 2001), "ccc")
     points = dense(25)
@@ -57,7 +57,7 @@ def test_the_exact_range_is_attained(name):
 @pytest.mark.parametrize("name", sorted(FILTERS))
 def test_the_bend_bounds_second_differences_along_lines(name):
     random = np.random.default_rng(4)
-    spline = Spline.of(random.normal(0.0, 1.0, SHAPE), name, prefilter=False)
+    spline = Spline.from_volume(random.normal(0.0, 1.0, SHAPE), name, prefilter=False)
     ranges = cell_ranges(spline, np.linspace(-6.0, 6.0, 4001), "bmcc")
     cells = np.array(list(np.ndindex(*(n - 1 for n in SHAPE))))
     for cell in cells:
@@ -74,7 +74,7 @@ def test_the_sphere_of_table_3(name, published):
     axis = np.arange(64) - 31.5
     radius = np.sqrt(axis[:, None, None] ** 2 + axis[:, None] ** 2 + axis**2)
     nodes = np.round(255.0 * np.exp(-(np.maximum(radius - 20.0, 0.0) ** 2) / 8.0))
-    spline = Spline.of(nodes, name, prefilter=False)
+    spline = Spline.from_volume(nodes, name, prefilter=False)
     count = {b: cell_ranges(spline, [128.0], b).candidates(128.0) for b in BOUNDS[:4]}
     assert count["accc"] / count["bmcc"] == pytest.approx(published, abs=0.04)
     assert count["bernstein"] < 0.55 * count["accc"]

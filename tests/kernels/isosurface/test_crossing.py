@@ -52,7 +52,7 @@ class Case:
 
     def __init__(self, seed: int, name: str, bound: str = "bernstein") -> None:
         random = np.random.default_rng(seed)
-        self.spline = Spline.of(random.normal(0.0, 1.0, SHAPE), name)
+        self.spline = Spline.from_volume(random.normal(0.0, 1.0, SHAPE), name)
         self.isos = np.sort(random.normal(0.0, 0.5, 2))
         self.octree = octree_of(cell_ranges(self.spline, self.isos, bound), self.isos)
         ends = random.random((2, 3)) * (np.array(SHAPE) - 1.0)
@@ -235,7 +235,7 @@ def test_steps_find_what_lies_between_two_of_them():
 def test_a_surface_on_the_face_of_cells_is_left_behind(name):
     # A ramp whose iso-surface is the plane of nodes x = 4: the ray goes on from there and does not stay.
     case = Case(0, name)
-    case.spline = Spline.of(np.arange(12.0)[:, None, None] + np.zeros((1, 4, 4)), name)
+    case.spline = Spline.from_volume(np.arange(12.0)[:, None, None] + np.zeros((1, 4, 4)), name)
     case.isos = np.array([4.0, 7.0])
     case.octree = octree_of(cell_ranges(case.spline, case.isos, "bernstein"), case.isos)
     case.origin, case.along = np.array([1.0, 1.3, 1.7]), np.array([9.0, 0.0, 0.0])

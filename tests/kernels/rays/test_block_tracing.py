@@ -27,7 +27,7 @@ def one_ray(tof, slowness, bounds, source, receiver):
     while end != ARRIVED:
         block = int(np.searchsorted(bounds, place[0], side="right")) - 1
         block = min(block, len(bounds) - 2)
-        planes = BlockPlanes.of(bounds[block], bounds[block + 1], SHAPE[0])
+        planes = BlockPlanes.from_range(bounds[block], bounds[block + 1], SHAPE[0])
         own = slice(planes.low, planes.high)
         rays = WaitingRays(place[None], np.array([count]), np.array([by_nodes]))
         parts = trace_block(tof[own], slowness[own], SPACING, planes, source, rays)
@@ -89,7 +89,7 @@ def test_straight_parts_of_all_blocks_are_the_whole_ray():
     corrections = np.array([1.0, -2.0, 3.0, np.nan])
     total, predicted = np.zeros((2, *SHAPE)), np.zeros(4)
     for start, stop in ((0, 20), (20, 21), (21, 40)):
-        planes = BlockPlanes.of(start, stop, SHAPE[0])
+        planes = BlockPlanes.from_range(start, stop, SHAPE[0])
         own = slice(planes.low, planes.high)
         rays = WaitingRays(receivers, np.ones(4, np.int64), np.zeros(4, np.bool_))
         parts = trace_block(None, slowness[own], SPACING, planes, source, rays)

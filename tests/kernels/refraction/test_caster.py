@@ -152,7 +152,7 @@ def test_an_object_cut_by_the_grid_has_flat_faces():
     axis = np.linspace(0.0, 1.0, 8)
     volume = 1.0 + 0.1 * axis[:, None, None] + np.zeros((8, 8, 8))
     volume[0, 0, 0] = 0.0
-    made = Scene.build(Spline.of(volume, "trilinear"), Layers((0.5,), (1.0, 1.5)), 1.0 / 7.0)
+    made = Scene.build(Spline.from_volume(volume, "trilinear"), Layers((0.5,), (1.0, 1.5)), 1.0 / 7.0)
     tilt = 0.3
     traced = trace(made, [[-0.5, 0.0, -2.0]], [[np.sin(tilt), 0.0, np.cos(tilt)]], paths=True)
     assert traced.crossed[0] == 2
@@ -181,7 +181,7 @@ def test_rays_that_miss_and_rays_that_are_lost():
 @pytest.mark.parametrize("name", ["central", "trilinear", "catmull-rom", "bspline2", "bspline4", "bspline6"])
 def test_every_filter_and_root_finder_sees_the_ball(name):
     volume = RADIUS - distance(48)
-    made = Scene.build(Spline.of(volume, name), Layers((0.0,), (1.0, 1.5)), 1.0 / 47)
+    made = Scene.build(Spline.from_volume(volume, name), Layers((0.0,), (1.0, 1.5)), 1.0 / 47)
     kinds = [("certain", "octree"), ("brent", "dda"), ("brent", "steps")]
     for roots, structure in [*kinds, ("analytic", "octree")] if made.linear else kinds:
         error = screen_error(made, RADIUS, 1.5, 0.8, structure=structure, roots=roots)
@@ -204,7 +204,7 @@ def test_a_point_without_a_normal_lets_rays_straight_through():
     # At the top of a saddle the gradient is 0; a ray that meets the surface there goes on as it came.
     axis = np.linspace(-1.0, 1.0, 9)
     volume = axis[:, None, None] * axis[None, :, None] + np.zeros((9, 9, 9)) + 0.0 * axis
-    made = Scene.build(Spline.of(volume, "trilinear"), Layers((0.0,), (1.0, 1.5)), 0.25)
+    made = Scene.build(Spline.from_volume(volume, "trilinear"), Layers((0.0,), (1.0, 1.5)), 0.25)
     traced = trace(made, [[-0.999, 0.999, 0.0]], [[1.0, -1.0, 0.0]])
     assert np.isfinite(traced.direction).all()
     assert np.linalg.norm(traced.direction[0]) == pytest.approx(1.0)
@@ -217,7 +217,7 @@ def plateaus() -> list[Scene]:
     ways = [(half_open, 0.0, "bspline3"), (mask, 0.0, "bspline3"), (mask, 1.0, "bspline6")]
     ways += [(mask, 0.0, "catmull-rom"), (mask, 1.0, "catmull-rom"), (mask, 0.0, "trilinear")]
     return [
-        Scene.build(Spline.of(volume, name), Layers((iso,), (1.0, 1.5)), 1.0 / 23)
+        Scene.build(Spline.from_volume(volume, name), Layers((iso,), (1.0, 1.5)), 1.0 / 23)
         for volume, iso, name in ways
     ]
 

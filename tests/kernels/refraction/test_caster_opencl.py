@@ -78,7 +78,7 @@ def rough(seed: int, name: str, dtype=np.float64) -> Scene:
     low, high = np.sort(random.normal(0.0, 0.3, 2))
     indices = tuple(random.uniform(1.0, 1.8, 3))
     layers = Layers((low, high), indices, int(random.integers(3)))
-    return Scene.build(Spline.of(volume, name, dtype=dtype), layers, 0.1)
+    return Scene.build(Spline.from_volume(volume, name, dtype=dtype), layers, 0.1)
 
 
 def both(
@@ -135,7 +135,7 @@ def test_every_filter_and_root_finder_sees_the_ball(name, roots, structure):
 
     The other filters meet every root finder below.
     """
-    made = Scene.build(Spline.of(RADIUS - distance(48), name), Layers((0.0,), (1.0, 1.5)), 1.0 / 47)
+    made = Scene.build(Spline.from_volume(RADIUS - distance(48), name), Layers((0.0,), (1.0, 1.5)), 1.0 / 47)
     error = test_caster.screen_error(made, RADIUS, 1.5, 0.8, structure=structure, roots=roots)
     assert np.median(error) < 2e-3
 
@@ -189,7 +189,7 @@ def test_float32_finds_directions_to_a_thousandth():
 def test_rays_that_run_along_a_surface_for_long_are_lost():
     """In place of the case above: with the most interfaces there, rounding decides what those rays meet."""
     mask = (distance(24) < 0.3).astype(np.uint8)
-    scene = Scene.build(Spline.of(mask, "bspline6"), Layers((1.0,), (1.0, 1.5)), 1.0 / 23)
+    scene = Scene.build(Spline.from_volume(mask, "bspline6"), Layers((1.0,), (1.0, 1.5)), 1.0 / 23)
     found, expected = both(scene, depth=200)
     given_up = (expected.fate == LOST) & (expected.crossed < 200)
     assert given_up.sum() >= 10

@@ -51,7 +51,7 @@ class EveryFilter:
         raise NotImplementedError
 
     def made(self, volume, name, **how):
-        return Spline.of(volume, name, **how)
+        return Spline.from_volume(volume, name, **how)
 
     @given(shape=SHAPES, seed=SEEDS, prefilter=st.booleans())
     @PROPERTY
@@ -96,7 +96,7 @@ class EveryFilter:
         points = rng.integers(0, np.array(shape) - 1, (20, len(shape))) + rng.uniform(0.02, 0.48, len(shape))
         points += 0.5 * rng.integers(0, 2, points.shape)
         _, gradients = self.read(spline, points)
-        exact = Spline.of(rough_volume(seed, shape), derived, prefilter=prefilter)
+        exact = Spline.from_volume(rough_volume(seed, shape), derived, prefilter=prefilter)
         for axis, unit in enumerate(np.eye(len(shape))):
             rise = exact.value(points + step * unit) - exact.value(points - step * unit)
             assert np.abs(gradients[:, axis] - rise / (2 * step)).max() < 1e-6 + 100 * self.tolerance

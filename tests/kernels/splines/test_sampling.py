@@ -31,7 +31,7 @@ def volume(seed=0, shape=(5, 7, 6)):
 @pytest.mark.parametrize("place", [(1.3, 4.0, 2.81), (0.0, 6.0, 5.0), (-0.9, 6.6, 5.4)])
 def test_equals_the_sum_over_the_taps(name, dtype, place):
     """Written out in numpy from the filter's own matrices; off the grid the outermost cell goes on."""
-    spline = Spline.of(volume(), name, dtype=dtype)
+    spline = Spline.from_volume(volume(), name, dtype=dtype)
     used, point = spline.filter, np.array(place)
     last = np.array(spline.coefficients.shape) - used.taps
     cells = np.clip(np.floor(point + used.shift).astype(int), 0, last)
@@ -52,7 +52,7 @@ def test_equals_the_sum_over_the_taps(name, dtype, place):
 @pytest.mark.parametrize("name", FILTERS)
 def test_never_reads_beyond_the_coefficients(name):
     """Corners of a grid that lies between NaNs."""
-    spline = Spline.of(volume(shape=(3, 2, 3)), name)
+    spline = Spline.from_volume(volume(shape=(3, 2, 3)), name)
     among = np.full(spline.coefficients.size + 40, np.nan)
     among[20:-20] = spline.coefficients.ravel()
     inside = among[20:-20].reshape(spline.coefficients.shape)

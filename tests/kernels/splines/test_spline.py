@@ -23,7 +23,7 @@ class TestSingle(EveryFilter):
     tolerance = 2e-6
 
     def made(self, volume, name, **how):
-        return Spline.of(volume, name, dtype=np.float32, **how)
+        return Spline.from_volume(volume, name, dtype=np.float32, **how)
 
     def read(self, spline, points):
         assert spline.coefficients.dtype == np.float32
@@ -34,7 +34,9 @@ def test_order_and_name_make_the_same_spline():
     volume = rough_volume(0, (6, 5, 7))
     for order in range(2, 7):
         by_order = Spline(volume, order, smoothing=0.3).coefficients
-        assert np.array_equal(by_order, Spline.of(volume, f"bspline{order}", smoothing=0.3).coefficients)
+        assert np.array_equal(
+            by_order, Spline.from_volume(volume, f"bspline{order}", smoothing=0.3).coefficients
+        )
 
 
 def test_an_order_may_be_any_kind_of_whole_number():
@@ -69,7 +71,7 @@ def test_the_volume_is_not_changed():
     volume = rough_volume(0, (6, 5, 7))
     before = volume.copy()
     Spline(volume, 3, smoothing=1.0)
-    Spline.of(volume, "trilinear").value(np.zeros((1, 3)))
+    Spline.from_volume(volume, "trilinear").value(np.zeros((1, 3)))
     assert np.array_equal(volume, before)
 
 
@@ -113,9 +115,9 @@ def test_rejects_invalid_splines(words, named):
 
 def test_unknown_filters_and_smoothing_of_those_that_take_none_are_rejected():
     with pytest.raises(InvalidInput, match=r"filter.*sinc.*catmull-rom"):
-        Spline.of(VOLUME, "sinc")
+        Spline.from_volume(VOLUME, "sinc")
     with pytest.raises(InvalidInput, match="smoothing"):
-        Spline.of(VOLUME, "catmull-rom", smoothing=1.0)
+        Spline.from_volume(VOLUME, "catmull-rom", smoothing=1.0)
 
 
 @pytest.mark.parametrize("shape", [(3,), (4, 3), (2, 2, 2)])

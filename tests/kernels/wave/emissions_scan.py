@@ -28,7 +28,7 @@ def medium(dtype=np.float32, seed=0, by=None):
             speed = speed + way
         else:
             absorbed = absorbed + way
-    return Medium.of(speed, SPACING, STEP, attenuation=absorbed, edge_nodes=8, dtype=dtype)
+    return Medium.from_speed(speed, SPACING, STEP, attenuation=absorbed, edge_nodes=8, dtype=dtype)
 
 
 def change(seed):

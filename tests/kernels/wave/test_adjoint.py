@@ -17,7 +17,7 @@ WAVELET = np.exp(-(((TIME - 6e-6) * 2e5) ** 2)) * np.sin(2.0 * np.pi * 2e5 * (TI
 
 
 def medium(speed, dtype=np.float64, loss=None):
-    return Medium.of(speed, SPACING, STEP, attenuation=loss, edge_nodes=8, dtype=dtype)
+    return Medium.from_speed(speed, SPACING, STEP, attenuation=loss, edge_nodes=8, dtype=dtype)
 
 
 def speeds(seed=0, shape=(40, 42)):

@@ -28,9 +28,9 @@ def test_a_plan_fits_or_there_is_none(size, limit, array):
     ]
     if not fitting:
         with pytest.raises(InvalidInput, match=f"at most {limit} bytes, {array} in one array"):
-            ShotPlan.of(size, limit, array)
+            ShotPlan.for_memory(size, limit, array)
         return
-    plan = ShotPlan.of(size, limit, array)
+    plan = ShotPlan.for_memory(size, limit, array)
     assert plan.segments == fitting[0]
     assert plan.emitters >= 1
     assert plan.emitters * size.bytes(plan.segments) <= limit
@@ -41,7 +41,7 @@ def test_a_volume_takes_checkpoints_of_a_few_dozen_fields():
     # 256 nodes a side with edges, 1000 steps, every fourth field: 250 stored ones would take 17 GB.
     size = ShotSize(304**3, 256**3, 250, 1000 * 256, 4)
     assert size.bytes(1) > 17e9
-    plan = ShotPlan.of(size, 6e9, math.inf)
+    plan = ShotPlan.for_memory(size, 6e9, math.inf)
     assert plan.emitters == 1
     assert 3 < plan.segments < 8
     assert size.bytes(plan.segments) < 6e9

@@ -28,7 +28,7 @@ def medium(dtype, by=None, change=0.0):
         speed, loss = speed + change, loss * speed / (speed + change)
     elif by == "attenuation":
         loss = loss + change
-    return Medium.of(speed, SPACING, STEP, attenuation=loss, edge_nodes=5, dtype=dtype)
+    return Medium.from_speed(speed, SPACING, STEP, attenuation=loss, edge_nodes=5, dtype=dtype)
 
 
 def energy(k, traces):

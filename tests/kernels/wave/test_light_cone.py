@@ -25,7 +25,7 @@ def medium(seed=0, loss=None, dtype=np.float64):
     """Rough tissue between 1400 and 1600 m/s."""
     rough = np.random.default_rng(seed).standard_normal((NODES // 10, NODES // 10))
     speed = np.clip(1500.0 + 60.0 * np.kron(rough, np.ones((10, 10))), 1400.0, 1600.0)
-    return Medium.of(speed, SPACING, STEP, attenuation=loss, dtype=dtype, order=OPTIMISED)
+    return Medium.from_speed(speed, SPACING, STEP, attenuation=loss, dtype=dtype, order=OPTIMISED)
 
 
 def shot(emitter):
@@ -78,7 +78,7 @@ def test_half_of_the_nodes_is_left_out():
 )
 def test_spans_lie_within_the_grid(shape, until, seed):
     rng = np.random.default_rng(seed)
-    host = Medium.of(np.full(shape, 1500.0), SPACING, STEP, edge_nodes=8, order=OPTIMISED)
+    host = Medium.from_speed(np.full(shape, 1500.0), SPACING, STEP, edge_nodes=8, order=OPTIMISED)
     places = rng.uniform(0.0, 1.0, (len(until) + 1, 2)) * (np.array(shape) - 1) * SPACING
     source, detectors = place_scan(host, places[0], places[1:], WAVELET)
     spans = light_cone(host, source, detectors, np.array(until))

@@ -38,7 +38,7 @@ def against_green(spacing, step):
     """Relative rms error of a trace at elements between nodes."""
     side = 0.032
     nodes = round(side / spacing) + 1
-    medium = Medium.of(
+    medium = Medium.from_speed(
         np.full((nodes, nodes), WATER), spacing, step, edge_nodes=round(0.02 / spacing), dtype=np.float64
     )
     time = np.arange(round(3.6e-5 / step)) * step
@@ -57,7 +57,9 @@ def test_traces_are_those_of_the_green_function():
 def test_remaining_error_equals_the_stated_dispersion(order, step):
     """With waves of 4.7 nodes and more that run askew: 0.8 and 21 % off, of which a tenth or less is left."""
     spacing = 1e-3
-    medium = Medium.of(np.full((60, 50), WATER), spacing, step, edge_nodes=40, dtype=np.float64, order=order)
+    medium = Medium.from_speed(
+        np.full((60, 50), WATER), spacing, step, edge_nodes=40, dtype=np.float64, order=order
+    )
     time = np.arange(round(6e-5 / step)) * step
     source, receiver = np.array([0.008, 0.009]), np.array([[0.050, 0.037]])
     across = receiver[0] - source
@@ -87,7 +89,7 @@ def test_phase_error_in_space_falls_with_the_eighth_power():
         traces = []
         for fine in (1, 2):
             count = (nodes - 1) * fine + 1
-            medium = Medium.of(
+            medium = Medium.from_speed(
                 np.full((count, count), WATER), spacing / fine, 5e-8, edge_nodes=12 * fine, dtype=np.float64
             )
             time = np.arange(900) * 5e-8
@@ -103,8 +105,8 @@ def test_little_comes_back_from_the_edges():
     wavelet = pulse(time)
     source = np.array([0.020, 0.020])
     receivers = np.array([[0.035, 0.020], [0.030, 0.030], [0.020, 0.005]])
-    small = Medium.of(np.full((41, 41), WATER), 1e-3, 3e-7)
-    large = Medium.of(np.full((241, 241), WATER), 1e-3, 3e-7)
+    small = Medium.from_speed(np.full((41, 41), WATER), 1e-3, 3e-7)
+    large = Medium.from_speed(np.full((241, 241), WATER), 1e-3, 3e-7)
     found = simulate(small, source, receivers, wavelet)
     open_space = simulate(large, source + 0.1, receivers + 0.1, wavelet)
     assert np.abs(found - open_space).max() < 6e-3 * np.abs(open_space).max()
@@ -112,7 +114,7 @@ def test_little_comes_back_from_the_edges():
 
 def test_energy_leaves_through_the_edges():
     time = np.arange(900) * 3e-7
-    medium = Medium.of(np.full((41, 41), WATER), 1e-3, 3e-7)
+    medium = Medium.from_speed(np.full((41, 41), WATER), 1e-3, 3e-7)
     trace = simulate(medium, np.array([0.02, 0.02]), np.array([[0.012, 0.031]]), pulse(time))[0]
     assert (trace[-300:] ** 2).sum() < 1e-5 * (trace**2).sum()
 
@@ -120,7 +122,9 @@ def test_energy_leaves_through_the_edges():
 def test_traces_are_reciprocal():
     rng = np.random.default_rng(5)
     speed = rng.uniform(1400.0, 1600.0, (40, 44))
-    medium = Medium.of(speed, 1e-3, 2e-7, attenuation=rng.uniform(0.0, 20.0, speed.shape), dtype=np.float64)
+    medium = Medium.from_speed(
+        speed, 1e-3, 2e-7, attenuation=rng.uniform(0.0, 20.0, speed.shape), dtype=np.float64
+    )
     time = np.arange(250) * 2e-7
     a, b = np.array([0.0123, 0.0304]), np.array([0.0311, 0.0087])
     there = simulate(medium, a, b[None], pulse(time))[0]
@@ -135,7 +139,7 @@ def test_loss_matches_the_request_at_every_frequency_without_delay(centre):
     source, receivers = np.array([0.008, 0.015]), np.array([[0.018, 0.015], [0.043, 0.015]])
     traces = [
         simulate(
-            Medium.of(speed, 1e-3, 2.5e-7, attenuation=np.full(speed.shape, loss), dtype=np.float64),
+            Medium.from_speed(speed, 1e-3, 2.5e-7, attenuation=np.full(speed.shape, loss), dtype=np.float64),
             source,
             receivers,
             pulse(time, centre),
@@ -154,7 +158,7 @@ def test_a_slab_delays_as_in_the_eikonal_solver():
     time = np.arange(700) * 1.25e-7
     source, receiver = np.array([0.006, 0.020]), np.array([[0.054, 0.020]])
     with_slab, without = (
-        simulate(Medium.of(c, spacing, 1.25e-7), source, receiver, pulse(time, 3e5))[0].astype(float)
+        simulate(Medium.from_speed(c, spacing, 1.25e-7), source, receiver, pulse(time, 3e5))[0].astype(float)
         for c in (speed, np.full_like(speed, WATER))
     )
     lags = np.arange(1 - time.size, time.size)
@@ -170,11 +174,11 @@ def test_a_slab_delays_as_in_the_eikonal_solver():
 def test_too_long_a_step_names_the_longest():
     limit = longest_step(1500.0, 1e-3)
     with pytest.raises(InvalidInput, match="time_step_s"):
-        Medium.of(np.full((20, 20), 1500.0), 1e-3, 1.01 * limit)
+        Medium.from_speed(np.full((20, 20), 1500.0), 1e-3, 1.01 * limit)
 
 
 def test_waves_too_short_for_the_grid_are_rejected():
-    medium = Medium.of(np.full((40, 40), WATER), 2e-3, 3e-7)
+    medium = Medium.from_speed(np.full((40, 40), WATER), 2e-3, 3e-7)
     time = np.arange(300) * 3e-7
     with pytest.raises(InvalidInput, match="nodes in the shortest wave"):
         simulate(medium, np.array([0.02, 0.02]), np.array([[0.03, 0.03]]), pulse(time, 4e5))
@@ -194,7 +198,7 @@ def test_waves_too_short_for_the_grid_are_rejected():
 def test_bad_media_are_rejected(change, field):
     words = {"speed": np.full((5, 5), 1500.0), "spacing": 1e-3, "time_step_s": 1e-7} | change
     with pytest.raises(InvalidInput) as caught:
-        Medium.of(**words)
+        Medium.from_speed(**words)
     assert caught.value.field == field
 
 

@@ -47,7 +47,7 @@ def green(across, time, wavelet, grid=None):
 
 def water(shape, step=STEP, edge_nodes=16, loss=0.0, order=8):
     loss = np.full(shape, loss)
-    return Medium.of(
+    return Medium.from_speed(
         np.full(shape, WATER), SPACING, step, attenuation=loss, edge_nodes=edge_nodes, order=order
     )
 
@@ -115,7 +115,7 @@ def test_loss_is_the_given_one():
 def test_traces_are_reciprocal_in_any_object():
     rng = np.random.default_rng(5)
     shape = (14, 20, 16)
-    medium = Medium.of(
+    medium = Medium.from_speed(
         rng.uniform(1400.0, 1500.0, shape),
         SPACING,
         STEP,
@@ -135,7 +135,7 @@ def test_symmetric_media_give_symmetric_traces(axis):
     speed = np.full((14, 14, 14), WATER)
     speed[4:10, 4:9, 4:8] = 1400.0
     speed = np.minimum(speed, np.flip(speed, axis))
-    medium = Medium.of(speed, SPACING, STEP, edge_nodes=10)
+    medium = Medium.from_speed(speed, SPACING, STEP, edge_nodes=10)
     time = np.arange(110) * STEP
     middle = np.array([3.2, 4.1, 9.4])
     middle[axis] = 6.5
@@ -153,13 +153,13 @@ def test_memory_is_known_before_and_refused_beyond_the_room():
     speed, loss = np.full((30, 24, 20), WATER), np.full((30, 24, 20), 3.0)
     known = emission_bytes(speed.shape, 16)
     tracemalloc.start()
-    medium = Medium.of(speed, SPACING, STEP, attenuation=loss, edge_nodes=16, memory_bytes=known)
+    medium = Medium.from_speed(speed, SPACING, STEP, attenuation=loss, edge_nodes=16, memory_bytes=known)
     simulate(medium, np.full(3, 8e-3), np.full((1, 3), 9e-3), pulse(np.arange(130) * STEP, 1.8e5))
     _, taken = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert 0.7 * known < taken < known
     with pytest.raises(InvalidInput, match=str(known)):
-        Medium.of(speed, SPACING, STEP, edge_nodes=16, memory_bytes=known - 1)
+        Medium.from_speed(speed, SPACING, STEP, edge_nodes=16, memory_bytes=known - 1)
 
 
 def test_rejects_unsupported_3d_settings():

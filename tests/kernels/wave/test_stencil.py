@@ -81,7 +81,7 @@ def grown(factor, order):
     """Highest pressure after 300 steps at a part of the limit, over that of a sound run."""
     speed, spacing = np.full((30, 30), 1500.0), 1e-3
     step = longest_step(1500.0, spacing, order=order)
-    medium = Medium.of(speed, spacing, 0.9 * step, dtype=np.float64, order=order)
+    medium = Medium.from_speed(speed, spacing, 0.9 * step, dtype=np.float64, order=order)
     rough = medium.__class__(
         np.full_like(medium.keep, 2.0),
         np.ones_like(medium.fade),
@@ -133,14 +133,14 @@ def test_a_lossy_medium_at_its_limit_stays_bounded():
     longest = longest_step(1500.0, spacing, damping)
     assert longest < 0.5 * longest_step(1500.0, spacing)
     step = 0.99 * longest
-    medium = Medium.of(
+    medium = Medium.from_speed(
         np.full((30, 30), 1500.0), spacing, step, attenuation=attenuation, edge_nodes=20, dtype=np.float64
     )
     wavelet = np.exp(-((np.arange(400) - 80.0) ** 2) / 400.0)
     at = np.array([[0.012, 0.013]])
     assert np.abs(simulate(medium, at[0], at, wavelet)).max() < 10.0
     with pytest.raises(InvalidInput, match="time_step_s"):
-        Medium.of(np.full((30, 30), 1500.0), spacing, 1.5 * longest, attenuation=attenuation)
+        Medium.from_speed(np.full((30, 30), 1500.0), spacing, 1.5 * longest, attenuation=attenuation)
 
 
 def measured_lag(points):

@@ -25,7 +25,7 @@ def made(bentray: Run, data: Path, *words: object) -> dict[str, Any]:
 
 def test_made_listed_and_revoked(bentray: Run, tmp_path: Path) -> None:
     key = made(bentray, tmp_path, "--tenant", "clinic", "--expires", "90d", "--scopes", "read")
-    assert ApiKey.of(key["key"]) is not None
+    assert ApiKey.from_text(key["key"]) is not None
     assert (key["tenant"], key["scopes"], key["state"]) == ("clinic", ["read"], "valid")
     made(bentray, tmp_path)
     listed = bentray("keys", "list", "--data", tmp_path, "--tenant", "clinic", "--json")
@@ -60,7 +60,7 @@ def test_the_tenant_of_a_user_or_project_has_no_keys(bentray: Run, tmp_path: Pat
 
 def test_only_the_key_is_on_stdout(bentray: Run, tmp_path: Path) -> None:
     result = bentray("keys", "create", "--name", "one", "--data", tmp_path)
-    assert ApiKey.of(result.stdout.removesuffix("\n")) is not None
+    assert ApiKey.from_text(result.stdout.removesuffix("\n")) is not None
     assert "not shown again" in result.stderr
 
 

@@ -39,7 +39,7 @@ def nifti(path: Path) -> None:
 
 
 def hdf5(path: Path) -> None:
-    write_volume(path, Volume.of(BALL, (1e-3,) * 3))
+    write_volume(path, Volume.from_values(BALL, (1e-3,) * 3))
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ BEGIN = b"begin "
 
 def checksum(algorithm, body):
     digest = base64.b64encode(hashlib.new(algorithm, body).digest()).decode()
-    return Checksum.of(f"{algorithm} {digest}")
+    return Checksum.from_header(f"{algorithm} {digest}")
 
 
 async def stream(chunks, error):
@@ -77,7 +77,7 @@ def test_more_than_the_length_is_rejected(tmp_path):
 )
 def test_rejects_invalid_checksums(header, error):
     with pytest.raises(error) as refused:
-        Checksum.of(header)
+        Checksum.from_header(header)
     assert refused.value.field == "Upload-Checksum"
 
 
@@ -110,7 +110,7 @@ async def stream():
     os.kill(os.getpid(), 9)
 
 path = Path(sys.argv[1])
-checksum = Checksum.of(sys.argv[2]) if sys.argv[2:] else None
+checksum = Checksum.from_header(sys.argv[2]) if sys.argv[2:] else None
 asyncio.run(append(stream(), path, 6, 2**40, checksum))
 """
 

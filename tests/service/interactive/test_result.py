@@ -33,7 +33,7 @@ def _closed_figures() -> None:
 
 
 def volume(values: np.ndarray) -> Result:
-    return result_of(Volume.of(values, (1e-3,) * 3, title="Cube"), {})
+    return result_of(Volume.from_values(values, (1e-3,) * 3, title="Cube"), {})
 
 
 def test_arrays_have_places_and_units(result: Result) -> None:
@@ -166,11 +166,11 @@ def test_another_grid_is_interpolated() -> None:
     coarse = volume(linear.astype(np.float32))
     fine_places = np.meshgrid(*(np.arange(3) * 5e-4 + 1e-3 for _ in range(3)), indexing="ij")
     exact = 1.0 + 2e3 * fine_places[0] - 1e3 * fine_places[1] + 5e2 * fine_places[2]
-    fine = result_of(Volume.of(exact, (5e-4,) * 3, (1e-3,) * 3), {})
+    fine = result_of(Volume.from_values(exact, (5e-4,) * 3, (1e-3,) * 3), {})
     found = fine.compare(coarse, "value")
     assert found.region.all()
     np.testing.assert_allclose(found.difference, 0.0, atol=1e-5)
-    outside = result_of(Volume.of(exact, (5e-4,) * 3, (1.0,) * 3), {})
+    outside = result_of(Volume.from_values(exact, (5e-4,) * 3, (1.0,) * 3), {})
     with pytest.raises(bentray.InvalidInput, match="without a common node"):
         outside.compare(coarse, "value")
 

@@ -35,7 +35,7 @@ def test_the_coefficients_are_those_of_the_spline(http, cluster, query, name, sm
     answer = http.get(f"{here}/coefficients", params=query)
     assert answer.headers["content-type"] == "application/x-npy"
     found = np.load(io.BytesIO(answer.content))
-    expected = Spline.of(values, name, smoothing=smoothing).coefficients
+    expected = Spline.from_volume(values, name, smoothing=smoothing).coefficients
     assert found.dtype == np.float32
     np.testing.assert_allclose(found, expected, atol=1e-4)
     assert cluster.submitted[-1]["resources"] == {"render": 1}

@@ -142,7 +142,7 @@ def test_files_are_not_made_in_the_memory_of_the_service(start):
         http = start(cluster=OtherProcess(pool))
         parts, volume_id = http.app.state.parts, new_id("volume")
         values = np.zeros((200, 200, 200), np.float32)
-        write_volume(parts.files.of(LOCAL).volume(volume_id), Volume.of(values, (1e-3,) * 3))
+        write_volume(parts.files.of(LOCAL).volume(volume_id), Volume.from_values(values, (1e-3,) * 3))
         summary = {
             "title": "large",
             "shape": list(values.shape),

@@ -55,7 +55,7 @@ def inputs(scan, tmp_path):
     """What the pipelines read."""
     loud = replace(scan, log_ratio_np=-1e6 * scan.delta_tof_s, water_attenuation_np_m=0.1)
     write_dataset(tmp_path / "scan.h5", loud)
-    write_volume(tmp_path / "volume.h5", Volume.of(sampled(TWO_HOLES, 12), (1e-3,) * 3))
+    write_volume(tmp_path / "volume.h5", Volume.from_values(sampled(TWO_HOLES, 12), (1e-3,) * 3))
     write_mesh(tmp_path / "mesh.h5", StoredMesh(torus(16, 10)))
     return tmp_path
 

@@ -64,6 +64,8 @@ def test_abandoned_scene_is_not_built(monkeypatch):
         return check
 
     monkeypatch.setattr(scene_cache, "cancellation_check", nobody)
-    filtered = scene_cache.filter_volume(Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3), RefractionView())
+    filtered = scene_cache.filter_volume(
+        Volume.from_values(sampled(ONE_HOLE, 12), (1e-3,) * 3), RefractionView()
+    )
     with pytest.raises(TaskCancelled):
         scene_cache.build_scene(filtered, Layers((0.5,), (1.0, 1.5)))

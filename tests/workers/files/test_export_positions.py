@@ -49,7 +49,9 @@ def turned(*degrees: float) -> np.ndarray:
 def solid(direction: np.ndarray | None = None) -> Volume:
     values = np.full((12, 10, 8), WATER, np.float32)
     values[MARKER] = BRIGHT
-    return Volume.of(values, STEPS, CORNER, **({} if direction is None else {"direction": direction}))
+    return Volume.from_values(
+        values, STEPS, CORNER, **({} if direction is None else {"direction": direction})
+    )
 
 
 def plane() -> Reconstruction:

@@ -26,7 +26,7 @@ from bentray_workers.files.geometry_image import (
 def maps():
     surface = sphere(9, 10)
     chart = parameterise(surface).chart
-    return GeometryMaps.of(geometry_image(chart, 32), chart.mesh.vertices)
+    return GeometryMaps.from_geometry_image(geometry_image(chart, 32), chart.mesh.vertices)
 
 
 @pytest.mark.parametrize("coloured", [True, False])

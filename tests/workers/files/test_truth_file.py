@@ -53,7 +53,7 @@ def test_a_result_or_a_volume_is_taken_as_true(tmp_path: Path) -> None:
     known = read_truth(tmp_path / "reconstruction.h5", SOLID).truth
     np.testing.assert_array_equal(known.sound_speed_mps, SOLID.speed)
     np.testing.assert_array_equal(known.attenuation_np_m, SOLID.attenuation)
-    write_volume(tmp_path / "volume.h5", Volume.of(SOLID.speed, SOLID.spacing_m, SOLID.origin_m))
+    write_volume(tmp_path / "volume.h5", Volume.from_values(SOLID.speed, SOLID.spacing_m, SOLID.origin_m))
     assert compare(SOLID, read_truth(tmp_path / "volume.h5", SOLID).truth).rms < 1e-3
 
 

@@ -28,7 +28,7 @@ STEPS = (1e-3, 2e-3, 3e-3)
 )
 def test_a_volume_survives_its_file(tmp_path, dtype, kept):
     values = (np.arange(60).reshape(3, 4, 5) % 2).astype(dtype)
-    write_volume(tmp_path / "v.h5", Volume.of(values, STEPS, (0.1, -0.2, 0.3), "A  title"))
+    write_volume(tmp_path / "v.h5", Volume.from_values(values, STEPS, (0.1, -0.2, 0.3), "A  title"))
     read = read_volume(tmp_path / "v.h5")
     assert read.values.dtype == kept
     np.testing.assert_array_equal(read.values, values.astype(kept))
@@ -39,32 +39,32 @@ def test_a_volume_survives_its_file(tmp_path, dtype, kept):
 @given(arrays.arrays(np.float32, arrays.array_shapes(min_dims=3, max_dims=3, min_side=2, max_side=5)))
 def test_a_volume_is_finite_or_refused(values):
     if np.isfinite(values).all():
-        np.testing.assert_array_equal(Volume.of(values, STEPS).values, values)
+        np.testing.assert_array_equal(Volume.from_values(values, STEPS).values, values)
     else:
         with pytest.raises(InvalidInput, match="finite"):
-            Volume.of(values, STEPS)
+            Volume.from_values(values, STEPS)
 
 
 @pytest.mark.parametrize("shape", [(4, 4), (4, 4, 1), (0, 4, 4), (2, 2, 2, 2), ()])
 def test_another_shape_is_rejected(shape):
     with pytest.raises(InvalidInput, match="shape"):
-        Volume.of(np.zeros(shape), STEPS)
+        Volume.from_values(np.zeros(shape), STEPS)
 
 
 @pytest.mark.parametrize("values", [np.zeros((2, 2, 2), complex), np.zeros((2, 2, 2), [("r", "u1")])])
 def test_rejects_complex_values(values):
     with pytest.raises(InvalidInput, match="accepted: integers or floating-point"):
-        Volume.of(values, STEPS)
+        Volume.from_values(values, STEPS)
 
 
 def test_a_number_too_large_for_float32_is_named():
     values = np.zeros((2, 2, 2))
     values[1, 0, 1] = 1e300
     with pytest.raises(InvalidInput, match=r"found 1e\+300, beyond float32"):
-        Volume.of(values, STEPS)
+        Volume.from_values(values, STEPS)
     values[1, 0, 0] = np.inf
     with pytest.raises(InvalidInput, match=r"found inf at node \(1, 0, 0\)"):
-        Volume.of(values, STEPS)
+        Volume.from_values(values, STEPS)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_a_number_too_large_for_float32_is_named():
 )
 def test_rejects_values_indistinguishable_in_float32(values, dtype):
     with pytest.raises(InvalidInput, match=r"cannot distinguish; accepted: .*subtract an offset first"):
-        Volume.of(values.astype(dtype).reshape(2, 2, 2), STEPS)
+        Volume.from_values(values.astype(dtype).reshape(2, 2, 2), STEPS)
 
 
 @pytest.mark.parametrize(
@@ -93,14 +93,14 @@ def test_rejects_values_indistinguishable_in_float32(values, dtype):
     ],
 )
 def test_accepts_values_distinguishable_in_float32(values, dtype):
-    volume = Volume.of(values.astype(dtype).reshape(2, 2, 2), STEPS)
+    volume = Volume.from_values(values.astype(dtype).reshape(2, 2, 2), STEPS)
     assert len(np.unique(volume.values)) == len(np.unique(values))
 
 
 @pytest.mark.parametrize("steps", [(1.0, 1.0), (1.0, 0.0, 1.0), (1.0, float("nan"), 1.0), (1.0, 1.0, -1.0)])
 def test_a_spacing_must_be_three_distances(steps):
     with pytest.raises(InvalidInput, match="spacing_m"):
-        Volume.of(np.zeros((2, 2, 2)), steps)
+        Volume.from_values(np.zeros((2, 2, 2)), steps)
 
 
 @pytest.mark.parametrize("step", [1e-300, 0.99e-9, 1.01e3, 1e300, float("inf")])
@@ -109,21 +109,21 @@ def test_rejects_implausible_spacing(step, axis):
     steps = [1e-3] * 3
     steps[axis] = step
     with pytest.raises(InvalidInput, match=r"spacing_m: .* three times a number from 1e-09 to 1000 m"):
-        Volume.of(np.zeros((2, 2, 2)), steps)
+        Volume.from_values(np.zeros((2, 2, 2)), steps)
 
 
 def test_the_closest_and_the_farthest_spacing_are_kept():
-    assert Volume.of(np.zeros((2, 2, 2)), (1e-9, 1.0, 1e3)).spacing_m == (1e-9, 1.0, 1e3)
+    assert Volume.from_values(np.zeros((2, 2, 2)), (1e-9, 1.0, 1e3)).spacing_m == (1e-9, 1.0, 1e3)
 
 
 def test_an_origin_must_be_finite():
     with pytest.raises(InvalidInput, match="origin_m"):
-        Volume.of(np.zeros((2, 2, 2)), STEPS, (0.0, float("inf"), 0.0))
+        Volume.from_values(np.zeros((2, 2, 2)), STEPS, (0.0, float("inf"), 0.0))
 
 
 @given(st.text())
 def test_a_title_from_a_stranger_can_be_stored(title):
-    kept = Volume.of(np.zeros((2, 2, 2)), STEPS, title=title).title
+    kept = Volume.from_values(np.zeros((2, 2, 2)), STEPS, title=title).title
     assert len(kept) <= 200
     kept.encode()
 
@@ -139,7 +139,7 @@ def test_a_title_from_a_stranger_can_be_stored(title):
     ],
 )
 def test_a_spoilt_file_is_named(tmp_path, spoil, field):
-    write_volume(tmp_path / "v.h5", Volume.of(np.zeros((2, 2, 2)), STEPS))
+    write_volume(tmp_path / "v.h5", Volume.from_values(np.zeros((2, 2, 2)), STEPS))
     with h5py.File(tmp_path / "v.h5", "a") as file:
         spoil(file)
     with pytest.raises(InvalidInput) as caught:

@@ -56,7 +56,7 @@ def test_raw_bytes_have_x_first(tmp_path, dtype):
 
 
 def test_a_volume_of_ours(tmp_path):
-    volume = Volume.of(ramp(), (1e-3, 2e-3, 3e-3), (0.0, 1.0, 2.0), "ours")
+    volume = Volume.from_values(ramp(), (1e-3, 2e-3, 3e-3), (0.0, 1.0, 2.0), "ours")
     write_volume(tmp_path / "v.h5", volume)
     read = import_volume(tmp_path / "v.h5")
     np.testing.assert_array_equal(read.values, volume.values)
@@ -192,9 +192,9 @@ def test_a_shape_without_use_is_rejected_before_the_values_are_read(tmp_path, mo
     (tmp_path / "v.raw").write_bytes(ramp().tobytes())
     nrrd.write(str(tmp_path / "v.nrrd"), ramp())
     (tmp_path / "v.nii").write_bytes(nibabel.Nifti1Image(ramp(), np.eye(4)).to_bytes())
-    write_volume(tmp_path / "v.h5", Volume.of(ramp(), (1e-3,) * 3))
+    write_volume(tmp_path / "v.h5", Volume.from_values(ramp(), (1e-3,) * 3))
     write_reconstruction(tmp_path / "r.h5", replace(made(3, 5), spacing_m=(2e-3, 2e-3, 3e-3)))
-    monkeypatch.setattr(Volume, "of", read)
+    monkeypatch.setattr(Volume, "from_values", read)
     monkeypatch.setattr(Reader, "array", read)
     for path in sorted(tmp_path.iterdir()):
         given = VolumeMetadata(shape=(3, 4, 5), dtype="uint8") if path.suffix == ".raw" else None
@@ -222,7 +222,7 @@ def test_raw_bytes_need_the_truth(tmp_path, given, field):
 
 
 def test_a_spacing_is_for_files_that_have_none(tmp_path):
-    write_volume(tmp_path / "v.h5", Volume.of(ramp(), (1e-3,) * 3))
+    write_volume(tmp_path / "v.h5", Volume.from_values(ramp(), (1e-3,) * 3))
     assert refused(tmp_path / "v.h5", VolumeMetadata(spacing_m=(1e-3,))).field == "spacing_m"
 
 

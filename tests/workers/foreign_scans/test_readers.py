@@ -41,7 +41,7 @@ def test_arrays_with_names_of_groups_of_other_formats_are_no_such_formats(tmp_pa
     convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5")
     np.testing.assert_array_equal(read_dataset(tmp_path / "canonical.h5").delta_tof_s, delta_tof())
     write_matlab73(tmp_path / "own", {"data": delta_tof(), "geometry": positions()}, header=False)
-    given = ScanMetadata.of(map=("element_position=geometry", "delta_tof=data"))
+    given = ScanMetadata.from_options(map=("element_position=geometry", "delta_tof=data"))
     convert_dataset(tmp_path / "own", tmp_path / "canonical.h5", given=given)
     np.testing.assert_array_equal(read_dataset(tmp_path / "canonical.h5").delta_tof_s, delta_tof())
 

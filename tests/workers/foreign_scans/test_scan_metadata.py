@@ -44,7 +44,7 @@ def archive(path, variables):
 
 
 def converted(tmp_path, **given):
-    convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5", given=ScanMetadata.of(**given))
+    convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5", given=ScanMetadata.from_options(**given))
     return read_dataset(tmp_path / "canonical.h5")
 
 
@@ -141,7 +141,7 @@ def test_water_that_contradicts_the_file_is_rejected(tmp_path):
 def test_files_in_the_upload_format_state_everything_themselves(tmp_path):
     savemat(tmp_path / "scan", travel_times(), appendmat=False)
     converted(tmp_path)
-    given = ScanMetadata.of(unit=["mm"], temperature_c=21.0)
+    given = ScanMetadata.from_options(unit=["mm"], temperature_c=21.0)
     with pytest.raises(InvalidInput, match="files in the upload format state their units") as refused:
         convert_dataset(tmp_path / "canonical.h5", tmp_path / "again.h5", given=given)
     assert refused.value.field == "unit, temperature"

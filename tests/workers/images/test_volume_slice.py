@@ -11,7 +11,7 @@ from bentray_workers.images.slice import volume_slice_png
 @pytest.fixture
 def path(tmp_path):
     values = np.zeros((6, 5, 4)) + 10.0 * np.arange(4)
-    write_volume(tmp_path / "v.h5", Volume.of(values, (1e-3,) * 3, (0.0, 0.0, 5e-3), "A $head"))
+    write_volume(tmp_path / "v.h5", Volume.from_values(values, (1e-3,) * 3, (0.0, 0.0, 5e-3), "A $head"))
     return tmp_path / "v.h5"
 
 

@@ -72,7 +72,7 @@ def arrived(dataset, folder, picker="aic", *, examined=True):
     """What goes on of a dataset in a file, and what was found."""
     path = folder / "scan.h5"
     write_dataset(path, dataset)
-    files = PickingFiles.of(folder)
+    files = PickingFiles.in_folder(folder)
     graph = PickingGraph(PickingSource(path, path.stat().st_mtime_ns, folder, picker, examined), files)
     run({"picking": graph}, ThreadPool())
     found = read_findings(files.findings)

@@ -149,14 +149,14 @@ def test_array_in_space_that_is_no_ring_is_planned_as_a_volume():
     every = np.arange(40)
     scan = Dataset(array.position_m, every, every, 1500.0, delta_tof_s=np.zeros((40, 40)), array_type="free")
     settings = Settings.of(method="gauss-newton", nodes=48)
-    counts = DatasetCounts.of(scan)
+    counts = DatasetCounts.from_dataset(scan)
     found = plan(counts.summary(settings), settings, [])
     assert found == plan(counts.summary(settings), settings.changed(decomposition="volume"), [])
     assert found.decomposition == "volume"
     pointed = settings.changed(opening_angle_deg=90.0)
     with pytest.raises(InvalidInput, match="geometry/element_normal"):
         plan(counts.summary(pointed), pointed, [])
-    directed = DatasetCounts.of(replace(scan, element_normal=array.normal))
+    directed = DatasetCounts.from_dataset(replace(scan, element_normal=array.normal))
     assert plan(directed.summary(pointed), pointed, []) == found
 
 

@@ -161,7 +161,7 @@ def test_an_array_of_no_width_that_was_taken_in_before_has_no_plan(width_m):
 def test_the_counts_of_a_dataset_are_those_of_its_file(dataset, tmp_path_factory):
     path = tmp_path_factory.mktemp("counts") / "scan.h5"
     write_dataset(path, dataset)
-    known = DatasetCounts.of(dataset)
+    known = DatasetCounts.from_dataset(dataset)
     # A missing frequency is estimated from the traces of the file.
     counted = counts_in(path)
     assert counted == (

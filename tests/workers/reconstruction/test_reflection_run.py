@@ -87,7 +87,7 @@ def test_result_without_the_image_is_named(result, tmp_path):
 
 
 def test_plan_counts_its_tasks_and_memory(scan):
-    counts = DatasetCounts.of(scan)
+    counts = DatasetCounts.from_dataset(scan)
     without, with_image = (
         plan(counts.summary(one), one, [])
         for one in (SETTINGS.changed(reflection=False), SETTINGS.changed(pixel_m=None))
@@ -101,7 +101,7 @@ def test_plan_counts_its_tasks_and_memory(scan):
 
 def test_plan_rejects_more_pixels_than_a_worker_holds(scan):
     fine = SETTINGS.changed(pixel_m=3e-5)
-    summary = DatasetCounts.of(scan).summary(fine)
+    summary = DatasetCounts.from_dataset(scan).summary(fine)
     found = plan(summary, fine, []).call_bytes["sum_emissions"]
     # Sums and their parts, 33 bytes for each of the pixels.
     assert found > 33 * (2.0 * scan.radius_m / 3e-5) ** 2
@@ -115,4 +115,4 @@ def test_plan_rejects_more_pixels_than_a_worker_holds(scan):
 def test_plan_rejects_a_scan_without_traces(scan):
     times = replace(scan, waveform=None, delta_tof_s=np.zeros((12, 24)))
     with pytest.raises(InvalidInput, match="reflection"):
-        plan(DatasetCounts.of(times).summary(SETTINGS), SETTINGS, [])
+        plan(DatasetCounts.from_dataset(times).summary(SETTINGS), SETTINGS, [])

@@ -35,7 +35,7 @@ ODD_GLASS, ODD_FIELD = 5e-3, 1e-3
 @pytest.fixture(scope="module")
 def volume(tmp_path_factory):
     path = tmp_path_factory.mktemp("glass") / "v.h5"
-    write_volume(path, Volume.of(sampled(ONE_HOLE, 24), (1e-3,) * 3))
+    write_volume(path, Volume.from_values(sampled(ONE_HOLE, 24), (1e-3,) * 3))
     return path
 
 

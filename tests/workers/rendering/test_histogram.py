@@ -18,7 +18,7 @@ from ..files.reconstructions import made
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])
 def test_the_numbers_are_those_of_numpy(tmp_path, kind):
     values = (np.random.default_rng(3).gamma(2.0, 20.0, (9, 8, 7)) % 250).astype(kind)
-    write_volume(tmp_path / "v.h5", Volume.of(values, (1e-3,) * 3))
+    write_volume(tmp_path / "v.h5", Volume.from_values(values, (1e-3,) * 3))
     found = volume_histogram(tmp_path / "v.h5", "value", 37)
     counts, edges = np.histogram(values, 37)
     assert found["counts"] == counts.tolist()

@@ -14,7 +14,7 @@ def balls(tmp_path, *middles, nodes=24):
     """A volume with a ball of radius 5 nodes about each middle; 1 in its middle, 0 on its surface."""
     places = np.stack(np.meshgrid(*[np.arange(nodes)] * 3, indexing="ij"), axis=-1)
     away = np.min([np.linalg.norm(places - middle, axis=-1) for middle in middles], axis=0)
-    write_volume(tmp_path / "v.h5", Volume.of(1.0 - away / 5.0, (1e-3, 1e-3, 2e-3)))
+    write_volume(tmp_path / "v.h5", Volume.from_values(1.0 - away / 5.0, (1e-3, 1e-3, 2e-3)))
     return tmp_path / "v.h5"
 
 

@@ -122,7 +122,7 @@ def volumes(tmp_path_factory):
     for name, n in (("small", 8), ("large", 200)):
         x = np.linspace(-1.0, 1.0, n, dtype=np.float32)
         ball = x[:, None, None] ** 2 + x[None, :, None] ** 2 + x[None, None, :] ** 2
-        write_volume(folder / f"{name}.h5", Volume.of(ball, (1e-3,) * 3))
+        write_volume(folder / f"{name}.h5", Volume.from_values(ball, (1e-3,) * 3))
     return folder
 
 

@@ -31,7 +31,7 @@ def wait_to_go_on():
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     path = tmp_path_factory.mktemp("ball") / "v.h5"
-    write_volume(path, Volume.of(sampled(ONE_HOLE, 24), (1e-3,) * 3))
+    write_volume(path, Volume.from_values(sampled(ONE_HOLE, 24), (1e-3,) * 3))
     return path
 
 
@@ -76,7 +76,7 @@ def test_a_warped_backdrop_is_met_at_its_heights(path, kind):
 def test_a_ball_of_glass_bends_as_snell_says(tmp_path):
     """Rays parallel to its axis, 0.5 of its radius and less from it: in closed form."""
     ball, index, edge = FringeSphere(0.4, 0.3), 1.5, 0.5 * 0.031
-    write_volume(tmp_path / "v.h5", Volume.of(sampled(ball, 32), (1e-3,) * 3))
+    write_volume(tmp_path / "v.h5", Volume.from_values(sampled(ball, 32), (1e-3,) * 3))
     view = replace(SMALL, height=48, index=(index,), supersampling="none", backdrop_distance=0.7)
     found = whole(tmp_path / "v.h5", view).position_m[23, :, 0]
     radius, screen = ball.iso_radius(0.5) * edge, 0.7 * 2.0 * edge * np.sqrt(3.0)

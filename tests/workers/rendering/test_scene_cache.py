@@ -26,7 +26,7 @@ BALL = sampled(ONE_HOLE, 12)
 
 @pytest.fixture
 def path(tmp_path):
-    write_volume(tmp_path / "v.h5", Volume.of(BALL, (1e-3, 1e-3, 2e-3)))
+    write_volume(tmp_path / "v.h5", Volume.from_values(BALL, (1e-3, 1e-3, 2e-3)))
     return tmp_path / "v.h5"
 
 
@@ -70,7 +70,7 @@ def test_the_default_surface_of_a_smoothed_volume_lies_within_it(tmp_path):
     """A small cube loses more than half of its height, and the middle of the stored range is above all."""
     cube = np.zeros((32, 32, 32), np.uint8)
     cube[12:20, 12:20, 12:20] = 255
-    write_volume(tmp_path / "cube.h5", Volume.of(cube, (1e-3,) * 3))
+    write_volume(tmp_path / "cube.h5", Volume.from_values(cube, (1e-3,) * 3))
     scene = scene_at(tmp_path / "cube.h5", RefractionView(smoothing=100.0))
     nodes = Spline(cube, smoothing=100.0).value(np.argwhere(np.ones(cube.shape)))
     assert nodes.max() < 127.5
@@ -84,7 +84,7 @@ def test_8_bit_values_are_smoothed_by_default(tmp_path):
     x = np.linspace(-1.0, 1.0, 40)
     radius = np.sqrt(x[:, None, None] ** 2 + x[:, None] ** 2 + x**2)
     write_volume(
-        tmp_path / "ball.h5", Volume.of(np.round(40.0 - 20.0 * radius).astype(np.uint8), (1e-3,) * 3)
+        tmp_path / "ball.h5", Volume.from_values(np.round(40.0 - 20.0 * radius).astype(np.uint8), (1e-3,) * 3)
     )
     angles = np.random.default_rng(1).normal(size=(500, 3))
     outwards = angles / np.linalg.norm(angles, axis=1, keepdims=True)
@@ -121,7 +121,7 @@ def test_other_surroundings_are_another_scene(path):
 
 def test_changed_file_is_read_again(path):
     before = scene_at(path, RefractionView(iso=(0.4,)))
-    write_volume(path, Volume.of(0.9 * BALL, (1e-3,) * 3))
+    write_volume(path, Volume.from_values(0.9 * BALL, (1e-3,) * 3))
     os.utime(path, ns=(1, 1))
     after = scene_at(path, RefractionView(iso=(0.4,)))
     np.testing.assert_allclose(
@@ -149,7 +149,7 @@ def test_the_figures_for_memory_are_no_less_than_what_is_used():
     """Of numpy's own arrays, which are nearly all there is."""
     import tracemalloc
 
-    volume = Volume.of(sampled(ONE_HOLE, 64), (1e-3,) * 3)
+    volume = Volume.from_values(sampled(ONE_HOLE, 64), (1e-3,) * 3)
     filtered = scene_cache.filter_volume(volume, RefractionView())
     scene_cache.build_scene(filtered, RefractionView(iso=(0.5,)).layers())
     tracemalloc.start()

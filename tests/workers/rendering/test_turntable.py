@@ -22,7 +22,7 @@ SMALL = {"iso": (0.5,), "width": 32, "height": 24}
 
 @pytest.fixture
 def path(tmp_path):
-    write_volume(tmp_path / "v.h5", Volume.of(sampled(TWO_HOLES, 12), (1e-3,) * 3))
+    write_volume(tmp_path / "v.h5", Volume.from_values(sampled(TWO_HOLES, 12), (1e-3,) * 3))
     return tmp_path / "v.h5"
 
 

@@ -138,7 +138,7 @@ def compile_field(folder: Path) -> None:
 def compile_filter(name: str, _folder: Path) -> None:
     """Render a ball with a filter, refracted and shaded, with all kinds of supersampling."""
     warmup.warm_up_rendering()
-    volume = Volume.of(sampled(ONE_HOLE, 12), (1e-3,) * 3)
+    volume = Volume.from_values(sampled(ONE_HOLE, 12), (1e-3,) * 3)
     filtered = filter_volume(volume, RefractionView(filter=name))
     for view in (
         RefractionView(iso=(0.5,), supersampling="prss", degree=2, width=8, height=8),

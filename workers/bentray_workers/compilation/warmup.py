@@ -54,7 +54,7 @@ def warm_up() -> None:
 
 def warm_up_rendering() -> None:
     """Draw a small ball with the default filter, refracted and shaded; other filters compile on demand."""
-    filtered = filter_volume(Volume.of(sampled(ONE_HOLE, 8), (1e-3,) * 3), RefractionView())
+    filtered = filter_volume(Volume.from_values(sampled(ONE_HOLE, 8), (1e-3,) * 3), RefractionView())
     for mode in ("refract", "shaded"):
         view = RefractionView(iso=(0.5,), mode=mode, width=4, height=4)
         draw_tile(build_scene(filtered, view.layers()), view, 0, 4)

@@ -40,7 +40,7 @@ class GeometryMaps:
     colours: Pixels | None = None
 
     @classmethod
-    def of(cls, image: GeometryImage, colours: Floats | None = None) -> GeometryMaps:
+    def from_geometry_image(cls, image: GeometryImage, colours: Floats | None = None) -> GeometryMaps:
         """Arrays of an image, with the colours of its mesh, (vertices, 3), if any."""
         return cls(
             image.positions.astype(np.float32),

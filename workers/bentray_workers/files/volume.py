@@ -78,7 +78,7 @@ class Volume:
         return Grid(self.spacing_m, self.origin_m, self.direction)
 
     @classmethod
-    def of(
+    def from_values(
         cls,
         values: ArrayLike,
         spacing_m: Sequence[float],
@@ -108,7 +108,7 @@ class Volume:
     def from_image(cls, image: PositionedImage) -> Volume:
         """A volume of an image from a foreign file; raises as ``of``."""
         grid = image.grid
-        return cls.of(image.values, grid.spacing_m, grid.origin_m, image.title, grid.direction)
+        return cls.from_values(image.values, grid.spacing_m, grid.origin_m, image.title, grid.direction)
 
     def range(self) -> tuple[float, float]:
         """Least and greatest value."""
@@ -180,7 +180,7 @@ def volume_in(reader: Reader) -> Volume:
     # Files of earlier versions have none.
     turned = np.array(reader.numbers("", "direction", "no unit") or np.eye(3).ravel())
     direction = turned.reshape(3, 3) if turned.size == 9 else turned
-    return Volume.of(values, spacing, origin, reader.text("", "title") or "", direction)
+    return Volume.from_values(values, spacing, origin, reader.text("", "title") or "", direction)
 
 
 def read_volume(path: Path, limits: Limits | None = None) -> Volume:

@@ -86,7 +86,7 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: VolumeMetadata, chec
     if start.startswith(b"\x93NUMPY"):
         return _numpy(path, file, given, check)
     if start.startswith(NPZ):
-        return Volume.of(read_npz(file, check), _spacing(given))
+        return Volume.from_values(read_npz(file, check), _spacing(given))
     if given.spacing_m is not None:
         raise InvalidInput(
             "spacing_m", given.spacing_m, "nothing: this file contains it, or has no known format"
@@ -135,7 +135,7 @@ def _raw(path: Path, given: VolumeMetadata, check: ShapeCheck) -> Volume:
     if size != count:
         raise InvalidInput("file", f"{size} bytes", f"{count} bytes, as shape and dtype say")
     values = np.memmap(path, dtype, "r", shape=tuple(given.shape), order="F")
-    return Volume.of(values, _spacing(given))
+    return Volume.from_values(values, _spacing(given))
 
 
 def _numpy(path: Path, file: IO[bytes], given: VolumeMetadata, check: ShapeCheck) -> Volume:
@@ -155,7 +155,7 @@ def _numpy(path: Path, file: IO[bytes], given: VolumeMetadata, check: ShapeCheck
         if left < count:
             raise InvalidInput("file", f"{left} bytes of values", f"{count}, as its header says")
         values = np.memmap(path, dtype, "r", file.tell(), shape, "F" if columns_first else "C")
-        return Volume.of(values, _spacing(given))
+        return Volume.from_values(values, _spacing(given))
 
 
 def _hdf5(path: Path, check: ShapeCheck) -> Volume:
@@ -174,7 +174,7 @@ def _hdf5(path: Path, check: ShapeCheck) -> Volume:
     from .reconstruction import read_reconstruction
 
     result = read_reconstruction(path, limits=limits)
-    return Volume.of(result.speed, result.spacing_m, result.origin_m, "Sound speed (m/s)")
+    return Volume.from_values(result.speed, result.spacing_m, result.origin_m, "Sound speed (m/s)")
 
 
 def _spacing(given: VolumeMetadata) -> tuple[float, ...]:

@@ -85,7 +85,7 @@ class ScanMetadata:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(
+    def from_options(
         cls,
         map: Iterable[str] = (),  # noqa: A002 - the name of the option
         unit: Iterable[str] = (),

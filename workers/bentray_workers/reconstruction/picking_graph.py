@@ -66,7 +66,7 @@ class PickingFiles(NamedTuple):
     findings: Path
 
     @classmethod
-    def of(cls, folder: Path, number: int = 0) -> PickingFiles:
+    def in_folder(cls, folder: Path, number: int = 0) -> PickingFiles:
         """The files of a round of picking in the folder of a job, from 0."""
         before = f"{number}-" if number else ""
         return cls(folder / (before + PICKED), folder / (before + FINDINGS))
@@ -291,7 +291,7 @@ class PickingGraph:
 def measure_traces(source: PickingSource, index: int, part: range) -> Measured:
     """Task: statistics of the traces of a batch of emissions."""
     with source.slice(index) as one:
-        return Measured.of(one, part)
+        return Measured.from_dataset(one, part)
 
 
 def examine_slice(source: PickingSource, index: int, parts: list[Measured]) -> tuple[Finding, ...]:

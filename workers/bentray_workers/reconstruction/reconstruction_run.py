@@ -172,7 +172,7 @@ def _pick_with_guides(
         settings.water_temperature_c,
         settings.picking.max_left_out,
     )
-    path, findings = _pick(job, source, PickingFiles.of(job.folder), None, progress)
+    path, findings = _pick(job, source, PickingFiles.in_folder(job.folder), None, progress)
     rounds = 0 if source.dataset.picked else settings.numerics.guided_rounds
     rays = settings.changed(
         method="auto" if settings.method == "waveform" else settings.method,
@@ -194,8 +194,10 @@ def _pick_with_guides(
             names = ("attenuation", "resolution_check", "uncertainty", "reflection", "minutes")
             requested = {name: getattr(settings, name) for name in names}
             settings = rays.changed(**requested)
-        guide = PickingGuide(image, PickingFiles.of(job.folder).findings)
-        again, findings_again = _pick(job, source, PickingFiles.of(job.folder, number), guide, progress)
+        guide = PickingGuide(image, PickingFiles.in_folder(job.folder).findings)
+        again, findings_again = _pick(
+            job, source, PickingFiles.in_folder(job.folder, number), guide, progress
+        )
         if same_picks(*(read_dataset(one, traces=False) for one in (path, again))):
             break
         path, findings = again, findings_again
@@ -226,7 +228,7 @@ def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _Jo
     lacking = lacks_water(job.scan)
     bare = lacking and not reference_path(job.folder, 0).exists()
     stamp, recorded = path.stat().st_mtime_ns, job.scan.stat().st_mtime_ns
-    faults = PickingFiles.of(job.folder).findings
+    faults = PickingFiles.in_folder(job.folder).findings
 
     def run_graphs(graphs: Sequence[TomographyGraph], before: int, after: int) -> None:
         # A resumed job runs the same groups in the same order, so a number names the same graph again.
@@ -263,7 +265,7 @@ def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _Jo
 
 def _echoes(job: _Job, stamp: int, water_temperature_c: float | None) -> Echoes | None:
     """The traces of the object; None without any."""
-    samples, faults = trace_samples(job.scan), PickingFiles.of(job.folder).findings
+    samples, faults = trace_samples(job.scan), PickingFiles.in_folder(job.folder).findings
     if not samples:
         return None
     return Echoes(samples, lambda index: FileEchoScan(job.scan, stamp, index, faults, water_temperature_c))

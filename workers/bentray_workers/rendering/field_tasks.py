@@ -62,7 +62,7 @@ def parameterise_mesh(mesh_path: Path, settings: FieldSettings, folder: Path) ->
     layout = parameterise(stored.mesh)
     laid_out = time.perf_counter()
     image, error = _image(layout.chart, settings)
-    maps = GeometryMaps.of(image, stored.colours)
+    maps = GeometryMaps.from_geometry_image(image, stored.colours)
     sampled = time.perf_counter()
     if error is None:
         error = geometric_error(layout.chart.mesh, image.mesh())

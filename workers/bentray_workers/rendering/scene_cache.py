@@ -142,7 +142,7 @@ def filter_volume(volume: Volume, view: RefractionView) -> FilteredVolume:
     check_even(volume.values.shape, volume.spacing_m)
     check_size(volume.values.shape)
     smoothing = view.smoothing_for(volume.values.dtype)
-    spline = Spline.of(volume.values, view.filter, smoothing=smoothing)
+    spline = Spline.from_volume(volume.values, view.filter, smoothing=smoothing)
     # Without smoothing the filter interpolates the nodes, up to rounding.
     values = range_at_nodes(spline) if smoothing else volume.range()
     return FilteredVolume(spline, volume.spacing_m, values, smoothing)

@@ -252,7 +252,7 @@ def simulate_emission(
 def _media(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
     """Of object and water."""
     received, water = (
-        Medium.of(
+        Medium.from_speed(
             speed,
             settings.spacing_m,
             settings.step_s,

@@ -40,7 +40,7 @@ def water_times(dataset: Dataset) -> Floats:
     assert dataset.sampling_rate_hz is not None
     assert dataset.center_frequency_hz is not None
     rate = dataset.sampling_rate_hz
-    crest = Measures.of(dataset.waveform.water, dataset).strongest_s
+    crest = Measures.from_traces(dataset.waveform.water, dataset).strongest_s
     pulse = measured_pulse(dataset, crest)
     period = rate / dataset.center_frequency_hz
     ahead = math.ceil(BEFORE * period)

@@ -54,7 +54,8 @@ def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats,
         (emissions, nrx), Np; NaN without a time, with an incomplete pulse or too much noise.
 
     Raises:
-        InvalidInput: for an unknown method, without the traces that ``pick`` requires, and as ``Gate.of``.
+        InvalidInput: for an unknown method, without the traces that ``pick`` requires, and as
+            ``Gate.from_dataset``.
     """
     if way not in WAYS:
         raise InvalidInput("amplitudes", repr(way), "one of " + ", ".join(WAYS))
@@ -64,7 +65,7 @@ def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats,
     assert traces.water is not None
     assert dataset.sampling_rate_hz is not None
     assert dataset.center_frequency_hz is not None
-    gate, rate = Gate.of(dataset), dataset.sampling_rate_hz
+    gate, rate = Gate.from_dataset(dataset), dataset.sampling_rate_hz
     rounding = ROUNDING if traces.object.dtype.kind == "i" else 0.0
     straight = (dataset.distance_m() / dataset.water_speed_mps - dataset.t0_s) * rate
     ratios = np.empty((len(emissions), len(dataset.rx)))

@@ -118,7 +118,7 @@ def read_times(
         Object minus water and its standard deviation, (emissions, nrx), s; NaN without an arrival.
     """
     chosen = picker_named(picker)
-    inverse = Inverse.of(dataset) if chosen.filtered else None
+    inverse = Inverse.from_dataset(dataset) if chosen.filtered else None
     delta = np.empty((len(emissions), len(dataset.rx)))
     sigma = np.empty_like(delta)
     for row, e in enumerate(emissions):

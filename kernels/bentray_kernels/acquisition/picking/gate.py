@@ -48,7 +48,7 @@ class Gate:
     noise_correlation: Floats
 
     @classmethod
-    def of(cls, dataset: Dataset) -> Gate:
+    def from_dataset(cls, dataset: Dataset) -> Gate:
         """For the pulse measured in water, see ``measured_pulse``.
 
         Args:

@@ -98,7 +98,7 @@ class Inverse:
     gain: float
 
     @classmethod
-    def of(cls, dataset: Dataset) -> Inverse:
+    def from_dataset(cls, dataset: Dataset) -> Inverse:
         """The filter of a scan: with the recorded wavelet if present, else with ``measured_pulse``.
 
         W = S* / (|S|² + ε max |S|²), so that the filtered pulse has zero phase and a flat band.

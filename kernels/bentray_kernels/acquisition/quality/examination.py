@@ -140,7 +140,7 @@ def _slice(
     checked: tuple[str, ...] = ()
     measured = None
     if dataset.waveform is not None:
-        measured = Measured.of(dataset, range(len(dataset.tx)), step)
+        measured = Measured.from_dataset(dataset, range(len(dataset.tx)), step)
         findings, checked = check_traces(dataset, measured)
     if any(finding.action == "refused" for finding in findings):
         return findings, None, checked

@@ -43,7 +43,7 @@ class Measures:
     peak: Floats
 
     @classmethod
-    def of(cls, traces: Iterable[NDArray[Any]], dataset: Dataset) -> Measures:
+    def from_traces(cls, traces: Iterable[NDArray[Any]], dataset: Dataset) -> Measures:
         """Measures of the traces of emissions, (nrx, nt) each; converted to floating point one by one."""
         assert dataset.sampling_rate_hz is not None
         rows = [_emission(np.asarray(emission)) for emission in traces]

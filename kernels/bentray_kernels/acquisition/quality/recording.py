@@ -54,7 +54,7 @@ class Measured(NamedTuple):
     object: Measures
 
     @classmethod
-    def of(
+    def from_dataset(
         cls, dataset: Dataset, emissions: Sequence[int], done: Callable[[], None] = lambda: None
     ) -> Measured:
         """Measure a slice with traces, which may be ``Emissions``; ``done`` is called after each emission."""
@@ -66,7 +66,7 @@ class Measured(NamedTuple):
                 done()
 
         received, water = (
-            None if traces is None else Measures.of(read(traces), dataset)
+            None if traces is None else Measures.from_traces(read(traces), dataset)
             for traces in (dataset.waveform.object, dataset.waveform.water)
         )
         assert received is not None
@@ -127,7 +127,7 @@ def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
     """Faults of the water shot with respect to the geometry."""
     if mismatch := find_wrong_order(dataset, strongest):
         return mismatch
-    line = WaterLine.of(dataset, strongest)
+    line = WaterLine.from_dataset(dataset, strongest)
     if line is None:
         return [Finding("water shot", "almost no pulses", "pulses that crossed the water", "refused")]
     speed = find_water_speed(dataset, line.speed_mps, ENVELOPE * line.speed_mps)
@@ -135,7 +135,7 @@ def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
     refused = sampling(dataset, line.speed_mps) + frequency(dataset)
     if refused or dataset.center_frequency_hz is None:
         return refused
-    line = WaterLine.of(dataset, strongest)
+    line = WaterLine.from_dataset(dataset, strongest)
     assert line is not None
     straight = dataset.distance_m() / dataset.water_speed_mps + line.intercept_s
     exchanged = find_swapped(dataset, strongest, straight)

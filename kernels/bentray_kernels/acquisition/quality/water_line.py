@@ -35,7 +35,7 @@ class WaterLine:
         return np.where(distance > NEAR * distance.max(), late, np.nan)
 
     @classmethod
-    def of(cls, dataset: Dataset, strongest_s: Floats) -> WaterLine | None:
+    def from_dataset(cls, dataset: Dataset, strongest_s: Floats) -> WaterLine | None:
         """The line through the water maxima; None with too few of them.
 
         Args:

@@ -89,7 +89,9 @@ class ReferenceShot:
         assert traces is not None
         samples = int(traces.object.shape[-1])
         shape = (len(dataset.tx), len(dataset.rx), samples)
-        water = Emissions.of(partial(self.traces, dataset, samples=samples), shape, np.dtype(np.float32))
+        water = Emissions.from_reader(
+            partial(self.traces, dataset, samples=samples), shape, np.dtype(np.float32)
+        )
         scale = None if traces.object_scale is None else np.ones(shape[:2])
         changed: dict[str, Any] = {"water": water, "water_scale": scale}
         return replace(dataset, waveform=replace(traces, **changed))

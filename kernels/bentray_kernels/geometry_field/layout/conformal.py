@@ -37,7 +37,7 @@ class Disk:
     angles: Floats
 
     @classmethod
-    def of(cls, vertices: Floats, opened: OpenMesh) -> Disk:
+    def from_mesh(cls, vertices: Floats, opened: OpenMesh) -> Disk:
         """A mesh after its cut."""
         places = vertices[opened.origin]
         return cls(places, opened.faces, corner_angles(places[opened.faces]))

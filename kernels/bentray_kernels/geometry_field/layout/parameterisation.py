@@ -96,7 +96,7 @@ def _parameterised(mesh: TriangleMesh) -> Parameterisation:
     for number, end in enumerate(chain(cutter.far_ends(cut), [None])):
         small_enough = end is None or end.scale <= SHRUNK
         if small_enough and number >= due and _opens(topology, cut.edges):
-            disk = Disk.of(mesh.vertices, cut_open(topology, cut.edges))
+            disk = Disk.from_mesh(mesh.vertices, cut_open(topology, cut.edges))
             plane = in_unit_square(disk.isometric_layout())
             overlaps = crosses_itself(plane[disk.boundary])
             stretch = area_stretch(areas, np.abs(signed_areas(plane[disk.faces])))

@@ -57,7 +57,7 @@ class ModelErrors:
     crossing_s: float
 
     @classmethod
-    def of(
+    def from_misfit(
         cls,
         speed: Floats,
         region: Flags,

@@ -119,7 +119,7 @@ def ray_uncertainty(
         (_squares(speed, mean, samples, width) for width in WIDTHS),
         key=lambda found: float(found[0][region].sum()),
     )
-    errors_of_model = ModelErrors.of(
+    errors_of_model = ModelErrors.from_misfit(
         speed, region, density, problem.noise_s, noise, spacing, problem.water_speed
     )
     squares = gaussian_filter(errors_of_model.added_to(squares), AVERAGED_NODES, mode="nearest")

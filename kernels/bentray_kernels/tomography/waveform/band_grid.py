@@ -37,7 +37,7 @@ class Extent(NamedTuple):
     every: int
 
     @classmethod
-    def of(cls, band: Band, reach_m: float, record_s: float, fastest_mps: float) -> Extent:
+    def for_scan(cls, band: Band, reach_m: float, record_s: float, fastest_mps: float) -> Extent:
         """The extent for a scan.
 
         Args:

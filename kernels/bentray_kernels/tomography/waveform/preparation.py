@@ -48,7 +48,7 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, poll: Poll
     centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
     samples = dataset.t0_s + np.arange(recorded.object.shape[-1]) / dataset.sampling_rate_hz
     reach = float(np.abs(flat - centre).max())
-    extent = Extent.of(band, reach, float(samples[-1] - samples[0]), settings.speed_bounds_mps[1])
+    extent = Extent.for_scan(band, reach, float(samples[-1] - samples[0]), settings.speed_bounds_mps[1])
     nodes = extent.nodes
     axis = spacing * (np.arange(nodes) - 0.5 * (nodes - 1))
     origin = centre + axis[0]

@@ -31,7 +31,7 @@ def core_seconds(plan: Sequence[Band], width_m: float, record_s: float, fastest_
     """
     seconds = 0.0
     for band in plan:
-        extent = Extent.of(band, 0.5 * width_m, record_s, fastest_mps)
+        extent = Extent.for_scan(band, 0.5 * width_m, record_s, fastest_mps)
         seconds += NODE_STEP_S * extent.padded * extent.steps * band.evaluations(WaveSettings.held_out)
     return seconds
 

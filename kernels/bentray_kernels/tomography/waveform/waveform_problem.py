@@ -67,7 +67,7 @@ class WaveProblem:
 
     def medium(self, speed: Floats, attenuation: Floats | None = None) -> Medium:
         """The medium of images on this grid."""
-        return Medium.of(
+        return Medium.from_speed(
             speed, self.band.spacing_m, self.clock.step_s, attenuation=attenuation, order=OPTIMISED
         )
 

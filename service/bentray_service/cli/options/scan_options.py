@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 ACCEPTED = "the path of a scan, see the documentation of scan files"
 
-# By the arguments of ``ScanMetadata.of``.
+# By the arguments of ``ScanMetadata.from_options``.
 OPTIONS = {
     "map": Option(
         "--map",
@@ -44,7 +44,7 @@ class ScanOptions:
         """The values as metadata of a scan; raises InvalidInput naming the first invalid one."""
         from bentray_workers.foreign_scans import ScanMetadata
 
-        return ScanMetadata.of(**self.options)
+        return ScanMetadata.from_options(**self.options)
 
 
 def with_scan_options(command: Command) -> Command:

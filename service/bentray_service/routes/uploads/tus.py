@@ -156,7 +156,7 @@ async def append_upload(
 
     A complete upload is ingested in the background; poll it with `GET`.
     """
-    checksum = None if upload_checksum is None else Checksum.of(upload_checksum)
+    checksum = None if upload_checksum is None else Checksum.from_header(upload_checksum)
     # First check the owner, so that uploads of other tenants are not reported as locked.
     await run_in_threadpool(service.uploads.get, tenant, upload_id)
     with service.hold(upload_id):

@@ -90,10 +90,10 @@ def scan_metadata(
     sound_speed_mps: float | None = None,
     frequency_hz: float | None = None,
 ) -> dict[str, Any]:
-    """What the user states about a scan, as arguments of ``ScanMetadata.of``; absent values are left out.
+    """Arguments of ``ScanMetadata.from_options`` that the user states about a scan; absent ones are left out.
 
     Raises:
-        InvalidInput: as ``ScanMetadata.of``.
+        InvalidInput: as ``ScanMetadata.from_options``.
     """
     given: dict[str, Any] = {
         "map": list(map),
@@ -106,7 +106,7 @@ def scan_metadata(
     if stated:
         from bentray_workers.foreign_scans import ScanMetadata
 
-        ScanMetadata.of(**stated)
+        ScanMetadata.from_options(**stated)
     return stated
 
 

@@ -29,7 +29,7 @@ def arrival(dataset):
 @pytest.mark.parametrize("periods_late", [0.0, 1.5])
 def test_it_finds_the_pulse_where_the_clock_is_not_the_middle_of_it(periods_late):
     dataset = replace(water(), t0_s=START_S - periods_late / FREQUENCY_HZ)
-    gate = Gate.of(dataset)
+    gate = Gate.from_dataset(dataset)
     assert gate.late == pytest.approx(-periods_late * PERIOD, abs=0.2)
     low, high = gate.frequency_hz[[0, -1]] / FREQUENCY_HZ
     # A Ricker pulse has x^4 exp(-2 x^2) of its highest power.
@@ -39,7 +39,7 @@ def test_it_finds_the_pulse_where_the_clock_is_not_the_middle_of_it(periods_late
 
 def test_the_power_does_not_depend_on_fractions_of_a_sample():
     dataset = water()
-    power, noise = Gate.of(dataset).powers(dataset.waveform.water[0], arrival(dataset), 0.0)
+    power, noise = Gate.from_dataset(dataset).powers(dataset.waveform.water[0], arrival(dataset), 0.0)
     whole = np.isfinite(power).all(axis=1)
     assert whole[1:].all()
     np.testing.assert_allclose(power[1:], np.broadcast_to(power[8], power[1:].shape), rtol=0.02)
@@ -48,7 +48,7 @@ def test_the_power_does_not_depend_on_fractions_of_a_sample():
 
 def test_the_noise_is_the_mean_power_of_noise_alone_and_its_likeness_along_frequency():
     dataset = water()
-    gate = Gate.of(dataset)
+    gate = Gate.from_dataset(dataset)
     random = np.random.default_rng(3)
     traces = 0.2 * random.standard_normal((600, dataset.waveform.water.shape[-1])).astype(np.float32)
     middle = np.full(600, 300.0)
@@ -63,7 +63,7 @@ def test_the_noise_is_the_mean_power_of_noise_alone_and_its_likeness_along_frequ
 
 def test_pulses_that_are_not_whole_have_no_power():
     dataset = water()
-    gate, traces = Gate.of(dataset), dataset.waveform.water[0].copy()
+    gate, traces = Gate.from_dataset(dataset), dataset.waveform.water[0].copy()
     traces[3, 5] = np.nan
     places = arrival(dataset)
     places[5], places[6], places[7] = np.nan, gate.half - gate.late - 1.0, traces.shape[1] - gate.half
@@ -78,4 +78,4 @@ def test_water_without_a_pulse_is_rejected():
     dataset = water()
     silent = replace(dataset, waveform=Waveform(dataset.waveform.object, 0.0 * dataset.waveform.water))
     with pytest.raises(InvalidInput, match="waveform/water"):
-        Gate.of(silent)
+        Gate.from_dataset(silent)

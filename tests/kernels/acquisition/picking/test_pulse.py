@@ -30,7 +30,7 @@ def test_deconvolution_leaves_a_crest_without_phase_at_the_largest_swing():
     place = 100
     trace = np.zeros((1, dataset.waveform.water.shape[-1]))
     trace[0, place : place + 48] = wavelet
-    filtered = Inverse.of(replace(dataset, wavelet=wavelet))(trace)[0]
+    filtered = Inverse.from_dataset(replace(dataset, wavelet=wavelet))(trace)[0]
     loudest = place + int(np.argmax(np.abs(wavelet)))
     assert int(np.argmax(filtered)) == loudest
     around = filtered[loudest - 60 : loudest + 61]
@@ -40,14 +40,14 @@ def test_deconvolution_leaves_a_crest_without_phase_at_the_largest_swing():
 
 def test_the_gain_is_that_of_white_noise():
     dataset = scan(elements=24)
-    inverse = Inverse.of(dataset)
+    inverse = Inverse.from_dataset(dataset)
     noise = np.random.default_rng(0).standard_normal((40, dataset.waveform.water.shape[-1]))
     assert inverse(noise).std() == pytest.approx(inverse.gain, rel=0.1)
 
 
 def test_a_broken_trace_stays_broken_and_harms_no_other():
     dataset = scan(elements=24)
-    inverse = Inverse.of(dataset)
+    inverse = Inverse.from_dataset(dataset)
     traces = dataset.waveform.water[0].copy()
     whole = inverse(traces)
     traces[3, 50] = np.inf

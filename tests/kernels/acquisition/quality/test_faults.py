@@ -49,7 +49,7 @@ def later(traces: np.ndarray, seconds: np.ndarray) -> np.ndarray:
 
 def found(dataset: Dataset) -> list[Finding]:
     """Findings in the traces, without picking them."""
-    measured = Measured.of(dataset, range(len(dataset.tx)))
+    measured = Measured.from_dataset(dataset, range(len(dataset.tx)))
     findings, _ = check_traces(dataset, measured)
     if measured.water is None:
         findings += estimate_water(apply(dataset, findings), measured.object)[0]

@@ -19,7 +19,7 @@ def test_the_maximum_of_a_pulse_is_at_its_time_after_the_time_zero(start_s):
     dataset = replace(scan(elements=4), t0_s=start_s)
     time = start_s + np.arange(200) / RATE_HZ
     at = start_s + np.array([6e-6, 9.03e-6, 12.51e-6])
-    measures = Measures.of([7.0 + ricker(time - at[:, None], FREQUENCY_HZ)], dataset)
+    measures = Measures.from_traces([7.0 + ricker(time - at[:, None], FREQUENCY_HZ)], dataset)
     assert measures.strongest_s[0] == pytest.approx(at, abs=0.02 / RATE_HZ)
     assert measures.detected.all()
     assert not (measures.broken | measures.constant | measures.clipped).any()

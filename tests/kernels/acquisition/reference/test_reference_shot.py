@@ -18,7 +18,7 @@ DELAY_S = disc_delay_s(0.6 * RADIUS_M)
 
 def estimated(dataset):
     bare = without_water(dataset)
-    return estimate_water(bare, Measures.of(bare.waveform.object, bare))[1]
+    return estimate_water(bare, Measures.from_traces(bare.waveform.object, bare))[1]
 
 
 @pytest.mark.parametrize("start_s", [pytest.param(0.0, marks=pytest.mark.nightly), 1e-6, -1e-6])

@@ -13,7 +13,7 @@ from ...meshes.examples import flat_patch
 
 
 def disk_of(surface):
-    return Disk.of(
+    return Disk.from_mesh(
         surface.vertices, OpenMesh(surface.faces.astype(np.int64), np.arange(len(surface.vertices)))
     )
 

@@ -15,7 +15,7 @@ from ...meshes.examples import flat_patch, mesh
 
 
 def disk_of(surface):
-    return Disk.of(
+    return Disk.from_mesh(
         surface.vertices, OpenMesh(surface.faces.astype(np.int64), np.arange(len(surface.vertices)))
     )
 

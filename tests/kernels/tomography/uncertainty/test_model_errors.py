@@ -16,7 +16,7 @@ EVEN, GATHERED = np.where(REGION, 5.0, 0.0), np.where(SKIN, 15.0, np.where(REGIO
 
 
 def errors(density=EVEN, noise_s=5e-8, misfit_s=5e-8, speed=SPEED):
-    return ModelErrors.of(speed, REGION, density, noise_s, misfit_s, SPACING_M, WATER)
+    return ModelErrors.from_misfit(speed, REGION, density, noise_s, misfit_s, SPACING_M, WATER)
 
 
 def test_noise_through_even_rays_adds_almost_nothing():

@@ -42,7 +42,7 @@ def lossy(x, y):
 
 
 def _traces(speed, loss, positions, emitter, wavelet, step):
-    medium = Medium.of(speed, SPACING, step, attenuation=loss, edge_nodes=40)
+    medium = Medium.from_speed(speed, SPACING, step, attenuation=loss, edge_nodes=40)
     return simulate(medium, positions[emitter], positions, wavelet)[:, ::FINER]
 
 

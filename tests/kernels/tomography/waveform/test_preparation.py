@@ -72,7 +72,7 @@ def test_no_other_emissions_are_read_than_the_band_uses():
             read.append(emitter)
             return traces[emitter]
 
-        return Emissions.of(one, traces.shape, traces.dtype)
+        return Emissions.from_reader(one, traces.shape, traces.dtype)
 
     recorded = data.waveform
     apart = replace(recorded, object=lazily(recorded.object), water=lazily(recorded.water))

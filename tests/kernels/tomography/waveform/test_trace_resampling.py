@@ -43,7 +43,7 @@ def test_coarse_simulations_agree_with_exact_traces_that_were_resampled():
     distance = float(np.linalg.norm(receiver[0] - source))
     green[1:] = -0.25j * hankel2(0, turn[1:] * distance / 1500.0)
     exact = np.fft.irfft(green * np.fft.rfft(wavelet, 2000), 2000)[:500]
-    medium = Medium.of(np.full((nodes, nodes), 1500.0), spacing, step, order=OPTIMISED)
+    medium = Medium.from_speed(np.full((nodes, nodes), 1500.0), spacing, step, order=OPTIMISED)
     clock = Clock(0.0, step, int(recorded[-1] / step))
 
     def gap(matrix):

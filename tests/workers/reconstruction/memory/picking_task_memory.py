@@ -47,7 +47,8 @@ def scan(elements: int, samples: int, water: bool) -> Dataset:
 def bytes_of(path: Path, picker: str) -> dict[str, int]:
     """The first task of each name, with its arguments, less a fork that does nothing."""
     graph = PickingGraph(
-        PickingSource(path, path.stat().st_mtime_ns, path.parent, picker, True), PickingFiles.of(path.parent)
+        PickingSource(path, path.stat().st_mtime_ns, path.parent, picker, True),
+        PickingFiles.in_folder(path.parent),
     )
     waiting, found = graph.first(), {}
     while waiting:

@@ -46,7 +46,7 @@ def test_buffers_of_a_device_are_planned():
     settings = Settings.of(method="sart", nodes=48, reflection=True)
     dataset = scan(24, 500)
     here, there = (
-        reflection_task_bytes(DatasetCounts.of(dataset).summary(one), one)
+        reflection_task_bytes(DatasetCounts.from_dataset(dataset).summary(one), one)
         for one in (settings, settings.changed(device="opencl"))
     )
     assert there["sum_emissions"] > here["sum_emissions"] + dataset.waveform.object.nbytes
@@ -73,7 +73,7 @@ def test_tasks_allocate_what_is_planned(elements, samples, water, changes):
         dataset, settings, speed, np.zeros_like(speed), -2.0 * corner / (nodes - 1), (corner, corner)
     )
     graph = ReflectionGraph(MemoryEchoScan(dataset, 0), plan, samples, RATE_HZ)
-    summary = DatasetCounts.of(dataset).summary(settings)
+    summary = DatasetCounts.from_dataset(dataset).summary(settings)
     planned = reflection_task_bytes(summary, settings)
     tasks, taken = graph.first(), {}
     while tasks:
@@ -101,7 +101,7 @@ def test_tasks_allocate_what_is_planned(elements, samples, water, changes):
 @given(emissions=st.integers(8, 512), samples=st.integers(300, 3000), slices=st.integers(1, 9))
 def test_planned_work_grows_with_the_scan(emissions, samples, slices):
     settings = Settings.of(method="sart", nodes=64, reflection=True)
-    one = DatasetCounts.of(scan(8, 8)).summary(settings)
+    one = DatasetCounts.from_dataset(scan(8, 8)).summary(settings)
     traces = replace(one.echoes, emissions=emissions, samples=samples)
     summary = replace(one, echoes=traces, slices=slices)
     wider = replace(summary, width_m=2.0 * summary.width_m)
@@ -117,7 +117,7 @@ def test_planned_work_grows_with_the_scan(emissions, samples, slices):
 def test_a_water_shot_is_planned():
     settings = Settings.of(method="sart", nodes=48, reflection=True)
     without, with_it = (
-        reflection_task_bytes(DatasetCounts.of(scan(24, 500, water)).summary(settings), settings)
+        reflection_task_bytes(DatasetCounts.from_dataset(scan(24, 500, water)).summary(settings), settings)
         for water in (False, True)
     )
     dataset = scan(24, 500)
@@ -128,7 +128,7 @@ def test_a_water_shot_is_planned():
 
 def test_nothing_is_planned_unless_it_is_requested():
     settings = Settings.of(method="sart", nodes=64)
-    summary = DatasetCounts.of(scan(8, 8)).summary(settings)
+    summary = DatasetCounts.from_dataset(scan(8, 8)).summary(settings)
     assert reflection_task_bytes(summary, settings) == {}
     assert reflection_tasks(summary, settings) == reflection_bytes(summary, settings) == 0
     assert reflection_seconds(summary, settings) == 0.0

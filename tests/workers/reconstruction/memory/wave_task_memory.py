@@ -41,7 +41,7 @@ def scan(elements: int, samples: int) -> Dataset:
     step = 1.0 / (RATE_HZ * FINER)
     late = (step * np.arange(samples * FINER) - 8e-6) * CENTRE_HZ
     wavelet = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
-    medium = Medium.of(np.full((2 * half + 1, 2 * half + 1), WATER), SPACING_M, step, edge_nodes=40)
+    medium = Medium.from_speed(np.full((2 * half + 1, 2 * half + 1), WATER), SPACING_M, step, edge_nodes=40)
     positions = ring + SPACING_M * half
     shot = simulate(medium, positions[0], positions, wavelet)[:, ::FINER].astype(np.float32)
     every = np.arange(elements)
@@ -53,7 +53,7 @@ def scan(elements: int, samples: int) -> Dataset:
         def block() -> NDArray[np.float32]:
             return np.stack([np.roll(shot, k, axis=0) for k in every])
 
-        return Emissions.of(lambda e: block()[e], (elements, elements, samples), shot.dtype)
+        return Emissions.from_reader(lambda e: block()[e], (elements, elements, samples), shot.dtype)
 
     return Dataset(
         ring,

@@ -136,7 +136,7 @@ class DatasetCounts:
     normals: bool = False
 
     @classmethod
-    def of(cls, dataset: Dataset) -> DatasetCounts:
+    def from_dataset(cls, dataset: Dataset) -> DatasetCounts:
         """Counts of a dataset; its traces may be placeholders."""
         traces = dataset.waveform
         both = [] if traces is None else [one for one in (traces.object, traces.water) if one is not None]

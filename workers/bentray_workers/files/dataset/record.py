@@ -29,7 +29,7 @@ def record_of(dataset: Dataset) -> dict[str, Any]:
         "has_travel_times": dataset.picked,
         "has_truth": dataset.truth is not None,
         "water_speed_mps": float(dataset.water_speed_mps),
-        "counts": DatasetCounts.of(dataset).to_dict(),
+        "counts": DatasetCounts.from_dataset(dataset).to_dict(),
     }
 
 

@@ -105,4 +105,4 @@ def emissions_in(
         return traces
 
     dtype = trace_type(stored.dtype)
-    return Emissions.of(emission, stored.shape[-3:], dtype)
+    return Emissions.from_reader(emission, stored.shape[-3:], dtype)

@@ -45,7 +45,7 @@ class BlockFiles(NamedTuple):
     def planes(self, block: int) -> BlockPlanes:
         """Planes of a block, and of its neighbours that it needs."""
         start, stop = self.bounds(block)
-        return BlockPlanes.of(start, stop, self.shape[0])
+        return BlockPlanes.from_range(start, stop, self.shape[0])
 
     def bounds(self, block: int) -> tuple[int, int]:
         """First plane of a block, and the one behind its last."""

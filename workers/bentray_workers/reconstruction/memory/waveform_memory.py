@@ -110,7 +110,7 @@ def least_batch_bytes(traces: Traces | None, width_m: float, settings: Settings)
     record_s = (traces.samples - 1) / traces.rate_hz
     least = 0
     for band in bands:
-        extent = Extent.of(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
+        extent = Extent.for_scan(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
         batch = _shot_size(traces, extent)
         least = max(least, min(batch.bytes(segments) for segments in range(1, max(1, batch.slots) + 1)))
     return least
@@ -124,7 +124,7 @@ def _shot_size(traces: Traces, extent: Extent) -> ShotSize:
 
 def _band_bytes(traces: Traces, width_m: float, settings: Settings, band: Band) -> dict[str, int]:
     record_s = (traces.samples - 1) / traces.rate_hz
-    extent = Extent.of(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
+    extent = Extent.for_scan(band, 0.5 * width_m, record_s, settings.speed_bounds_mps[1])
     image, padded = 8 * extent.nodes**2, extent.padded
     samples = traces.receivers * extent.steps
     looks = band.emitters + WaveSettings((band,)).held_out
