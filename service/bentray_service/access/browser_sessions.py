@@ -6,10 +6,10 @@ import logging
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
+from starlette.requests import HTTPConnection
 
 from bentray_kernels.errors import InvalidInput
 
@@ -176,10 +176,4 @@ class BrowserSessions:
 
 
 def _cookies(headers: Headers) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for line in headers.getlist("cookie"):
-        try:
-            found |= {name: morsel.value for name, morsel in SimpleCookie(line).items()}
-        except CookieError:
-            continue
-    return found
+    return HTTPConnection({"type": "http", "headers": headers.raw}).cookies

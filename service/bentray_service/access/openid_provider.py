@@ -1,21 +1,27 @@
 """A provider of OpenID Connect: its discovery document, its keys, and verified claims in exchange for a code.
 
+Requests and the rules of ID tokens are those of Authlib, signatures those of joserfc. The HTTP clients of
+Authlib are not used: they read answers without a bound, and keys again for every unknown key id.
+
 References: OpenID Connect Core 1.0 and Discovery 1.0; RFC 7636 (PKCE); RFC 9207 (issuer in the response).
 """
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
 import logging
 import threading
 import time
 from collections.abc import Mapping
 from typing import Any
-from urllib.parse import quote_plus, urlencode, urlsplit
+from urllib.parse import quote_plus, urlsplit
 
 import httpx
+from authlib.common.urls import add_params_to_uri
+from authlib.oauth2.auth import ClientAuth
+from authlib.oauth2.client import OAuth2Client
+from authlib.oauth2.rfc6749.parameters import prepare_token_request
+from authlib.oidc.core import CodeIDToken
 from joserfc import jwt
 from joserfc.errors import BadSignatureError, ClaimError, InvalidKeyIdError, JoseError
 from joserfc.jwk import KeySet
@@ -91,24 +97,21 @@ class Provider:
         Raises:
             ProviderUnavailable: when the discovery document cannot be read.
         """
-        challenge = base64.urlsafe_b64encode(hashlib.sha256(verifier.encode()).digest()).rstrip(b"=").decode()
-        query = {
-            "response_type": "code",
-            "client_id": self._client_id,
-            "redirect_uri": redirect_uri,
-            "scope": self._scope,
-            "state": state,
-            "nonce": nonce,
-            "code_challenge": challenge,
-            "code_challenge_method": "S256",
-        }
-        return _with_query(self._discovered()["authorization_endpoint"], query)
+        client = OAuth2Client(None, self._client_id, scope=self._scope, code_challenge_method="S256")
+        url, _ = client.create_authorization_url(
+            self._discovered()["authorization_endpoint"],
+            state=state,
+            code_verifier=verifier,
+            redirect_uri=redirect_uri,
+            nonce=nonce,
+        )
+        return str(url)
 
     def logout_url(self, back: str) -> str | None:
         """Address that ends the session at the provider and leads back; None if it offers none."""
         end = self._discovered().get("end_session_endpoint")
-        query = {"client_id": self._client_id, "post_logout_redirect_uri": back}
-        return None if end is None else _with_query(end, query)
+        query = [("client_id", self._client_id), ("post_logout_redirect_uri", back)]
+        return None if end is None else add_params_to_uri(end, query)
 
     def claims(
         self, code: str, redirect_uri: str, nonce: str, verifier: str, names: tuple[str, ...]
@@ -124,18 +127,13 @@ class Provider:
             NotAuthenticated: when the provider refuses the code, or its answer is not valid.
             ProviderUnavailable: when it does not answer.
         """
-        form = {"grant_type": "authorization_code", "code": code, "redirect_uri": redirect_uri}
-        form |= {"code_verifier": verifier, "client_id": self._client_id}
         document = self._discovered()
-        methods = document.get("token_endpoint_auth_methods_supported", ["client_secret_basic"])
-        by_header = "client_secret_basic" in methods
-        auth = None
-        if self._secret is not None and by_header:
-            # RFC 6749, 2.3.1: both are form-encoded first.
-            auth = httpx.BasicAuth(quote_plus(self._client_id), quote_plus(self._secret))
-        elif self._secret is not None:
-            form["client_secret"] = self._secret
-        answer = self._fetch("POST", document["token_endpoint"], data=form, auth=auth)
+        form = {"code": code, "code_verifier": verifier}
+        body = prepare_token_request("authorization_code", "", redirect_uri, **form)
+        headers = {"Content-Type": "application/x-www-form-urlencoded"}
+        authentication = self._authentication(document)
+        address, headers, body = authentication.prepare("POST", document["token_endpoint"], headers, body)
+        answer = self._fetch("POST", address, headers, content=body)
         if answer is None or not isinstance(answer.get("id_token"), str):
             raise NotAuthenticated("code", "one that the provider does not accept", "a new sign-in")
         claims = self._verified(answer["id_token"], nonce)
@@ -151,34 +149,38 @@ class Provider:
             claims = {**more, **{name: value for name, value in claims.items() if name not in pair}}
         return claims
 
+    def _authentication(self, document: Mapping[str, Any]) -> ClientAuth:
+        """How this client authenticates at the token endpoint."""
+        if self._secret is None:
+            return ClientAuth(self._client_id, None, "none")
+        methods = document.get("token_endpoint_auth_methods_supported", ["client_secret_basic"])
+        if "client_secret_basic" in methods:
+            # RFC 6749, 2.3.1: both are form-encoded first.
+            return ClientAuth(quote_plus(self._client_id), quote_plus(self._secret), "client_secret_basic")
+        return ClientAuth(self._client_id, self._secret, "client_secret_post")
+
     def _verified(self, token: str, nonce: str) -> dict[str, Any]:
         """The claims of an ID token, verified as in OpenID Connect Core 3.1.3.7."""
-        rules = jwt.JWTClaimsRegistry(
-            leeway=LEEWAY_S,
-            iss={"essential": True, "value": self.issuer},
-            sub={"essential": True},
-            aud={"essential": True, "value": self._client_id},
-            exp={"essential": True},
-            iat={"essential": True},
-            nonce={"essential": True, "value": nonce},
-        )
+        rules: dict[str, Any] = {
+            "iss": {"essential": True, "value": self.issuer},
+            "sub": {"essential": True},
+            "aud": {"essential": True, "value": self._client_id},
+            "azp": {"value": self._client_id},
+            "nonce": {"essential": True, "value": nonce},
+        }
         try:
             try:
-                claims = jwt.decode(token, self._key_set(), algorithms=ALGORITHMS).claims
+                decoded = jwt.decode(token, self._key_set(), algorithms=ALGORITHMS)
             except (InvalidKeyIdError, BadSignatureError):
                 # The provider may have changed its keys.
                 if not self._forget_keys():
                     raise
-                claims = jwt.decode(token, self._key_set(), algorithms=ALGORITHMS).claims
-            rules.validate(claims)
+                decoded = jwt.decode(token, self._key_set(), algorithms=ALGORITHMS)
+            claims = CodeIDToken(decoded.claims, decoded.header, rules, {"client_id": self._client_id})
+            claims.validate(leeway=LEEWAY_S)
         except (JoseError, ValueError) as error:
             # The message of the library names the claim, not the token.
             raise NotAuthenticated("ID token", _words(error), "one signed for this sign-in") from error
-        audience = claims["aud"]
-        party = claims.get("azp")
-        several = isinstance(audience, list) and len(audience) > 1
-        if party != self._client_id and (party is not None or several):
-            raise NotAuthenticated("ID token", "the authorized party of another client", self._client_id)
         return dict(claims)
 
     def _discovered(self) -> dict[str, Any]:
@@ -280,10 +282,6 @@ def _is_safe(address: str) -> bool:
     """Whether an address is encrypted, or of this machine."""
     parts = urlsplit(address)
     return parts.scheme == "https" or (parts.scheme == "http" and names_loopback(parts.netloc))
-
-
-def _with_query(address: str, query: Mapping[str, str]) -> str:
-    return f"{address}{'&' if '?' in address else '?'}{urlencode(query)}"
 
 
 def _words(error: Exception) -> str:
