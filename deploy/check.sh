@@ -21,7 +21,9 @@ elif [ "$major" -lt 2 ] || { [ "$major" -eq 2 ] && [ "$minor" -lt 24 ]; }; then
   lacks "docker compose $version; 2.24 or later reads .env for the service"
 else
   for secret in "${BENTRAY_FIRST_KEY_SECRET:-deploy/secrets/first-key}" \
-    "${BENTRAY_DATABASE_PASSWORD_SECRET:-deploy/secrets/database-password}"; do
+    "${BENTRAY_DATABASE_PASSWORD_SECRET:-deploy/secrets/database-password}" \
+    "${BENTRAY_EDGE_CERTIFICATE_SECRET:-deploy/secrets/edge-certificate.pem}" \
+    "${BENTRAY_EDGE_KEY_SECRET:-deploy/secrets/edge-key.pem}"; do
     [ -r "$secret" ] || lacks "no $secret; deploy/secrets.sh creates it"
   done
   docker compose config -q || lacks "docker-compose.yml with .env is not valid, as said above"

@@ -81,7 +81,6 @@ from .web import errors
 from .web.description import OpenApiApp
 from .web.headers import SecurityHeaders
 from .web.request_id import RequestIds
-from .web.slow_bodies import SlowBodies
 from .web.tus_headers import TusHeaders
 from .webhooks.sender import Webhooks
 from .wiring import Parts
@@ -132,7 +131,6 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     # Set when the server stops, so that event streams end before it waits for them.
     app.state.leaving = threading.Event()
     errors.install_handlers(app, tuple(KINDS))
-    app.add_middleware(SlowBodies, seconds=settings.upload_patience_s)
     app.add_middleware(TusHeaders)
     app.add_middleware(Guard)
     app.add_middleware(SecurityHeaders)

@@ -66,30 +66,6 @@ class TooLarge(InvalidInput):
     """The body is too large."""
 
 
-class BodyTimeout(InvalidInput):
-    """The body is received too slowly."""
-
-
-class TinyChunks(InvalidInput):
-    """The body is sent in too many small chunks."""
-
-
-class MalformedRequest(InvalidInput):
-    """The request is not valid HTTP."""
-
-
-class UnknownMethod(InvalidInput):
-    """The HTTP method is unknown."""
-
-
-class HeadersTooLarge(InvalidInput):
-    """The request headers are too long."""
-
-
-class TooManyConnections(InvalidInput):
-    """Too many connections are open."""
-
-
 class WrongProtocol(InvalidInput):
     """The request has another version of the upload protocol."""
 

@@ -28,7 +28,7 @@ _SECRETS = (
 CLOSED = "distributed.batched"
 
 # Loggers whose messages any client can trigger.
-PROVOKED = ("bentray.connections", "uvicorn.error", "asyncio")
+PROVOKED = ("uvicorn.error", "asyncio")
 SELDOM_S = 60.0
 
 

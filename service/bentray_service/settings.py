@@ -29,10 +29,11 @@ OF_OTHER_PARTS = {
 OF_COMPOSE = {
     f"{PREFIX}{name}"
     for name in (
-        *("PUBLISH", "GRAFANA_PUBLISH", "WORKER_CONTAINER_MEMORY"),
-        *(f"{part}_CPUS" for part in ("SERVICE", "SCHEDULER", "WORKER", "DATABASE", "MONITORING")),
-        *(f"{part}_MEMORY" for part in ("SERVICE", "SCHEDULER", "DATABASE", "MONITORING")),
+        *("PUBLISH", "PUBLISH_TLS", "GRAFANA_PUBLISH", "WORKER_CONTAINER_MEMORY"),
+        *(f"{part}_CPUS" for part in ("EDGE", "SERVICE", "SCHEDULER", "WORKER", "DATABASE", "MONITORING")),
+        *(f"{part}_MEMORY" for part in ("EDGE", "SERVICE", "SCHEDULER", "DATABASE", "MONITORING")),
         *(f"{name}_SECRET" for name in ("FIRST_KEY", "DATABASE_PASSWORD", "METRICS_KEY", "GRAFANA_PASSWORD")),
+        *(f"EDGE_{name}_SECRET" for name in ("CERTIFICATE", "KEY")),
     )
 }
 
@@ -49,7 +50,21 @@ class ServiceSettings(BaseSettings):
     data_dir: Path = Field(
         Path("bentray-data"), description="Folder of the datasets, volumes and the database."
     )
-    host: str = Field("127.0.0.1", description="Address to listen on; 0.0.0.0 for every interface.")
+    host: str = Field(
+        "127.0.0.1",
+        description="Address to listen on; any but a loopback address requires behind_proxy, trusted_proxies "
+        "or bare.",
+    )
+    behind_proxy: str | None = Field(
+        None,
+        description="Addresses or networks of proxies in front that only forward, such as nginx with "
+        "deploy/nginx.conf, separated by commas.",
+    )
+    bare: bool = Field(
+        False,
+        description="Listen on any address without a proxy: without TLS, and without limits of connections "
+        "and slow clients.",
+    )
     port: int = Field(8000, ge=0, le=65535, description="TCP port to listen on; 0 picks a free one.")
     max_upload_bytes: int = Field(2 * GIB, gt=0, description="Largest upload accepted, in bytes.")
     dask_scheduler_address: str | None = Field(
@@ -109,9 +124,6 @@ class ServiceSettings(BaseSettings):
     )
     ingest_seconds: float = Field(
         120.0, gt=0, description="CPU time limit of this process, in seconds; four times as long in all."
-    )
-    upload_patience_s: float = Field(
-        60.0, gt=0, description="Time in which 64 KiB of a request body must arrive, in seconds."
     )
     upload_keep_s: float = Field(
         86400.0,
@@ -189,12 +201,6 @@ class ServiceSettings(BaseSettings):
     )
     session_hours: float = Field(
         12.0, gt=0, le=24 * 30, description="Time after which a user signs in again, in hours."
-    )
-    connections_per_address: int | None = Field(
-        None,
-        ge=1,
-        description="Maximum number of connections per client address, except for trusted proxies; "
-        "default: a quarter of all connections, which are limited by file descriptors and to 4096.",
     )
     requests_per_minute: int = Field(
         1200, ge=0, description="Rate limit per tenant with keys or a proxy; 0: unlimited."

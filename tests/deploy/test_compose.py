@@ -1,4 +1,4 @@
-"""docker-compose.yml: valid, only the service published, locked down, pinned; and its scripts."""
+"""docker-compose.yml: valid, only the edge published, locked down, pinned; and its scripts."""
 
 from __future__ import annotations
 
@@ -71,9 +71,12 @@ def test_tls_encrypts_every_connection_and_changes_nothing_else(file: dict[str, 
     assert secured["services"]["database"] == file["services"]["database"]
 
 
-def test_only_the_service_is_published_and_on_loopback(file: dict[str, Any]) -> None:
+def test_only_the_edge_is_published_and_on_loopback(file: dict[str, Any]) -> None:
     published = {name: part["ports"] for name, part in file["services"].items() if "ports" in part}
-    assert published == {"service": ["127.0.0.1:8000:8000"], "grafana": ["127.0.0.1:3000:3000"]}
+    assert published == {
+        "edge": ["127.0.0.1:8000:8080", "127.0.0.1:8443:8443"],
+        "grafana": ["127.0.0.1:3000:3000"],
+    }
     internal = {name for name, network in file["networks"].items() if network.get("internal")}
     for name in ("scheduler", "worker", "database", "prometheus"):
         assert set(file["services"][name]["networks"]) <= internal
@@ -85,6 +88,23 @@ def test_only_the_service_is_published_and_on_loopback(file: dict[str, Any]) -> 
         for other in others:
             networks = [set(file["services"][part]["networks"]) for part in (name, other)]
             assert not networks[0] & networks[1]
+
+
+def test_the_edge_reads_files_that_are_mounted(file: dict[str, Any]) -> None:
+    part, text = file["services"]["edge"], (DEPLOY / "nginx.conf").read_text()
+    (mounted,) = part["volumes"]
+    assert mounted == f"./deploy/nginx.conf:{part['entrypoint'][2]}:ro"
+    folder = Path(part["entrypoint"][2]).parent
+    read = {str(folder / name) for name in re.findall(r"ssl_certificate(?:_key)? (\S+);", text)}
+    assert {secret["target"] for secret in part["secrets"]} == read
+    published = {words.rpartition(":")[2] for words in part["ports"]}
+    assert set(re.findall(r"listen (\d+) ", text)) == published
+    command = file["services"]["service"]["command"]
+    assert f"set $service service:{command[command.index('--port') + 1]};" in text
+    (files,) = re.findall(r"worker_connections (\d+);", text)
+    assert int(files) < part["ulimits"]["nofile"]
+    # In the temporary folders that the container may write.
+    assert all(path.startswith("/tmp/") for path in re.findall(r"(?:pid|_temp_path) (\S+);", text))
 
 
 def test_every_part_is_locked_down_and_limited(file: dict[str, Any]) -> None:
@@ -151,7 +171,8 @@ def test_no_password_is_in_the_file_and_git_ignores_where_it_is(file: dict[str, 
     text = compose.FILE.read_text()
     assert not re.search(r"postgresql\+psycopg://\w+:", text)
     assert "POSTGRES_PASSWORD:" not in text
-    assert set(file["secrets"]) == {"database-password", "first-key", "metrics-key", "grafana-password"}
+    ours = {"database-password", "first-key", "metrics-key", "grafana-password"}
+    assert set(file["secrets"]) == ours | {"edge-certificate", "edge-key"}
     assert "GF_SECURITY_ADMIN_PASSWORD:" not in text
     for secret in file["secrets"].values():
         path = secret["file"].removeprefix("./")
@@ -289,6 +310,8 @@ def test_the_check_says_what_a_machine_lacks(
         "PATH": f"{tmp_path}:{os.environ['PATH']}",
         "BENTRAY_FIRST_KEY_SECRET": str(tmp_path / "first-key"),
         "BENTRAY_DATABASE_PASSWORD_SECRET": str(tmp_path / "database-password"),
+        "BENTRAY_EDGE_CERTIFICATE_SECRET": str(tmp_path / "edge-certificate.pem"),
+        "BENTRAY_EDGE_KEY_SECRET": str(tmp_path / "edge-key.pem"),
     }
     done = subprocess.run(
         [str(DEPLOY / "check.sh")], env=environment, capture_output=True, text=True, check=False

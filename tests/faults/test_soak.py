@@ -21,6 +21,7 @@ from bentray_kernels.tomography import reconstruct
 from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.files.dataset import write_dataset
 
+from ..edge import edge
 from ..service.ingest.hostile_volumes import npy
 from .footprint import Footprint, measured, oldest_upload, rise
 from .honest_traffic import PLAN, HonestTenant
@@ -101,13 +102,16 @@ def service(tmp_path):
     made = LiveService(
         tmp_path,
         (*HONEST, HOSTILE),
-        BENTRAY_CONNECTIONS_PER_ADDRESS=str(CONNECTIONS),
         BENTRAY_MAX_TENANT_BYTES=str(MAX_TENANT_BYTES),
         BENTRAY_UPLOAD_KEEP_S=str(UPLOAD_KEEP_S),
         BENTRAY_MIN_FREE_BYTES="0",
     )
-    yield made
-    made.kill()
+    try:
+        with edge(tmp_path / "edge", made.port, limit_conn=f"requests {CONNECTIONS}") as front:
+            made.url = front.url
+            yield made
+    finally:
+        made.kill()
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Run the hostile list and print its table: ``python -m tests.hostile [service | parts]``."""
+"""Run the hostile list and print its table: ``python -m tests.hostile [service | edge | parts]``."""
 
 from __future__ import annotations
 

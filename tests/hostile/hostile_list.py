@@ -1,8 +1,9 @@
-"""The two halves of the hostile list, each with the deployment that it is tried on."""
+"""The parts of the hostile list, each with the deployment that it is tried on."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,9 +28,9 @@ def _scan() -> Dataset:
     return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta)
 
 
-def _on_service(folder: Path, say: Callable[[str], None]) -> list[Outcome]:
+def _on_service(folder: Path, say: Callable[[str], None], *, fronted: bool = False) -> list[Outcome]:
     write_dataset(folder / "scan.h5", _scan())
-    victim = Victim(folder)
+    victim = Victim(folder, fronted=fronted)
     try:
         return run(service_attacks(victim, (folder / "scan.h5").read_bytes()), say)
     finally:
@@ -48,11 +49,11 @@ def _on_parts(folder: Path, say: Callable[[str], None]) -> list[Outcome]:
         machine.close()
 
 
-LISTS = {"service": _on_service, "parts": _on_parts}
+LISTS = {"service": _on_service, "edge": partial(_on_service, fronted=True), "parts": _on_parts}
 
 
 def run_list(name: str, folder: Path, say: Callable[[str], None]) -> list[Outcome]:
-    """Try one half in an empty folder.
+    """Try one part in an empty folder.
 
     Args:
         name: a key of ``LISTS``.

@@ -22,6 +22,7 @@ import psutil
 from bentray_workers.files.volume_export import FORMATS
 from bentray_workers.rendering.picture_cost import VolumeFile, export_cost
 
+from ..edge import edge
 from ..faults.live_service import LiveService
 from ..faults.machine import ENDED, wait_until
 from .attack_table import Attack
@@ -56,9 +57,14 @@ time.time = _now
 
 
 class Victim:
-    """A service with a hostile and an honest tenant, and a clock that can be set."""
+    """A service with a hostile and an honest tenant, and a clock that can be set.
 
-    def __init__(self, folder: Path) -> None:
+    Args:
+        folder: for data and logs.
+        fronted: whether they reach it through nginx.
+    """
+
+    def __init__(self, folder: Path, *, fronted: bool = False) -> None:
         (folder / "clock").mkdir(parents=True)
         (folder / "clock" / "sitecustomize.py").write_text(CLOCK)
         self._offset = folder / "offset"
@@ -72,13 +78,17 @@ class Victim:
             BENTRAY_MIN_FREE_BYTES="0",
             PYTHONPATH=path,
         )
+        self._closing = ExitStack()
+        self._closing.callback(self.service.kill)
         self.port = self.service.port
+        if fronted:
+            self.port = self._closing.enter_context(edge(folder / "edge", self.port)).port
         self.http = {who: self._client(who) for who in (MALLORY, ADA)}
         self.own = f"Authorization: Bearer {self.service.keys[MALLORY]}"
 
     def _client(self, who: str) -> httpx.Client:
         headers = {"Authorization": f"Bearer {self.service.keys[who]}"}
-        return httpx.Client(base_url=self.service.url, headers=headers, timeout=120.0)
+        return httpx.Client(base_url=f"http://127.0.0.1:{self.port}", headers=headers, timeout=120.0)
 
     def set_clock(self, offset_s: float) -> None:
         new = self._offset.with_suffix(".new")
@@ -130,7 +140,7 @@ class Victim:
     def close(self) -> None:
         for one in self.http.values():
             one.close()
-        self.service.kill()
+        self._closing.close()
 
 
 def service_attacks(victim: Victim, scan: bytes) -> list[Attack]:
@@ -190,7 +200,8 @@ def contradictory_lengths(victim: Victim) -> str:
         ("Transfer-Encoding: chunked, identity",),
     ):
         head = ["POST /v1/jobs HTTP/1.1", victim.own, "Content-Type: application/json", *lines]
-        statuses, _ = exchange(victim.port, head, b"5\r\nhello\r\n0\r\n\r\nGET /v1/jobs HTTP/1.1\r\n\r\n")
+        body = b"5\r\nhello\r\n0\r\n\r\nGET /v1/jobs HTTP/1.1\r\n\r\n"
+        statuses, _ = exchange(victim.port, head, body, ends=False)
         found += statuses[:1]
         assert statuses[:1] in ([400], [501], [422]), (lines, statuses)
         # What follows is not taken for a request of this caller.

@@ -15,6 +15,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import uvicorn
 
 from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography.result import Iteration, Progress, Reconstruction, Trial
@@ -26,8 +27,7 @@ from bentray_service.ingest.sandbox import summary_in
 from bentray_service.rows.accounts import Account, Accounts
 from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
-from bentray_service.web.listening import Listening
-from bentray_service.web.server import Server
+from bentray_service.web.server import configuration, listen
 from bentray_workers.cluster.fair_shares import Share
 from bentray_workers.reconstruction import reconstruction_run
 
@@ -319,8 +319,7 @@ def serve(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., str]]:
 def serving(settings: ServiceSettings, cluster: FakeCluster) -> Iterator[str]:
     """A service behind a real socket; gives its address."""
     app = create_app(settings, cluster)
-    server, listening = Server(app, settings), Listening()
-    listening.bind(("127.0.0.1", 0))
+    server, listening = uvicorn.Server(configuration(app)), listen("127.0.0.1", 0)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
     thread.start()
     try:

@@ -141,8 +141,8 @@ def test_client_errors_are_logged_once_a_minute(capsys):
 def test_only_in_the_service_and_only_of_those(capsys):
     with logs.configured("text"):
         for _ in range(3):
-            logging.getLogger("bentray.connections").warning("too many")
+            logging.getLogger("uvicorn.error").warning("too many")
             logging.getLogger("bentray.jobs").warning("a job")
     written = capsys.readouterr().err
     assert (written.count("too many"), written.count("a job")) == (1, 3)
-    assert not logging.getLogger("bentray.connections").filters
+    assert not logging.getLogger("uvicorn.error").filters

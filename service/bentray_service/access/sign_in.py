@@ -30,6 +30,10 @@ log = logging.getLogger("bentray.access")
 # Names the project in which a request acts.
 PROJECT_HEADER = "Bentray-Project"
 
+# The client of a proxy.
+FORWARDED = "X-Forwarded-For"
+THIS_MACHINE = networks("127.0.0.0/8, ::1")
+
 # Sign-ins that an address may begin per minute.
 SIGN_INS_PER_MINUTE = 60
 
@@ -37,8 +41,9 @@ SIGN_INS_PER_MINUTE = 60
 NO_KEYS_S = 1.0
 
 ACCEPTED_HOSTS = (
-    "127.0.0.1; or a first key, created with `bentray keys create`; or BENTRAY_TRUSTED_PROXIES, "
-    "the addresses of authenticating proxies; or BENTRAY_OIDC_ISSUER, an OpenID provider"
+    "127.0.0.1 without a proxy; or a first key, created with `bentray keys create`; or "
+    "BENTRAY_TRUSTED_PROXIES, the addresses of authenticating proxies; or BENTRAY_OIDC_ISSUER, an OpenID "
+    "provider"
 )
 
 
@@ -68,6 +73,7 @@ class SignIn:
         self._keys = keys
         self._projects, self._accounts, self._claimed = projects, accounts, claimed
         self._trusted = networks(settings.trusted_proxies or "")
+        self._forwarding = networks(settings.behind_proxy or "", "BENTRAY_BEHIND_PROXY")
         self._user_header = settings.proxy_user_header
         self.browsers = None if settings.oidc_issuer is None else BrowserSessions(settings, sessions, claimed)
         self._guarded = bool(self._trusted) or self.browsers is not None
@@ -78,10 +84,9 @@ class SignIn:
         if settings.first_key_file is not None and not keys.any():
             self._create_first_key(settings)
         if not self._guarded and not keys.any():
-            if not is_loopback(settings.host):
-                raise InvalidInput(
-                    "host", f"{settings.host}, reachable by others, without any key", ACCEPTED_HOSTS
-                )
+            if self._forwarding or not is_loopback(settings.host):
+                where = f"{settings.host} behind a proxy" if self._forwarding else settings.host
+                raise InvalidInput("host", f"{where}, reachable by others, without any key", ACCEPTED_HOSTS)
             log.info("no key required: every caller on this machine is the tenant %s", LOCAL)
 
     def close(self) -> None:
@@ -181,12 +186,12 @@ class SignIn:
         self._take(self._renders, "renders", caller, share)
 
     def check_sign_in(self, address: str) -> None:
-        """Check the rate limit of an address for sign-ins; trusted proxies have limits of their own.
+        """Check the rate limit of an address for sign-ins; proxies have limits of their own.
 
         Raises:
             RateLimited: when it is exceeded.
         """
-        wait_s = 0.0 if within(address, self._trusted) else self._sign_ins.take(address)
+        wait_s = 0.0 if within(address, self._trusted + self._forwarding) else self._sign_ins.take(address)
         if wait_s > 0.0:
             found = f"more than {SIGN_INS_PER_MINUTE} per minute"
             raise RateLimited("sign-ins", found, "a lower rate; see Retry-After", wait_s)
@@ -206,6 +211,10 @@ class SignIn:
             if value is not None and not names_loopback(value):
                 accepted = "localhost or 127.0.0.1; other names require a key (`bentray keys create`)"
                 raise Forbidden(name.title(), repr(value[:80]), accepted)
+        # The other headers of a proxy may be claimed by its client.
+        for value in ", ".join(headers.getlist(FORWARDED)).split(","):
+            if value.strip() and not within(value.strip(), THIS_MACHINE):
+                raise Forbidden(FORWARDED, repr(value[:80]), "this machine; behind a proxy a key is required")
         return ANYONE
 
     def _caller_with_key(self, text: str) -> Caller:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import logging
 import os
@@ -26,9 +25,15 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("bentray.serve")
 
+BARE = (
+    "No proxy is in front of the service (--bare): connections are not encrypted, and slow clients are not "
+    "limited; deploy/nginx.conf does both."
+)
 OPTIONS = {
     "host": "--host",
     "port": "--port",
+    "behind_proxy": "--behind-proxy",
+    "bare": "--bare",
     "data_dir": "--data",
     "dask_scheduler_address": "--scheduler",
     "workers": "--workers",
@@ -38,6 +43,14 @@ OPTIONS = {
 def serve(
     host: Annotated[str | None, typer.Option(help="Address to listen on.", show_default="127.0.0.1")] = None,
     port: Annotated[int | None, typer.Option(help="Port; 0 picks a free one.", show_default="8000")] = None,
+    behind_proxy: Annotated[
+        str | None,
+        typer.Option(help="Addresses of the proxy in front, needed to listen on more than this machine."),
+    ] = None,
+    bare: Annotated[
+        bool | None,
+        typer.Option("--bare", help="Listen without a proxy: no TLS, no limits of slow clients."),
+    ] = None,
     data: Annotated[
         Path | None,
         typer.Option(help="Folder of the datasets, volumes and the database.", show_default="./bentray-data"),
@@ -60,10 +73,13 @@ def serve(
     Example:  bentray serve --port 8000 --data /srv/bentray
     """
     from ..settings import ServiceSettings
+    from ..web.server import listen
 
     options = {
         "host": host,
         "port": port,
+        "behind_proxy": behind_proxy,
+        "bare": bare,
         "data_dir": data,
         "dask_scheduler_address": scheduler,
         "workers": workers,
@@ -78,46 +94,44 @@ def serve(
         raise InvalidInput(field, error.value, error.accepted) from error
     shown = {name: f"{OPTIONS[name]} {value}" for name, value in given.items()}
     unused = list(ServiceSettings.unused_variables(os.environ, shown))
-    listening = _listen(settings.host, settings.port)
+    # The socket is bound before any worker starts, so that a busy port is reported early
+    # and port 0 is replaced by the actual number.
+    listening = listen(settings.host, settings.port)
     try:
+        _check_exposure(settings, listening.getsockname()[0])
         _run(settings, listening, unused, as_json)
     finally:
         listening.close()
 
 
-def _listen(host: str, port: int) -> socket.socket:
-    from ..web.listening import Listening
+def _check_exposure(settings: ServiceSettings, address: str) -> None:
+    """Refuse to listen for other machines without a proxy, unless that is the declared intention."""
+    from ..web.addresses import is_loopback
 
-    # The socket is bound before any worker starts, so that a busy port is reported early
-    # and port 0 is replaced by the actual number.
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-    except (socket.gaierror, UnicodeError) as error:
-        raise InvalidInput("host", repr(host), "an address of this machine, e.g. 127.0.0.1") from error
-    listening = Listening(family, kind, protocol)
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listening.bind(address)
-    except OSError as error:
-        listening.close()
-        if error.errno == errno.EADDRNOTAVAIL:
-            raise InvalidInput("host", repr(host), "an address of this machine, e.g. 127.0.0.1") from error
+    if is_loopback(address) or settings.behind_proxy or settings.trusted_proxies:
+        return
+    if not settings.bare:
         raise InvalidInput(
-            "port", f"{port} on {host} ({error.strerror})", "a free port of this machine; 0 picks one"
-        ) from error
-    return listening
+            "host",
+            f"{settings.host}, reachable by others, without a proxy in front",
+            "127.0.0.1, with a proxy on this machine (deploy/nginx.conf); or --behind-proxy and the "
+            "addresses of a proxy elsewhere; or --bare, without TLS and without limits of slow clients",
+        )
+    _announce(settings, BARE, logging.WARNING)
 
 
 def _run(settings: ServiceSettings, listening: socket.socket, unused: list[str], as_json: bool) -> None:
+    import uvicorn
+
     from .. import logs
     from ..app import create_app
     from ..malloc_arenas import limit_arenas
-    from ..web.server import Server
+    from ..web.server import configuration
 
     host, port = listening.getsockname()[:2]
     url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
 
-    class Announcing(Server):
+    class Announcing(uvicorn.Server):
         interrupted = False
 
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -146,7 +160,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, unused: list[str],
     limit_arenas()
     made = create_app(settings)
     app = _Starting(made)
-    server = Announcing(app, settings)
+    server = Announcing(configuration(app))
     # Uvicorn exits when the application cannot start; the reason is raised below.
     with suppress(SystemExit), logs.configured(settings.log_format):
         for words in unused:

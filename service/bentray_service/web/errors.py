@@ -53,12 +53,6 @@ PROBLEMS: Mapping[type[Exception], ProblemType] = {
     errors.PackedBody: ProblemType(415, "packed-body", "Unsupported content coding"),
     errors.EmptyBody: ProblemType(422, "empty-body", "Empty body"),
     errors.TooLarge: ProblemType(413, "too-large", "Body too large"),
-    errors.BodyTimeout: ProblemType(408, "too-slow", "Body received too slowly"),
-    errors.TinyChunks: ProblemType(400, "tiny-chunks", "Too many small chunks"),
-    errors.MalformedRequest: ProblemType(400, "malformed-request", "Malformed request"),
-    errors.UnknownMethod: ProblemType(501, "unknown-method", "Unknown method"),
-    errors.HeadersTooLarge: ProblemType(431, "head-too-large", "Request headers too long"),
-    errors.TooManyConnections: ProblemType(503, "too-many-connections", "Too many connections"),
     errors.WrongProtocol: ProblemType(412, "wrong-protocol", "Unsupported version of the upload protocol"),
     errors.WrongOffset: ProblemType(409, "wrong-offset", "Wrong offset of the upload"),
     errors.Locked: ProblemType(423, "locked", "Upload in use by another request"),
@@ -93,8 +87,17 @@ LATER = (
     errors.ProviderUnavailable,
     errors.QueueFull,
     errors.StorageUnavailable,
-    errors.TooManyConnections,
     errors.TooManyStreams,
+)
+# Answered by the proxy in front (deploy/nginx.conf) for requests that do not reach the service.
+EDGE = (
+    ProblemType(400, "malformed-request", "Malformed request"),
+    ProblemType(408, "too-slow", "Body received too slowly"),
+    ProblemType(414, "address-too-long", "Address too long"),
+    ProblemType(431, "head-too-large", "Request headers too long"),
+    ProblemType(502, "service-away", "Service unavailable"),
+    ProblemType(503, "too-many-connections", "Too many connections"),
+    ProblemType(504, "service-away", "Service unavailable"),
 )
 INVALID_REQUEST = ProblemType(422, "invalid-request", "Invalid request")
 UNREADABLE = ProblemType(400, "unreadable-body", "Unreadable body")
@@ -122,7 +125,7 @@ def problems(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
     """The error responses of a route, for the OpenAPI description."""
     content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     titles: dict[int | str, list[str]] = {"default": ["A problem"]}
-    for kind in (*PROBLEMS.values(), INVALID_REQUEST, UNREADABLE):
+    for kind in (*EDGE, *PROBLEMS.values(), INVALID_REQUEST, UNREADABLE):
         titles.setdefault(kind.status, []).append(kind.title)
     words = {status: "; or: ".join(dict.fromkeys(said)) for status, said in titles.items()}
     return {status: {"description": words[status], "content": content} for status in statuses}

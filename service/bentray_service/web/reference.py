@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 
 from .documents import document, table
-from .errors import FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
+from .errors import EDGE, FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
 
 Node = dict[str, Any]
 
@@ -121,7 +121,7 @@ def _schema(name: str, schema: Node) -> str:
 
 
 def _problems() -> str:
-    kinds = [*PROBLEMS.values(), INVALID_REQUEST, NOT_FOUND, FAILED, INTERNAL]
+    kinds = [*PROBLEMS.values(), *EDGE, INVALID_REQUEST, NOT_FOUND, FAILED, INTERNAL]
     return table(
         ("Type", "Status", "Title"), [(f"/problems/{k.slug}", str(k.status), k.title) for k in kinds]
     )

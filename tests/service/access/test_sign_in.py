@@ -53,6 +53,9 @@ def test_remote_clients_need_keys(sign_in, keys, host):
     with pytest.raises(InvalidInput, match=f"host: found {host}.*bentray keys create"):
         sign_in(host=host)
     sign_in(host=host, **PROXIED)
+    # What a proxy forwards comes from elsewhere, though it listens on this machine.
+    with pytest.raises(InvalidInput, match=r"found 127\.0\.0\.1 behind a proxy.*bentray keys create"):
+        sign_in(behind_proxy="127.0.0.1")
     keys.add(ApiKey.new(), LOCAL, "one", ("read",))
     sign_in(host=host)
 
@@ -63,6 +66,9 @@ def test_remote_clients_need_keys(sign_in, keys, host):
         {"host": "evil.example:8000"},
         {"host": "localhost", "origin": "https://evil.example"},
         {"origin": "null"},
+        {"host": "localhost", "x-forwarded-for": "192.0.2.1"},
+        {"host": "localhost", "x-forwarded-for": "192.0.2.1, 127.0.0.1"},
+        {"host": "localhost", "x-forwarded-for": "unknown"},
     ],
 )
 def test_cross_origin_requests_are_rejected(sign_in, headers):
@@ -72,7 +78,8 @@ def test_cross_origin_requests_are_rejected(sign_in, headers):
 
 @pytest.mark.parametrize("host", ["localhost", "LOCALHOST:80", "127.0.0.1", "127.8.9.1:1", "[::1]:8000"])
 def test_names_of_this_machine(sign_in, host):
-    assert sign_in().caller(Headers({"host": host, "origin": f"http://{host}"}), NEAR).how == "open"
+    headers = {"host": host, "origin": f"http://{host}", "x-forwarded-for": "127.0.0.1, ::1"}
+    assert sign_in().caller(Headers(headers), NEAR).how == "open"
 
 
 def test_first_key_closes_the_service(sign_in, keys, monkeypatch):

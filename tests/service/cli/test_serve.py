@@ -11,6 +11,7 @@ from typer.testing import Result
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.cli import serve as module
+from bentray_service.web.server import listen
 
 
 @pytest.fixture
@@ -42,7 +43,7 @@ def test_a_host_that_is_not_of_this_machine_is_rejected(
 @pytest.mark.parametrize("host", ["a..b", 70 * "a", "\udc80"])
 def test_rejects_invalid_host_names(host: str) -> None:
     with pytest.raises(InvalidInput, match="host: found"):
-        module._listen(host, 0)
+        listen(host, 0)
 
 
 def test_an_unknown_host_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,7 +52,7 @@ def test_an_unknown_host_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("socket.getaddrinfo", unknown)
     with pytest.raises(InvalidInput, match=r"host: found 'nowhere'"):
-        module._listen("nowhere", 0)
+        listen("nowhere", 0)
 
 
 @pytest.mark.parametrize(
@@ -91,15 +92,25 @@ def test_reachability_is_shown() -> None:
     assert "Authentication by API key" in module._reachability(required=True)
 
 
-def test_remote_access_needs_keys(bentray: Callable[..., Result], tmp_path: Path) -> None:
-    result = bentray("serve", "--host", "0.0.0.0", "--port", 0, "--data", tmp_path)
+@pytest.mark.parametrize(
+    ("words", "found", "accepted"),
+    [
+        ((), "0.0.0.0, reachable by others, without a proxy in front", "--behind-proxy"),
+        (("--bare",), "0.0.0.0, reachable by others, without any key", "bentray keys create"),
+        (("--behind-proxy", "10.0.0.7"), "0.0.0.0 behind a proxy, reachable by others, without any", "keys"),
+        (("--behind-proxy", "edge"), "'edge'", "addresses or networks"),
+    ],
+)
+def test_remote_access_needs_a_proxy_and_keys(
+    bentray: Callable[..., Result], tmp_path: Path, words: tuple[str, ...], found: str, accepted: str
+) -> None:
+    result = bentray("serve", "--host", "0.0.0.0", *words, "--port", 0, "--data", tmp_path)
     assert result.exit_code == 2
     assert "Traceback" not in result.stderr
     last = result.stderr.splitlines()[-1]
-    assert last.startswith(
-        "bentray: host: found 0.0.0.0, reachable by others, without any key; accepted: 127.0."
-    )
-    assert "bentray keys create" in last
+    assert f": found {found}" in last
+    assert accepted in last
+    assert (module.BARE in result.stderr) == ("--bare" in words)
 
 
 def test_start_failure_is_one_line(
