@@ -27,6 +27,7 @@ from .installation import PARTS, Installation
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.nightly,
     pytest.mark.skipif(postgresql.programs() is None, reason=postgresql.SKIPPED),
 ]
 
@@ -79,14 +80,7 @@ def test_no_page_of_dask_is_shown(installation: Installation, part: str) -> None
         assert pages(sockets) == []
 
 
-@pytest.mark.parametrize(
-    "part",
-    # The others are killed in tests/faults too.
-    [
-        *(pytest.param(part, marks=pytest.mark.nightly) for part in ("worker", "service", "scheduler")),
-        "database",
-    ],
-)
+@pytest.mark.parametrize("part", ["worker", "service", "scheduler", "database"])
 def test_it_works_again_after_a_part_was_killed(installation: Installation, scan: Path, part: str) -> None:
     with Client(installation.url, key=installation.key) as client:
         job = client.submit(client.upload(scan).id, LONG.to_dict())
@@ -104,7 +98,6 @@ def test_it_works_again_after_a_part_was_killed(installation: Installation, scan
         assert client.wait(again.id).state == "succeeded"
 
 
-@pytest.mark.nightly
 def test_parts_accept_only_tls_with_certificates(tmp_path: Path, scan: Path) -> None:
     subprocess.run([str(compose.ROOT / "deploy" / "certificates.sh"), str(tmp_path / "tls")], check=True)
     secured = Installation(tmp_path, compose.TLS)

@@ -72,6 +72,7 @@ def a_scan(path, megabytes):
     return path
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_upload_survives_a_service_kill(tmp_path):
     scan = a_scan(tmp_path / "scan.h5", 40)

@@ -75,6 +75,7 @@ def test_without_json_it_ends_with_a_table_and_the_paths(
     assert result.stderr == ""
 
 
+@pytest.mark.nightly
 def test_several_workers_give_the_same_bits(
     bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
 ) -> None:

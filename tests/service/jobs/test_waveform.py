@@ -61,6 +61,7 @@ def torn(monkeypatch):
     return gone, restored
 
 
+@pytest.mark.nightly
 def test_interrupted_job_gives_the_bits_of_one_process(http, torn, tmp_path):
     write_dataset(tmp_path / "scan.h5", scan())
     sent = http.post("/v1/datasets", content=(tmp_path / "scan.h5").read_bytes(), headers=HDF5)

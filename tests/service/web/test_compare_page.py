@@ -56,6 +56,7 @@ def test_four_images_have_one_range(page, both, shared_service):
         expect(page.locator(".readout")).to_contain_text(f"{values[node]:.2f} m/s")
 
 
+@pytest.mark.nightly
 def test_the_difference_and_the_border_to_swipe(page, both):
     ready(page, both)
     page.get_by_role("button", name="Difference", exact=True).click()
@@ -77,6 +78,7 @@ def test_the_difference_and_the_border_to_swipe(page, both):
     page.wait_for_url(re.compile("mode=swipe"))
 
 
+@pytest.mark.nightly
 def test_a_way_that_is_chosen_before_the_values_are_read_is_shown(page, both):
     held = []
     page.route("**/data?*", lambda route: held.append(route))

@@ -20,7 +20,7 @@ from ..conftest import PATIENCE_S
 from .finished_results import finished, known
 from .live_results import in_turns, started
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 
 # Ends of the addresses of pages whose parts axe has seen in another one.
 REPEATED = ("?planes=3", "?mode=swipe")
@@ -153,7 +153,6 @@ def test_every_page_on_a_laptop_and_on_the_narrowest_telephone(page, places):
     expect(page.locator("h1")).to_have_count(1)
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("scheme", RULES)
 def test_axe_finds_nothing_serious_in_any_colours_or_width(page, places, scheme):
     address, pages = places
@@ -170,7 +169,6 @@ def test_axe_finds_nothing_serious_in_any_colours_or_width(page, places, scheme)
     assert found == {}
 
 
-@pytest.mark.nightly
 def test_nothing_scrolls_sideways_at_any_width(page, places):
     address, pages = places
     wide = []

@@ -63,6 +63,7 @@ def test_a_link_restores_filters(page, address, queued):
     assert page.url.endswith(f"#/jobs/{right['id']}")
 
 
+@pytest.mark.nightly
 def test_pages_and_actions_by_keyboard(page, address, queued):
     scan = queued(*(f"Job {k}" for k in range(27)))[0]["dataset"]
     page.goto(f"{address}/#/jobs")
@@ -94,6 +95,7 @@ def test_pages_and_actions_by_keyboard(page, address, queued):
     expect(page.get_by_label("Name, scan, notes")).to_have_value(scan)
 
 
+@pytest.mark.nightly
 def test_a_telephone_shows_cards(page, address, queued):
     queued("A name that is far too long for one line of a telephone " * 3)
     page.set_viewport_size({"width": 390, "height": 844})

@@ -21,6 +21,7 @@ def two_frames(client, path, turntable, target, work_dir, **control):
     first.save(target, "PNG", save_all=True, append_images=[second])
 
 
+@pytest.mark.nightly
 def test_a_turntable_is_shown_and_plays_when_asked(page, address, work, monkeypatch):
     monkeypatch.setattr(kinds, "draw_turntable", two_frames)
     values = io.BytesIO()
@@ -86,6 +87,7 @@ def test_simulated_scan_can_be_reconstructed(page, serve, monkeypatch):
     page.get_by_role("link", name="A phantom").wait_for()
 
 
+@pytest.mark.nightly
 def test_a_queued_job_tells_its_place(page, serve, scan):
     # Jobs stay where they are: no disk has so much room.
     address = serve(min_free_bytes=2**60)
@@ -133,6 +135,7 @@ def test_events_take_the_place_of_polling(page, serve, scan, work):
     expect(job.get_by_text("succeeded")).to_have_count(2)
 
 
+@pytest.mark.nightly
 def test_without_a_stream_the_page_polls(page, serve, scan, work):
     address = serve()
     page.route("**/v1/events*", lambda route: route.abort())

@@ -85,6 +85,7 @@ def test_it_sharpens_until_the_result_is_shown(page, address, scan, turns):
     assert page.locator(".live-views").count() == 0
 
 
+@pytest.mark.nightly
 def test_it_can_be_cancelled_and_run_again(page, address, scan, turns):
     job = started(address, scan)
     page.goto(f"{address}/#/jobs/{job['id']}")
@@ -112,6 +113,7 @@ def test_a_failure_is_explained(page, address, scan, work):
     page.get_by_role("heading", level=1, name="Sixteen elements").wait_for()
 
 
+@pytest.mark.nightly
 def test_progress_between_two_reports_is_even(page, shared_service):
     page.goto(shared_service.address)
     shares, left, next_phase = page.evaluate(
@@ -136,6 +138,7 @@ def test_progress_between_two_reports_is_even(page, shared_service):
     assert next_phase == 0
 
 
+@pytest.mark.nightly
 def test_a_total_that_changes_changes_the_pace_and_the_bar_never_jumps(page, shared_service):
     page.goto(shared_service.address)
     shares, left = page.evaluate(
@@ -163,6 +166,7 @@ def test_a_total_that_changes_changes_the_pace_and_the_bar_never_jumps(page, sha
     np.testing.assert_allclose(left[20:40], np.arange(60, 40, -1), atol=1e-9)
 
 
+@pytest.mark.nightly
 def test_a_misfit_that_falls_far_is_drawn_over_powers_of_ten(page, shared_service):
     page.goto(shared_service.address)
     texts, path = page.evaluate(

@@ -41,6 +41,7 @@ def members(address):
     return project["name"], {one["member"]: one["role"] for one in found}
 
 
+@pytest.mark.nightly
 def test_members_are_listed_added_and_removed_by_keyboard(page, address):
     page.goto(f"{address}/#/service")
     page.get_by_label("New project").fill("Trial 7")
@@ -116,6 +117,7 @@ def test_chosen_scans_are_one_batch_with_one_progress(page, address):
     page.get_by_text("100 % · 2 succeeded").wait_for()
 
 
+@pytest.mark.nightly
 def test_attempts_to_call_a_webhook(page, address):
     dataset = httpx.get(f"{address}/v1/datasets").json()["datasets"][0]["id"]
     order = {"kind": "reconstruction", "dataset": dataset, "settings": {"method": "sart", "nodes": 16}}

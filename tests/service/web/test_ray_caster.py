@@ -99,7 +99,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", ["8-bit", pytest.param("layers", marks=pytest.mark.nightly)])
 def test_its_pictures_are_those_of_the_service(page, address, name):
     values, spacing, chosen, surfaces = CASES[name]
     volume = stored(address, values(), spacing)
@@ -146,6 +146,7 @@ def moved(page, address, tmp_path):
     page.keyboard.press("ArrowRight")
 
 
+@pytest.mark.nightly
 def test_the_page_draws_previews_here_once_the_volume_is_loaded(page, address, tmp_path):
     pretend(page, "1.0")
     with page.expect_response("**/coefficients*"):
@@ -157,7 +158,8 @@ def test_the_page_draws_previews_here_once_the_volume_is_loaded(page, address, t
     assert ["browser", "full"] not in page.evaluate("window.sources")
 
 
-@pytest.mark.parametrize("card", [True, pytest.param(False, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("card", [True, False])
 def test_the_service_draws_where_this_would_be_slow(page, address, tmp_path, card):
     loads = []
     page.on("request", lambda request: loads.append(request.url) if "coefficients" in request.url else None)

@@ -90,6 +90,7 @@ def test_a_volume_is_uploaded_looked_at_and_turned(page, serve, work, tmp_path, 
     expect(page.get_by_role("button", name="Delete the volume")).to_be_hidden()
 
 
+@pytest.mark.nightly
 def test_the_filter_is_chosen(ball):
     page = ball
     page.route("**/*filter=*", lambda route: route.abort())
@@ -100,6 +101,7 @@ def test_the_filter_is_chosen(ball):
     expect(page.locator("#look-error")).to_be_hidden()
 
 
+@pytest.mark.nightly
 def test_dragging_turns_the_view_and_full_quality_follows(ball):
     page = ball
     before = whole(page, azimuth_deg="30").evaluate("canvas => canvas.toDataURL()")
@@ -129,6 +131,7 @@ def test_dragging_turns_the_view_and_full_quality_follows(ball):
     expect(page.get_by_role("spinbutton", name="Zoom")).to_have_value("2")
 
 
+@pytest.mark.nightly
 def test_the_view_is_turned_by_keyboard_and_kept_in_the_address(ball):
     page = ball
     page.locator("#stage").focus()
@@ -146,6 +149,7 @@ def test_the_view_is_turned_by_keyboard_and_kept_in_the_address(ball):
     whole(page, mode="refract", azimuth_deg="30", elevation_deg="20", zoom="1")
 
 
+@pytest.mark.nightly
 def test_two_requests_at_most_and_the_newest_view_wins(ball):
     page = ball
     requested, under_way, most = [], set(), []
@@ -186,6 +190,7 @@ def test_two_requests_at_most_and_the_newest_view_wins(ball):
     )
 
 
+@pytest.mark.nightly
 def test_a_preview_that_comes_late_is_not_shown(ball):
     page = ball
     content = io.BytesIO()
@@ -213,6 +218,7 @@ def test_a_preview_that_comes_late_is_not_shown(ball):
     assert whole(page, azimuth_deg="40").get_attribute("data-pictures") == pictures
 
 
+@pytest.mark.nightly
 def test_an_iso_value_is_chosen_by_its_histogram(page, address, tmp_path):
     values = np.round(200.0 * sampled(ONE_HOLE, 14)).astype(np.uint8)
     page.goto(address + "/#/rendering")
@@ -236,6 +242,7 @@ def test_an_iso_value_is_chosen_by_its_histogram(page, address, tmp_path):
     assert float(histogram.locator("line").get_attribute("x1")) == pytest.approx(256 * 40 / 200)
 
 
+@pytest.mark.nightly
 def test_display_errors_are_shown_as_text(ball, tmp_path):
     page = ball
     page.get_by_label("Iso-value", exact=True).fill("7")

@@ -112,6 +112,7 @@ def test_the_value_and_the_colour_under_the_pointer_are_those_of_the_array(page,
     assert middle == pytest.approx((X0 + 11.5 * DX, Y0 + 7.5 * DY), abs=0.1)
 
 
+@pytest.mark.nightly
 def test_the_attenuation_is_in_decibels_per_centimetre(page, result):
     ready(page, result)
     page.get_by_role("button", name="Attenuation (experimental)").click()
@@ -122,6 +123,7 @@ def test_the_attenuation_is_in_decibels_per_centimetre(page, result):
     )
 
 
+@pytest.mark.nightly
 def test_the_resolution_is_the_recovered_fraction(page, shared_service):
     """With the same colours from nothing to all, whatever its values are."""
     address, scan, work, monkeypatch, _ = shared_service
@@ -140,6 +142,7 @@ def test_the_resolution_is_the_recovered_fraction(page, shared_service):
         expect(page.locator(".readout")).to_contain_text(f"{recovered[node]:.3f}")
 
 
+@pytest.mark.nightly
 def test_the_uncertainty_fades_what_is_not_known(page, shared_service):
     """Opaque without uncertainty, clear where two deviations reach half the range of the colours."""
     address, scan, work, monkeypatch, _ = shared_service
@@ -211,6 +214,7 @@ def table_of(download):
         return list(csv.reader(file))
 
 
+@pytest.mark.nightly
 def test_a_profile_is_the_linear_interpolation_of_the_array(page, result):
     ready(page, result)
     ends = (-8.0, -15.5, 9.25, 4.0)
@@ -267,6 +271,7 @@ def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result,
     assert cells[2] == f"{contrast:.2f}"
 
 
+@pytest.mark.nightly
 def test_dragging_sets_the_window_and_moves_the_image_and_two_fingers_zoom(page, result):
     ready(page, result + "?window=1430,1570")
     box = page.locator("canvas.plane").bounding_box()
@@ -303,6 +308,7 @@ def test_dragging_sets_the_window_and_moves_the_image_and_two_fingers_zoom(page,
     assert 0.1 * box["width"] / (right - left) == pytest.approx(2.0 * scale, rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_service):
     address, scan, work, monkeypatch, _ = shared_service
     # On a grid that has a node at each of the image.
@@ -344,6 +350,7 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
     expect(table.locator("td").first).to_have_text("1.0000")
 
 
+@pytest.mark.nightly
 def test_the_image_is_used_by_keys_alone(page, result):
     ready(page, result)
     page.locator("#skip").focus()
@@ -405,6 +412,7 @@ def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, volume):
     page.get_by_text(f"Slice {node[1]} of 0 to 5").wait_for()
 
 
+@pytest.mark.nightly
 def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, volume):
     ready(page, volume(known((8, 6, 5))))
     asked = []
@@ -417,6 +425,7 @@ def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, volume):
     assert [one for one in asked if "/v1/volumes/" in one] == []
 
 
+@pytest.mark.nightly
 def test_a_result_is_run_again_with_changes(page, own_result, work):
     ready(page, own_result)
     page.get_by_role("link", name="Run again with changes").click()
@@ -444,6 +453,7 @@ def copied(page, name):
     page.evaluate("window.copied")
 
 
+@pytest.mark.nightly
 def test_the_copied_code_reads_the_values(page, result):
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     ready(page, result)
@@ -474,6 +484,7 @@ def test_a_result_is_exported_and_deleted(page, own_result):
     assert httpx.get(own_result.replace("/#/jobs/", "/v1/jobs/")).status_code == 404
 
 
+@pytest.mark.nightly
 def test_a_result_is_renamed(page, own_result):
     ready(page, own_result)
     page.get_by_role("button", name="Rename").click()
@@ -486,6 +497,7 @@ def test_a_result_is_renamed(page, own_result):
     page.get_by_role("main").get_by_role("link", name="With the new water speed").wait_for()
 
 
+@pytest.mark.nightly
 def test_provenance_is_told_in_words_and_copied_as_json(page, result):
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     rms = {"held_out_mean_s": 1e-9, "held_out_rms_s": 25e-9, "training_rms_s": 20e-9}

@@ -82,6 +82,7 @@ def test_only_changed_settings_are_sent(page, address, scan, work):
     assert (settings.method, settings.iterations, settings.sart.relaxation) == ("auto", 2, 0.25)
 
 
+@pytest.mark.nightly
 def test_every_setting_has_a_field_with_its_default(page, address, scan):
     sent(page, address, scan)
     page.get_by_text("Nothing has run yet").wait_for()
@@ -128,6 +129,7 @@ def test_a_refused_setting_is_told_at_its_field(page, address, scan, work):
     assert len(work.calls) == 1
 
 
+@pytest.mark.nightly
 def test_the_buttons_tell_their_time(page, serve, scan, work):
     sent(page, serve(), scan)
     expect(page.get_by_role("button", name="Fast")).to_contain_text(re.compile(r"about \d+ s, rough"))
@@ -140,6 +142,7 @@ def test_the_buttons_tell_their_time(page, serve, scan, work):
     expect(page.get_by_role("button", name="Best")).to_contain_text(re.compile(r"about \d+ s$"))
 
 
+@pytest.mark.nightly
 def test_the_residual_curve_shows_where_a_stage_begins(page, address, scan, work):
     work.stages = 2
     sent(page, address, scan)
@@ -154,6 +157,7 @@ def test_the_residual_curve_shows_where_a_stage_begins(page, address, scan, work
     assert (border.count(), float(border.get_attribute("x1"))) == (1, 50.0)
 
 
+@pytest.mark.nightly
 def test_a_volume_in_space_is_shown_as_glass(page, address, scan, work, monkeypatch):
     plain = type(work).__call__
 
@@ -260,6 +264,7 @@ def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
     expect(drawing.locator(".receiver")).to_have_count(12)
 
 
+@pytest.mark.nightly
 def test_the_slider_changes_the_emission(page, traced):
     told = page.locator("#shot-facts")
     expect(told).to_contain_text("Emission 0 by element 0")
@@ -296,6 +301,7 @@ def test_the_slider_changes_the_emission(page, traced):
     expect(marked).to_have_attribute("cx", page.locator("#elements .emitter").nth(11).get_attribute("cx"))
 
 
+@pytest.mark.nightly
 def test_name_notes_and_water_are_edited(page, own_traced, work):
     traced = own_traced
     expect(page.locator("#shot-values")).to_contain_text("Receiving element 0")
@@ -390,6 +396,7 @@ def test_a_scan_in_wrong_units_is_corrected_as_the_page_proposes(page, address, 
     assert len(found) == 2, "the scan and one copy, whose notes name it"
 
 
+@pytest.mark.nightly
 def test_without_a_water_shot_there_is_none_to_choose(page, address, tmp_path):
     made = trace_scan(blob_delay(12), elements=12, noise=0.01)
     write_dataset(tmp_path / "bare.h5", replace(made, waveform=replace(made.waveform, water=None)))

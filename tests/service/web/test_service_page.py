@@ -18,6 +18,7 @@ def rows(page, name):
     return [one.locator("th, td").all_inner_texts() for one in table.all()]
 
 
+@pytest.mark.nightly
 def test_without_keys(page, serve, scan, cluster):
     metrics = {"memory": 3 * 2**29, "cpu": 87.4, "task_counts": {"executing": 1}}
     one = {"nthreads": 2, "memory_limit": 2**31, "resources": {"recon": 1, "opencl": 1}, "metrics": metrics}

@@ -84,6 +84,7 @@ def test_unknown_addresses_are_named(page, shared_service):
     page.get_by_role("alert").get_by_text("job-none").wait_for()
 
 
+@pytest.mark.nightly
 def test_the_colours_are_chosen_and_kept(page, shared_service):
     page.emulate_media(color_scheme="light")
     page.goto(shared_service.address)
@@ -99,6 +100,7 @@ def test_the_colours_are_chosen_and_kept(page, shared_service):
     expect(root).to_have_attribute("data-theme", "dark")
 
 
+@pytest.mark.nightly
 def test_a_page_goes_on_by_itself_when_the_service_answers_again(page, shared_service):
     page.goto(f"{shared_service.address}/#/jobs")
     page.get_by_role("heading", level=1, name="Jobs").wait_for()
@@ -116,6 +118,7 @@ def test_a_page_goes_on_by_itself_when_the_service_answers_again(page, shared_se
     assert page.locator("main .error:visible").count() == 0
 
 
+@pytest.mark.nightly
 def test_a_page_that_found_no_service_opens_later(page, shared_service):
     page.route("**/v1/access", lambda route: route.abort())
     page.goto(f"{shared_service.address}/#/jobs")

@@ -17,6 +17,7 @@ pytestmark = pytest.mark.browser
 HDF5 = {"Content-Type": "application/x-hdf5"}
 
 
+@pytest.mark.nightly
 def test_an_empty_list_says_so(page, serve):
     page.goto(serve())
     page.get_by_text("No scan yet").wait_for()
@@ -32,6 +33,7 @@ def test_an_uploaded_scan_is_opened_and_listed(page, serve, scan):
     page.get_by_text("16 emitters").wait_for()
 
 
+@pytest.mark.nightly
 def test_several_files_are_dropped_beside_the_zone(page, serve, scan, tmp_path):
     page.goto(serve())
     page.get_by_text("No scan yet").wait_for()
@@ -53,6 +55,7 @@ def test_several_files_are_dropped_beside_the_zone(page, serve, scan, tmp_path):
     expect(page.locator("#scans li")).to_have_count(2)
 
 
+@pytest.mark.nightly
 def test_scans_are_found_by_their_names_and_read_in_pages(page, serve, scan):
     address = serve()
     for name in ("Left", "Right", "Left again"):
@@ -90,6 +93,7 @@ def test_errors_are_shown_as_text(page, address, tmp_path):
     page.get_by_role("heading", name="openUSCT (HDF5)").wait_for()
 
 
+@pytest.mark.nightly
 def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_rejected(page, address, tmp_path):
     savemat(tmp_path / "scan.mat", {"pos": 1e3 * positions(), "dtof": 1e6 * delta_tof()})
     page.goto(address)
@@ -105,6 +109,7 @@ def test_own_variables_are_named_in_a_form_that_opens_when_a_file_is_rejected(pa
     expect(page.locator("#dataset-facts")).to_contain_text("water 1494")
 
 
+@pytest.mark.nightly
 def test_a_sample_scan_is_simulated_and_opened(page, address, monkeypatch):
     requests = []
     made = {"title": "A phantom", "source": "", "license": "", "dimension": 2, "elements": 64, "ntx": 32}
@@ -159,6 +164,7 @@ def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, address,
     assert sent[-1] == (file.stat().st_size - 1) // 4096 * 4096
 
 
+@pytest.mark.nightly
 def test_an_upload_that_a_closed_page_left_is_continued(page, address, scan):
     file = scan()
     page.goto(address)

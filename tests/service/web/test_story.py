@@ -63,6 +63,7 @@ def dropped(page, scan, folder):
     page.wait_for_url("**/#/scans/*")
 
 
+@pytest.mark.nightly
 def test_from_a_dropped_file_over_a_killed_service_to_an_export(page, service, breast, tmp_path):
     enter(page, service, "north")
     dropped(page, breast, tmp_path)
@@ -150,6 +151,7 @@ def test_the_whole_story_by_keyboard_alone(page, service, breast, tmp_path):
     assert http.get(f"{service.url}{job['links']['self']}").status_code == 404
 
 
+@pytest.mark.nightly
 def test_two_tenants_see_nothing_of_each_other(page, browser, service, breast, tmp_path):
     enter(page, service, "north")
     dropped(page, breast, tmp_path)

@@ -24,6 +24,7 @@ async def until(so: Callable[[], object]) -> None:
             await asyncio.sleep(0.05)
 
 
+@pytest.mark.nightly
 def test_a_lost_worker_is_replaced_until_the_scheduler_is_gone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -74,13 +74,10 @@ def mortal(tmp_path_factory):
         yield client
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "pipeline",
-    # One for every change: a single task loop runs them all.
-    [
-        reconstruction,
-        *(pytest.param(one, marks=pytest.mark.nightly) for one in (simulation, turntable, geometry_field)),
-    ],
+    [reconstruction, simulation, turntable, geometry_field],
     ids=lambda pipeline: pipeline.__name__,
 )
 def test_killed_worker_keeps_the_bits(mortal, inputs, pipeline, monkeypatch):

@@ -53,6 +53,7 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Cluster]:
         yield cluster
 
 
+@pytest.mark.nightly
 def test_a_worker_killed_while_its_successor_starts_is_replaced(own: Cluster) -> None:
     killed: set[int] = set()
     # Dask gives a nanny up whose worker stays away for this long, 15 s by default.
@@ -68,6 +69,7 @@ def test_a_worker_killed_while_its_successor_starts_is_replaced(own: Cluster) ->
     assert len(killed) == 3
 
 
+@pytest.mark.nightly
 def test_a_worker_without_its_nanny_is_replaced(own: Cluster) -> None:
     deployed: Any = own.client.cluster
     (nanny,) = deployed.workers.values()

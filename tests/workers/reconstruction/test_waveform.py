@@ -50,6 +50,7 @@ def same(result, expected):
     assert {**expected.provenance, **stated} == {**result.provenance}
 
 
+@pytest.mark.nightly
 @pytest.mark.opencl
 def test_waves_of_a_device_make_the_image_of_compiled_code(path, tmp_path):
     expected = reconstruct_here(replace(pick(scan()), waveform=scan().waveform), SHORT)
@@ -111,6 +112,7 @@ def test_a_file_gives_the_bits_of_the_kernels(path, expected):
     assert seen[-1].history == expected.history
 
 
+@pytest.mark.nightly
 def test_interrupted_run_resumes_to_the_same_bits(cluster, path, tmp_path, expected):
     def go_on(tear):
         return reconstruction_run.reconstruct(cluster.client, path, PLAN, tear, work_dir=tmp_path / "work")
@@ -149,6 +151,7 @@ def test_slices_are_refined_by_themselves(cluster, tmp_path, expected):
     assert {sweep.slice for sweep in result.history if sweep.band_hz} == {0, 1}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "picked",
     [

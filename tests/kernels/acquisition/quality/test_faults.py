@@ -122,6 +122,7 @@ def test_a_clock_offset_of_a_module(water):
     assert finding.value == pytest.approx(3e-7, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_times_are_right_in_spite_of_it():
     """The offset is part of the estimated water shot, as it is of a recorded one."""
     late = np.zeros((ELEMENTS, ELEMENTS))
