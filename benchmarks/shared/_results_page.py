@@ -61,9 +61,6 @@ def recorded(folder: Path = RESULTS) -> dict[str, dict[str, Recorded]]:
     found: dict[str, dict[str, Recorded]] = {}
     for path in sorted(folder.glob("*.json")):
         rows = json.loads(path.read_text())
-        if not (isinstance(rows, list) and all("target" in row for row in rows)):
-            # Other results are no rows, e.g. those of a mutation run.
-            continue
         found[path.stem] = {row["target"]: row for row in rows}
         if len(found[path.stem]) != len(rows):
             raise ValueError(f"{path.name}: a label occurs twice")
