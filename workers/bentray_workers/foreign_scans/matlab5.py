@@ -1,72 +1,53 @@
-"""MATLAB files of version 5 (6, 7): plain arrays of numbers, decompressed only as far as they are read.
+"""MATLAB files of version 5 (6, 7), read by SciPy: plain arrays of numbers.
 
-The format is that of "MAT-File Format", The MathWorks, chapter 1. Cells, structures, objects, functions and
-opaque data are never read.
+Cells, structures, objects, functions and opaque data are named but never read.
 """
 
 from __future__ import annotations
 
-import math
 import struct
+import warnings
+import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.io import loadmat, whosmat
 
 from bentray_kernels.errors import InvalidInput
 
 from ..files.complex_numbers import ACCEPTED
+from ..files.damage import rejecting_damage
 from .arrays import check_declared, check_row
-from .stream import Stream
 
 START = b"MATLAB 5.0 MAT-file"
-HEADER_BYTES = 128
 
-MATRIX, COMPRESSED = 14, 15
-
-# Types of data in the file, by number.
-STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-# Classes of numeric arrays, by number, and of other arrays.
-NUMBERS = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
+# Types of the classes of numeric arrays, and other classes in words.
+NUMBERS = {
+    name: np.dtype(name.replace("single", "float32").replace("double", "float64"))
+    for name in ("double", "single", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
+} | {"logical": np.dtype("uint8")}
 OTHERS = {
-    1: "a cell",
-    2: "a structure",
-    3: "an object",
-    4: "text",
-    5: "a sparse matrix",
-    16: "a function",
-    17: "opaque",
+    "cell": "a cell",
+    "struct": "a structure",
+    "object": "an object",
+    "char": "text",
+    "sparse": "a sparse matrix",
+    "function": "a function",
 }
-COMPLEX, COMPLEX_NUMBERS = 0x0800, "complex numbers"
+COMPLEX_NUMBERS = "complex numbers"
+
+# "MAT-File Format", The MathWorks, chapter 1: a compressed element; bytes of the header of the file, and those
+# of an element that hold the header of its array; classes, stored types and flag of complex numbers.
+COMPRESSED, HEADER_BYTES, ENOUGH_BYTES = 15, 128, 4096
+CLASSES, STORED, COMPLEX = range(6, 16), (1, 2, 3, 4, 5, 6, 7, 9, 12, 13), 0x0800
 
 MAX_VARIABLES = 1000
-LONGEST_NAME = 200
-# Alignment after the numbers of an array.
-PADDING_BYTES = 8
-# Largest compression ratio of zlib is 1032.
-PACKING = 1100.0
-
-
-@dataclass(frozen=True)
-class _Variable:
-    """Position of the numbers of an array.
-
-    Attributes:
-        offset: of the content of its element in the file.
-        stored: size of the content, bytes.
-        packed: whether it is compressed.
-        begin: of the numbers in the decompressed content.
-        found: shape in the order of the user, type of the array, and stored type; or its kind in words.
-    """
-
-    offset: int
-    stored: int
-    packed: bool
-    begin: int
-    found: tuple[tuple[int, ...], np.dtype[Any], np.dtype[Any]] | str
+# Largest compression ratio of zlib is 1032; a number of 8 bytes may be stored in one.
+PACKING = 8 * 1100.0
 
 
 class Matlab5:
@@ -81,126 +62,83 @@ class Matlab5:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        with path.open("rb") as file:
-            header = file.read(HEADER_BYTES)
-            if len(header) < HEADER_BYTES or header[126:128] not in (b"IM", b"MI"):
-                raise InvalidInput("file", "a damaged header of MATLAB 5", "a whole MATLAB file")
-            self._order = "<" if header[126:128] == b"IM" else ">"
-            self._variables = dict(self._index(file, path.stat().st_size))
+        with _rejecting_damage("file"), path.open("rb") as file:
+            self._complex = _complex_arrays(file)
+            file.seek(0)
+            listed = whosmat(file)
+        if len(listed) > MAX_VARIABLES:
+            raise InvalidInput("file", f"{len(listed)} variables", f"at most {MAX_VARIABLES}")
+        self._variables = {name: (shape, kind) for name, shape, kind in listed}
 
     def names(self) -> tuple[str, ...]:
         return tuple(self._variables)
 
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
-        variable = self._variables.get(name)
-        if variable is None:
+        if name not in self._variables:
             return None
-        if isinstance(variable.found, str):
-            accepted = "a plain array of real numbers"
-            if variable.found == COMPLEX_NUMBERS:
-                accepted = f"{accepted}; {ACCEPTED}"
-            raise InvalidInput(name, variable.found, accepted)
-        shape, dtype, stored = variable.found
-        reversed_shape = shape[::-1]
-        packing = PACKING if variable.packed else 1.0
-        check_declared(name, reversed_shape, stored, variable.stored, packing)
-        check_declared(name, reversed_shape, dtype, variable.stored, 8 * packing)
-        return reversed_shape, dtype
+        shape, kind = self._variables[name]
+        if kind not in NUMBERS:
+            raise InvalidInput(name, OTHERS.get(kind, kind), "a plain array of real numbers")
+        if name in self._complex:
+            accepted = f"a plain array of real numbers; {ACCEPTED}"
+            raise InvalidInput(name, COMPLEX_NUMBERS, accepted)
+        dtype = NUMBERS[kind]
+        check_declared(name, shape[::-1], dtype, self._path.stat().st_size, PACKING)
+        return shape[::-1], dtype
 
     def whole(self, name: str) -> NDArray[Any]:
-        shape, _ = self._known(name)
-        (array,) = self._parts(name, 1, math.prod(shape))
-        return array.reshape(shape)
-
-    def rows(self, name: str) -> Iterator[NDArray[Any]]:
-        shape, dtype = self._known(name)
-        check_row(name, shape, dtype)
-        for part in self._parts(name, shape[0], math.prod(shape[1:])):
-            yield part.reshape(shape[1:])
-
-    def _known(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
         declaration = self.declared(name)
         if declaration is None:
             raise InvalidInput(name, "nothing", "an array")
-        return declaration
+        shape, dtype = declaration
+        with _rejecting_damage(name), self._path.open("rb") as file:
+            array = loadmat(file, variable_names=[name])[name]
+            # A damaged NaN may signal, which is no reason to warn.
+            with np.errstate(invalid="ignore"):
+                return np.asarray(array.T, dtype=dtype).reshape(shape)
 
-    def _parts(self, name: str, count: int, size: int) -> Iterator[NDArray[Any]]:
-        """Read parts of equal size, one after the other."""
-        variable = self._variables[name]
-        assert not isinstance(variable.found, str)
-        _, dtype, stored = variable.found
-        with self._path.open("rb") as file:
-            stream = Stream(file, variable.offset, variable.stored, variable.packed, name)
-            stream.skip(variable.begin)
-            for _ in range(count):
-                data = stream.read(size * stored.itemsize)
-                # A damaged NaN may signal, which is no reason to warn.
-                with np.errstate(invalid="ignore"):
-                    part = np.frombuffer(data, dtype=stored).astype(dtype)
-                yield part
-            stream.end(PADDING_BYTES)
+    def rows(self, name: str) -> Iterator[NDArray[Any]]:
+        declaration = self.declared(name)
+        if declaration is not None:
+            check_row(name, *declaration)
+        yield from self.whole(name)
 
-    def _index(self, file: IO[bytes], size: int) -> Iterator[tuple[str, _Variable]]:
-        at = HEADER_BYTES
-        for _ in range(MAX_VARIABLES):
-            if at + 8 > size:
-                return
-            file.seek(at)
-            kind, length = struct.unpack(self._order + "II", file.read(8))
-            if kind not in (MATRIX, COMPRESSED) or at + 8 + length > size:
-                raise InvalidInput("file", f"a damaged element at byte {at}", "a whole MATLAB file")
-            packed = kind == COMPRESSED
-            yield self._variable(Stream(file, at + 8, length, packed, "file"), at + 8, length, packed)
-            at += 8 + length
-        raise InvalidInput("file", f"more than {MAX_VARIABLES} variables", "fewer")
 
-    def _variable(self, stream: Stream, offset: int, length: int, packed: bool) -> tuple[str, _Variable]:
-        if packed:
-            kind, _ = struct.unpack(self._order + "II", stream.read(8))
-            if kind != MATRIX:
-                raise InvalidInput("file", f"an element of type {kind}", "a whole MATLAB file")
-        flags = self._small(stream, 8)
-        if len(flags) != 8:
-            raise InvalidInput("file", "a damaged array", "a whole MATLAB file")
-        (word,) = struct.unpack(self._order + "I", flags[:4])
-        number = word & 0xFF
-        if number == 17:
-            # Opaque ones have no dimensions; their name comes at once.
-            name = self._small(stream, LONGEST_NAME).decode("ascii", "replace")
-            return name, _Variable(offset, length, packed, 0, OTHERS[17])
-        shape_data = self._small(stream, 4 * 32)
-        name = self._small(stream, LONGEST_NAME).decode("ascii", "replace")
-        if number not in NUMBERS or word & COMPLEX:
-            what = COMPLEX_NUMBERS if number in NUMBERS else OTHERS.get(number, f"class {number}")
-            return name, _Variable(offset, length, packed, 0, what)
-        shape = tuple(int(n) for n in np.frombuffer(shape_data, dtype=self._order + "i4"))
-        kind, count, inline = self._tag(stream)
-        if kind not in STORED:
-            return name, _Variable(offset, length, packed, 0, f"data of type {kind}")
-        stored = np.dtype(self._order + STORED[kind])
-        if any(n < 0 for n in shape) or count != math.prod(shape) * stored.itemsize:
-            raise InvalidInput(name, f"shape {shape} and {count} bytes of {stored}", "as many as it says")
-        begin = stream.position - (4 if inline else 0)
-        dtype = np.dtype(NUMBERS[number])
-        if dtype.kind != "f" and stored.kind == "f":
-            raise InvalidInput(name, f"{dtype} stored as {stored}", "integers stored as integers")
-        return name, _Variable(offset, length, packed, begin, (shape, dtype, stored))
+def _complex_arrays(file: IO[bytes]) -> set[str]:
+    """The names of the arrays of complex numbers.
 
-    def _small(self, stream: Stream, most: int) -> bytes:
-        """Content of a short element; skips its padding."""
-        _, count, inline = self._tag(stream)
-        if count > most:
-            raise InvalidInput("file", f"{count} bytes in a header", "a whole MATLAB file")
-        if inline:
-            # The four bytes were read with the tag.
-            return stream.last[4 : 4 + count]
-        data = stream.read(count)
-        stream.skip(-count % 8)
-        return data
+    Raises:
+        InvalidInput: for numbers that are stored as another type, with which SciPy 1.17 ends the process.
+    """
+    found = set()
+    order = "<" if file.read(HEADER_BYTES)[-2:] == b"IM" else ">"
+    while tag := file.read(8):
+        kind, length = struct.unpack(order + "II", tag)
+        after = file.tell() + length
+        array = file.read(min(length, ENOUGH_BYTES))
+        if kind == COMPRESSED:
+            array = zlib.decompressobj().decompress(array, ENOUGH_BYTES)[8:]
+        # Flags of 16 bytes, dimensions, name, numbers.
+        (flags,) = struct.unpack_from(order + "I", array, 8)
+        at, parts = 16, []
+        for _ in range(3 if flags & 0xFF in CLASSES else 0):
+            stored, count = struct.unpack_from(order + "II", array, at)
+            # Short elements have their size in the upper half of the type, and are in the tag.
+            short = stored >> 16
+            begin, size = (at + 4, short) if short else (at + 8, count)
+            parts.append((stored & 0xFFFF, array[begin : begin + size]))
+            at += 8 if short else 8 + count + -count % 8
+        if parts and parts[-1][0] not in STORED:
+            raise InvalidInput("file", f"numbers stored as type {parts[-1][0]}", "a whole MATLAB file")
+        if parts and flags & COMPLEX:
+            found.add(parts[1][1].decode("latin-1"))
+        file.seek(after)
+    return found
 
-    def _tag(self, stream: Stream) -> tuple[int, int, bool]:
-        """Type, size, and whether the data are in the tag itself."""
-        kind, count = struct.unpack(self._order + "II", stream.read(8))
-        if kind >> 16:
-            return kind & 0xFFFF, min(kind >> 16, 4), True
-        return kind, count, False
+
+@contextmanager
+def _rejecting_damage(name: str) -> Iterator[None]:
+    """Convert what SciPy raises on damaged data, and silence what it warns of."""
+    with rejecting_damage(name, "a whole MATLAB file"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
