@@ -40,8 +40,8 @@ OTHERS = {
 }
 COMPLEX_NUMBERS = "complex numbers"
 
-# "MAT-File Format", The MathWorks, chapter 1: a compressed element; bytes of the header of the file, and those
-# of an element that hold the header of its array; classes, stored types and flag of complex numbers.
+# "MAT-File Format", The MathWorks, chapter 1: a compressed element; bytes of the header of the file, and
+# those of an element that hold the header of its array; classes, stored types and flag of complex numbers.
 COMPRESSED, HEADER_BYTES, ENOUGH_BYTES = 15, 128, 4096
 CLASSES, STORED, COMPLEX = range(6, 16), (1, 2, 3, 4, 5, 6, 7, 9, 12, 13), 0x0800
 
