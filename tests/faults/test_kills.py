@@ -17,7 +17,7 @@ from ..effort import effort
 from .conftest import ELEMENTS
 from .machine import wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 PLAN = {"nodes": 64, "attenuation": {"enabled": False}}
 PLANS = [
@@ -77,7 +77,6 @@ def test_killing_any_part_loses_no_job(machine, scan, scan_file):
     assert attempts > len(jobs) + targets.count("service")
 
 
-@pytest.mark.nightly
 def test_simulation_resumes_from_finished_emissions(machine, tmp_path):
     asked = {**WAVES, "emissions": EMISSIONS}
     job = machine.submit(**asked)

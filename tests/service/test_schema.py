@@ -129,6 +129,7 @@ def attack(serve, scan, tmp_path) -> Callable[..., tuple[int, str]]:
     return run
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_every_answer_is_one_of_those_described(attack):
     failed, words = attack("--generation-deterministic", f"--max-examples={effort(1, 4)}", more=MANY)

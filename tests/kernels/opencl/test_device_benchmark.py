@@ -111,9 +111,8 @@ def test_failed_trials_are_counted_and_repeated_on_request(gpu, monkeypatch, fre
 
 @pytest.mark.opencl
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "engine", ["field", *(pytest.param(one, marks=pytest.mark.nightly) for one in ENGINES if one != "field")]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("engine", ENGINES)
 def test_the_child_process_times_engines(opencl_session, engine):
     (answer,), ending = device_benchmark.in_a_child(opencl_session.device, engine, 300.0)
     assert ending == "ended with exit code 0" or ending.startswith("ended with exit code 0 (")

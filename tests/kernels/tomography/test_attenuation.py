@@ -79,6 +79,7 @@ def test_ratios_from_traces_are_smoothed_more(scan):
     assert read < 0.2 * (truth.max() - truth.min())
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("rays", ["straight", "curved"])
 def test_smoothing_of_trace_ratios_does_not_depend_on_the_grid(scan, rays):
     """The penalty is in metres: grids see the same image, each at its own nodes."""

@@ -21,6 +21,8 @@ from bentray_kernels.tomography.reconstruction_graph import (
     solve_attenuation,
 )
 
+from ...effort import effort
+
 PLANS = {
     "sart": Settings(method="sart", nodes=32, side_m=TABLE6_SIDE_M, iterations=2, resolution_check=True),
     "gauss-newton": Settings.of(
@@ -65,7 +67,7 @@ def run(make, cuts=()):
 
 
 @pytest.mark.parametrize("name", PLANS)
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=effort(2, 12), deadline=None)
 @given(cuts=st.sets(st.integers(0, 12), min_size=1, max_size=4))
 def test_a_graph_interrupted_anywhere_gives_the_same_bits(dataset, name, cuts):
     def make():

@@ -13,13 +13,18 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.reconstruction import subdomains
 
+from ...effort import effort
 from ...kernels.eikonal.blocks import solve_by_blocks
 
 GRIDS = st.sampled_from([((20, 17), (3, 2)), ((5, 6), (5, 3)), ((30, 4), (1, 4)), ((8, 9, 7), (2, 3, 2))])
 
 
 @given(grid=GRIDS, seed=st.integers(0, 2**32 - 1), on_node=st.booleans())
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=effort(4, 20),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 def test_blocks_equal_the_whole_domain(cluster, grid, seed, on_node):
     shape, blocks = grid
     rng = np.random.default_rng(seed)

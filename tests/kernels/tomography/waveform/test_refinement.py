@@ -80,6 +80,7 @@ def test_advice_without_waveform_inversion_uses_times():
     )
 
 
+@pytest.mark.nightly
 def test_held_out_emitters_decide_against_it():
     """Noise as high as the signal: what waves make of it predicts nothing."""
     loud = heard(0.3)

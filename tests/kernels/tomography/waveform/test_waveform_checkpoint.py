@@ -13,6 +13,7 @@ from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.refinement_graph import RefinementGraph
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
+from ....effort import effort
 from .scans import SETTINGS, refined, scan, water
 
 
@@ -43,7 +44,7 @@ def run(cuts=()):
     return graph
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=effort(2, 12), deadline=None)
 @given(cuts=st.sets(st.integers(0, 140), min_size=1, max_size=5))
 def test_a_refinement_cut_off_anywhere_ends_with_the_same_bits(cuts):
     resumed, expected = run(cuts), refined()
