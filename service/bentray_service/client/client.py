@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar, Unpack
+from typing import Any, Self, TypeVar, Unpack
 
 import httpx
 
 from ..web.outbound import Transport
-from . import batches as batch_flows
-from . import flows, lists, pictures
-from . import projects as project_flows
-from .connection import Connection, ConnectionOptions, document
+from .connection import Connection, ConnectionOptions
 from .errors import ClientError, from_response, no_answer
+from .operations import Operations
 from .saving import saving
 from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, FlowRun, PauseStep, RequestStep, Step
 
-P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def _method(flow: Callable[Concatenate[Connection, P], Flow[T]]) -> Callable[Concatenate[Client, P], T]:
-    def method(client: Client, /, *args: P.args, **kwargs: P.kwargs) -> T:
-        return client._run(flow(client, *args, **kwargs))
-
-    document(method, flow)
-    return method
-
-
-class Client(Connection):
+class Client(Operations):
     __doc__ = Connection.__doc__
 
     def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
@@ -49,39 +38,6 @@ class Client(Connection):
         """Close the connections."""
         self._http.close()
         self._bucket.close()
-
-    upload = _method(flows.upload)
-    correct_dataset = _method(flows.correct_dataset)
-    submit = _method(flows.submit)
-    simulate = _method(flows.simulate)
-    reconstruct = _method(flows.reconstruct)
-    wait = _method(flows.wait)
-    cancel = _method(flows.cancel)
-    submit_batch = _method(batch_flows.submit_batch)
-    wait_batch = _method(batch_flows.wait_batch)
-    cancel_batch = _method(batch_flows.cancel_batch)
-    batch = _method(batch_flows.batch)
-    batches = _method(batch_flows.batches)
-    result = _method(flows.result)
-    download = _method(flows.download)
-    download_dataset = _method(flows.download_dataset)
-    delete = _method(flows.delete)
-    create_project = _method(project_flows.create_project)
-    set_member = _method(project_flows.set_member)
-    delete_project = _method(project_flows.delete_project)
-    project = _method(project_flows.project)
-    projects = _method(project_flows.projects)
-    datasets = _method(lists.datasets)
-    jobs = _method(lists.jobs)
-    volumes = _method(lists.volumes)
-    meshes = _method(lists.meshes)
-    dataset = _method(lists.dataset)
-    job = _method(lists.job)
-    volume = _method(lists.volume)
-    quality = _method(lists.quality)
-    quality_png = _method(pictures.quality_png)
-    slice_png = _method(pictures.slice_png)
-    refraction_png = _method(pictures.refraction_png)
 
     def _run(self, flow: Flow[T]) -> T:
         run = FlowRun(self._retries.through(flow))

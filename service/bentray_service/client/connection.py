@@ -1,11 +1,9 @@
-"""Common options of both clients, and the documentation of their methods."""
+"""Common options of both clients."""
 
 from __future__ import annotations
 
-import inspect
 import os
 from collections.abc import Callable
-from functools import update_wrapper
 from typing import Any, TypedDict
 
 import httpx
@@ -82,15 +80,3 @@ class Connection:
 
     def __repr__(self) -> str:
         return f"<bentray.{type(self).__name__} of {self.url}>"
-
-
-def document(method: Callable[..., Any], flow: Callable[..., Any]) -> None:
-    """Copy name, docstring and signature from a flow to a method, with its result as return type."""
-    update_wrapper(method, flow)
-    signature = inspect.signature(flow)
-    first, *others = signature.parameters.values()
-    result = str(signature.return_annotation).removeprefix("Flow[").removesuffix("]")
-    kind = others[0].kind if others else first.kind
-    parameters = [first.replace(name="self", annotation=first.empty, kind=kind), *others]
-    documented = signature.replace(parameters=parameters, return_annotation=result)
-    method.__signature__ = documented  # type: ignore[attr-defined]
