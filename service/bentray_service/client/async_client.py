@@ -8,6 +8,7 @@ from typing import Any, Self, TypeVar, Unpack
 
 import anyio
 import httpx
+from tenacity import AsyncRetrying
 
 from ..web.outbound import AsyncTransport
 from .connection import ConnectionOptions
@@ -40,13 +41,14 @@ class AsyncClient(Operations):
         await self._bucket.aclose()
 
     async def _run(self, flow: Flow[T]) -> T:
-        run = FlowRun(self._retries.through(flow))
+        run = FlowRun(flow)
         outcome: Any = None
         async with AsyncExitStack() as streams:
             listening: dict[str, AsyncIterator[str]] = {}
             while (step := run.next(outcome)) is not None:
                 try:
-                    outcome = await self._do(step, streams, listening)
+                    retrying = AsyncRetrying(sleep=anyio.sleep, **self._retries.options(step))
+                    outcome = await retrying(self._do, step, streams, listening)
                 except ClientError as error:
                     outcome = error
         return run.result

@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any, Self, TypeVar, Unpack
 
 import httpx
+from tenacity import Retrying
 
 from ..web.outbound import Transport
 from .connection import Connection, ConnectionOptions
@@ -40,13 +41,14 @@ class Client(Operations):
         self._bucket.close()
 
     def _run(self, flow: Flow[T]) -> T:
-        run = FlowRun(self._retries.through(flow))
+        run = FlowRun(flow)
         outcome: Any = None
         with ExitStack() as streams:
             listening: dict[str, Iterator[str]] = {}
             while (step := run.next(outcome)) is not None:
                 try:
-                    outcome = self._do(step, streams, listening)
+                    retrying = Retrying(sleep=time.sleep, **self._retries.options(step))
+                    outcome = retrying(self._do, step, streams, listening)
                 except ClientError as error:
                     outcome = error
         return run.result

@@ -1,15 +1,18 @@
-"""Retries of idempotent requests while the service is unavailable."""
+"""Retries of idempotent requests while the service is unavailable, by tenacity.
+
+Not by stamina, which is for applications: it logs every retry, and its switches are global.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
+
+from tenacity import RetryCallState, stop_before_delay, wait_exponential
 
 from .errors import ClientError, NoAnswer
-from .steps import DownloadStep, Flow, FlowRun, PauseStep, RequestStep, Step
-
-T = TypeVar("T")
+from .steps import DownloadStep, PauseStep, RequestStep, Step
 
 # Time for which requests are retried, s.
 PATIENCE_S = 300.0
@@ -42,47 +45,45 @@ class Retries:
         self._on_message = on_message
         self._answered = False
 
-    def through(self, flow: Flow[T]) -> Flow[T]:
-        """The same flow with retries of its steps."""
-        run = FlowRun(flow)
-        outcome: Any = None
-        while (step := run.next(outcome)) is not None:
-            try:
-                outcome = yield from self._done(step)
-            except ClientError as error:
-                outcome = error
-        return run.result
-
-    def _done(self, step: Step) -> Flow[Any]:
-        begun, pause, errors, waits = time.monotonic(), FIRST_PAUSE_S, 0, False
-        last = begun + self._seconds
+    def options(self, step: Step) -> dict[str, Any]:
+        """The options of ``tenacity.Retrying`` and ``AsyncRetrying`` for one step, but for ``sleep``."""
+        seconds, errors = self._seconds, 0
         if isinstance(step, RequestStep) and step.until is not None:
-            last = min(last, step.until)
-        while True:
-            try:
-                result = yield step
-            except ClientError as error:
-                self._answered |= error.status is not None
-                errors += error.status == ERROR
-                pause = max(pause, error.retry_after_s or 0.0)
-                if not (self._answered and repeatable(step, error) and errors < MAX_ERRORS):
-                    raise
-                if time.monotonic() + pause > last:
-                    raise
-                if not waits:
-                    self._report(f"{error}; retrying for up to {last - begun:.0f} s.")
-                waits = True
-                yield PauseStep(pause)
-                pause = min(2.0 * pause, LONGEST_PAUSE_S)
-            else:
+            seconds = min(seconds, step.until - time.monotonic())
+
+        def again(state: RetryCallState) -> bool:
+            nonlocal errors
+            error = _error(state)
+            if error is None:
                 self._answered |= not isinstance(step, PauseStep)
-                if waits:
+                if state.attempt_number > 1:
                     self._report("The service answers again.")
-                return result
+                return False
+            if not isinstance(error, ClientError):
+                return False
+            self._answered |= error.status is not None
+            errors += error.status == ERROR
+            return self._answered and repeatable(step, error) and errors < MAX_ERRORS
+
+        def report(state: RetryCallState) -> None:
+            if state.attempt_number == 1:
+                self._report(f"{_error(state)}; retrying for up to {seconds:.0f} s.")
+
+        stop = stop_before_delay(seconds)
+        return {"retry": again, "wait": _pause, "stop": stop, "before_sleep": report, "reraise": True}
 
     def _report(self, line: str) -> None:
         if self._on_message is not None:
             self._on_message(line)
+
+
+def _error(state: RetryCallState) -> BaseException | None:
+    return None if state.outcome is None else state.outcome.exception()
+
+
+def _pause(state: RetryCallState) -> float:
+    pause = wait_exponential(FIRST_PAUSE_S, LONGEST_PAUSE_S)(state)
+    return max(pause, getattr(_error(state), "retry_after_s", None) or 0.0)
 
 
 def repeatable(step: Step, error: ClientError) -> bool:

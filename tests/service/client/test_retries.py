@@ -9,19 +9,19 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import uvicorn
+from tenacity import Retrying
 
 from bentray_service.app import create_app
-from bentray_service.client import AsyncClient, Client, ClientError, flows, lists, retries, uploading
+from bentray_service.client import AsyncClient, Client, ClientError, flows, retries, uploading
 from bentray_service.client.connection import Connection
 from bentray_service.client.errors import NoAnswer
 from bentray_service.client.retries import Retries
-from bentray_service.client.steps import DownloadStep, PauseStep, RequestStep
+from bentray_service.client.steps import DownloadStep, RequestStep
 from bentray_service.settings import ServiceSettings
 
 from ...free_ports import free_port
@@ -43,32 +43,29 @@ def answered(status: int, retry_after_s: float | None = None) -> ClientError:
 class Walk:
     """A client whose answers are given, and whose clock only pauses move."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, seconds: float = 300.0) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, first: Any = "first") -> None:
         self.now, self.pauses, self.told = 1000.0, [], list[str]()
-        monkeypatch.setattr(retries, "time", SimpleNamespace(monotonic=lambda: self.now))
-        self._retries = Retries(seconds, self.told.append)
-        self.ask(LOOK, "first")
+        monkeypatch.setattr(time, "monotonic", lambda: self.now)
+        self._retries = Retries(300.0, self.told.append)
+        self.ask(LOOK, first)
+
+    def _pause(self, seconds: float) -> None:
+        self.now += seconds
+        self.pauses.append(seconds)
 
     def ask(self, step: Any, *answers: Any) -> Any:
         """The value of a step that gets these answers, errors among them."""
+        left = iter(answers)
 
-        def flow() -> Any:
-            return (yield step)
+        def request() -> Any:
+            answer = next(left, GONE)
+            if isinstance(answer, Exception):
+                raise answer
+            return answer
 
-        walk, left, answer = self._retries.through(flow()), iter(answers), None
-        try:
-            while True:
-                asked = walk.throw(answer) if isinstance(answer, Exception) else walk.send(answer)
-                answer = None
-                if isinstance(asked, PauseStep):
-                    self.now += asked.seconds
-                    self.pauses.append(asked.seconds)
-                else:
-                    assert asked is step
-                    answer = next(left, GONE)
-        except StopIteration as end:
-            assert next(left, None) is None, "an answer was not asked for"
-            return end.value
+        answer = Retrying(sleep=self._pause, **self._retries.options(step))(request)
+        assert next(left, None) is None, "an answer was not asked for"
+        return answer
 
 
 @pytest.fixture
@@ -103,12 +100,8 @@ def test_wait_timeout_is_honoured(walk: Walk) -> None:
 
 
 def test_service_that_never_answered_fails_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[str] = []
-    flow = Retries(300.0, told.append).through(lists.job(HERE, "job-1"))
-    assert isinstance(next(flow), RequestStep)
     with pytest.raises(NoAnswer, match="refused"):
-        flow.throw(REFUSED)
-    assert told == []
+        Walk(monkeypatch, first=REFUSED)
 
 
 @pytest.mark.parametrize("error", [GONE, answered(500), answered(503)])
