@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
+from ..rendering_limits import MAX_ISOS
 from .cell_bounds import CellRanges
 
 Masks = NDArray[np.uint8]
-
-# One bit each in a mask of 8.
-MAX_ISOS = 8
 
 
 class Octree(NamedTuple):

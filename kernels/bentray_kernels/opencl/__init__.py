@@ -9,7 +9,7 @@ from .device_selection import (
     session_or_warning,
 )
 from .devices import VARIABLE, WISH, Device, find_devices
-from .engine_selection import DeviceRequest, Work, check_available, requested, select_engine
+from .engine_selection import Work, check_available, requested, select_engine
 from .lost_device import DeviceLostError, computed, computing_on, on_cpu, with_cpu_retry
 from .self_test_results import SelfTestResult, self_test_result
 from .session import Session
@@ -21,7 +21,6 @@ __all__ = [
     "Device",
     "DeviceBenchmark",
     "DeviceLostError",
-    "DeviceRequest",
     "DeviceSelection",
     "OpenCLFallbackWarning",
     "SelfTestResult",

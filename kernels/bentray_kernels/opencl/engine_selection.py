@@ -7,8 +7,9 @@ import os
 import threading
 import time
 from functools import cache
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple
 
+from ..device_request import REQUESTS
 from ..errors import InvalidInput
 from .device_benchmark import ENGINES, MOST_ATTEMPTS, DeviceBenchmark, benchmark_engine, stored_benchmark
 from .device_selection import open_session, select_device
@@ -18,15 +19,6 @@ from .self_test_results import self_test_result, stored_self_test_result
 from .session import Session
 
 log = logging.getLogger(__name__)
-
-DeviceRequest = Literal["auto", "cpu", "opencl"]
-REQUESTS: tuple[str, ...] = get_args(DeviceRequest)
-
-DESCRIPTION = (
-    "Where to compute what exists for OpenCL devices too. auto: on the device where a trial on this machine "
-    "was faster; cpu: never on a device; opencl: on the device, an error without one."
-)
-
 
 # Most seconds that ``auto`` waits for the self-test and the benchmark of a card, and the least that are worth
 # a start.

@@ -12,13 +12,11 @@ from scipy.ndimage import correlate1d
 from ..arrays import Floats, refuse_mask
 from ..compiled import kernel
 from ..errors import InvalidInput
+from ..rendering_limits import MAX_SMOOTHING
 from .filters import bspline
 
 # Lines filtered together: whole vectors, and few enough to stay in the first-level cache.
 LOCKSTEP = 32
-
-# Smooths over dozens of nodes; rounding errors grow with λ and reach 1e-8 here.
-MAX_SMOOTHING = 1e6
 
 
 def prefilter(values: ArrayLike, order: int, smoothing: float = 0.0) -> Floats:

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 
 from ..arrays import Floats, refuse_mask
 from ..errors import InvalidInput
-from .prefilter import MAX_SMOOTHING, sampled_bspline, symbols
+from ..rendering_limits import MAX_SMOOTHING
+from .prefilter import sampled_bspline, symbols
 
 # Rounding to whole numbers leaves errors that are uniform over one step.
 ROUNDING = 1.0 / math.sqrt(12.0)

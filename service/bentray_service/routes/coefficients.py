@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.ranges import Range
-from bentray_kernels.splines.prefilter import MAX_SMOOTHING
+from bentray_kernels.rendering_limits import MAX_SMOOTHING
 from bentray_workers.rendering.coefficients import check_nodes
 from bentray_workers.rendering.refraction_view import RefractionView
 

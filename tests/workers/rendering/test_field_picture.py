@@ -9,16 +9,19 @@ from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
+from bentray_kernels.request_fields import choices_of
 from bentray_workers.files.geometry_image import GeometryMaps, read_geometry_image, write_geometry_image
 from bentray_workers.rendering import field_cache, tiles
 from bentray_workers.rendering.field_cache import world_at
 from bentray_workers.rendering.field_picture import map_png, picture_png, tasks_of, tile_image
 from bentray_workers.rendering.field_scenes import PLACES
 from bentray_workers.rendering.field_settings import FieldSettings
-from bentray_workers.rendering.field_view import CHOICES, LOOKUPS, FieldView
+from bentray_workers.rendering.field_view import LOOKUPS, FieldView
 
 from ..pixels import pixels_of
 from .field_folders import field_of
+
+CHOICES = choices_of(FieldView)
 
 SIZE = {"width": 48, "height": 40}
 

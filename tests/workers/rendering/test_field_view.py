@@ -5,7 +5,10 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tracing.lookup_scene import WAYS
 from bentray_kernels.ranges import ranges_of
-from bentray_workers.rendering.field_view import CHOICES, LOOKUPS, FieldView
+from bentray_kernels.request_fields import choices_of
+from bentray_workers.rendering.field_view import LOOKUPS, FieldView
+
+CHOICES = choices_of(FieldView)
 
 WITHIN = {name: (within.least, within.most) for name, within in ranges_of(FieldView).items()}
 

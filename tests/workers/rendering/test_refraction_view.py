@@ -11,7 +11,10 @@ from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.ranges import ranges_of
-from bentray_workers.rendering.refraction_view import CHOICES, SMOOTHING_8_BIT, RefractionView, check_even
+from bentray_kernels.request_fields import choices_of
+from bentray_workers.rendering.refraction_view import SMOOTHING_8_BIT, RefractionView, check_even
+
+CHOICES = choices_of(RefractionView)
 
 WITHIN = {name: (within.least, within.most) for name, within in ranges_of(RefractionView).items()}
 

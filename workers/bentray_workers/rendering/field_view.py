@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from bentray_kernels.device_request import DESCRIPTION, DeviceRequest
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.geometry_field.tables.reference_field import MAX_REFERENCE_SAMPLES
-from bentray_kernels.opencl.engine_selection import DESCRIPTION, REQUESTS, DeviceRequest
 from bentray_kernels.ranges import Range
+from bentray_kernels.rendering_limits import MAX_REFERENCE_SAMPLES
 from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
 
 # Public names, and those of the kernels.
@@ -24,16 +24,6 @@ LOOKUPS = {
 OBJECTS = {"object": 0, "mirror-ball": 3, "two-mirrors": 2}
 # Of an object from the centre of the ground, which has a radius of 7 m.
 POSITION_M = Range(-5.0, 5.0, unit="m")
-
-CHOICES: dict[str, tuple[str, ...]] = {
-    "device": REQUESTS,
-    "scene": ("object", "mirror-ball", "two-mirrors"),
-    "mode": ("reflect", "refract", "refract-single", "self", "self-only", "diffuse"),
-    "lookup": tuple(LOOKUPS),
-    "eye": tuple(LOOKUPS),
-    "camera": ("perspective", "orthographic"),
-    "up": ("z", "y"),
-}
 
 
 @dataclass(frozen=True)
@@ -101,7 +91,7 @@ class FieldView:
     device: DeviceRequest = setting("auto", DESCRIPTION)  # noqa: RUF009 - a string, by its alias
 
     def __post_init__(self) -> None:
-        check(self, CHOICES)
+        check(self)
         numbers = 2 * OBJECTS[self.scene]
         if len(self.positions_m) not in (0, numbers):
             found = f"{len(self.positions_m)} numbers"

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
+from bentray_kernels.device_request import DESCRIPTION, DeviceRequest
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.isosurface.octree import MAX_ISOS
-from bentray_kernels.opencl.engine_selection import DESCRIPTION, REQUESTS, DeviceRequest
 from bentray_kernels.ranges import Range
-from bentray_kernels.refraction import Layers
+from bentray_kernels.rendering_limits import MAX_ISOS, MAX_SMOOTHING
 from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, Uses, check, setting
-from bentray_kernels.splines import FILTERS
-from bentray_kernels.splines.prefilter import MAX_SMOOTHING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from bentray_kernels.refraction import Layers
 
 INDEX = Range(0.01, 100.0)
 
@@ -25,14 +25,8 @@ GLASS: Uses = ({"mode": ("refract",)},)
 # Of a B-spline through 8-bit integers: their steps, at every node, would scatter refracted rays.
 SMOOTHING_8_BIT = 30.0
 
-CHOICES: dict[str, tuple[str, ...]] = {
-    "device": REQUESTS,
-    "filter": tuple(FILTERS),
-    "camera": ("orthographic", "perspective"),
-    "backdrop": ("checkerboard", "picture", "warped-checkerboard", "warped-picture"),
-    "supersampling": ("none", "prss", "real"),
-    "mode": ("refract", "shaded"),
-}
+# A test compares them with those of the splines, which load compiled code.
+FILTERS = ("central", "trilinear", "catmull-rom", "bspline2", "bspline3", "bspline4", "bspline5", "bspline6")
 
 
 @dataclass(frozen=True)
@@ -49,6 +43,7 @@ class RefractionView:
         (),
         "Increasing iso-values, unit of the volume; by default the middle of its range after smoothing.",
         schema={"maxItems": MAX_ISOS},
+        unset="the middle of the range",
     )
     index: tuple[float, ...] = setting(
         (1.5,),
@@ -128,7 +123,7 @@ class RefractionView:
     device: DeviceRequest = setting("auto", DESCRIPTION)  # noqa: RUF009 - a string, by its alias
 
     def __post_init__(self) -> None:
-        check(self, CHOICES)
+        check(self)
         if len(self.iso) > MAX_ISOS:
             raise InvalidInput("iso", f"{len(self.iso)} iso-values", f"at most {MAX_ISOS}")
         if len(self.index) not in (1, max(len(self.iso), 1)):
@@ -155,6 +150,8 @@ class RefractionView:
 
     def layers(self) -> Layers:
         """Iso-values and indices for the ray caster; raises InvalidInput unless the values increase."""
+        from bentray_kernels.refraction import Layers
+
         return Layers(self.iso, (self.outside, *self.indices), self.surroundings)
 
     @property
@@ -179,7 +176,7 @@ class RefractionView:
         """The smoothing of a volume of this type, with the default filled in."""
         if self.smoothing is not None:
             return self.smoothing
-        return SMOOTHING_8_BIT if self._smooths and dtype == np.uint8 else 0.0
+        return SMOOTHING_8_BIT if self._smooths and dtype == "uint8" else 0.0
 
     def filtered_within(self, low: float, high: float) -> RefractionView:
         """As ``within`` for a filtered volume with values from ``low`` to ``high`` at the nodes.

@@ -13,9 +13,7 @@ from ...arrays import Floats
 from ...compiled import kernel
 from ...errors import InvalidInput
 from ...float32 import higher, lower, real, whole
-
-# The dissertation's textures end at 24; at 48 a table has 191 million entries.
-MAX_SAMPLES = 48
+from ...rendering_limits import MAX_SAMPLES
 
 # Replaces a 0 of a direction: its reciprocal is finite in float32, and so are products with it.
 ALMOST_ZERO = real(1e-18)

@@ -18,14 +18,12 @@ from ...errors import InvalidInput
 from ...float32 import higher, lower, real, whole
 from ...meshes.face_plane import meet_plane
 from ...meshes.surface import Surface
+from ...rendering_limits import MAX_REFERENCE_SAMPLES
 from .cube import samples
 from .inner_field import InnerField
 from .outer_field import OuterField
 from .quadrilinear import Corner, lerp4
 from .reference_inner_field import inner_uv_table
-
-# The dissertation's textures end here; the table of 24 takes 96 MB of memory, that of 48 1.5 GB.
-MAX_REFERENCE_SAMPLES = 24
 
 # Numbers of a pixel: position and normal.
 CHANNELS = 6

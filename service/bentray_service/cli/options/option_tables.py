@@ -1,16 +1,22 @@
-"""Options generated from tables: they replace one parameter of a command."""
+"""Options of a command in place of one parameter, generated from tables or from the fields of requests."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import Field, dataclass, fields
 from functools import wraps
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import typer
 
+from bentray_kernels.ranges import RANGE
+from bentray_kernels.request_fields import choices_of
+
 Command = Callable[..., None]
+
+# Left off the name of an option: ``--side`` is in metres, as its help says.
+UNITS = ("_mps", "_m", "_nodes", "_deg", "_c")
 
 
 @dataclass(frozen=True)
@@ -60,3 +66,65 @@ def with_options(
         return run
 
     return decorate
+
+
+def options_of(kind: Any, names: Mapping[str, str], more: Mapping[str, str]) -> dict[str, Option]:
+    """One option for each field of a dataclass, by field.
+
+    Args:
+        kind: whose fields have a ``description`` in their metadata.
+        names: of options that are not called as their field.
+        more: further sentences of the help, by field.
+    """
+    hints, choices = get_type_hints(kind), choices_of(kind)
+    return {
+        field.name: option_of(
+            field,
+            hints[field.name],
+            choices.get(field.name, ()),
+            names.get(field.name, field.name),
+            more.get(field.name, ""),
+        )
+        for field in fields(kind)
+    }
+
+
+def option_of(field: Field[Any], hint: Any, choices: tuple[str, ...], name: str, more: str = "") -> Option:
+    """The option of one field; its help is the description, with choices or range.
+
+    Args:
+        field: of a dataclass, with metadata.
+        hint: its type.
+        choices: accepted words, if any.
+        name: of the option, without hyphens at its beginning.
+        more: a further sentence of the help.
+    """
+    unit = next((unit for unit in UNITS if name.endswith(unit)), "")
+    flag = "--" + name.removesuffix(unit).replace("_", "-")
+    kind, metavar, text = hint, None, field.metadata["description"]
+    if field.default is None:
+        (kind,) = (part for part in get_args(hint) if part is not type(None))
+    if choices:
+        kind = str
+        if not all(word in text for word in choices):
+            text = f"{text} One of: {', '.join(choices)}."
+    elif kind is bool:
+        flag = f"{flag}/--no-{flag[2:]}"
+    elif get_origin(kind) is tuple and get_args(kind)[-1] is ...:
+        kind, text = list[get_args(kind)[0]], f"{text} Repeatable."  # type: ignore[misc]
+    elif get_args(kind):
+        metavar = "LOW HIGH"
+    elif RANGE in field.metadata:
+        words = field.metadata[RANGE].words
+        # Not capitalize(), which turns °C and MHz into °c and mhz.
+        text = f"{text} {words[:1].upper()}{words[1:]}."
+    return Option(flag, kind, default_of(field), f"{text} {more}".rstrip(), metavar)
+
+
+def default_of(field: Field[Any]) -> str:
+    """The default of a field in words."""
+    if field.default in (None, ()):
+        return str(field.metadata["unset"])
+    if isinstance(field.default, bool):
+        return "yes" if field.default else "no"
+    return " ".join(map(str, field.default)) if isinstance(field.default, tuple) else str(field.default)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import Field, dataclass, fields
-from typing import Any, get_args, get_type_hints
+from dataclasses import dataclass, fields
+from typing import Any, get_type_hints
 
-from bentray_kernels.ranges import RANGE
 from bentray_kernels.request_fields import choices_of
 from bentray_kernels.tomography.settings import PLACES, Settings
 
-from .option_tables import Command, Option, with_options
-
-# Left off the name of an option: ``--side`` is in metres, as its help says.
-UNITS = ("_mps", "_m", "_nodes", "_deg", "_c")
+from .option_tables import Command, Option, option_of, with_options
 
 
 @dataclass(frozen=True)
@@ -28,38 +24,8 @@ def _options() -> dict[str, Option]:
         record, _, leaf = place.rpartition(".")
         kind: Any = type(getattr(Settings(), record)) if record else Settings
         (field,) = (one for one in fields(kind) if one.name == leaf)
-        found[name] = _option(name, field, get_type_hints(kind)[leaf], choices_of(kind).get(leaf, ()))
+        found[name] = option_of(field, get_type_hints(kind)[leaf], choices_of(kind).get(leaf, ()), name)
     return found
-
-
-def _option(name: str, field: Field[Any], hint: Any, choices: tuple[str, ...]) -> Option:
-    unit = next((unit for unit in UNITS if name.endswith(unit)), "")
-    flag = "--" + name.removesuffix(unit).replace("_", "-")
-    kind, metavar, text = hint, None, field.metadata["description"]
-    if field.default is None:
-        (kind,) = (part for part in get_args(hint) if part is not type(None))
-    if choices:
-        kind = str
-        if not all(word in text for word in choices):
-            text = f"{text} One of: {', '.join(choices)}."
-    elif kind is bool:
-        flag = f"{flag}/--no-{flag[2:]}"
-    elif get_args(kind):
-        metavar = "LOW HIGH"
-    elif RANGE in field.metadata:
-        words = field.metadata[RANGE].words
-        # Not capitalize(), which turns °C and MHz into °c and mhz.
-        text = f"{text} {words[:1].upper()}{words[1:]}."
-    return Option(flag, kind, default_of(field), text, metavar)
-
-
-def default_of(field: Field[Any]) -> str:
-    """The default of a setting in words."""
-    if field.default is None:
-        return str(field.metadata["unset"])
-    if isinstance(field.default, bool):
-        return "yes" if field.default else "no"
-    return " ".join(map(str, field.default)) if isinstance(field.default, tuple) else str(field.default)
 
 
 # By the names of ``PLACES``, in the order of the help.
