@@ -11,7 +11,7 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .keys import Data
+from .keys import Data, service_settings
 from .output.terminal import AsJson, print_json, print_table
 
 COLUMNS = ("time", "tenant", "how", "who", "method", "route", "ids", "status", "sent")
@@ -42,9 +42,8 @@ def audit(
     """
     from ..access.audit import entries
     from ..files.data_folder import Files
-    from ..settings import ServiceSettings
 
-    settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
+    settings = service_settings(data)
     folder, first = Files(settings.data_dir).audit, _day(since)
     if not folder.is_dir():
         raise InvalidInput(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from .keys import Data
+from .keys import Data, service_settings
 from .output.exit_codes import WorkFailed
 from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
 
@@ -38,7 +38,7 @@ def backup(
     from ..backup.back_up import back_up
 
     with progress_bar("Backing up", shown=not as_json) as step:
-        made = back_up(_settings(data), folder, link, step)
+        made = back_up(service_settings(data), folder, link, step)
     if as_json:
         print_json({"folder": str(folder.resolve()), **asdict(made)})
     else:
@@ -64,7 +64,7 @@ def restore(
     """
     from ..backup.restore import restore as restore_backup
 
-    settings = _settings(data)
+    settings = service_settings(data)
     with progress_bar("Restoring", shown=not as_json) as step:
         restored = restore_backup(folder, settings, step)
     target = settings.data_dir.resolve()
@@ -73,9 +73,3 @@ def restore(
         return
     remark(f"{restored.items} stored items of a backup by Bentray {restored.bentray}; start the service with")
     print_lines([f"bentray serve --data {target}"])
-
-
-def _settings(data: Path | None) -> Any:
-    from ..settings import ServiceSettings
-
-    return ServiceSettings.load(**({} if data is None else {"data_dir": data}))

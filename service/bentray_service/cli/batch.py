@@ -59,16 +59,13 @@ def submit_batch(
         InvalidInput: for an invalid folder, scheduler or setting.
         WorkFailed: when a dataset failed; the others are completed.
     """
-    entries = entries_of(folder)
-    results = output_folder((output or folder / "results").resolve())
+    results = (output or folder / "results").resolve()
+    entries = entries_of(folder, results, settings, given)
+    output_folder(results)
 
     from bentray_workers.cluster.connection import open_cluster
     from bentray_workers.reconstruction import batch
 
-    for entry in entries:
-        found = finished(results / entry.name, entry.source, settings, given)
-        if found is not None:
-            entry.skip(found["seconds"], found["residual_rms_s"], found.get("doubt", ""))
     waiting = [entry for entry in entries if entry.state == "waiting"]
     if waiting:
         with open_cluster(scheduler, tls=tls) as cluster, watching(entries) as watch:
@@ -82,8 +79,8 @@ def submit_batch(
     return entries
 
 
-def entries_of(folder: Path) -> list[Entry]:
-    """An entry for each scan of a folder, by name.
+def entries_of(folder: Path, results: Path, settings: Settings, given: ScanMetadata) -> list[Entry]:
+    """An entry for each scan of a folder, by name; those with a result are skipped.
 
     Raises:
         InvalidInput: when there are none, or two of the same name.
@@ -104,7 +101,12 @@ def entries_of(folder: Path) -> list[Entry]:
             raise InvalidInput(
                 "--batch", f"{one.name} and {other.name}", "names that differ without their endings"
             )
-    return [Entry(path) for path in found]
+    entries = [Entry(path) for path in found]
+    for entry in entries:
+        result = finished(results / entry.name, entry.source, settings, given)
+        if result is not None:
+            entry.skip(result["seconds"], result["residual_rms_s"], result.get("doubt", ""))
+    return entries
 
 
 def reconstruct_one(

@@ -69,7 +69,7 @@ def create(
     token = ApiKey.new()
     with _opened(data) as store:
         row = store.add(token, whose, name, requested, until)
-        remember_authentication(_settings(data).data_dir)
+        remember_authentication(service_settings(data).data_dir)
     if as_json:
         print_json({**_shown(row), "key": token.shown()})
     else:
@@ -136,7 +136,7 @@ def opened_database(data: Path | None) -> Iterator[Database]:
     from ..files.folder_database import open_folder_database
     from ..files.private import private_files
 
-    settings = _settings(data)
+    settings = service_settings(data)
     with private_files():
         files = Files(settings.data_dir)
         files.prepare()
@@ -147,7 +147,8 @@ def opened_database(data: Path | None) -> Iterator[Database]:
             database.close()
 
 
-def _settings(data: Path | None) -> ServiceSettings:
+def service_settings(data: Path | None) -> ServiceSettings:
+    """The settings of the environment, with this data folder if it is given."""
     from ..settings import ServiceSettings
 
     return ServiceSettings.load(**({} if data is None else {"data_dir": data}))

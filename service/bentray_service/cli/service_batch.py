@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from bentray_kernels.errors import InvalidInput
 
-from .batch import entries_of, finished, request_of
+from .batch import entries_of, request_of
 from .options.paths import output_folder
 from .options.scan_options import dataset_file
 from .output.batch_view import report
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 # Scans on the service among which those of the folder are looked for.
 KNOWN = 1000
-CHUNK_BYTES = 1 << 20
 
 
 def submit_service_batch(
@@ -65,12 +64,9 @@ def submit_service_batch(
     """
     from ..client import Client
 
-    entries = entries_of(folder)
-    results = output_folder((output or folder / "results").resolve())
-    for entry in entries:
-        found = finished(results / entry.name, entry.source, settings, given)
-        if found is not None:
-            entry.skip(found["seconds"], found["residual_rms_s"], found.get("doubt", ""))
+    results = (output or folder / "results").resolve()
+    entries = entries_of(folder, results, settings, given)
+    output_folder(results)
     with client_errors(), Client(url, on_wait=remark) as client:
         waiting = _upload_all(client, entries, settings, given)
         batch = _start(client, folder.resolve().name, list(waiting), settings) if waiting else None
@@ -112,7 +108,8 @@ def _upload_all(
             try:
                 with _dataset(entry, given) as scan:
                     check_scan(read_dataset(scan, traces=False), settings, trace_samples(scan))
-                    digest = _sha256(scan)
+                    with scan.open("rb") as file:
+                        digest = hashlib.file_digest(file, "sha256").hexdigest()
                     if digest not in known:
                         known[digest] = client.upload(scan).id
             except InvalidInput as error:
@@ -177,11 +174,3 @@ def _download(
 def _dataset(entry: Entry, given: ScanMetadata) -> Iterator[Path]:
     with TemporaryDirectory() as folder, dataset_file(entry.source, given, Path(folder)) as scan:
         yield scan
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while chunk := file.read(CHUNK_BYTES):
-            digest.update(chunk)
-    return digest.hexdigest()

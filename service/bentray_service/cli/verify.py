@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .keys import Data
+from .keys import Data, service_settings
 from .output.exit_codes import WorkFailed
 from .output.terminal import AsJson, print_json, print_lines, remark
 
@@ -38,9 +38,8 @@ def verify(
     from ..files.orphans import Orphans
     from ..files.scrub import scrub
     from ..rows.checksums import Checksums
-    from ..settings import ServiceSettings
 
-    settings = ServiceSettings.load(**({} if data is None else {"data_dir": data}))
+    settings = service_settings(data)
     root = Files(settings.data_dir)
     root.prepare()
     with closing(open_folder_database(root, settings.database)) as database:

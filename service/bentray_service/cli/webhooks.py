@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
 
 import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .keys import Data, opened_database
+from .keys import Data, opened_database, shown_time
 from .output.command_list import CommandList
 from .output.terminal import AsJson, print_json, print_lines, print_table, remark
 
@@ -105,6 +104,6 @@ def _shown(row: Any) -> dict[str, Any]:
         "job": row["job_id"],
         "state": row["state"],
         "attempts": row["attempts"],
-        "created": datetime.fromtimestamp(row["created"], UTC).isoformat(timespec="seconds"),
+        "created": shown_time(row["created"]),
         "last": (row["log"][-1]["error"] or "accepted") if row["log"] else "",
     }

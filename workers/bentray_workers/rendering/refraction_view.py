@@ -43,7 +43,6 @@ class RefractionView:
         (),
         "Increasing iso-values, unit of the volume; by default the middle of its range after smoothing.",
         schema={"maxItems": MAX_ISOS},
-        unset="the middle of the range",
     )
     index: tuple[float, ...] = setting(
         (1.5,),
