@@ -14,11 +14,10 @@ import socket
 import ssl
 import time
 from collections.abc import Mapping, Sequence
-from http import HTTPStatus
 from typing import Any, NamedTuple
 from urllib.parse import SplitResult, urlsplit
 
-import httptools
+import h11
 
 from bentray_kernels.errors import InvalidInput
 
@@ -134,8 +133,8 @@ def post(url: str, headers: Mapping[str, str], body: bytes, permitted: Sequence[
         error = f"no answer within {EXCHANGE_S:g} s"
     except ssl.SSLCertVerificationError as failed:
         error = f"the certificate is not valid: {failed.verify_message}"
-    except (OSError, httptools.HttpParserError) as failed:
-        error = f"no answer: {getattr(failed, 'strerror', None) or type(failed).__name__}"
+    except (OSError, h11.ProtocolError) as failed:
+        error = f"no answer: {getattr(failed, 'strerror', None) or 'no response of HTTP'}"
         if variable := proxy_variable(urlsplit(url).scheme):
             error += f" (webhooks do not use {variable})"
     return Outcome(status, error, round(time.monotonic() - begun, 3))
@@ -155,23 +154,27 @@ def _exchange(
     if address[1] != (443 if parts.scheme == "https" else 80):
         shown += f":{address[1]}"
     target = f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/"
-    lines = [f"POST {target} HTTP/1.1", f"Host: {shown}", f"Content-Length: {len(body)}", "Connection: close"]
-    lines += [f"{name}: {value}" for name, value in headers.items()]
+    lines = [("Host", shown), ("Content-Length", str(len(body))), ("Connection", "close"), *headers.items()]
+    request = h11.Request(method="POST", target=target, headers=lines)
     with socket.socket(family, socket.SOCK_STREAM) as connection:
         connection.settimeout(min(CONNECT_S, _left(end)))
         connection.connect(address)
         if parts.scheme != "https":
-            return _answer(connection, "\r\n".join([*lines, "", ""]).encode() + body, end)
+            return _answer(connection, request, body, end)
         with certificates().wrap_socket(connection, server_hostname=host) as secured:
-            return _answer(secured, "\r\n".join([*lines, "", ""]).encode() + body, end)
+            return _answer(secured, request, body, end)
 
 
-def _answer(connection: socket.socket, request: bytes, end: float) -> int:
+def _answer(connection: socket.socket, request: h11.Request, body: bytes, end: float) -> int:
     """Send a request; returns the status of its response when all headers have come."""
+    protocol, came = h11.Connection(h11.CLIENT, LONGEST_HEADERS), 0
+    events = request, h11.Data(data=body), h11.EndOfMessage()
     connection.settimeout(_left(end))
-    connection.sendall(request)
-    response, came = _Response(), 0
-    while response.status is None:
+    connection.sendall(b"".join(protocol.send(event) or b"" for event in events))
+    while not isinstance(event := protocol.next_event(), h11.Response):
+        if event is not h11.NEED_DATA:
+            # An interim response (1xx).
+            continue
         # A receiver that sends one byte now and then would never exceed the limit of a single operation.
         connection.settimeout(_left(end))
         piece = connection.recv(LONGEST_HEADERS)
@@ -179,31 +182,8 @@ def _answer(connection: socket.socket, request: bytes, end: float) -> int:
         if not piece or came > LONGEST_HEADERS:
             found = f"more than {LONGEST_HEADERS} bytes of headers" if piece else "the connection was closed"
             raise OSError(errno.EPROTO, found)
-        response.feed(piece)
-    return response.status
-
-
-class _Response:
-    """Reads the status of a response; interim ones (1xx) are passed over."""
-
-    def __init__(self) -> None:
-        self.status: int | None = None
-        self._parser = httptools.HttpResponseParser(self)
-
-    def feed(self, piece: bytes) -> None:
-        """Raises HttpParserError for what is no response."""
-        try:
-            self._parser.feed_data(piece)
-        except httptools.HttpParserError:
-            # What follows the headers does not matter.
-            if self.status is None:
-                raise
-
-    def on_headers_complete(self) -> None:
-        """Called by the parser after the empty line, never at the end of the connection."""
-        status = self._parser.get_status_code()
-        if self.status is None and (status >= 200 or status == HTTPStatus.SWITCHING_PROTOCOLS):
-            self.status = status
+        protocol.receive_data(piece)
+    return event.status_code
 
 
 def _left(end: float) -> float:

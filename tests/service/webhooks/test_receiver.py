@@ -190,7 +190,7 @@ def test_a_receiver_without_end_fails_in_time(receiver, pieces, monkeypatch):
     [
         ([b"HTTP/1.1 200 OK\r\nA: b\r\n", None], "no answer: the connection was closed"),
         ([b"HTTP/1.1 200 OK\r\n", b"A: " + b"b" * 10000], "no answer: more than 65536 bytes of headers"),
-        ([b"220 mail.example ready\r\n", None], "no answer: HttpParserError"),
+        ([b"220 mail.example ready\r\n\r\n", None], "no answer: no response of HTTP"),
         ([b"HTTP/1.1 100 Continue\r\n\r\nHTTP/1.1 204 No Content\r\n\r\n", None], ""),
     ],
 )
