@@ -41,6 +41,7 @@ def geometry_field(
     view.check_samples(settings.samples)
 
     from bentray_service.rows.ids import field_of
+    from bentray_workers.files.geometry_field_folder import write_json
     from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
     from bentray_workers.files.mesh_formats import read_mesh
     from bentray_workers.rendering.field_settings import check_faces
@@ -68,7 +69,7 @@ def geometry_field(
     seconds = {"make_seconds": made - started, "draw_seconds": time.perf_counter() - made}
     found = {"mesh": str(source), **summary, **settings.plain(), "figures": figures, **seconds}
     found |= {"view": view.plain(), "outputs": {"field": str(target), **outputs}}
-    _write(folder / "geometry-field.json", found)
+    write_json(folder / "geometry-field.json", found)
     _show(source, found, as_json=as_json)
 
 
@@ -96,12 +97,6 @@ def _draw(field: Path, view: FieldView, folder: Path, step: Step) -> dict[str, s
     for name, png in draw.items():
         write_bytes(folder / f"{name}.png", png())
     return {name.replace("-", "_"): str(folder / f"{name}.png") for name in draw}
-
-
-def _write(path: Path, found: dict[str, Any]) -> None:
-    from bentray_workers.files.geometry_field_folder import write_json
-
-    write_json(path, found)
 
 
 def _show(source: Path, found: dict[str, Any], *, as_json: bool) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from concurrent.futures import Future
+from typing import TypeVar
 
 from bentray_kernels.tomography.result import Progress
 
@@ -32,42 +34,26 @@ def run_interruptibly(work: Callable[[OnProgress, Stop], T], show: OnProgress) -
         KeyboardInterrupt: after ``work`` has stopped; a second Ctrl-C does not wait for it.
         BaseException: what ``work`` raises.
     """
-    running = _Running(work)
+    stop, reported, result = threading.Event(), deque[Progress](maxlen=1), Future[T]()
+
+    def run() -> None:
+        try:
+            result.set_result(work(reported.append, stop.is_set))
+        except BaseException as error:
+            result.set_exception(error)
+
+    # Of a daemon nobody waits for the end, unlike of the threads of an executor.
+    running = threading.Thread(target=run, name="bentray", daemon=True)
     running.start()
     shown: Progress | None = None
     try:
         while running.is_alive():
             running.join(LOOK_S)
-            latest = running.latest
-            if latest is not None and latest is not shown:
-                shown = latest
-                show(latest)
+            if reported and reported[-1] is not shown:
+                shown = reported[-1]
+                show(shown)
     except KeyboardInterrupt:
-        running.stop.set()
+        stop.set()
         running.join()
         raise
-    if running.error is not None:
-        raise running.error
-    return running.result
-
-
-class _Running(threading.Thread, Generic[T]):
-    """``work`` in a thread, with its latest progress and its result or error."""
-
-    result: T
-
-    def __init__(self, work: Callable[[OnProgress, Stop], T]) -> None:
-        super().__init__(name="bentray", daemon=True)
-        self._work = work
-        self.stop = threading.Event()
-        self.latest: Progress | None = None
-        self.error: BaseException | None = None
-
-    def run(self) -> None:
-        try:
-            self.result = self._work(self._report, self.stop.is_set)
-        except BaseException as error:
-            self.error = error
-
-    def _report(self, progress: Progress) -> None:
-        self.latest = progress
+    return result.result()
