@@ -171,11 +171,12 @@ def test_a_misfit_that_falls_far_is_drawn_over_powers_of_ten(page, shared_servic
     page.goto(shared_service.address)
     texts, path = page.evaluate(
         """async () => {
-          const { misfitCurve } = await import("/static/jobs/misfit_curve.js");
+          const { MisfitCurve } = await import("/static/jobs/misfit_curve.js");
+          const { html, render } = await import("/static/parts/view.js");
           const place = document.createElement("div");
           const row = (value, k) => ({ stage: 0, sweep: k + 1, residual_rms_s: value });
           const history = [1e-6, 1e-7, 1e-8].map(row);
-          misfitCurve(place).show(history);
+          render(html`<${MisfitCurve} history=${history} />`, place);
           const texts = [...place.querySelectorAll("text")].map((one) => one.textContent);
           return [texts, place.querySelector(".curve").getAttribute("d")];
         }"""

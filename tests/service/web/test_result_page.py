@@ -445,7 +445,7 @@ def copied(page, name):
         """button => {
             window.copied = new Promise((done) => {
                 const watch = () => button.textContent === "Copied" && done();
-                new MutationObserver(watch).observe(button, { childList: true });
+                new MutationObserver(watch).observe(button, { characterData: true, subtree: true });
             });
         }"""
     )

@@ -1,10 +1,11 @@
 // The shell of the viewer: opens the page that the address names, and shows the state of the service.
 import { lost, request } from "./parts/api.js";
-import { at, make } from "./parts/dom.js";
+import { at } from "./parts/dom.js";
 import { admitted } from "./parts/key.js";
 import { parse } from "./parts/address.js";
+import { Alert, html, render } from "./parts/view.js";
 
-// A page is pages/NAME.js with open(root, { id, query }), which returns close(), or a promise of it.
+// A page is pages/NAME.js with open({ id, query }), which returns its view, or a promise of it.
 const PAGES = [
   [/^\/$/, "start", "#/"],
   [/^\/scans\/([^/]+)$/, "scan", "#/"],
@@ -18,7 +19,6 @@ const PAGES = [
 ];
 const HEALTH_MS = 15000;
 const LOST_MS = 2000;
-let closeShown = () => {};
 let visit = 0;
 // Opens again what could not be opened, once the service answers.
 let again = null;
@@ -30,10 +30,8 @@ function markMenu(entry) {
   }
 }
 
-function showFailure(root, words, ...above) {
-  const message = make("p", "error", words);
-  message.setAttribute("role", "alert");
-  root.replaceChildren(...above, message);
+function show(view) {
+  render(view, at("page"));
 }
 
 async function openPage(first) {
@@ -41,13 +39,9 @@ async function openPage(first) {
   again = null;
   const { path, query } = parse(location.hash);
   const found = PAGES.find(([pattern]) => pattern.test(path));
-  closeShown();
-  closeShown = () => {};
   document.title = "Bentray";
   markMenu(found?.[2]);
-  const root = make("div", "content");
-  const waiting = make("p", "loading", "Opening the page");
-  at("page").replaceChildren(waiting, root);
+  show(html`<p class="loading" key=${mine}>Opening the page</p>`);
   if (!first) at("page").focus({ preventScroll: true });
   scrollTo(0, 0);
   try {
@@ -58,19 +52,15 @@ async function openPage(first) {
       again = () => location.reload();
       throw lost();
     });
-    if (mine !== visit) return;
-    const close = await open(root, { id: pattern.exec(path)[1], query });
+    const view = await open({ id: pattern.exec(path)[1], query });
     // The reader may have gone on while the page was opened.
-    if (mine === visit) closeShown = close;
-    else close();
+    if (mine === visit) show(html`<div class="content" key=${mine}>${view}</div>`);
   } catch (error) {
     if (mine !== visit) return;
     again ??= () => openPage(false);
     const unknown = error.problem?.status === 404;
     const words = unknown ? `There is no ${error.problem.found}. It has been deleted, or belongs to another tenant or project.` : error.message;
-    showFailure(root, words, make("h1", "", unknown || !found ? "Not found" : "The page could not be opened"));
-  } finally {
-    waiting.remove();
+    show(html`<h1>${unknown || !found ? "Not found" : "The page could not be opened"}</h1><${Alert} error=${words} />`);
   }
 }
 
@@ -121,7 +111,7 @@ if (await admitted(request)) {
   addEventListener("hashchange", () => openPage(false));
   openPage(true);
 } else if (at("key").hidden) {
-  showFailure(at("page"), at("access").textContent);
+  show(html`<${Alert} error=${at("access").textContent} />`);
   const enter = () => request("/v1/access").then(() => location.reload(), () => setTimeout(enter, LOST_MS));
   setTimeout(enter, LOST_MS);
 }

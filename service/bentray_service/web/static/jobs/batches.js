@@ -1,87 +1,39 @@
 // Batches of reconstructions above the table of jobs: one with its settings, or the newest, each with one progress.
 import { request } from "../parts/api.js";
-import { make } from "../parts/dom.js";
+import { Alert, Button, html, useAct, useRead } from "../parts/view.js";
 import { UNFINISHED } from "./followed_jobs.js";
-import { duration, moment } from "../parts/job_words.js";
+import { duration, moment } from "./job_words.js";
 
 const SHOWN = 5;
 const BUSY_MS = 2000;
 const IDLE_MS = 15000;
 const STATES = ["succeeded", "failed", "cancelled", "cancelling", "running", "queued"];
 
-function nameOf(batch) {
-  return batch.name || `Batch of ${batch.size} scans`;
+function Batch({ batch, act }) {
+  const { id, state, counts, progress, seconds, created, links } = batch;
+  const name = batch.name || `Batch of ${batch.size} scans`;
+  const states = STATES.filter((one) => counts[one]).map((one) => `${counts[one]} ${one}`).join(", ");
+  const time = seconds === null ? "" : ` · ${duration(seconds)}`;
+  const cancel = () => confirm(`Cancel ${name}? Results so far stay.`) && act(links.cancel);
+  return html`<section class="batch">
+    <h2><a href=${`#/jobs?batch=${id}`}>${name}</a><span class=${`state ${state}`}>${state}</span></h2>
+    <progress max="1" value=${progress} aria-label=${`Progress of ${name}`}></progress>
+    <p class="facts">${Math.floor(100 * progress)} % · ${states} · started ${moment(created)}${time}</p>
+    ${links.cancel && html`<${Button} aria-label=${`Cancel ${name}`} onClick=${cancel}>Cancel</${Button}>`}
+  </section>`;
 }
 
-// The jobs in each state, in words.
-function countsOf({ counts }) {
-  return STATES.filter((state) => counts[state]).map((state) => `${counts[state]} ${state}`).join(", ");
-}
-
-function card(batch, act, level) {
-  const box = make("section", "batch");
-  const heading = make(level);
-  const anchor = make("a", "", nameOf(batch));
-  anchor.href = `#/jobs?batch=${batch.id}`;
-  heading.append(anchor, make("span", `state ${batch.state}`, batch.state));
-  const bar = make("progress");
-  Object.assign(bar, { max: 1, value: batch.progress });
-  bar.setAttribute("aria-label", `Progress of ${nameOf(batch)}`);
-  const time = batch.seconds === null ? "" : ` · ${duration(batch.seconds)}`;
-  const words = `${Math.floor(100 * batch.progress)} % · ${countsOf(batch)} · started ${moment(batch.created)}${time}`;
-  box.append(heading, bar, make("p", "facts", words));
-  if (batch.links.cancel) {
-    const cancel = make("button", "quiet", "Cancel");
-    cancel.type = "button";
-    cancel.setAttribute("aria-label", `Cancel ${nameOf(batch)}`);
-    cancel.addEventListener("click", () => {
-      if (confirm(`Cancel ${nameOf(batch)}? Results so far stay.`)) act(request(batch.links.cancel, { method: "POST" }));
-    });
-    box.append(cancel);
-  }
-  return box;
-}
-
-// Show one batch, or without an id the newest, at the end of root. Returns close().
-export async function showBatches(root, id) {
-  const place = make("div", "batches");
-  const error = make("p", "error");
-  error.setAttribute("role", "alert");
-  error.hidden = true;
-  root.append(error, place);
-  let timer = 0;
-  let closed = false;
-  let shown = "";
-
-  async function act(promise) {
-    try {
-      await promise;
-      await refresh();
-    } catch (problem) {
-      error.textContent = problem.message;
-      error.hidden = false;
-    }
-  }
-
-  async function refresh() {
-    clearTimeout(timer);
-    const found = id ? [await request(`/v1/batches/${id}`)] : (await request(`/v1/batches?limit=${SHOWN}`)).batches;
-    if (closed) return;
-    error.hidden = true;
-    const signature = JSON.stringify(found);
-    if (signature !== shown) {
-      shown = signature;
-      const focused = place.contains(document.activeElement) && document.activeElement.getAttribute("aria-label");
-      place.replaceChildren(...found.map((batch) => card(batch, act, "h2")));
-      if (focused) place.querySelector(`[aria-label="${CSS.escape(focused)}"]`)?.focus();
-    }
-    const busy = found.some((batch) => UNFINISHED.includes(batch.state));
-    timer = setTimeout(() => act(Promise.resolve()), busy ? BUSY_MS : IDLE_MS);
-  }
-
-  await act(Promise.resolve());
-  return () => {
-    closed = true;
-    clearTimeout(timer);
-  };
+// One batch, or without an id the newest.
+export function Batches({ id }) {
+  const read = async () => (id ? [await request(`/v1/batches/${id}`)] : (await request(`/v1/batches?limit=${SHOWN}`)).batches);
+  const busy = (batches) => batches?.some((batch) => UNFINISHED.includes(batch.state));
+  const [batches, error, refresh] = useRead(read, (found) => (busy(found) ? BUSY_MS : IDLE_MS));
+  const [failure, attempt] = useAct();
+  const act = (address) => attempt(async () => {
+    await request(address, { method: "POST" });
+    await refresh();
+  });
+  return html`
+    <${Alert} error=${failure ?? error} />
+    <div class="batches">${batches?.map((batch) => html`<${Batch} key=${batch.id} batch=${batch} act=${act} />`)}</div>`;
 }

@@ -1,4 +1,5 @@
 // Jobs kept up to date while a page is open: by the stream of events, or by polling where there is none.
+import { useEffect, useNewest, useRef, useState } from "../parts/view.js";
 import { jobEvents } from "./job_events.js";
 
 // Without a stream of events: intervals while a job is unfinished, and else.
@@ -83,4 +84,25 @@ export function followJobs({ read, onJobs, onError, historyMs = HISTORY_MS }) {
       clearTimeout(timer);
     },
   };
+}
+
+// [jobs, error, refresh] as a hook; onJobs(jobs) is also called with each answer. jobs is null before the first one.
+export function useJobs({ read, historyMs, onJobs = () => {} }) {
+  const [{ jobs, error }, setState] = useState({ jobs: null, error: null });
+  const newest = useNewest({ read, onJobs });
+  const followed = useRef(null);
+  useEffect(() => {
+    followed.current = followJobs({
+      read: () => newest.current.read(),
+      historyMs,
+      onJobs(found) {
+        // Another list each time, since events change the records in place.
+        setState((before) => ({ ...before, jobs: [...found] }));
+        newest.current.onJobs(found);
+      },
+      onError: (problem) => setState((before) => ({ ...before, error: problem })),
+    });
+    return followed.current.close;
+  }, []);
+  return [jobs, error, () => followed.current.refresh()];
 }

@@ -1,13 +1,12 @@
 // The table of jobs: one row a job, with filters and pages in the address; kept up to date while it is open.
-import { keepQuery } from "../parts/address.js";
-import { request } from "../parts/api.js";
-import { make } from "../parts/dom.js";
-import { followJobs } from "./followed_jobs.js";
-import { jobFilters } from "./job_filters.js";
+import { keepQuery, pick } from "../parts/address.js";
 import { inTime } from "../parts/amounts.js";
-import { duration, inWords, moment } from "../parts/job_words.js";
-import { methodOf } from "../parts/results.js";
+import { request } from "../parts/api.js";
+import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { loadTitles, titleOfJob } from "../parts/titles.js";
+import { Alert, Button, html, Labelled, Options, useAct, useEffect, useRef, useState } from "../parts/view.js";
+import { useJobs } from "./followed_jobs.js";
+import { duration, inWords, methodOf, moment } from "./job_words.js";
 
 const PAGE = 25;
 const ENDED = ["succeeded", "failed", "cancelled"];
@@ -15,216 +14,121 @@ const PLACES = { dataset: "scans", volume: "rendering", mesh: "surfaces" };
 // On a small screen the name of the column stands before each text.
 const COLUMNS = ["Name", "Kind", "Scan", "State", "Started by", "When", "Duration", "Actions"];
 
-// Roles in full, since a table that is laid out as cards is no table for a screen reader.
-function row(cells, role = "cell") {
-  const line = make("tr");
-  line.setAttribute("role", "row");
-  cells.forEach((content, i) => {
-    const cell = make(role === "cell" ? "td" : "th");
-    cell.setAttribute("role", role);
-    if (role === "cell") cell.dataset.column = COLUMNS[i];
-    cell.append(content);
-    line.append(cell);
-  });
-  return line;
-}
-
-function nameOf(job) {
-  return job.name || (job.kind === "reconstruction" ? methodOf(job) : inWords(job.kind));
-}
-
-function jobLink(job) {
-  const anchor = make("a", "", nameOf(job));
-  anchor.href = `#/jobs/${job.id}`;
-  return anchor;
-}
+const nameOf = (job) => job.name || (job.kind === "reconstruction" ? methodOf(job) : inWords(job.kind));
 
 // What the job reads, or the scan that it made.
 function source(job) {
-  const field = ["mesh", "dataset", "volume"].find((one) => job[one] && !(one === "volume" && job.kind === "reconstruction"));
-  if (!field) return "–";
-  const anchor = make("a", "", titleOfJob(job));
-  anchor.href = `#/${PLACES[field]}/${job[field]}`;
-  return anchor;
+  const field = ["mesh", "dataset", "volume"].find((name) => job[name] && !(name === "volume" && job.kind === "reconstruction"));
+  return field ? html`<a href=${`#/${PLACES[field]}/${job[field]}`}>${titleOfJob(job)}</a>` : "–";
 }
 
-function stateOf(job) {
-  const box = make("div", "state-cell");
-  box.append(make("span", `state ${job.state}`, job.state));
+function State({ job }) {
   const { done, total, phase } = job.progress;
-  if (job.state === "running" && total) {
-    const bar = make("progress");
-    Object.assign(bar, { max: total, value: done });
-    bar.setAttribute("aria-label", `Progress of ${nameOf(job)}`);
-    box.append(bar, make("small", "", `${phase} ${Math.floor((100 * done) / total)} %`));
+  return html`<div class="state-cell">
+    <span class=${`state ${job.state}`}>${job.state}</span>
+    ${job.state === "running" && total > 0 && html`
+      <progress max=${total} value=${done} aria-label=${`Progress of ${nameOf(job)}`}></progress>
+      <small>${phase} ${Math.floor((100 * done) / total)} %</small>`}
+    ${job.error && html`<small class="reason">${job.error.detail}</small>`}
+  </div>`;
+}
+
+function Actions({ job, act }) {
+  const name = `${nameOf(job)} of ${moment(job.created)}`;
+  function remove() {
+    const made = job.kind === "simulation" ? "Its scan stays." : "What it made is deleted too.";
+    if (confirm(`Delete ${name}? ${made}`)) act(job.links.self, "DELETE");
   }
-  if (job.error) box.append(make("small", "reason", job.error.detail));
-  return box;
+  return html`<div class="row-actions">
+    ${job.links.cancel && html`<${Button} aria-label=${`Cancel ${name}`} onClick=${() => act(job.links.cancel, "POST")}>Cancel</${Button}>`}
+    ${ENDED.includes(job.state) && html`<${Button} aria-label=${`Delete ${name}`} onClick=${remove}>Delete</${Button}>`}
+  </div>`;
 }
 
-function button(text, job, onClick) {
-  const made = make("button", "quiet", text);
-  made.type = "button";
-  made.dataset.action = text;
-  made.setAttribute("aria-label", `${text} ${nameOf(job)} of ${moment(job.created)}`);
-  made.addEventListener("click", onClick);
-  return made;
+// Roles in full, since a table that is laid out as cards is no table for a screen reader.
+function Row({ job, act }) {
+  const cells = [
+    html`<a href=${`#/jobs/${job.id}`}>${nameOf(job)}</a>`, inWords(job.kind), source(job), html`<${State} job=${job} />`, job.started_by || "–",
+    html`<time datetime=${job.created} title=${inTime(job.created)}>${moment(job.created)}</time>`,
+    job.seconds === null ? "–" : duration(job.seconds), html`<${Actions} job=${job} act=${act} />`,
+  ];
+  return html`<tr role="row" id=${job.id}>
+    ${cells.map((cell, i) => html`<td role="cell" data-column=${COLUMNS[i]}>${cell}</td>`)}
+  </tr>`;
 }
 
-function when(job) {
-  const time = make("time", "", moment(job.created));
-  time.dateTime = job.created;
-  time.title = inTime(job.created);
-  return time;
-}
-
-// Show the table in root with the filters and the page of query. Returns { refresh, close }.
-export async function jobTable(root, query) {
-  let asked = new URLSearchParams([...query].filter(([name]) => ["batch", "text", "state", "kind", "before"].includes(name)));
-  const rows = new Map();
-  const error = make("p", "error");
-  error.setAttribute("role", "alert");
-  error.hidden = true;
-  const told = make("p", "facts");
-  told.setAttribute("role", "status");
-  const body = make("tbody");
-  body.setAttribute("role", "rowgroup");
-  const head = make("thead");
-  head.setAttribute("role", "rowgroup");
-  head.append(row(COLUMNS, "columnheader"));
-  const table = make("table", "job-table");
-  table.setAttribute("role", "table");
-  table.setAttribute("aria-label", "Jobs");
-  table.append(head, body);
-  const pages = make("nav", "pages");
-  pages.setAttribute("aria-label", "Pages of the list");
-  const batch = asked.get("batch");
-  const filters = await jobFilters(asked, (changed) => {
-    asked = changed;
-    // The page of a batch stays that of the batch.
-    if (batch) asked.set("batch", batch);
-    keepQuery(asked);
-    followed.refresh();
-  });
-  root.append(filters.form, error, told, table, pages);
-
-  const show = (problem) => {
-    error.textContent = problem ? problem.message : "";
-    error.hidden = !problem;
+// words: the choices of the filters by their names.
+function JobFilters({ words, query, onChange, hidden }) {
+  const form = useRef(null);
+  const clear = () => {
+    for (const field of form.current.elements) if (field.name) field.value = "";
+    form.current.elements.text.focus();
+    onChange(new URLSearchParams());
   };
+  const choice = (name) => html`<select name=${name}>
+    <option value="">All</option>
+    <${Options} entries=${words[name].map((word) => [word, inWords(word)])} chosen=${query.get(name)} />
+  </select>`;
+  return html`<${Filters} ref=${form} label="Jobs" hidden=${hidden} onChange=${onChange}>
+    <${Labelled} caption="Name, scan, notes, owner or id">
+      <input name="text" type="search" maxlength="200" autocomplete="off" defaultValue=${query.get("text") ?? ""} />
+    </${Labelled}>
+    <${Labelled} caption="State">${choice("state")}</${Labelled}>
+    <${Labelled} caption="Kind">${choice("kind")}</${Labelled}>
+    <${Button} disabled=${!pick(query, ["text", "state", "kind"]).size} onClick=${clear}>Clear filters</${Button}>
+  </${Filters}>`;
+}
 
-  async function act(promise) {
-    try {
-      show(null);
-      await promise;
-    } catch (problem) {
-      return show(problem);
-    }
-    return followed.refresh();
-  }
-
-  function actions(job) {
-    const box = make("div", "row-actions");
-    if (job.links.cancel) box.append(button("Cancel", job, () => act(request(job.links.cancel, { method: "POST" }))));
-    if (ENDED.includes(job.state)) {
-      box.append(
-        button("Delete", job, () => {
-          const made = job.kind === "simulation" ? "Its scan stays." : "What it made is deleted too.";
-          if (confirm(`Delete ${nameOf(job)} of ${moment(job.created)}? ${made}`)) act(request(job.links.self, { method: "DELETE" }));
-        }),
-      );
-    }
-    return box;
-  }
-
-  // Rows that stay the same keep their elements, and with them the focus; one that changes gives it to the same button.
-  function draw(jobs) {
-    const present = new Set(jobs.map((job) => job.id));
-    for (const [id, { line }] of rows) {
-      if (present.has(id)) continue;
-      line.remove();
-      rows.delete(id);
-    }
-    jobs.forEach((job, place) => {
-      const { history, plan, advice, settings, ...shown } = job;
-      if (ENDED.includes(job.state)) delete shown.progress;
-      const signature = JSON.stringify([shown, titleOfJob(job)]);
-      const known = rows.get(job.id);
-      let line = known?.line;
-      if (known?.signature !== signature) {
-        const focused = line?.contains(document.activeElement) ? document.activeElement.dataset.action ?? "link" : "";
-        const fresh = row([
-          jobLink(job), inWords(job.kind), source(job), stateOf(job), job.started_by || "–", when(job),
-          job.seconds === null ? "–" : duration(job.seconds), actions(job),
-        ]);
-        fresh.id = job.id;
-        line?.replaceWith(fresh);
-        line = fresh;
-        rows.set(job.id, { line, signature });
-        if (focused) (line.querySelector(`[data-action="${focused}"]`) ?? line.querySelector("a")).focus();
-      }
-      if (body.children[place] !== line) body.insertBefore(line, body.children[place] ?? null);
-    });
-  }
-
-  function pageLink(text, more) {
-    const address = new URLSearchParams(asked);
-    address.delete("before");
-    if (more) address.set("before", more);
-    const anchor = make("a", "button", text);
-    anchor.href = `#/jobs${address.size ? `?${address}` : ""}`;
-    return anchor;
-  }
-
-  function scansLink() {
-    const anchor = make("a", "", "To the scans");
-    anchor.href = "#/";
-    return anchor;
-  }
-
-  let older = "";
+// query: filters and page, of the address; words: the choices of the filters by their names.
+export function JobTable({ query: first, words }) {
+  const [query, setQuery] = useState(pick(first, ["batch", "text", "state", "kind", "before"]));
+  const newest = useRef(query);
+  const [older, setOlder] = useState("");
+  const [failure, attempt] = useAct();
 
   async function read() {
     for (;;) {
-      const mine = asked;
-      const { jobs, next } = await request(`/v1/jobs?${new URLSearchParams([...mine, ["limit", PAGE]])}`);
+      const asked = newest.current;
+      const { jobs, next } = await request(`/v1/jobs?${new URLSearchParams([...asked, ["limit", PAGE]])}`);
       await loadTitles(jobs);
       // The filters may have been changed in the meantime.
-      if (mine !== asked) continue;
-      older = next && new URLSearchParams(next.split("?")[1]).get("before");
+      if (asked !== newest.current) continue;
+      setOlder(olderOf(next));
       return jobs;
     }
   }
 
-  function onJobs(jobs) {
-    draw(jobs);
-    table.hidden = !jobs.length;
-    const filtered = [...asked.keys()].some((name) => name !== "before" && name !== "batch");
-    const none = filtered ? "No job matches these filters." : "Nothing has run yet. Upload a scan and press Fast or Best.";
-    const many = `${jobs.length === 1 ? "1 job" : `${jobs.length} jobs`}${older ? " on this page, and older ones" : ""}`;
-    told.textContent = jobs.length ? many : none;
-    if (!jobs.length && !filtered) told.append(" ", scansLink());
-    // Nothing to look for yet.
-    filters.form.hidden = !jobs.length && !asked.size;
-    const links = [asked.has("before") && pageLink("Newest jobs", ""), older && pageLink("Older jobs", older)].filter(Boolean);
-    if (pages.dataset.links !== links.map(String).join(" ")) {
-      pages.dataset.links = links.map(String).join(" ");
-      pages.replaceChildren(...links);
-    }
-  }
+  const [jobs, error, refresh] = useJobs({ read });
+  const act = (address, method) => attempt(async () => {
+    await request(address, { method });
+    await refresh();
+  });
 
-  function onError(problem) {
-    show(problem);
-    if (problem && asked.has("before")) pages.replaceChildren(pageLink("Newest jobs", ""));
+  function change(filters) {
+    // The page of a batch stays that of the batch.
+    if (query.has("batch")) filters.set("batch", query.get("batch"));
+    keepQuery(filters);
+    newest.current = filters;
+    setQuery(filters);
   }
+  useEffect(() => {
+    if (jobs) refresh();
+  }, [query]);
 
-  const followed = followJobs({ read, onJobs, onError });
-  await followed.ready;
-  return {
-    refresh: followed.refresh,
-    close() {
-      followed.close();
-      filters.close();
-    },
-  };
+  const none = jobs?.length === 0;
+  const filtered = pick(query, ["text", "state", "kind"]).size > 0;
+  const count = jobs?.length === 1 ? "1 job" : `${jobs?.length} jobs`;
+  return html`
+    <${JobFilters} words=${words} query=${query} onChange=${change} hidden=${!jobs || (none && !query.size)} />
+    <${Alert} error=${failure ?? error} />
+    <p class="facts" role="status">
+      ${jobs?.length > 0 && `${count}${older ? " on this page, and older ones" : ""}`}
+      ${none && filtered && "No job matches these filters."}
+      ${none && !filtered && html`Nothing has run yet. Upload a scan and press Fast or Best. <a href="#/">To the scans</a>`}
+    </p>
+    <table class="job-table" role="table" aria-label="Jobs" hidden=${!jobs || none}>
+      <thead role="rowgroup"><tr role="row">${COLUMNS.map((name) => html`<th role="columnheader">${name}</th>`)}</tr></thead>
+      <tbody role="rowgroup">${jobs?.map((job) => html`<${Row} key=${job.id} job=${job} act=${act} />`)}</tbody>
+    </table>
+    <${ListPages} path="/jobs" query=${query} older=${older} words="jobs" />`;
 }

@@ -1,14 +1,13 @@
 // An unfinished job: what happens now, even progress with the time left, the image and the misfit so far; a failure with its reason.
 import { inWords, request } from "../parts/api.js";
-import { make } from "../parts/dom.js";
-import { followJobs } from "./followed_jobs.js";
-import { placeInQueue, planned, summaryOf } from "./job_cards.js";
-import { duration } from "../parts/job_words.js";
-import { comparesModels, misfitCurve } from "./misfit_curve.js";
-import { previewPicture } from "./preview_picture.js";
-import { ProgressEstimate } from "./progress_estimate.js";
-import { methodOf } from "../parts/results.js";
 import { loadTitles, titleOfJob } from "../parts/titles.js";
+import { Alert, Button, html, useAct, useEffect, useReducer, useRef, useState } from "../parts/view.js";
+import { useJobs } from "./followed_jobs.js";
+import { Plan } from "./job_cards.js";
+import { duration, methodOf, placeInQueue, summaryOf } from "./job_words.js";
+import { comparesModels, MisfitCurve } from "./misfit_curve.js";
+import { PreviewPicture } from "./preview_picture.js";
+import { ProgressEstimate } from "./progress_estimate.js";
 
 const TICK_MS = 500;
 // Between two images, and between two questions to the workers while nothing is done yet.
@@ -18,20 +17,7 @@ const HISTORY_MS = 1000;
 
 const PHASES = { examining: "Examining the scan", picking: "Picking first arrivals in the traces" };
 const COMPILING = "The workers compile their kernels for this processor. That happens once and takes up to some minutes.";
-
-const PAGE = `
-  <p class="crumb"><a href="#/jobs">Jobs</a><span class="live-scan" hidden> · <a>Scan</a></span></p>
-  <h1></h1>
-  <p class="facts live-facts"></p>
-  <section class="panel" aria-label="State">
-    <p class="live-what" role="status"></p>
-    <progress aria-label="Progress" max="1"></progress>
-    <p class="facts live-time"></p>
-    <div class="live-plan"></div>
-    <p class="error live-error" role="alert" hidden></p>
-    <div class="links live-links"></div>
-  </section>
-  <section class="live-views" aria-label="Image and misfit so far" hidden></section>`;
+const STATES = { cancelling: "Cancelling: running tasks come to an end", cancelled: "Cancelled", failed: "Failed", succeeded: "Finished" };
 
 // The iteration in words, from the last record of the history.
 function iterationOf({ history, settings }) {
@@ -48,10 +34,7 @@ function iterationOf({ history, settings }) {
 function happening(job, compiling) {
   const { done, phase } = job.progress;
   if (job.state === "queued") return job.ahead === null ? "Waiting in the queue" : placeInQueue(job.ahead);
-  if (job.state === "cancelling") return "Cancelling: running tasks come to an end";
-  if (job.state === "cancelled") return "Cancelled";
-  if (job.state === "failed") return "Failed";
-  if (job.state === "succeeded") return "Finished";
+  if (STATES[job.state]) return STATES[job.state];
   if (compiling && !done) return COMPILING;
   if (PHASES[phase]) return PHASES[phase];
   if (job.kind !== "reconstruction") return done ? "Running" : "Starting";
@@ -64,145 +47,102 @@ function leftInWords(seconds) {
   return seconds < 90 ? `about ${5 * Math.ceil(seconds / 5)} s left` : `about ${Math.ceil(seconds / 60)} min left`;
 }
 
-function anchor(text, address) {
-  const made = make("a", "button quiet", text);
-  made.href = address;
-  return made;
+// What can be done about a failure.
+function advice({ kind, error: { type, field } }) {
+  if (type === "/problems/internal") return " Ask the operator of the service, who finds the entry in its log.";
+  // Of a damaged scan the reason says it.
+  if (kind !== "reconstruction" || type === "/problems/stored-data-damaged") return "";
+  return field ? " Change this and run it again." : " Run it again with fewer nodes, or examine the scan.";
 }
 
-// Shows a job in root until it has succeeded, then calls onSuccess(job). Returns { close }.
-export function liveJob(root, first, onSuccess) {
-  root.innerHTML = PAGE;
-  const part = (name) => root.querySelector(name);
-  const estimate = new ProgressEstimate();
-  const bar = part("progress");
-  let job = first;
-  let received = performance.now();
-  let seconds;
-  let compiling = false;
-  let over = false;
-  let asked = -Infinity;
-  let drawn = "";
-  let drawing = false;
-  let curve = null;
-  let picture = null;
+// Calls work() every so often; a new drawing follows.
+function useTicks(work) {
+  const [, draw] = useReducer((count) => count + 1, 0);
+  const newest = useRef(work);
+  newest.current = work;
+  useEffect(() => {
+    const ticking = setInterval(() => {
+      newest.current();
+      draw();
+    }, TICK_MS);
+    return () => clearInterval(ticking);
+  }, []);
+}
 
-  function say(selector, words) {
-    if (part(selector).textContent !== words) part(selector).textContent = words;
+// Progress and time of a job at this moment.
+function Progress({ job, estimate, elapsed }) {
+  const now = performance.now() / 1e3;
+  const running = job.state === "running";
+  const share = running && job.progress.total ? estimate.share(now) : null;
+  const planMinutes = job.plan?.minutes;
+  const left = estimate.left(now) ?? (planMinutes ? Math.max(0, 60 * planMinutes - elapsed) : null);
+  const words = [
+    share !== null && `${Math.floor(100 * share)} % of this step`,
+    job.seconds !== null && (job.finished ? `took ${duration(elapsed)}` : `${duration(elapsed)} so far`),
+    running && left !== null && `${leftInWords(left)}${PHASES[job.progress.phase] ? " of this step" : ""}`,
+  ];
+  return html`
+    ${share !== null && html`<progress key="share" aria-label="Progress" max="1" value=${share}></progress>`}
+    ${share === null && (running || job.state === "cancelling") && html`<progress key="unknown" aria-label="Progress"></progress>`}
+    <p class="facts live-time">${words.filter(Boolean).join(" · ")}</p>`;
+}
+
+// The preview after the newest progress, asked for by ask(); without one yet it is null.
+function usePreview(job) {
+  const [record, setRecord] = useState(null);
+  const last = useRef({ key: "", time: -Infinity });
+  async function ask() {
+    const { phase, done } = job.progress;
+    const key = `${phase} ${done} ${job.history.length}`;
+    const soon = performance.now() - last.current.time < PREVIEW_MS;
+    if (soon || key === last.current.key || !job.links.preview || !done || phase !== "reconstructing") return;
+    last.current = { key, time: Infinity };
+    // There may be none yet, or no longer.
+    const found = await request(job.links.preview).catch(() => null);
+    last.current.time = performance.now();
+    if (found) setRecord(found);
   }
+  return [record, ask];
+}
 
-  function tick() {
-    const now = performance.now() / 1e3;
-    const running = job.state === "running";
-    const elapsed = (job.seconds ?? 0) + (running ? now - received / 1e3 : 0);
-    say(".live-what", happening(job, compiling));
-    bar.hidden = !running && job.state !== "cancelling";
-    if (running && job.progress.total) bar.value = estimate.share(now);
-    else bar.removeAttribute("value");
-    const words = [];
-    if (running && job.progress.total) words.push(`${Math.floor(100 * estimate.share(now))} % of this step`);
-    if (job.seconds !== null) words.push(job.finished ? `took ${duration(elapsed)}` : `${duration(elapsed)} so far`);
-    const planMinutes = job.plan?.minutes;
-    const left = estimate.left(now) ?? (planMinutes ? Math.max(0, 60 * planMinutes - elapsed) : null);
-    if (running && left !== null) words.push(`${leftInWords(left)}${PHASES[job.progress.phase] ? " of this step" : ""}`);
-    say(".live-time", words.join(" · "));
-    if (running && !job.progress.done) askWorkers();
-    if (running && picture) draw();
-  }
-
-  async function askWorkers() {
-    if (performance.now() - asked < WORKERS_MS) return;
-    asked = performance.now();
+// Whether the workers compile, asked for by ask().
+function useCompiling() {
+  const [compiling, setCompiling] = useState(false);
+  const last = useRef(-Infinity);
+  async function ask() {
+    if (performance.now() - last.current < WORKERS_MS) return;
+    last.current = performance.now();
     const { workers } = await request("/v1/cluster").catch(() => ({ workers: [] }));
-    compiling = workers.some((one) => one.compiling);
+    setCompiling(workers.some((worker) => worker.compiling));
   }
+  return [compiling, ask];
+}
 
-  // The image after the newest progress; without one yet, the hint stays.
-  async function draw() {
-    const key = `${job.progress.phase} ${job.progress.done} ${job.history.length}`;
-    if (drawing || key === drawn || !job.links.preview || !job.progress.done || job.progress.phase !== "reconstructing") return;
-    drawing = true;
-    drawn = key;
-    try {
-      const record = await request(job.links.preview);
-      if (!over) picture.show(record, comparesModels(job.history) ? "candidate method" : "slice");
-    } catch {
-      // There is none yet, or no longer.
-    }
-    setTimeout(() => {
-      drawing = false;
-    }, PREVIEW_MS);
-  }
+function Links({ job, act, refresh }) {
+  const cancel = async ({ currentTarget: button }) => {
+    button.disabled = true;
+    await act(async () => {
+      await request(job.links.cancel, { method: "POST" });
+      await refresh();
+    });
+  };
+  const ended = job.kind === "reconstruction" && ["failed", "cancelled"].includes(job.state);
+  return html`<div class="links live-links">
+    ${job.links.cancel && html`<${Button} onClick=${cancel}>Cancel</${Button}>`}
+    ${ended && html`
+      <a class="button quiet" href=${`#/scans/${job.dataset}?from=${job.id}`}>Run again with changes</a>
+      <a class="button quiet" href=${`#/scans/${job.dataset}`}>Examine the scan</a>`}
+  </div>`;
+}
 
-  function showLinks() {
-    const made = [];
-    if (job.links.cancel) {
-      const cancel = make("button", "quiet", "Cancel");
-      cancel.type = "button";
-      cancel.addEventListener("click", async () => {
-        cancel.disabled = true;
-        try {
-          await request(job.links.cancel, { method: "POST" });
-          await followed.refresh();
-        } catch (problem) {
-          showProblem(problem.message);
-        }
-      });
-      made.push(cancel);
-    }
-    if (job.kind === "reconstruction" && ["failed", "cancelled"].includes(job.state)) {
-      made.push(anchor("Run again with changes", `#/scans/${job.dataset}?from=${job.id}`), anchor("Examine the scan", `#/scans/${job.dataset}`));
-    }
-    const kept = part(".live-links");
-    const labels = (nodes) => [...nodes].map((node) => node.textContent).join();
-    if (labels(kept.children) !== labels(made)) kept.replaceChildren(...made);
-  }
-
-  function showProblem(words) {
-    part(".live-error").textContent = words ?? "";
-    part(".live-error").hidden = !words;
-  }
-
-  // What can be done about a failure.
-  function advice({ type, field }) {
-    if (type === "/problems/internal") return " Ask the operator of the service, who finds the entry in its log.";
-    // Of a damaged scan the reason says it.
-    if (job.kind !== "reconstruction" || type === "/problems/stored-data-damaged") return "";
-    return field ? " Change this and run it again." : " Run it again with fewer nodes, or examine the scan.";
-  }
-
-  function show(next) {
-    // Events carry the progress alone.
-    if (next.seconds !== seconds) [seconds, received] = [next.seconds, performance.now()];
-    job = next;
-    const [summary, settings] = summaryOf(job);
-    const what = job.kind === "reconstruction" ? methodOf(job) : summary;
-    say("h1", job.name || what);
-    if (job.dataset && job.kind === "reconstruction") {
-      part(".live-scan").hidden = false;
-      part(".live-scan a").href = `#/scans/${job.dataset}`;
-    }
-    say(".live-facts", [titleOfJob(job), job.name ? `${what}: ${settings}` : settings].join(" · "));
-    const now = performance.now();
-    estimate.add(now / 1e3, job.progress, (job.seconds ?? 0) + (now - received) / 1e3);
-    if (job.plan && !part(".live-plan").childElementCount) part(".live-plan").append(planned(job.plan));
-    const views = part(".live-views");
-    if (job.kind === "reconstruction" && job.state === "running" && !picture) {
-      views.hidden = false;
-      picture = previewPicture(views);
-      curve = misfitCurve(views);
-    }
-    curve?.show(job.history);
-    if (job.error) showProblem(`${inWords(job.error)}${advice(job.error)}`);
-    showLinks();
-    tick();
-    if (job.state !== "succeeded" || over) return;
-    over = true;
-    Promise.resolve(onSuccess(job)).catch((problem) => showProblem(problem.message));
-  }
-
-  const ticking = setInterval(tick, TICK_MS);
-  const followed = followJobs({
+// Shows a job until it has succeeded, then calls onSuccess(job).
+export function LiveJob({ first, onSuccess }) {
+  const [estimate] = useState(() => new ProgressEstimate());
+  const over = useRef(false);
+  // When the running time of the job was received.
+  const clock = useRef({ seconds: first.seconds, received: performance.now() });
+  const elapsedOf = (job) => (job.seconds ?? 0) + (job.state === "running" ? (performance.now() - clock.current.received) / 1e3 : 0);
+  const [jobs, error, refresh] = useJobs({
     historyMs: HISTORY_MS,
     // Alone, since lists do not count the jobs before it.
     async read() {
@@ -210,15 +150,44 @@ export function liveJob(root, first, onSuccess) {
       await loadTitles([found]);
       return [found];
     },
-    onJobs: ([found]) => !over && show(found),
-    onError: (problem) => job.error || showProblem(problem?.message),
-  });
-  return {
-    close() {
-      over = true;
-      clearInterval(ticking);
-      followed.close();
-      picture?.close();
+    onJobs([found]) {
+      // Events carry the progress alone.
+      if (found.seconds !== clock.current.seconds) clock.current = { seconds: found.seconds, received: performance.now() };
+      estimate.add(performance.now() / 1e3, found.progress, elapsedOf(found));
+      if (found.state !== "succeeded" || over.current) return;
+      over.current = true;
+      onSuccess(found);
     },
-  };
+  });
+  const job = jobs?.[0] ?? first;
+  const [failure, act] = useAct();
+  const [preview, askPreview] = usePreview(job);
+  const [compiling, askWorkers] = useCompiling();
+  const running = job.state === "running";
+  const seen = useRef(false);
+  seen.current ||= running && job.kind === "reconstruction";
+  useTicks(() => {
+    if (running && !job.progress.done) askWorkers();
+    if (running && seen.current) askPreview();
+  });
+  const [summary, settings] = summaryOf(job);
+  const what = job.kind === "reconstruction" ? methodOf(job) : summary;
+  const problem = job.error ? `${inWords(job.error)}${advice(job)}` : failure ?? error;
+  return html`
+    <p class="crumb"><a href="#/jobs">Jobs</a>
+      ${job.dataset && job.kind === "reconstruction" && html`<span class="live-scan"> · <a href=${`#/scans/${job.dataset}`}>Scan</a></span>`}
+    </p>
+    <h1>${job.name || what}</h1>
+    <p class="facts live-facts">${jobs && titleOfJob(job)} · ${job.name ? `${what}: ${settings}` : settings}</p>
+    <section class="panel" aria-label="State">
+      <p class="live-what" role="status">${happening(job, compiling)}</p>
+      <${Progress} job=${job} estimate=${estimate} elapsed=${elapsedOf(job)} />
+      <div class="live-plan">${job.plan && html`<${Plan} plan=${job.plan} />`}</div>
+      <${Alert} className="live-error" error=${problem} />
+      <${Links} job=${job} act=${act} refresh=${refresh} />
+    </section>
+    ${seen.current && html`<section class="live-views" aria-label="Image and misfit so far">
+      <${PreviewPicture} record=${preview} what=${comparesModels(job.history) ? "candidate method" : "slice"} />
+      <${MisfitCurve} history=${job.history} />
+    </section>`}`;
 }

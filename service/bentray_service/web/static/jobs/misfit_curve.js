@@ -1,13 +1,10 @@
-// The misfit of a reconstruction after each iteration, as a curve with axes.
-import { plot } from "../viewer/plot.js";
+// The misfit of a reconstruction after each iteration: as a curve with axes, and as a small one without.
 import { inNanoseconds } from "../parts/amounts.js";
-import { make } from "../parts/dom.js";
-import { residuals } from "./job_cards.js";
+import { html } from "../parts/view.js";
+import { Plot } from "../viewer/plot.js";
 
 // Largest over smallest misfit above which a linear axis would show a flat line.
 const STEEP = 20;
-
-const WAITING = "The misfit of the first iteration follows";
 
 // Whether several models are reconstructed side by side: then an iteration of a slice occurs more than once.
 export function comparesModels(history) {
@@ -15,38 +12,51 @@ export function comparesModels(history) {
   return new Set(keys).size < keys.length;
 }
 
-// Adds a figure to a place; show(history) draws it, unless nothing has changed.
-export function misfitCurve(place) {
-  const box = make("figure", "tile misfit");
-  const hint = make("p", "hint", WAITING);
-  box.append(make("figcaption", "facts", "Misfit: measured minus predicted travel time, rms; of full waveforms the equivalent time shift"), hint);
-  place.append(box);
-  let drawn = 0;
-
+// Mean residual of each iteration over the slices, stage by stage; and the iterations at which a stage begins.
+export function residuals(history) {
+  const sums = new Map();
+  for (const { stage, sweep, residual_rms_s: value } of history) {
+    if (value === null) continue;
+    const key = `${stage} ${sweep}`;
+    const sum = sums.get(key) ?? { stage, sweep, total: 0, count: 0 };
+    sums.set(key, { ...sum, total: sum.total + value, count: sum.count + 1 });
+  }
+  const sweeps = [...sums.values()].sort((a, b) => a.stage - b.stage || a.sweep - b.sweep);
   return {
-    show(history) {
-      if (comparesModels(history)) {
-        hint.textContent = "Candidate methods are compared; the curve is that of the chosen one.";
-        hint.hidden = false;
-        box.querySelector("svg")?.remove();
-        drawn = 0;
-        return;
-      }
-      const { values, begins } = residuals(history);
-      if (values.length === drawn) return;
-      drawn = values.length;
-      box.querySelector("svg")?.remove();
-      hint.hidden = drawn > 1;
-      // One point is no curve.
-      hint.textContent = drawn ? `${inNanoseconds(values[0])} in the first iteration` : WAITING;
-      if (drawn < 2) return;
-      const stages = begins.length ? ` in ${begins.length + 1} stages` : "";
-      const label = `Misfit of ${drawn} iterations${stages}: ${inNanoseconds(values[0])} to ${inNanoseconds(values.at(-1))}`;
-      const curve = { x: values.map((_, k) => k + 1), y: values.map((value) => 1e9 * value) };
-      const logarithmic = Math.min(...values) > 0 && Math.max(...values) > STEEP * Math.min(...values);
-      const picture = plot([curve], { across: "Iteration", up: "Misfit (ns)", label, whole: true, logarithmic });
-      picture.dataset.points = drawn;
-      hint.before(picture);
-    },
+    values: sweeps.map(({ total, count }) => total / count),
+    begins: sweeps.flatMap(({ stage }, i) => (i && stage !== sweeps[i - 1].stage ? [i] : [])),
   };
+}
+
+const inStages = (begins) => (begins.length ? ` in ${begins.length + 1} stages` : "");
+
+export function Sparkline({ values, begins }) {
+  const top = Math.max(...values) || 1;
+  const across = (i) => (100 * i) / (values.length - 1);
+  const points = values.map((value, i) => `${across(i)},${39 - (36 * value) / top}`).join(" ");
+  const label = `Residual of ${values.length} iterations${inStages(begins)}`;
+  return html`<svg class="spark" viewBox="0 0 100 40" preserveAspectRatio="none" role="img" aria-label=${label}>
+    <line x1="0" x2="100" y1="39" y2="39" />
+    ${begins.map((first) => html`<line class="stage" x1=${across(first - 0.5)} x2=${across(first - 0.5)} y1="0" y2="39" />`)}
+    <polyline points=${points} />
+  </svg>`;
+}
+
+function Curve({ history }) {
+  if (comparesModels(history)) return html`<p class="hint">Candidate methods are compared; the curve is that of the chosen one.</p>`;
+  const { values, begins } = residuals(history);
+  if (!values.length) return html`<p class="hint">The misfit of the first iteration follows</p>`;
+  // One point is no curve.
+  if (values.length === 1) return html`<p class="hint">${inNanoseconds(values[0])} in the first iteration</p>`;
+  const label = `Misfit of ${values.length} iterations${inStages(begins)}: ${inNanoseconds(values[0])} to ${inNanoseconds(values.at(-1))}`;
+  const logarithmic = Math.min(...values) > 0 && Math.max(...values) > STEEP * Math.min(...values);
+  const curve = { x: values.map((_, k) => k + 1), y: values.map((value) => 1e9 * value) };
+  return html`<${Plot} curves=${[curve]} across="Iteration" up="Misfit (ns)" label=${label} whole logarithmic=${logarithmic} data-points=${values.length} />`;
+}
+
+export function MisfitCurve({ history }) {
+  return html`<figure class="tile misfit">
+    <figcaption class="facts">Misfit: measured minus predicted travel time, rms; of full waveforms the equivalent time shift</figcaption>
+    <${Curve} history=${history} />
+  </figure>`;
 }

@@ -1,120 +1,97 @@
 // Several scans with one set of settings: choose them, start one reconstruction of each, and follow them as one batch.
 import { go } from "../parts/address.js";
 import { inTime } from "../parts/amounts.js";
-import { request } from "../parts/api.js";
-import { at, make, showError } from "../parts/dom.js";
-import { settingsForm } from "../parts/settings_form.js";
+import { send } from "../parts/api.js";
+import { readSettings, SettingsForm, useSettings } from "../parts/settings_form.js";
 import { load, titleOf } from "../parts/titles.js";
+import { Alert, Button, Facts, Form, html, Labelled, useShown, useState } from "../parts/view.js";
 
-const PAGE = `
-  <p class="crumb"><a href="#/">Scans</a></p>
-  <h1>Reconstruct several scans</h1>
-  <form id="batch-form" novalidate>
-    <section class="panel" aria-labelledby="choice-title">
-      <h2 id="choice-title">Scans</h2>
-      <div class="line-form">
-        <label><span class="caption">Show scans with</span>
-          <input id="choice-filter" type="search" autocomplete="off"></label>
-        <button id="choose-all" type="button" class="quiet">Choose all shown</button>
-        <button id="choose-none" type="button" class="quiet">Choose none</button>
-      </div>
-      <ul id="choices" class="choices" aria-labelledby="choice-title"></ul>
-      <p id="choice-count" class="facts" role="status"></p>
-    </section>
-    <section class="panel" aria-labelledby="same-title">
-      <h2 id="same-title">The same for all</h2>
-      <label><span class="caption">Name of the batch</span>
-        <input name="name" type="text" maxlength="200" autocomplete="off"></label>
-      <details id="batch-own">
-        <summary>All settings</summary>
-        <div id="batch-settings"><p class="facts">Reading the settings</p></div>
-      </details>
-      <details id="batch-webhook">
-        <summary>Webhook</summary>
-        <label><span class="caption">Address that receives a signed message when each job ends</span>
-          <input name="webhook" type="url" maxlength="2000" autocomplete="off" placeholder="https://"></label>
-      </details>
-      <p class="facts">As they are, rays and method are chosen automatically for each scan.</p>
-      <button id="batch-start" type="submit" disabled>Start</button>
-      <p id="batch-error" class="error" role="alert" hidden></p>
-    </section>
-  </form>`;
+const wordsOf = (scan) => `${scan.ntx} emitters × ${scan.nrx} receivers · ${inTime(scan.created)}`;
 
-const JSON_TYPE = { "Content-Type": "application/json" };
-
-function choice(scan) {
-  const item = make("li");
-  const label = make("label");
-  const box = make("input");
-  Object.assign(box, { type: "checkbox", name: "dataset", value: scan.id });
-  const words = make("small", "", `${scan.ntx} emitters × ${scan.nrx} receivers · ${inTime(scan.created)}`);
-  label.append(box, make("span", "", titleOf(scan)), words);
-  item.append(label);
-  return item;
+// chosen: ids, as a Set.
+function Choice({ scans, chosen, onChange }) {
+  const [text, setText] = useState("");
+  const shows = (scan) => `${titleOf(scan)}${wordsOf(scan)}`.toLowerCase().includes(text);
+  const toggle = ({ target }) => {
+    const others = [...chosen].filter((id) => id !== target.value);
+    onChange(new Set(target.checked ? [...others, target.value] : others));
+  };
+  const none = scans.length ? "No scan is chosen." : "No scan is stored yet.";
+  return html`<section class="panel" aria-labelledby="choice-title">
+    <h2 id="choice-title">Scans</h2>
+    <div class="line-form">
+      <${Labelled} caption="Show scans with">
+        <input id="choice-filter" type="search" autocomplete="off" onInput=${({ target }) => setText(target.value.trim().toLowerCase())}
+          onKeyDown=${(event) => event.key === "Enter" && event.preventDefault()} />
+      </${Labelled}>
+      <${Button} id="choose-all" onClick=${() => onChange(new Set([...chosen, ...scans.filter(shows).map((scan) => scan.id)]))}>Choose all shown</${Button}>
+      <${Button} id="choose-none" onClick=${() => onChange(new Set())}>Choose none</${Button}>
+    </div>
+    <ul id="choices" class="choices" aria-labelledby="choice-title">
+      ${scans.map((scan) => html`<li key=${scan.id} hidden=${!shows(scan)}>
+        <label>
+          <input type="checkbox" name="dataset" value=${scan.id} checked=${chosen.has(scan.id)} onChange=${toggle} />
+          <span>${titleOf(scan)}</span>
+          <small>${wordsOf(scan)}</small>
+        </label>
+      </li>`)}
+    </ul>
+    <p id="choice-count" class="facts" role="status">${chosen.size ? `${chosen.size} of ${scans.length} scans chosen, one job each.` : none}</p>
+  </section>`;
 }
 
-export async function open(root) {
-  document.title = "Reconstruct several scans – Bentray";
-  const [scans, settings] = await Promise.all([load("datasets"), settingsForm()]);
-  root.innerHTML = PAGE;
-  const form = at("batch-form");
-  at("batch-settings").replaceChildren(settings.node);
-  at("choices").replaceChildren(...scans.map(choice));
-  const items = [...at("choices").children];
-  const boxes = items.map((item) => item.querySelector("input"));
-  const chosen = () => boxes.filter((box) => box.checked).map((box) => box.value);
+function Batch({ scans, groups }) {
+  const [chosen, setChosen] = useState(new Set());
+  const [{ error, opened, sending }, setState] = useState({ error: null, opened: false, sending: false });
+  const settings = useSettings(groups);
+  const shown = useShown();
 
-  function count() {
-    const { length } = chosen();
-    const none = scans.length ? "No scan is chosen." : "No scan is stored yet.";
-    at("choice-count").textContent = length ? `${length} of ${scans.length} scans chosen, one job each.` : none;
-    at("batch-start").disabled = !length;
-    at("batch-start").textContent = length ? `Start ${length === 1 ? "1 job" : `${length} jobs`}` : "Start";
+  async function start({ currentTarget: { elements } }) {
+    const same = settings.changed(true);
+    if (!same) return setState({ error: null, opened: true, sending: false });
+    const datasets = scans.map((scan) => scan.id).filter((id) => chosen.has(id));
+    const body = { datasets, name: elements.name.value.trim(), settings: same, webhook: elements.webhook.value.trim() || null };
+    setState({ error: null, opened, sending: true });
+    try {
+      const made = await send("POST", "/v1/batches", body);
+      if (shown.current) go(`/jobs?batch=${made.id}`);
+    } catch (problem) {
+      const placed = settings.refuse(problem.problem ?? {}, false);
+      setState({ error: placed ? null : problem, opened: opened || placed, sending: false });
+      // Once the settings are open.
+      if (placed) setTimeout(() => shown.current && settings.refuse(problem.problem, true));
+    }
+    return undefined;
   }
 
-  at("choice-filter").addEventListener("input", ({ target }) => {
-    const text = target.value.trim().toLowerCase();
-    items.forEach((item) => {
-      item.hidden = !item.textContent.toLowerCase().includes(text);
-    });
-  });
-  at("choose-all").addEventListener("click", () => {
-    items.forEach((item, i) => {
-      if (!item.hidden) boxes[i].checked = true;
-    });
-    count();
-  });
-  at("choose-none").addEventListener("click", () => {
-    for (const box of boxes) box.checked = false;
-    count();
-  });
-  at("choices").addEventListener("change", count);
-  // Enter in the filter is no start of a batch.
-  at("choice-filter").addEventListener("keydown", (event) => event.key === "Enter" && event.preventDefault());
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    const datasets = chosen();
-    const same = settings.changed(true);
-    if (!same || !datasets.length) {
-      at("batch-own").open ||= !same;
-      return;
-    }
-    const { name, webhook } = form.elements;
-    const body = { datasets, name: name.value.trim(), settings: same, webhook: webhook.value.trim() || null };
-    showError("batch-error", null);
-    at("batch-start").disabled = true;
-    try {
-      const made = await request("/v1/batches", { method: "POST", headers: JSON_TYPE, body: JSON.stringify(body) });
-      if (root.isConnected) go(`/jobs?batch=${made.id}`);
-    } catch (error) {
-      if (!root.isConnected) return;
-      at("batch-start").disabled = false;
-      const placed = settings.refuse(error.problem ?? {}, false);
-      at("batch-own").open ||= placed;
-      if (placed) settings.refuse(error.problem, true);
-      else showError("batch-error", error);
-    }
-  });
-  count();
-  return () => {};
+  const jobs = chosen.size === 1 ? "1 job" : `${chosen.size} jobs`;
+  return html`
+    <p class="crumb"><a href="#/">Scans</a></p>
+    <h1>Reconstruct several scans</h1>
+    <${Form} id="batch-form" novalidate onSubmit=${start}>
+      <${Choice} scans=${scans} chosen=${chosen} onChange=${setChosen} />
+      <section class="panel" aria-labelledby="same-title">
+        <h2 id="same-title">The same for all</h2>
+        <${Labelled} caption="Name of the batch"><input name="name" type="text" maxlength="200" autocomplete="off" /></${Labelled}>
+        <details id="batch-own" open=${opened} onToggle=${({ target }) => setState((before) => ({ ...before, opened: target.open }))}>
+          <summary>All settings</summary>
+          <div id="batch-settings"><${SettingsForm} groups=${groups} form=${settings} /></div>
+        </details>
+        <details id="batch-webhook">
+          <summary>Webhook</summary>
+          <${Labelled} caption="Address that receives a signed message when each job ends">
+            <input name="webhook" type="url" maxlength="2000" autocomplete="off" placeholder="https://" />
+          </${Labelled}>
+        </details>
+        <${Facts}>As they are, rays and method are chosen automatically for each scan.</${Facts}>
+        <button id="batch-start" type="submit" disabled=${sending || !chosen.size}>${chosen.size ? `Start ${jobs}` : "Start"}</button>
+        <${Alert} id="batch-error" error=${error} />
+      </section>
+    </${Form}>`;
+}
+
+export async function open() {
+  document.title = "Reconstruct several scans – Bentray";
+  const [scans, groups] = await Promise.all([load("datasets"), readSettings()]);
+  return html`<${Batch} scans=${scans} groups=${groups} />`;
 }

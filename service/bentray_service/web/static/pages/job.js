@@ -1,45 +1,42 @@
 // One job: its progress while it runs, then its result; and below it the messages to its webhook.
-import { parse } from "../parts/address.js";
+import { JobList } from "../jobs/job_list.js";
+import { LiveJob } from "../jobs/live_job.js";
+import { WebhookPanel } from "../jobs/webhook_panel.js";
 import { request } from "../parts/api.js";
-import { make } from "../parts/dom.js";
-import { jobList } from "../jobs/job_list.js";
-import { liveJob } from "../jobs/live_job.js";
-import { showWebhook } from "../jobs/webhook_panel.js";
+import { Alert, html, useShown, useState } from "../parts/view.js";
 
-export async function open(page, parameters) {
-  const { id } = parameters;
-  const [root, below] = [make("div"), make("div")];
-  page.append(root, below);
-  const closeMain = await openMain(root, parameters);
-  const closeWebhook = showWebhook(below, id);
-  return () => {
-    closeWebhook();
-    closeMain();
-  };
+const resultOf = async (parameters) => (await import("./result.js")).open(parameters);
+
+// result: the view of a reconstruction that has succeeded already.
+function Job({ job, result: ready, query, id }) {
+  const [result, setResult] = useState(ready);
+  const [error, setError] = useState(null);
+  const shown = useShown();
+
+  async function onSuccess(ended) {
+    // Who asked for a sample wants its scan, and "back" to lead to the start.
+    if (query.get("then") === "scan" && ended.kind === "simulation") {
+      location.replace(`#/scans/${ended.dataset}`);
+      return;
+    }
+    try {
+      const view = ended.kind === "reconstruction" ? await resultOf({ id, query }) : html`<${JobList} read=${async () => [await request(`/v1/jobs/${id}`)]} />`;
+      // The reader may have gone on in the meantime.
+      if (shown.current) setResult(view);
+    } catch (problem) {
+      setError(problem);
+    }
+  }
+
+  return html`
+    <div>${result ?? html`<${LiveJob} first=${job} onSuccess=${onSuccess} />`}</div>
+    <${Alert} error=${error} />
+    <${WebhookPanel} id=${id} />`;
 }
 
-async function openMain(root, parameters) {
-  const { id } = parameters;
-  // Who asked for a sample wants its scan, and "back" to lead to the start.
-  const opensScan = parse(location.hash).query.get("then") === "scan";
-  const result = async () => (await import("./result.js")).open(root, parameters);
+export async function open({ id, query }) {
   const job = await request(`/v1/jobs/${id}`);
-  if (job.kind === "reconstruction" && job.state === "succeeded") return result();
-  document.title = "Job – Bentray";
-  let left = false;
-  let close = () => {};
-  const live = liveJob(root, job, async (ended) => {
-    if (opensScan && ended.kind === "simulation") return location.replace(`#/scans/${ended.dataset}`);
-    live.close();
-    root.replaceChildren();
-    const opened = ended.kind === "reconstruction" ? await result() : jobList(root, { read: async () => [await request(`/v1/jobs/${id}`)] }).close;
-    // The reader may have gone on in the meantime.
-    if (left) opened();
-    else close = opened;
-  });
-  return () => {
-    left = true;
-    live.close();
-    close();
-  };
+  const finished = job.kind === "reconstruction" && job.state === "succeeded";
+  if (!finished) document.title = "Job – Bentray";
+  return html`<${Job} job=${job} id=${id} query=${query} result=${finished ? await resultOf({ id, query }) : null} />`;
 }

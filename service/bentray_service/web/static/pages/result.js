@@ -1,126 +1,98 @@
 // The result of a reconstruction: image to measure in, how it was made, and what can be done with it.
+import { methodOf } from "../jobs/job_words.js";
 import { go, keepQuery } from "../parts/address.js";
 import { inTime } from "../parts/amounts.js";
-import { request } from "../parts/api.js";
+import { request, send } from "../parts/api.js";
 import { curlOf, pythonOf } from "../parts/code_snippets.js";
-import { copyButton } from "../parts/copying.js";
-import { make, showError } from "../parts/dom.js";
-import { exportMenu } from "../parts/export_menu.js";
-import { menuOf } from "../parts/menu.js";
-import { deleteStored } from "../parts/panel.js";
-import { provenanceTable } from "../parts/provenance.js";
-import { choiceTable, facts, planTable, truthTable } from "../parts/result_tables.js";
-import { loadResult, methodOf, nameOf } from "../parts/results.js";
+import { CopyButton } from "../parts/copying.js";
+import { ExportMenu } from "../parts/export_menu.js";
+import { Menu } from "../parts/menu.js";
+import { Provenance } from "../parts/provenance.js";
+import { ChoiceTable, facts, PlanTable, TruthTable } from "../parts/result_tables.js";
+import { loadResult, nameOf } from "../parts/results.js";
+import { Alert, Button, Facts, Form, html, useAct, useEffect, useRead, useRef, useState } from "../parts/view.js";
 import { QUANTITIES } from "../viewer/quantities.js";
 import { stateOf } from "../viewer/state.js";
-import { viewer } from "../viewer/viewer.js";
-
-const PAGE = `
-  <p class="crumb"><a href="#/jobs">Jobs</a> · <a id="result-scan">Scan</a></p>
-  <h1 id="result-name"></h1>
-  <p id="result-facts" class="facts"></p>
-  <div id="result-cautions"></div>
-  <div id="result-actions" class="links"></div>
-  <form id="rename" class="rename" hidden>
-    <label>Name <input name="name" type="text" maxlength="200"></label>
-    <button type="submit">Rename</button>
-  </form>
-  <p id="result-error" class="error" role="alert" hidden></p>
-  <section id="result-viewer" aria-label="Image"></section>
-  <div id="result-tables" class="result-tables"></div>`;
-
-const JSON_TYPE = { "Content-Type": "application/json" };
-
-function button(title, onClick) {
-  const made = make("button", "quiet", title);
-  made.type = "button";
-  made.addEventListener("click", onClick);
-  return made;
-}
+import { Viewer } from "../viewer/viewer.js";
 
 // Results of other jobs to compare this one with, at most three.
-async function compareMenu(job) {
-  const { jobs } = await request("/v1/jobs?kind=reconstruction&state=succeeded&limit=100");
-  const others = jobs.filter((one) => one.id !== job.id).sort((a, b) => (b.dataset === job.dataset) - (a.dataset === job.dataset));
+function CompareMenu({ job }) {
+  const [found] = useRead(() => request("/v1/jobs?kind=reconstruction&state=succeeded&limit=100"));
+  const [chosen, setChosen] = useState([]);
+  const isSame = (other) => other.dataset === job.dataset;
+  const others = found?.jobs.filter((other) => other.id !== job.id).sort((a, b) => isSame(b) - isSame(a)) ?? [];
   if (!others.length) return null;
-  const form = make("form");
-  const list = make("div", "others");
-  for (const one of others) {
-    const label = make("label");
-    const box = make("input");
-    Object.assign(box, { type: "checkbox", name: "other", value: one.id });
-    const same = one.dataset === job.dataset ? "this scan" : "another scan";
-    label.append(box, ` ${one.name || methodOf(one)}, ${same}, ${inTime(one.created)}`);
-    list.append(label);
-  }
-  const start = make("button", "", "Compare");
-  start.type = "submit";
-  const sync = () => {
-    const chosen = form.querySelectorAll("input:checked").length;
-    start.disabled = chosen < 1 || chosen > 3;
-  };
-  form.addEventListener("change", sync);
-  sync();
-  form.append(list, make("p", "facts", "One to three others"), start);
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    go(`/compare/${[job.id, ...new FormData(form).getAll("other")].join(",")}`);
-  });
-  return menuOf("Compare with", form);
+  const choose = ({ currentTarget }) => setChosen(new FormData(currentTarget).getAll("other"));
+  return html`<${Menu} title="Compare with">
+    <${Form} class="sheet" onChange=${choose} onSubmit=${() => go(`/compare/${[job.id, ...chosen].join(",")}`)}>
+      <div class="others">
+        ${others.map((other) => html`<label key=${other.id}><input type="checkbox" name="other" value=${other.id} /> ${" "}
+          ${other.name || methodOf(other)}, ${isSame(other) ? "this scan" : "another scan"}, ${inTime(other.created)}</label>`)}
+      </div>
+      <${Facts}>One to three others</${Facts}>
+      <button type="submit" disabled=${chosen.length < 1 || chosen.length > 3}>Compare</button>
+    </${Form}>
+  </${Menu}>`;
 }
 
-export async function open(root, { id, query }) {
-  const result = await loadResult(id);
-  const { job, volume, summary } = result;
-  root.innerHTML = PAGE;
-  root.classList.add("wide");
-  const part = (name) => root.querySelector(`#${name}`);
-  const entitle = () => {
-    document.title = `${nameOf(result)} – Bentray`;
-    part("result-name").textContent = nameOf(result);
-  };
-  entitle();
-  part("result-facts").textContent = facts(result);
-  part("result-cautions").append(...summary.cautions.map((one) => {
-    const notice = make("p", one.doubtful ? "error" : "notice", `${one.doubtful ? "Doubtful result. " : ""}${one.text}`);
-    notice.setAttribute("role", "note");
-    return notice;
-  }));
-  part("result-scan").href = `#/scans/${job.dataset}`;
-  const shown = viewer(part("result-viewer"), [{ title: nameOf(result), values: result.values, stored: summary.quantities }], stateOf(query), keepQuery);
-  const stored = () => QUANTITIES[shown.state.quantity].reads[0];
-
-  const rename = part("rename");
-  rename.elements.name.value = job.name || "";
-  rename.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    try {
-      const name = new FormData(rename).get("name").trim();
-      result.job = await request(job.links.self, { method: "PATCH", headers: JSON_TYPE, body: JSON.stringify({ name }) });
-      rename.hidden = true;
-      entitle();
-    } catch (error) {
-      showError("result-error", error);
-    }
-  });
-  const remove = button("Delete", async () => {
-    if (await deleteStored(volume.links.self, `the result ${nameOf(result)}`, "result-error")) go("/jobs");
-  });
-  const again = make("a", "button quiet", "Run again with changes");
-  again.href = `#/scans/${job.dataset}?from=${job.id}`;
-  part("result-actions").append(
-    exportMenu(result, shown.state),
-    copyButton("Copy link", () => location.href),
-    copyButton("Copy as Python", () => pythonOf(result, stored())),
-    copyButton("Copy as curl", () => curlOf(result, stored())),
-    again,
-    remove,
-  );
-  remove.before(button("Rename", () => {
-    rename.hidden = !rename.hidden;
-    if (!rename.hidden) rename.elements.name.focus();
-  }));
-  compareMenu(job).then((menu) => menu && part("result-actions")?.prepend(menu), () => {});
-  part("result-tables").append(...[choiceTable(summary, job), truthTable(summary), planTable(job), provenanceTable(result)].filter(Boolean));
-  return shown.close;
+function Rename({ job, onRename }) {
+  const field = useRef(null);
+  useEffect(() => field.current.focus(), []);
+  const rename = ({ currentTarget: { elements } }) => onRename(elements.name.value.trim());
+  return html`<${Form} id="rename" class="rename" onSubmit=${rename}>
+    <label>Name <input name="name" type="text" maxlength="200" ref=${field} defaultValue=${job.name || ""} /></label>
+    <button type="submit">Rename</button>
+  </${Form}>`;
 }
+
+function Result({ result: first, query }) {
+  const [job, setJob] = useState(first.job);
+  const [state] = useState(() => stateOf(query));
+  const [renaming, setRenaming] = useState(false);
+  const [error, act] = useAct();
+  const result = { ...first, job };
+  const { volume, summary, values } = result;
+  const name = nameOf(result);
+  useEffect(() => {
+    document.title = `${name} – Bentray`;
+  }, [name]);
+
+  const rename = (changed) => act(async () => {
+    setJob(await send("PATCH", job.links.self, { name: changed }));
+    setRenaming(false);
+  });
+  const remove = () => confirm(`Delete the result ${name} for good?`) && act(async () => {
+    await request(volume.links.self, { method: "DELETE" });
+    go("/jobs");
+  });
+  const stored = () => QUANTITIES[state.quantity].reads[0];
+  return html`<div class="wide">
+    <p class="crumb"><a href="#/jobs">Jobs</a> · <a id="result-scan" href=${`#/scans/${job.dataset}`}>Scan</a></p>
+    <h1 id="result-name">${name}</h1>
+    <p id="result-facts" class="facts">${facts(result)}</p>
+    <div id="result-cautions">
+      ${summary.cautions.map(({ doubtful, text }) => html`<p class=${doubtful ? "error" : "notice"} role="note">${doubtful && "Doubtful result. "}${text}</p>`)}
+    </div>
+    <div id="result-actions" class="links">
+      <${CompareMenu} job=${job} />
+      <${ExportMenu} result=${result} state=${state} />
+      <${CopyButton} title="Copy link" text=${() => location.href} />
+      <${CopyButton} title="Copy as Python" text=${() => pythonOf(result, stored())} />
+      <${CopyButton} title="Copy as curl" text=${() => curlOf(result, stored())} />
+      <a class="button quiet" href=${`#/scans/${job.dataset}?from=${job.id}`}>Run again with changes</a>
+      <${Button} onClick=${() => setRenaming(!renaming)}>Rename</${Button}>
+      <${Button} onClick=${remove}>Delete</${Button}>
+    </div>
+    ${renaming && html`<${Rename} job=${job} onRename=${rename} />`}
+    <${Alert} id="result-error" error=${error} />
+    <${Viewer} panes=${[{ title: name, values, stored: summary.quantities }]} state=${state} keep=${keepQuery} id="result-viewer" aria-label="Image" />
+    <div id="result-tables" class="result-tables">
+      <${ChoiceTable} ...${summary} advice=${job.advice} />
+      <${TruthTable} truth=${summary.truth} />
+      <${PlanTable} plan=${job.plan} />
+      <${Provenance} job=${job} volume=${volume} />
+    </div>
+  </div>`;
+}
+
+export const open = async ({ id, query }) => html`<${Result} result=${await loadResult(id)} query=${query} />`;

@@ -1,63 +1,15 @@
 // One scan: its geometry, facts, quality and traces, the reconstruction to start, and the reconstructions of it.
-import { request } from "../parts/api.js";
-import { at, make, showError } from "../parts/dom.js";
-import { jobList } from "../jobs/job_list.js";
-import { show, withKey } from "../parts/key.js";
-import { startJob } from "../parts/panel.js";
-import { planInWords, planOf, queueInWords, timeInWords } from "../parts/plan_estimate.js";
-import { drawElements, inWordsOf } from "../scans/scan_drawing.js";
-import { correctButton, scanEditor } from "../scans/scan_edit.js";
-import { factRows, fillFacts, showQuality } from "../scans/scan_facts.js";
-import { settingsForm } from "../parts/settings_form.js";
-import { openShot } from "../scans/shot.js";
+import { JobList } from "../jobs/job_list.js";
+import { request, send } from "../parts/api.js";
+import { KeyLink, Picture } from "../parts/key.js";
+import { planInWords, planOf, waitInWords } from "../parts/plan_estimate.js";
+import { readSettings, SettingsForm, useSettings } from "../parts/settings_form.js";
 import { titleOf } from "../parts/titles.js";
-
-const PAGE = `
-  <h1 id="scan-name"></h1>
-  <p id="dataset-facts" class="facts"></p>
-  <div id="scan-editor"></div>
-  <section aria-labelledby="run-title" class="panel">
-    <h2 id="run-title">Reconstruction</h2>
-    <form id="run" novalidate>
-      <div class="presets">
-        <button id="start" type="submit" value="fast">Fast
-          <small>rays and method chosen automatically</small>
-          <small class="time" id="fast-time">…</small></button>
-        <button id="best" type="submit" value="best">Best
-          <small id="best-words">then full waveform, where it predicts unused traces better</small>
-          <small class="time" id="best-time">…</small></button>
-      </div>
-      <details id="run-own">
-      <summary>All settings</summary>
-      <div id="run-settings"><p class="facts">Reading the settings</p></div>
-      <p id="own-plan" class="facts" role="status"></p>
-      <button id="start-own" type="submit" value="own" disabled>Start</button>
-      </details>
-      <p id="run-error" class="error" role="alert" hidden></p>
-    </form>
-  </section>
-  <section aria-labelledby="jobs-title" id="of-scan">
-    <h2 id="jobs-title">Reconstructions of this scan</h2>
-  </section>
-  <section aria-labelledby="about-title" class="panel">
-    <h2 id="about-title">Geometry and quality</h2>
-    <div class="about">
-      <figure id="elements" class="figure"></figure>
-      <div>
-        <dl id="scan-facts" class="terms"></dl>
-        <p id="geometry-error" class="error" role="alert" hidden></p>
-        <h3>Quality</h3>
-        <div id="quality"><p class="facts">Checking the scan</p></div>
-        <p id="quality-error" class="error" role="alert" hidden></p>
-      </div>
-    </div>
-    <details id="quality-more">
-      <summary>Matrix and histogram of the travel times, excluded pairs</summary>
-      <img id="quality-picture" class="report" alt="Traces with picks, matrix and histogram of the travel times, excluded pairs with reasons, findings">
-      <p><a id="quality-page" target="_blank" rel="noopener">Quality report as an image</a></p>
-    </details>
-  </section>
-  <section aria-labelledby="shot-title" class="panel" id="traces" hidden></section>`;
+import { Alert, Button, Facts, Form, html, useAct, useEffect, useLater, useRead, useRef, useState } from "../parts/view.js";
+import { Elements, inWordsOf } from "../scans/scan_drawing.js";
+import { ScanEditor } from "../scans/scan_edit.js";
+import { factRows, Quality } from "../scans/scan_facts.js";
+import { Shot } from "../scans/shot.js";
 
 // Settings of the two buttons. Best may take half an hour of one processor core for full waveforms.
 const PRESETS = { fast: { method: "auto" }, best: { method: "auto", minutes: 30 } };
@@ -71,173 +23,156 @@ function factsOf(scan) {
   return `${scan.ntx} emitters × ${scan.nrx} receivers · ${times}${slices} · ${water}`;
 }
 
-// The time of each button, by a plan of the service; a plan that is refused says why.
-function presetTimes(scan) {
-  let number = 0;
-  return () => {
-    const mine = ++number;
-    for (const [name, settings] of Object.entries(PRESETS)) {
-      const show = (textContent, title = "") => {
-        if (mine === number && at(`${name}-time`)) Object.assign(at(`${name}-time`), { textContent, title });
-      };
-      planOf({ kind: "reconstruction", dataset: scan.id, settings }).then(
-        (estimate) => show([timeInWords(estimate), queueInWords(estimate)].filter(Boolean).join(", "), estimate.basis),
-        (error) => show(error.message),
-      );
-    }
-  };
+// A button with the time that its settings take; a plan that is refused says why. changes: of jobs, which change the time.
+function Preset({ id, name, title, words, scan, changes }) {
+  const job = { kind: "reconstruction", dataset: scan.id, settings: PRESETS[name] };
+  const [estimate, error] = useRead(() => planOf(job), undefined, changes);
+  return html`<button id=${id} type="submit" value=${name}>${title}
+    <small id=${`${name}-words`}>${words}</small>
+    <small class="time" id=${`${name}-time`} title=${estimate?.basis}>${estimate ? waitInWords(estimate) : error?.message ?? "…"}</small></button>`;
 }
 
-// All settings as a form, those of an earlier job in it to run it again with changes. Returns close() and own().
-async function showSettings(scan, from) {
-  const form = await settingsForm();
-  const earlier = from && (await request(`/v1/jobs/${from}`).catch((error) => showError("run-error", error)));
-  if (!at("run-settings")) return { close() {} };
-  at("run-settings").replaceChildren(form.node);
-  if (earlier) {
-    form.fill(earlier.settings);
-    at("run-own").open = true;
-  }
-  let timer = 0;
-  let number = 0;
+// The plan of the settings in the form, in words: [words, later]; later() asks for it a moment after a change.
+function usePlan(scan, form) {
+  const [words, setWords] = useState("");
+  const wait = useLater();
+  const number = useRef(0);
   // A setting that the service refuses is told at its field before anything is started.
-  const plan = async () => {
-    const mine = ++number;
+  async function plan() {
+    number.current += 1;
+    const mine = number.current;
     const settings = form.changed(false);
-    if (!settings) {
-      at("own-plan").textContent = "";
-      return;
-    }
-    let words = "";
-    let refused = null;
-    try {
-      const estimate = await planOf({ kind: "reconstruction", dataset: scan.id, settings });
-      words = `${planInWords(estimate)}. ${estimate.basis}`;
-    } catch (error) {
-      refused = error;
-    }
-    if (mine !== number || !at("own-plan")) return;
-    at("own-plan").textContent = words;
-    if (refused && !form.refuse(refused.problem ?? {}, false)) at("own-plan").textContent = refused.message;
-  };
-  const later = () => {
-    clearTimeout(timer);
-    timer = setTimeout(plan, PLAN_MS);
-  };
-  form.node.addEventListener("input", later);
-  at("run-own").addEventListener("toggle", () => at("run-own")?.open && later());
-  if (earlier) later();
-  at("start-own").disabled = false;
-  return { form, close: () => clearTimeout(timer) };
-}
-
-// The elements and the facts; a function that marks the element that emits.
-function showGeometry(scan, geometry, editor) {
-  const { picture, mark } = drawElements(geometry);
-  const words = make("figcaption", "facts", `${inWordsOf(geometry)}. Circles emit, dots receive.`);
-  at("elements").replaceChildren(picture, words);
-  fillFacts(at("scan-facts"), factRows(geometry, scan));
-  at("scan-facts").querySelector("[data-term=Water]").append(" ", correctButton(editor.openWater));
-  editor.propose(geometry.proposed_corrections);
-  return mark;
-}
-
-// What workers read from the scan, each part on its own, so that one that fails hides no other. Returns close().
-function showScan(scan, editor) {
-  const page = `/v1/datasets/${scan.id}/quality.png`;
-  at("quality-page").href = page;
-  let reported = false;
-  const drawPage = () => {
-    if (reported || !at("quality-more").open) return;
-    reported = true;
-    // Another fragment after another temperature, or the browser would keep the picture that it has.
-    show(at("quality-picture"), `${page}#${scan.water_temperature_c ?? ""}`);
-  };
-  at("quality-more").ontoggle = drawPage;
-  drawPage();
-  at("quality").replaceChildren(make("p", "facts", "Checking the scan"));
-  for (const id of ["geometry-error", "quality-error"]) showError(id, null);
-  // What arrives after the page, or this view of the scan, was closed is left out.
-  let closed = false;
-  const unless = (show) => (found) => (closed ? () => {} : show(found));
-  const geometry = request(`/v1/datasets/${scan.id}/geometry`);
-  const drawn = geometry.then(unless((found) => showGeometry(scan, found, editor))).catch(
-    unless((error) => {
-      showError("geometry-error", error);
-      return () => {};
-    }),
-  );
-  request(`/v1/datasets/${scan.id}/quality`).then(
-    unless((report) => showQuality(at("quality"), report, scan.slices > 1)),
-    unless((error) => {
-      at("quality").replaceChildren();
-      showError("quality-error", error);
-    }),
-  );
-  let closeShot = () => {};
-  if (scan.has_traces) {
-    at("traces").hidden = false;
-    closeShot = openShot(at("traces"), scan, geometry, (element) => drawn.then((mark) => mark(element)));
+    if (!settings) return setWords("");
+    const [estimate, refused] = await planOf({ kind: "reconstruction", dataset: scan.id, settings }).then((found) => [found], (error) => [null, error]);
+    if (mine !== number.current) return undefined;
+    if (estimate) return setWords(`${planInWords(estimate)}. ${estimate.basis}`);
+    return setWords(form.refuse(refused.problem ?? {}, false) ? "" : refused.message);
   }
-  return () => {
-    closed = true;
-    closeShot();
-  };
+  return [words, () => wait(plan, PLAN_MS)];
 }
 
-export async function open(root, { id, query }) {
-  const scan = await request(`/v1/datasets/${id}`);
-  root.innerHTML = PAGE;
-  withKey(at("quality-page"));
-  const entitle = (shown) => {
-    document.title = `${titleOf(shown)} – Bentray`;
-    at("scan-name").textContent = titleOf(shown);
-    at("dataset-facts").textContent = factsOf(shown);
-  };
-  entitle(scan);
-  if (!scan.has_traces) at("best-words").textContent = "the same here: full waveforms need traces, and the file has none";
-  const showTimes = presetTimes(scan);
-  showTimes();
-  let states = null;
-  const jobs = jobList(at("of-scan"), {
-    // A job that ends changes the estimates, one that waits the place in the queue.
-    onJobs(all) {
-      const now = all.map((job) => job.id + job.state).join();
-      if (states !== null && states !== now) showTimes();
-      states = now;
-    },
-    empty: "Nothing has run yet. Press Fast or Best. The image appears here.",
-    filters: { kind: "reconstruction", text: id },
-  });
-  let own = { close() {} };
-  at("run").addEventListener("submit", (event) => {
-    event.preventDefault();
-    const settings = PRESETS[event.submitter?.value ?? "fast"] ?? own.form.changed(true);
-    if (!settings) return;
-    const refused = (error) => event.submitter?.value === "own" && own.form.refuse(error.problem ?? {}, true);
-    startJob({ kind: "reconstruction", dataset: id, settings }, "run-error", jobs.refresh, refused);
-  });
-  let closed = false;
-  showSettings(scan, query.get("from")).then(
-    (made) => {
-      own = made;
-      if (closed) own.close();
-    },
-    (error) => showError("run-error", error),
-  );
-  let water = scan.water_temperature_c;
-  const editor = scanEditor(at("scan-editor"), scan, (changed) => {
-    entitle(changed);
-    if (changed.water_temperature_c === water) return;
-    water = changed.water_temperature_c;
-    closeShot();
-    closeShot = showScan(changed, editor);
-  });
-  let closeShot = showScan(scan, editor);
-  return () => {
-    closed = true;
-    own.close();
-    closeShot();
-    jobs.close();
-  };
+// from: the id of a job whose settings are run again with changes; changes: of jobs; onStarted() is called after a start.
+function Run({ scan, from, changes, onStarted }) {
+  const [read, readError] = useRead(() => Promise.all([
+    readSettings(),
+    from && request(`/v1/jobs/${from}`).catch((problem) => setError(problem)),
+  ]));
+  const [groups, earlier] = read ?? [];
+  const [opened, setOpened] = useState(false);
+  const [error, act, setError] = useAct();
+  const form = useSettings(groups);
+  const [plan, later] = usePlan(scan, form);
+  useEffect(() => {
+    if (earlier) setOpened(true);
+  }, [earlier]);
+
+  function start({ submitter }) {
+    const own = submitter?.value === "own";
+    const settings = own ? form.changed(true) : PRESETS[submitter?.value ?? "fast"];
+    if (settings) act(async () => {
+      const started = send("POST", "/v1/jobs", { kind: "reconstruction", dataset: scan.id, settings });
+      await started.then(onStarted, (problem) => {
+        if (!own || !form.refuse(problem.problem ?? {}, true)) throw problem;
+      });
+    });
+  }
+
+  const best = scan.has_traces ? "then full waveform, where it predicts unused traces better" : "the same here: full waveforms need traces, and the file has none";
+  return html`<section aria-labelledby="run-title" class="panel">
+    <h2 id="run-title">Reconstruction</h2>
+    <${Form} id="run" novalidate onSubmit=${start}>
+      <div class="presets">
+        <${Preset} id="start" name="fast" title="Fast" words="rays and method chosen automatically" scan=${scan} changes=${changes} />
+        <${Preset} id="best" name="best" title="Best" words=${best} scan=${scan} changes=${changes} />
+      </div>
+      <details id="run-own" open=${opened} onToggle=${({ target }) => {
+        setOpened(target.open);
+        if (target.open && groups) later();
+      }}>
+        <summary>All settings</summary>
+        <div id="run-settings"><${SettingsForm} groups=${groups} earlier=${earlier?.settings} form=${form} onInput=${later} /></div>
+        <p id="own-plan" class="facts" role="status">${plan}</p>
+        <button id="start-own" type="submit" value="own" disabled=${!groups}>Start</button>
+      </details>
+      <${Alert} id="run-error" error=${error ?? readError} />
+    </${Form}>
+  </section>`;
+}
+
+// element: the one that emits; openWater(): opens the form of the water.
+function About({ scan, geometry, geometryError, element, openWater }) {
+  const address = `/v1/datasets/${scan.id}/quality`;
+  const water = scan.water_temperature_c ?? "";
+  const [report, error] = useRead(() => request(address), undefined, water);
+  const [opened, setOpened] = useState(false);
+  return html`<section aria-labelledby="about-title" class="panel">
+    <h2 id="about-title">Geometry and quality</h2>
+    <div class="about">
+      <figure id="elements" class="figure">
+        ${geometry && html`
+          <${Elements} geometry=${geometry} chosen=${element} />
+          <figcaption class="facts">${inWordsOf(geometry)}. Circles emit, dots receive.</figcaption>`}
+      </figure>
+      <div>
+        <dl id="scan-facts" class="terms">
+          ${geometry && factRows(geometry, scan).map(([term, value]) => html`
+            <dt>${term}</dt>
+            <dd data-term=${term}>${value}
+              ${term === "Water" && html` <${Button} aria-label="Correct the water temperature" onClick=${openWater}>Correct</${Button}>`}</dd>`)}
+        </dl>
+        <${Alert} id="geometry-error" error=${geometryError} />
+        <h3>Quality</h3>
+        <div id="quality">
+          ${report && html`<${Quality} report=${report} several=${scan.slices > 1} />`}
+          ${!report && !error && html`<${Facts}>Checking the scan</${Facts}>`}
+        </div>
+        <${Alert} id="quality-error" error=${error} />
+      </div>
+    </div>
+    <details id="quality-more" onToggle=${({ target }) => setOpened(opened || target.open)}>
+      <summary>Matrix and histogram of the travel times, excluded pairs</summary>
+      ${/* Another fragment after another temperature, or the browser would keep the picture that it has. */
+        opened && html`<${Picture} id="quality-picture" class="report" address=${`${address}.png#${water}`}
+          alt="Traces with picks, matrix and histogram of the travel times, excluded pairs with reasons, findings" />`}
+      <p><${KeyLink} id="quality-page" href=${`${address}.png`} target="_blank" rel="noopener">Quality report as an image</${KeyLink}></p>
+    </details>
+  </section>`;
+}
+
+function Scan({ scan: first, from }) {
+  const [scan, setScan] = useState(first);
+  const [changes, setChanges] = useState(0);
+  const states = useRef(null);
+  const [element, setElement] = useState(null);
+  const [refresh, openWater] = [useRef(null), useRef(null)];
+  const water = scan.water_temperature_c ?? "";
+  const [geometry, geometryError] = useRead(() => request(`/v1/datasets/${scan.id}/geometry`), undefined, water);
+  useEffect(() => {
+    document.title = `${titleOf(scan)} – Bentray`;
+  }, [scan]);
+  // A job that ends changes the estimates, one that waits the place in the queue.
+  function onJobs(jobs) {
+    const now = jobs.map((job) => job.id + job.state).join();
+    if (states.current !== null && states.current !== now) setChanges((count) => count + 1);
+    states.current = now;
+  }
+  const hasWater = geometry ? geometry.water_shot : geometryError ? false : null;
+  return html`
+    <h1 id="scan-name">${titleOf(scan)}</h1>
+    <p id="dataset-facts" class="facts">${factsOf(scan)}</p>
+    <${ScanEditor} scan=${scan} proposed=${geometry?.proposed_corrections ?? []} onChange=${setScan} openWater=${openWater} />
+    <${Run} scan=${scan} from=${from} changes=${changes} onStarted=${() => refresh.current()} />
+    <section aria-labelledby="jobs-title" id="of-scan">
+      <h2 id="jobs-title">Reconstructions of this scan</h2>
+      <${JobList} refresh=${refresh} empty="Nothing has run yet. Press Fast or Best. The image appears here."
+        filters=${{ kind: "reconstruction", text: scan.id }} onJobs=${onJobs} />
+    </section>
+    <${About} scan=${scan} geometry=${geometry} geometryError=${geometryError} element=${element} openWater=${() => openWater.current()} />
+    ${scan.has_traces && html`<section aria-labelledby="shot-title" class="panel" id="traces">
+      <${Shot} key=${water} scan=${scan} hasWater=${hasWater} onEmission=${setElement} />
+    </section>`}`;
+}
+
+export async function open({ id, query }) {
+  return html`<${Scan} scan=${await request(`/v1/datasets/${id}`)} from=${query.get("from")} />`;
 }

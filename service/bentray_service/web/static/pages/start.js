@@ -1,59 +1,16 @@
 // Start: upload a scan, and the list of scans.
+import { go, keepQuery, pick } from "../parts/address.js";
 import { inTime } from "../parts/amounts.js";
-import { at, make, showError } from "../parts/dom.js";
-import { go, keepQuery } from "../parts/address.js";
-import { request } from "../parts/api.js";
+import { request, send } from "../parts/api.js";
+import { DropZone } from "../parts/drop_zone.js";
+import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { titleOf } from "../parts/titles.js";
-import { startJob } from "../parts/panel.js";
-import { uploads } from "../parts/uploads.js";
+import { Alert, Button, Facts, Form, html, Labelled, Options, useAct, useEffect, useRef, useShown, useState } from "../parts/view.js";
 
-const PAGE = `
-  <h1>Scans</h1>
-  <section aria-labelledby="scan-title" class="panel">
-    <h2 id="scan-title">Upload a scan</h2>
-    <div id="scan-place" data-accept=".h5,.hdf5,.mat,.npz,.zip,application/x-hdf5" data-prompt="Choose a file" data-formats="HDF5 (uct-transmission, zea, openUSCT), MATLAB, NumPy, zip of k-Wave or KIT 3D USCT"></div>
-    <details id="scan-own">
-      <summary>Own variables, units, water</summary>
-      <form id="own">
-        <label><span class="caption">Variables, FIELD=NAME</span>
-          <input name="map" type="text" spellcheck="false" placeholder="element_position=pos, delta_tof=dtof"></label>
-        <div class="numbers">
-          <label><span class="caption">Lengths</span>
-            <select name="unit"><option value="">m</option><option>mm</option><option>cm</option><option value="um">µm</option></select></label>
-          <label><span class="caption">Times</span>
-            <select name="unit"><option value="">s</option><option value="us">µs</option><option>ms</option><option>ns</option></select></label>
-          <label><span class="caption">Water, °C</span>
-            <input name="temperature_c" type="number" step="any"></label>
-          <label><span class="caption">Frequency, Hz</span>
-            <input name="frequency_hz" type="number" step="any"></label>
-        </div>
-        <button id="scan-again" type="submit" class="quiet" disabled>Send the file again</button>
-      </form>
-    </details>
-  </section>
-  <section aria-labelledby="sample-title" class="panel">
-    <h2 id="sample-title">No scan at hand?</h2>
-    <p>Simulate a small scan of a 2-D breast phantom, with traces and the truth to compare with. It takes some seconds.</p>
-    <button id="sample" type="button">Simulate a sample scan</button>
-    <p id="sample-error" class="error" role="alert" hidden></p>
-  </section>
-  <section aria-labelledby="scans-title">
-    <h2 id="scans-title">Stored scans</h2>
-    <p id="scans-error" class="error" role="alert" hidden></p>
-    <form id="scan-filter" class="filters" role="search" aria-label="Scans" hidden>
-      <label><span class="caption">Name, notes or id</span>
-        <input name="text" type="search" maxlength="200" autocomplete="off"></label>
-    </form>
-    <p id="several" class="links" hidden><a class="button" href="#/batch">Reconstruct several scans</a></p>
-    <p id="empty" class="empty" role="status" hidden></p>
-    <ul id="scans" class="records"></ul>
-    <nav id="scan-pages" class="pages" aria-label="Pages of the list"></nav>
-  </section>`;
-
-const NONE = "No scan yet. Upload one, or simulate a sample.";
-// Scans on one page of the list, and the pause in typing after which they are searched.
+// Scans on one page of the list.
 const PAGE_LENGTH = 25;
-const TYPING_MS = 300;
+const ACCEPT = ".h5,.hdf5,.mat,.npz,.zip,application/x-hdf5";
+const FORMATS = "HDF5 (uct-transmission, zea, openUSCT), MATLAB, NumPy, zip of k-Wave or KIT 3D USCT";
 
 // A scan that is simulated within seconds, with traces, so that both Fast and Best apply.
 const SAMPLE = {
@@ -62,85 +19,109 @@ const SAMPLE = {
 };
 
 // What the form states about a file of another program.
-function metadata() {
+function metadataIn(form) {
   const stated = { kind: "dataset" };
-  for (const [name, value] of new FormData(at("own"))) {
-    const words = value.split(",").map((one) => one.trim()).filter(Boolean);
+  for (const [name, value] of new FormData(form)) {
+    const words = value.split(",").map((word) => word.trim()).filter(Boolean);
     if (words.length) stated[name] = [stated[name], ...words].filter(Boolean).join(",");
   }
   return stated;
 }
 
-function entry(scan) {
-  const item = make("li");
-  const link = make("a", "", titleOf(scan));
-  link.href = `#/scans/${scan.id}`;
-  const words = `${scan.ntx} emitters × ${scan.nrx} receivers · ${inTime(scan.created)}`;
-  item.append(link, make("p", "facts", words));
-  return item;
+function Upload({ onSeveral }) {
+  const [[opened, begun], setState] = useState([false, false]);
+  const [form, again] = [useRef(null), useRef(null)];
+  return html`<section aria-labelledby="scan-title" class="panel">
+    <h2 id="scan-title">Upload a scan</h2>
+    <${DropZone} name="scan" accept=${ACCEPT} prompt="Choose a file" formats=${FORMATS} again=${again}
+      metadataOf=${() => metadataIn(form.current)} onStored=${(scan, several) => (several ? onSeveral() : go(`/scans/${scan.id}`))}
+      onBegin=${() => setState(([open]) => [open, true])} onRefused=${() => setState([true, true])} />
+    <details id="scan-own" open=${opened} onToggle=${({ target }) => setState([target.open, begun])}>
+      <summary>Own variables, units, water</summary>
+      <${Form} id="own" ref=${form} onSubmit=${() => again.current()}>
+        <${Labelled} caption="Variables, FIELD=NAME">
+          <input name="map" type="text" spellcheck="false" placeholder="element_position=pos, delta_tof=dtof" />
+        </${Labelled}>
+        <div class="numbers">
+          <${Labelled} caption="Lengths">
+            <select name="unit"><${Options} entries=${[["", "m"], "mm", "cm", ["um", "µm"]]} /></select>
+          </${Labelled}>
+          <${Labelled} caption="Times">
+            <select name="unit"><${Options} entries=${[["", "s"], ["us", "µs"], "ms", "ns"]} /></select>
+          </${Labelled}>
+          <${Labelled} caption="Water, °C"><input name="temperature_c" type="number" step="any" /></${Labelled}>
+          <${Labelled} caption="Frequency, Hz"><input name="frequency_hz" type="number" step="any" /></${Labelled}>
+        </div>
+        <button id="scan-again" type="submit" class="quiet" disabled=${!begun}>Send the file again</button>
+      </${Form}>
+    </details>
+  </section>`;
 }
 
-function pageLink(text, query, more) {
-  const address = new URLSearchParams(query);
-  address.delete("before");
-  if (more) address.set("before", more);
-  const anchor = make("a", "button", text);
-  anchor.href = `#/${address.size ? `?${address}` : ""}`;
-  return anchor;
-}
-
-export function open(root, { query }) {
-  root.innerHTML = PAGE;
-  let closed = false;
-  let asked = new URLSearchParams([...query].filter(([name]) => ["text", "before"].includes(name)));
-  const filter = at("scan-filter");
-  const field = filter.elements.text;
-  field.value = asked.get("text") ?? "";
-  const sendAgain = uploads("scan", metadata, (scan, several) => closed || (several ? showScans() : go(`/scans/${scan.id}`)));
-  at("sample").addEventListener("click", () => startJob(SAMPLE, "sample-error", (job) => closed || go(`/jobs/${job.id}?then=scan`)));
-  at("own").addEventListener("submit", (event) => {
-    event.preventDefault();
-    sendAgain();
+function Sample() {
+  const [error, act] = useAct();
+  const shown = useShown();
+  const simulate = () => act(async () => {
+    const job = await send("POST", "/v1/jobs", SAMPLE);
+    if (shown.current) go(`/jobs/${job.id}?then=scan`);
   });
-
-  function showScans() {
-    const mine = asked;
-    request(`/v1/datasets?${new URLSearchParams([...mine, ["limit", PAGE_LENGTH]])}`)
-      .then(({ datasets, next }) => {
-        // The text may have been changed in the meantime.
-        if (closed || mine !== asked) return;
-        showError("scans-error", null);
-        at("scans").replaceChildren(...datasets.map(entry));
-        at("empty").textContent = datasets.length ? "" : mine.has("text") ? "No scan has this text." : NONE;
-        at("empty").hidden = datasets.length > 0;
-        at("several").hidden = datasets.length < 2;
-        filter.hidden = !datasets.length && !mine.size;
-        const older = next && new URLSearchParams(next.split("?")[1]).get("before");
-        const links = [mine.has("before") && pageLink("Newest scans", mine, ""), older && pageLink("Older scans", mine, older)];
-        at("scan-pages").replaceChildren(...links.filter(Boolean));
-      })
-      .catch((error) => showError("scans-error", error));
-  }
-
-  let timer = 0;
-  const find = (wait) => {
-    clearTimeout(timer);
-    timer = setTimeout(() => {
-      const text = field.value.trim();
-      asked = new URLSearchParams(text ? { text } : {});
-      keepQuery(asked);
-      showScans();
-    }, wait);
-  };
-  field.addEventListener("input", () => find(TYPING_MS));
-  filter.addEventListener("submit", (event) => {
-    event.preventDefault();
-    find(0);
-  });
-
-  showScans();
-  return () => {
-    closed = true;
-    clearTimeout(timer);
-  };
+  return html`<section aria-labelledby="sample-title" class="panel">
+    <h2 id="sample-title">No scan at hand?</h2>
+    <p>Simulate a small scan of a 2-D breast phantom, with traces and the truth to compare with. It takes some seconds.</p>
+    <${Button} id="sample" quiet=${false} onClick=${simulate}>Simulate a sample scan</${Button}>
+    <${Alert} id="sample-error" error=${error} />
+  </section>`;
 }
+
+// changes: a number that grows when the list is to be read again.
+function Scans({ first, changes }) {
+  const [query, setQuery] = useState(first);
+  const [found, setFound] = useState(null);
+  const [error, act] = useAct();
+  useEffect(() => {
+    let newest = true;
+    act(async () => {
+      const answer = await request(`/v1/datasets?${new URLSearchParams([...query, ["limit", PAGE_LENGTH]])}`);
+      // The text may have been changed in the meantime.
+      if (newest) setFound({ ...answer, query });
+    });
+    return () => {
+      newest = false;
+    };
+  }, [query, changes]);
+  const search = (changed) => {
+    keepQuery(changed);
+    setQuery(changed);
+  };
+  const scans = found?.datasets ?? [];
+  const none = found?.query.has("text") ? "No scan has this text." : "No scan yet. Upload one, or simulate a sample.";
+  return html`<section aria-labelledby="scans-title">
+    <h2 id="scans-title">Stored scans</h2>
+    <${Alert} id="scans-error" error=${error} />
+    <${Filters} label="Scans" id="scan-filter" hidden=${!scans.length && !query.size} onChange=${search}>
+      <${Labelled} caption="Name, notes or id">
+        <input name="text" type="search" maxlength="200" autocomplete="off" defaultValue=${first.get("text") ?? ""} />
+      </${Labelled}>
+    </${Filters}>
+    <p id="several" class="links" hidden=${scans.length < 2}><a class="button" href="#/batch">Reconstruct several scans</a></p>
+    <p id="empty" class="empty" role="status" hidden=${!found || scans.length > 0}>${found && !scans.length && none}</p>
+    <ul id="scans" class="records">
+      ${scans.map((scan) => html`<li key=${scan.id}>
+        <a href=${`#/scans/${scan.id}`}>${titleOf(scan)}</a>
+        <${Facts}>${scan.ntx} emitters × ${scan.nrx} receivers · ${inTime(scan.created)}</${Facts}>
+      </li>`)}
+    </ul>
+    ${found && html`<${ListPages} id="scan-pages" path="/" query=${found.query} older=${olderOf(found.next)} words="scans" />`}
+  </section>`;
+}
+
+function Start({ query }) {
+  const [changes, setChanges] = useState(0);
+  return html`
+    <h1>Scans</h1>
+    <${Upload} onSeveral=${() => setChanges((count) => count + 1)} />
+    <${Sample} />
+    <${Scans} first=${pick(query, ["text", "before"])} changes=${changes} />`;
+}
+
+export const open = ({ query }) => html`<${Start} query=${query} />`;

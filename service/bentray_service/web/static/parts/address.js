@@ -17,3 +17,11 @@ export function keepQuery(query) {
   const text = query.toString();
   history.replaceState(history.state, "", `#${path}${text ? `?${text}` : ""}`);
 }
+
+// Some parameters of an address.
+export function pick(query, names) {
+  return new URLSearchParams([...query].filter(([name]) => names.includes(name)));
+}
+
+// The address of a page with parameters, if there are any.
+export const linkTo = (path, query) => `#${path}${query.size ? `?${query}` : ""}`;

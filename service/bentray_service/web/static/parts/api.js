@@ -39,3 +39,8 @@ export async function request(path, options = {}) {
   if (!response.ok) throw Object.assign(new Error(inWords(body)), { problem: body });
   return body;
 }
+
+// A request with a JSON body.
+export function send(method, path, body, headers = {}) {
+  return request(path, { method, headers: { "Content-Type": "application/json", ...headers }, body: JSON.stringify(body) });
+}

@@ -1,34 +1,28 @@
 // Text for the clipboard; where the browser gives none, the text is shown to copy by hand.
-import { make } from "./dom.js";
+import { Button, html, useLater, useRef, useState } from "./view.js";
+
+const COPIED_MS = 2000;
 
 // A button that copies text() and says so.
-export function copyButton(title, text) {
-  const button = make("button", "quiet", title);
-  button.type = "button";
-  button.addEventListener("click", async () => {
+export function CopyButton({ title, text }) {
+  const [copied, setCopied] = useState(false);
+  const [dialog, area] = [useRef(null), useRef(null)];
+  const later = useLater();
+  async function copy() {
     try {
       await navigator.clipboard.writeText(text());
-      button.textContent = "Copied";
-      setTimeout(() => {
-        button.textContent = title;
-      }, 2000);
+      setCopied(true);
+      later(() => setCopied(false), COPIED_MS);
     } catch {
-      showText(title, text());
+      area.current.value = text();
+      dialog.current.showModal();
+      area.current.select();
     }
-  });
-  return button;
-}
-
-function showText(title, text) {
-  const box = make("dialog", "copy");
-  const area = make("textarea");
-  Object.assign(area, { value: text, readOnly: true, rows: 8 });
-  area.setAttribute("aria-label", title);
-  const close = make("button", "", "Close");
-  close.addEventListener("click", () => box.close());
-  box.addEventListener("close", () => box.remove());
-  box.append(area, close);
-  document.body.append(box);
-  box.showModal();
-  area.select();
+  }
+  return html`
+    <${Button} onClick=${copy}>${copied ? "Copied" : title}</${Button}>
+    <dialog class="copy" ref=${dialog}>
+      <textarea ref=${area} readonly rows="8" aria-label=${title}></textarea>
+      <button type="button" onClick=${() => dialog.current.close()}>Close</button>
+    </dialog>`;
 }

@@ -1,66 +1,51 @@
 // The menu of downloads of a result: every format, and the picture of the view.
-import { make } from "./dom.js";
-import { withKey } from "./key.js";
-import { menuOf } from "./menu.js";
-import { queryOf } from "./views.js";
 import { QUANTITIES } from "../viewer/quantities.js";
+import { KeyLink } from "./key.js";
+import { Menu } from "./menu.js";
+import { Facts, html, Options, useState } from "./view.js";
+import { queryOf } from "./views.js";
 
-const WHOLE = [["hdf5", "HDF5"], ["mat", "MATLAB"], ["vti", "VTK (ParaView)"], ["ome-zarr", "OME-Zarr"], ["dicom", "DICOM"]];
-const SINGLE = [["npy", "NumPy"], ["nifti", "NIfTI"], ["nrrd", "NRRD"], ["metaimage", "MetaImage"]];
+export const WHOLE = [["hdf5", "HDF5"], ["mat", "MATLAB"], ["vti", "VTK (ParaView)"], ["ome-zarr", "OME-Zarr"], ["dicom", "DICOM"]];
+export const SINGLE = [["npy", "NumPy"], ["nifti", "NIfTI"], ["nrrd", "NRRD"], ["metaimage", "MetaImage"]];
 const NAMES = {
   speed: "speed (m/s)", attenuation: "attenuation (Np/m)", coverage: "coverage (m)", recovery: "resolution",
   uncertainty: "uncertainty (m/s)", reflection: "reflection (dB)", truth: "truth (m/s)",
 };
 const DECIBEL = "attenuation-db";
 
-function link(title, address) {
-  const anchor = make("a", "", title);
-  anchor.href = address;
-  anchor.download = "";
-  // The key is added when it is followed; the address may change until then.
-  return anchor;
-}
-
 function pictureOf({ volume }, state) {
-  const [stored] = QUANTITIES[state.quantity].reads;
+  const { reads: [stored], factor = 1 } = QUANTITIES[state.quantity];
   if (stored === "truth") return null;
-  const factor = QUANTITIES[state.quantity].factor ?? 1;
   const query = { quantity: stored, size: 1200, scale_bar: true };
   if (state.map && state.map !== "RdBu_r") query.colormap = state.map;
-  if (state.window && state.quantity !== "error") [query.low, query.high] = state.window.map((one) => one / factor);
+  if (state.window && state.quantity !== "error") [query.low, query.high] = state.window.map((limit) => limit / factor);
   if (volume.shape.length === 3) query.axis = state.axis;
   return `${volume.links.image}?${queryOf(query)}`;
 }
 
-export function exportMenu(result, state) {
-  const { volume, summary } = result;
-  const sheet = make("div");
-  const menu = menuOf("Export", sheet, "export");
-  const data = volume.links.data;
-  const group = (title, nodes) => sheet.append(make("h2", "", title), ...nodes);
-  group(summary.quantities.includes("reflection") ? "All quantities (reflection: HDF5)" : "All quantities", WHOLE.map(([format, title]) => withKey(link(title, `${data}?format=${format}`), `${data}?format=${format}`)));
-  const label = make("label", "", "Quantity ");
-  const choice = make("select");
-  for (const one of summary.quantities) choice.append(new Option(NAMES[one], one));
-  if (summary.quantities.includes("attenuation") && volume.provenance.frequency_hz) choice.append(new Option("attenuation (dB/cm/MHz)", DECIBEL));
-  label.append(choice);
-  const links = make("div", "single");
-  const relink = () => {
-    const query = choice.value === DECIBEL ? { quantity: "attenuation", attenuation: "dB/cm/MHz" } : { quantity: choice.value };
-    links.replaceChildren(...SINGLE.map(([format, title]) => {
-      const address = `${data}?${queryOf({ format, ...query })}`;
-      return withKey(link(title, address), address);
-    }));
-  };
-  choice.addEventListener("change", relink);
-  relink();
-  group("One quantity", [label, links]);
-  const place = make("div");
-  const address = () => pictureOf(result, state);
-  menu.addEventListener("toggle", () => {
-    const found = menu.open && address();
-    place.replaceChildren(...(found ? [withKey(link("PNG of this quantity", found), found)] : [make("p", "facts", "No picture of this quantity")]));
-  });
-  group("Picture", [place]);
-  return menu;
+const Download = ({ href, children }) => html`<${KeyLink} href=${href} download="">${children}</${KeyLink}>`;
+
+// state: of the viewer, which goes on changing.
+export function ExportMenu({ result, state }) {
+  const { volume, summary: { quantities } } = result;
+  const [quantity, setQuantity] = useState(quantities[0]);
+  const [picture, setPicture] = useState(null);
+  const { data } = volume.links;
+  const query = quantity === DECIBEL ? { quantity: "attenuation", attenuation: "dB/cm/MHz" } : { quantity };
+  const entries = quantities.map((name) => [name, NAMES[name]]);
+  if (quantities.includes("attenuation") && volume.provenance.frequency_hz) entries.push([DECIBEL, "attenuation (dB/cm/MHz)"]);
+  return html`<${Menu} title="Export" className="export" onOpen=${() => setPicture(pictureOf(result, state))}>
+    <div class="sheet">
+      <h2>All quantities${quantities.includes("reflection") && " (reflection: HDF5)"}</h2>
+      ${WHOLE.map(([format, title]) => html`<${Download} href=${`${data}?format=${format}`}>${title}</${Download}>`)}
+      <h2>One quantity</h2>
+      <label>Quantity ${" "}
+        <select onChange=${({ target }) => setQuantity(target.value)}><${Options} entries=${entries} chosen=${quantity} /></select></label>
+      <div class="single">
+        ${SINGLE.map(([format, title]) => html`<${Download} href=${`${data}?${queryOf({ format, ...query })}`}>${title}</${Download}>`)}
+      </div>
+      <h2>Picture</h2>
+      ${picture ? html`<${Download} href=${picture}>PNG of this quantity</${Download}>` : html`<${Facts}>No picture of this quantity</${Facts}>`}
+    </div>
+  </${Menu}>`;
 }

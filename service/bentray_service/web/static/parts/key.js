@@ -1,5 +1,6 @@
 // Who uses this tab: with an API key, kept until the tab is closed and in no address, or signed in at an OpenID provider.
 import { at } from "./dom.js";
+import { html, useEffect, useRef } from "./view.js";
 
 const STORED = "bentray-key";
 const PROJECT = "bentray-project";
@@ -27,11 +28,7 @@ async function blobOf(address) {
 }
 
 // An element that shows a picture cannot send a key, so that the picture is fetched for it.
-export function show(image, address) {
-  if (!hasHeaders()) {
-    image.src = address;
-    return;
-  }
+function show(image, address) {
   image.addEventListener("load", () => URL.revokeObjectURL(image.src), { once: true });
   blobOf(address).then(
     (blob) => {
@@ -52,39 +49,46 @@ const near = new IntersectionObserver(
   { rootMargin: "300px" },
 );
 
-// The same once the reader comes near it.
-export function showOnceNear(image, address) {
-  image.loading = "lazy";
-  if (!hasHeaders()) {
-    image.src = address;
-    return;
-  }
-  image.dataset.address = address;
-  near.observe(image);
+// A picture of the service, once the reader comes near it.
+export function Picture({ address, alt, ...more }) {
+  const image = useRef(null);
+  useEffect(() => {
+    if (!hasHeaders()) return;
+    image.current.dataset.address = address;
+    near.observe(image.current);
+  }, [address]);
+  return html`<img ref=${image} loading="lazy" alt=${alt} src=${hasHeaders() ? undefined : address} ...${more} />`;
 }
 
-// A link cannot send a key either: what it leads to is fetched, and saved. Without an address it is that of the link.
-export function withKey(anchor, fixed) {
-  anchor.addEventListener("click", async (event) => {
+const ENDINGS = { "image/png": ".png", "image/apng": ".png", "application/zip": ".zip", "application/x-hdf5": ".h5" };
+
+async function save(address) {
+  const blob = await blobOf(address);
+  const path = address.split("?")[0].split("/");
+  const format = new URLSearchParams(address.split("?")[1]).get("format");
+  const ending = path.at(-1).includes(".") ? "" : ENDINGS[blob.type] || (format ? `.${format}` : ".json");
+  saveBlob(blob, `${path.slice(-2).join("-")}${ending}`);
+}
+
+export function saveBlob(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+}
+
+// A link cannot send a key either: what it leads to is fetched, and saved.
+export function KeyLink({ href, children, ...more }) {
+  const follow = (event) => {
     if (!hasHeaders()) return;
     event.preventDefault();
-    const address = fixed ?? anchor.getAttribute("href");
-    const saving = document.createElement("a");
-    try {
-      const blob = await blobOf(address);
-      const path = address.split("?")[0].split("/");
-      const kinds = { "image/png": ".png", "image/apng": ".png", "application/zip": ".zip", "application/x-hdf5": ".h5" };
-      const format = new URLSearchParams(address.split("?")[1]).get("format");
-      const ending = path.at(-1).includes(".") ? "" : kinds[blob.type] || (format ? `.${format}` : ".json");
-      saving.href = URL.createObjectURL(blob);
-      saving.download = `${path.slice(-2).join("-")}${ending}`;
-      saving.click();
-      setTimeout(() => URL.revokeObjectURL(saving.href), 60000);
-    } catch (error) {
+    const anchor = event.currentTarget;
+    save(href).catch((error) => {
       anchor.title = error.message;
-    }
-  });
-  return anchor;
+    });
+  };
+  return html`<a href=${href} onClick=${follow} ...${more}>${children}</a>`;
 }
 
 // Where the service has an OpenID provider, the form offers it; it leads back to the view that is open.

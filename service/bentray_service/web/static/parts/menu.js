@@ -1,26 +1,26 @@
 // A menu that opens below its title, and closes by Escape, by a click elsewhere and when its focus goes on.
-import { make } from "./dom.js";
+import { html, useEffect, useRef } from "./view.js";
 
-// A details element with a title and a sheet of content.
-export function menuOf(title, sheet, className = "") {
-  const menu = make("details", `menu ${className}`.trim());
-  const summary = make("summary", "", title);
-  sheet.classList.add("sheet");
-  menu.append(summary, sheet);
-  menu.addEventListener("keydown", (event) => {
-    if (event.key !== "Escape" || !menu.open) return;
-    menu.open = false;
-    summary.focus();
-  });
-  menu.addEventListener("focusout", ({ relatedTarget: next }) => {
-    if (next && !menu.contains(next)) menu.open = false;
-  });
-  const elsewhere = ({ target }) => {
-    if (!menu.contains(target)) menu.open = false;
+// onOpen() is called when it opens.
+export function Menu({ title, className = "", onOpen = () => {}, children }) {
+  const menu = useRef(null);
+  useEffect(() => {
+    const elsewhere = ({ target }) => {
+      if (!menu.current.contains(target)) menu.current.open = false;
+    };
+    document.addEventListener("pointerdown", elsewhere);
+    return () => document.removeEventListener("pointerdown", elsewhere);
+  }, []);
+  const onKeyDown = ({ key, currentTarget }) => {
+    if (key !== "Escape" || !currentTarget.open) return;
+    currentTarget.open = false;
+    currentTarget.querySelector("summary").focus();
   };
-  menu.addEventListener("toggle", () => {
-    if (menu.open) document.addEventListener("pointerdown", elsewhere);
-    else document.removeEventListener("pointerdown", elsewhere);
-  });
-  return menu;
+  const onFocusOut = ({ relatedTarget: next, currentTarget }) => {
+    if (next && !currentTarget.contains(next)) currentTarget.open = false;
+  };
+  return html`<details ref=${menu} class=${`menu ${className}`.trim()} onKeyDown=${onKeyDown} onFocusOut=${onFocusOut} onToggle=${({ target }) => target.open && onOpen()}>
+    <summary>${title}</summary>
+    ${children}
+  </details>`;
 }

@@ -1,9 +1,9 @@
 // What a job would be and how long it would take, asked before it is started.
-import { request } from "./api.js";
+import { send } from "./api.js";
 
 // job: as for POST /v1/jobs.
 export function planOf(job) {
-  return request("/v1/plans", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(job) });
+  return send("POST", "/v1/plans", job);
 }
 
 function time(minutes) {
@@ -16,15 +16,18 @@ function time(minutes) {
 }
 
 // As "about 2 min, rough".
-export function timeInWords({ minutes, rough }) {
+function timeInWords({ minutes, rough }) {
   if (minutes === null) return "no estimate yet";
   return `about ${time(minutes)}${rough ? ", rough" : ""}`;
 }
 
-export function queueInWords({ ahead }) {
+function queueInWords({ ahead }) {
   if (!ahead) return "";
   return ahead === 1 ? "after 1 queued job" : `after ${ahead} queued jobs`;
 }
+
+// The time, and the place in the queue.
+export const waitInWords = (estimate) => [timeInWords(estimate), queueInWords(estimate)].filter(Boolean).join(", ");
 
 // The plan in a line: time, method, nodes, tasks and memory.
 export function planInWords(estimate) {

@@ -1,7 +1,8 @@
 // Provenance, settings and numerical parameters of a result as tables in words, and all of it as JSON to copy.
 import { inTime } from "./amounts.js";
-import { copyButton } from "./copying.js";
-import { make } from "./dom.js";
+import { CopyButton } from "./copying.js";
+import { Pairs } from "./tables.js";
+import { html } from "./view.js";
 
 const SOFTWARE = { bentray: "Bentray", python: "Python", numpy: "NumPy", numba: "Numba", scipy: "SciPy" };
 const SAID = {
@@ -43,7 +44,7 @@ function named(name) {
 }
 
 // A value in words; without one, what that means.
-export function inWords(value, unit = "", unset = "automatic") {
+function inWords(value, unit = "", unset = "automatic") {
   if (value === null) return unset;
   if (typeof value === "boolean") return value ? "yes" : "no";
   // Times of waves are nanoseconds.
@@ -53,22 +54,8 @@ export function inWords(value, unit = "", unset = "automatic") {
   return unit && typeof value !== "string" ? `${text} ${unit}` : text;
 }
 
-function pairs(entries) {
-  const table = make("table", "pairs");
-  const body = table.createTBody();
-  for (const [name, value] of entries) {
-    const row = body.insertRow();
-    const head = make("th", "", name);
-    head.scope = "row";
-    row.append(head, make("td", "", value));
-  }
-  return table;
-}
-
-function folded(title, ...content) {
-  const box = make("details");
-  box.append(make("summary", "", title), ...content);
-  return box;
+function Folded({ title, rows }) {
+  return html`<details><summary>${title}</summary><${Pairs} rows=${rows} /></details>`;
 }
 
 // Rows of settings: those of nested records below the name of the record.
@@ -86,26 +73,30 @@ const fixed = (numerics) => Object.entries(numerics).map(([name, value]) => {
 });
 
 // The provenance of a result in a section of its own.
-export function provenanceTable({ job, volume }) {
+export function Provenance({ job, volume }) {
   const { advice, numerics: stored, ray_numerics: ofRays, ...provenance } = volume.provenance;
   const [numerics, rayNumerics] = [stored, ofRays].map((text) => (text ? JSON.parse(text) : null));
   const frequency = (hertz) => `${(1e-3 * Number(hertz)).toFixed(1)} kHz`;
   const said = Object.entries(provenance).filter(([name]) => !(name in SOFTWARE));
   const versions = Object.entries(SOFTWARE).filter(([name]) => name in provenance).map(([name, words]) => `${words} ${provenance[name]}`);
+  const temperature = job.settings.water_temperature_c;
   const rows = [
     ["Job", job.id], ["Volume", volume.id], ["Scan", job.dataset],
     ["Finished", inTime(job.finished)],
-    ["Speed in water", `${volume.water_speed_mps.toFixed(1)} m/s${job.settings.water_temperature_c == null ? "" : `, ${job.settings.water_temperature_c} °C by the user`}`],
+    ["Speed in water", `${volume.water_speed_mps.toFixed(1)} m/s${temperature == null ? "" : `, ${temperature} °C by the user`}`],
     ...said.map(([name, value]) => [SAID[name] ?? named(name)[0], name === "frequency_hz" ? frequency(value) : String(value)]),
     ["Software", versions.join(", ")],
   ];
-  const box = make("section", "panel provenance");
-  const head = make("div", "section-head");
   const everything = { job: job.id, volume: volume.id, scan: job.dataset, finished: job.finished, settings: job.settings, numerics, provenance };
   if (rayNumerics) everything.ray_numerics = rayNumerics;
-  head.append(make("h2", "", "Provenance"), copyButton("Copy JSON", () => `${JSON.stringify(everything, null, 2)}\n`));
-  box.append(head, pairs(rows), folded("Settings", pairs(settingRows(job.settings))));
-  if (numerics) box.append(folded("Numerical parameters, chosen automatically", pairs(fixed(numerics))));
-  if (rayNumerics) box.append(folded("Those of the rays before full waveforms", pairs(fixed(rayNumerics))));
-  return box;
+  return html`<section class="panel provenance">
+    <div class="section-head">
+      <h2>Provenance</h2>
+      <${CopyButton} title="Copy JSON" text=${() => `${JSON.stringify(everything, null, 2)}\n`} />
+    </div>
+    <${Pairs} rows=${rows} />
+    <${Folded} title="Settings" rows=${settingRows(job.settings)} />
+    ${numerics && html`<${Folded} title="Numerical parameters, chosen automatically" rows=${fixed(numerics)} />`}
+    ${rayNumerics && html`<${Folded} title="Those of the rays before full waveforms" rows=${fixed(rayNumerics)} />`}
+  </section>`;
 }

@@ -16,10 +16,3 @@ export async function loadResult(id) {
 export function nameOf({ job, volume }) {
   return job.name || volume.title || job.id;
 }
-
-const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "Automatic", waveform: "Full waveform" };
-
-export function methodOf({ settings: { method, rays } }) {
-  if (method === "auto" || method === "waveform") return METHODS[method];
-  return `${METHODS[method] ?? method}, ${rays === "straight" ? "straight" : "bent"} rays`;
-}

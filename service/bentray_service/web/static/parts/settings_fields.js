@@ -1,10 +1,11 @@
 // One field of a form for each setting, made from its description in JSON Schema: label, unit, bounds, choices, default.
-import { make } from "./dom.js";
+import { html, Options } from "./view.js";
 
 // What remains of a schema that also accepts null.
-const without = (schema) => ({ ...schema, ...(schema.anyOf?.find((one) => one.type !== "null") ?? {}) });
+const without = (schema) => ({ ...schema, ...(schema.anyOf?.find((branch) => branch.type !== "null") ?? {}) });
 
 const number = (value) => Number(value).toString();
+const captionOf = (schema) => schema["x-label"] ?? schema.title;
 
 function bounds(schema) {
   const { minimum, maximum, exclusiveMinimum: above, exclusiveMaximum: below } = schema;
@@ -12,79 +13,50 @@ function bounds(schema) {
   const most = maximum ?? below;
   if (least === undefined || most === undefined) return "";
   // The largest exact integer says nothing to a reader.
-  if (most >= 2 ** 53 - 1) return `From ${number(least)}`;
-  return `${above === undefined ? "From" : "Above"} ${number(least)} ${below === undefined ? "to" : "and below"} ${number(most)}`;
+  if (most >= 2 ** 53 - 1) return `From ${number(least)}.`;
+  return `${above === undefined ? "From" : "Above"} ${number(least)} ${below === undefined ? "to" : "and below"} ${number(most)}.`;
 }
 
-function numberInput(name, schema) {
-  const input = make("input");
-  Object.assign(input, { type: "number", name, step: "any", min: schema.minimum ?? "", max: schema.maximum ?? "", autocomplete: "off" });
-  return input;
+function NumberInput({ schema, value, ...more }) {
+  return html`<input type="number" step="any" autocomplete="off" min=${schema.minimum} max=${schema.maximum} defaultValue=${value ?? ""} ...${more} />`;
 }
 
 // What a person has typed that is no number, which the browser otherwise hands out as nothing.
-class NotANumber extends Error {}
-
 function read(input) {
-  if (input.validity.badInput) throw new NotANumber("Found: no number; accepted: a number.");
+  if (input.validity.badInput) throw new Error("Found: no number; accepted: a number.");
   return input.value === "" ? undefined : Number(input.value);
 }
 
-// Kinds of fields: their inputs, and how a value is put in and read; undefined stands for the default.
+// Kinds of fields: their inputs, and what the inputs say; undefined stands for the default.
 const KINDS = {
-  choice(name, schema, nullable) {
-    const select = make("select");
-    select.name = name;
-    const words = schema["x-words"] ?? {};
-    if (nullable) select.append(new Option("Automatic", ""));
-    select.append(...schema.enum.map((word) => new Option(words[word] ?? word, word)));
-    return {
-      inputs: [select],
-      put: (value) => {
-        select.value = value ?? "";
-      },
-      take: () => select.value || undefined,
-    };
+  choice: {
+    inputs: ({ schema, nullable, value, ...more }) => html`<select ...${more}>
+      ${nullable && html`<option value="">Automatic</option>`}
+      <${Options} entries=${schema.enum.map((word) => [word, schema["x-words"]?.[word] ?? word])} chosen=${value} />
+    </select>`,
+    read: ([select]) => select.value || undefined,
+    about: () => "",
+    unset: "Automatic",
   },
-  yes(name) {
-    const box = make("input");
-    Object.assign(box, { type: "checkbox", name });
-    return {
-      inputs: [box],
-      put: (value) => {
-        box.checked = Boolean(value);
-      },
-      take: () => box.checked,
-    };
+  yes: {
+    inputs: ({ schema, nullable, value, ...more }) => html`<input type="checkbox" defaultChecked=${Boolean(value)} ...${more} />`,
+    read: ([box]) => box.checked,
+    about: () => "",
   },
-  pair(name, schema) {
-    const inputs = ["lowest", "highest"].map((end, i) => {
-      const input = numberInput(`${name}.${i}`, schema.prefixItems[i]);
-      input.setAttribute("aria-label", `${schema["x-label"] ?? schema.title}, ${end}`);
-      input.placeholder = end;
-      return input;
-    });
-    return {
-      inputs,
-      put: (value) => inputs.forEach((input, i) => {
-        input.value = value?.[i] ?? "";
-      }),
-      take: () => {
-        const values = inputs.map(read);
-        // One of two is sent as it is: the service says what is missing.
-        return values.every((value) => value === undefined) ? undefined : values.filter((value) => value !== undefined);
-      },
-    };
+  pair: {
+    inputs: ({ schema, nullable, value, name, id, ...more }) => ["lowest", "highest"].map((end, i) => html`<${NumberInput} schema=${schema.prefixItems[i]}
+      value=${value?.[i]} name=${`${name}.${i}`} id=${i ? undefined : id} aria-label=${`${captionOf(schema)}, ${end}`} placeholder=${end} ...${more} />`),
+    // One of two is sent as it is: the service says what is missing.
+    read: (inputs) => {
+      const values = inputs.map(read).filter((value) => value !== undefined);
+      return values.length ? values : undefined;
+    },
+    about: (schema) => bounds(schema.prefixItems[0]),
   },
-  number(name, schema) {
-    const input = numberInput(name, schema);
-    return {
-      inputs: [input],
-      put: (value) => {
-        input.value = value ?? "";
-      },
-      take: () => read(input),
-    };
+  number: {
+    inputs: ({ nullable, ...more }) => html`<${NumberInput} ...${more} />`,
+    read: ([input]) => read(input),
+    about: bounds,
   },
 };
 
@@ -94,53 +66,36 @@ function kindOf(schema) {
   return schema.prefixItems ? "pair" : "number";
 }
 
-const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
-
-// The field of a setting: { path, node, put(value), changed(), refuse(text) }; changed() is undefined for the default.
-export function settingField(path, given, prefix) {
+// A setting as the form knows it: its path, and how it is described.
+export function settingOf(path, given) {
   const schema = without(given);
-  const name = path.join(".");
-  const id = `${prefix}-${path.join("-")}`;
-  const kind = kindOf(schema);
-  const { inputs, put, take } = KINDS[kind](name, schema, Boolean(given.anyOf));
-  const node = make("div", `setting setting-${kind}`);
-  const label = make("label", "caption", schema["x-label"] ?? schema.title);
-  if (schema["x-unit"]) label.append(` (${schema["x-unit"]})`);
-  label.htmlFor = id;
-  inputs[0].id = id;
-  const said = [schema.description];
-  if (kind === "number") said.push(bounds(schema) && `${bounds(schema)}.`);
-  if (kind === "pair") said.push(bounds(schema.prefixItems[0]) && `${bounds(schema.prefixItems[0])}.`);
-  if (schema["x-unset"]) said.push(`${kind === "choice" ? "Automatic" : "Empty"}: ${schema["x-unset"]}.`);
-  const hint = make("small", "hint", said.filter(Boolean).join(" "));
-  hint.id = `${id}-hint`;
-  const error = make("p", "error");
-  error.id = `${id}-error`;
-  error.setAttribute("role", "alert");
-  error.hidden = true;
-  const box = make("div", "setting-inputs");
-  box.append(...inputs);
-  if (kind === "yes") box.append(label);
-  node.append(...(kind === "yes" ? [] : [label]), box, hint, error);
-  for (const input of inputs) input.setAttribute("aria-describedby", `${hint.id} ${error.id}`);
-  const refuse = (text) => {
-    error.textContent = text;
-    error.hidden = !text;
-    for (const input of inputs) {
-      if (text) input.setAttribute("aria-invalid", "true");
-      else input.removeAttribute("aria-invalid");
-    }
-  };
-  put(schema.default);
-  return {
-    path: name,
-    node,
-    put: (value) => put(value ?? schema.default),
-    changed() {
-      const value = take();
-      return value === undefined || same(value, schema.default) ? undefined : value;
-    },
-    refuse,
-    focus: () => inputs[0].focus(),
-  };
+  return { path: path.join("."), schema, kind: kindOf(schema), nullable: Boolean(given.anyOf) };
+}
+
+const inputsOf = (form, { path }) => [...form.querySelector(`[data-path="${path}"]`).querySelectorAll("input, select")];
+
+export const focusOn = (form, setting) => inputsOf(form, setting)[0].focus();
+
+// The value of a setting in the form, undefined for its default; throws an error that says what is wrong.
+export function changedIn(form, setting) {
+  const value = KINDS[setting.kind].read(inputsOf(form, setting));
+  return value === undefined || JSON.stringify(value) === JSON.stringify(setting.schema.default) ? undefined : value;
+}
+
+// value: the one to begin with; fault: what is wrong, "" for nothing.
+export function SettingField({ setting: { path, schema, kind, nullable }, value, fault }) {
+  const id = `set-${path.replaceAll(".", "-")}`;
+  const { inputs, about, unset = "Empty" } = KINDS[kind];
+  const label = html`<label class="caption" for=${id}>${captionOf(schema)}${schema["x-unit"] && ` (${schema["x-unit"]})`}</label>`;
+  const hint = [schema.description, about(schema), schema["x-unset"] && `${unset}: ${schema["x-unset"]}.`].filter(Boolean).join(" ");
+  const described = { "aria-describedby": `${id}-hint ${id}-error`, ...(fault && { "aria-invalid": "true" }) };
+  return html`<div class=${`setting setting-${kind}`} data-path=${path}>
+    ${kind !== "yes" && label}
+    <div class="setting-inputs">
+      <${inputs} schema=${schema} nullable=${nullable} value=${value ?? schema.default} name=${path} id=${id} ...${described} />
+      ${kind === "yes" && label}
+    </div>
+    <small class="hint" id=${`${id}-hint`}>${hint}</small>
+    <p class="error" role="alert" id=${`${id}-error`} hidden=${!fault}>${fault}</p>
+  </div>`;
 }

@@ -1,97 +1,95 @@
 // The form of all settings of a reconstruction, made from their description; only changed settings are sent.
-import { description } from "./defaults.js";
-import { make } from "./dom.js";
-import { settingField } from "./settings_fields.js";
+import { description } from "./description.js";
+import { changedIn, focusOn, SettingField, settingOf } from "./settings_fields.js";
+import { Facts, html, useMemo, useRef, useState } from "./view.js";
 
 const REFERENCE = "#/components/schemas/";
 
-function groupOf(schema, fields) {
-  const box = make("fieldset", "setting-group");
-  box.append(make("legend", "", schema["x-label"] ?? schema.title));
-  if (schema.description) box.append(make("p", "facts", schema.description));
-  const grid = make("div", "settings");
-  grid.append(...fields.map((field) => field.node));
-  box.append(grid);
-  return box;
+// Groups of settings that are described as a schema: [schema, settings]; the first one, without a schema, has those of no group.
+export async function readSettings(name = "Settings") {
+  const { components: { schemas } } = await description();
+  const entries = Object.entries(schemas[name].properties);
+  const own = entries.filter(([, schema]) => !schema.$ref).map(([leaf, schema]) => settingOf([leaf], schema));
+  const groups = entries.filter(([, schema]) => schema.$ref).map(([group, schema]) => {
+    const { properties } = schemas[schema.$ref.slice(REFERENCE.length)];
+    return [schema, Object.entries(properties).map(([leaf, inner]) => settingOf([group, leaf], inner))];
+  });
+  return [[null, own], ...groups];
 }
 
 // The fault of a problem as [path, text]; the service names a setting with or without the place of the record.
-function faultsOf(problem) {
-  const { errors, ...first } = problem;
+function faultsOf({ errors, ...first }) {
   return (errors?.length ? errors : [first])
     .filter(({ field }) => field)
     .map(({ field, found, accepted }) => [field.replace(/^settings\./, ""), `Found ${found}; accepted: ${accepted}.`]);
 }
 
-// { node, changed(), fill(settings), clear(), refuse(problem) } for the settings that are described as schema.
-export async function settingsForm(schema = "Settings") {
-  const { components } = await description();
-  const own = [];
-  const groups = [];
-  for (const [name, one] of Object.entries(components.schemas[schema].properties)) {
-    if (!one.$ref) {
-      own.push(settingField([name], one, "set"));
-      continue;
-    }
-    const inner = components.schemas[one.$ref.slice(REFERENCE.length)];
-    const fields = Object.entries(inner.properties).map(([leaf, what]) => settingField([name, leaf], what, "set"));
-    groups.push({ schema: one, fields });
-  }
-  const every = [...own, ...groups.flatMap(({ fields }) => fields)];
-  const node = make("div", "all-settings");
-  const grid = make("div", "settings");
-  grid.append(...own.map((field) => field.node));
-  node.append(grid, ...groups.map(({ schema: one, fields }) => groupOf(one, fields)));
+// The end of a pair belongs to it; a group that is refused as a whole is told at its first setting.
+function settingAt(settings, path) {
+  return settings.find((setting) => path === setting.path || path.startsWith(`${setting.path}.`))
+    ?? settings.find((setting) => setting.path.startsWith(`${path}.`));
+}
 
-  const clear = () => every.forEach((field) => field.refuse(""));
+const valueAt = (record, path) => path.split(".").reduce((inner, name) => inner?.[name], record);
+
+// { root, faults, changed(focus), refuse(problem, focus) } for a SettingsForm of these groups.
+export function useSettings(groups) {
+  const settings = useMemo(() => groups?.flatMap(([, members]) => members), [groups]);
+  const root = useRef(null);
+  const [faults, setFaults] = useState({});
+
+  function show(found, focus) {
+    setFaults(Object.fromEntries(found.map(([setting, text]) => [setting.path, text])));
+    if (focus && found.length) focusOn(root.current, found[0][0]);
+  }
 
   return {
-    node,
-    clear,
+    root,
+    faults,
 
     // The settings that differ from their defaults, nested as the service takes them; null after a wrong number, which may get the focus.
     changed(focus) {
-      clear();
-      const settings = {};
-      let wrong = null;
-      for (const field of every) {
+      const record = {};
+      const wrong = [];
+      for (const setting of settings) {
+        const [group, leaf] = setting.path.split(".");
         try {
-          const value = field.changed();
+          const value = changedIn(root.current, setting);
           if (value === undefined) continue;
-          const [group, leaf] = field.path.split(".");
-          if (leaf) settings[group] = { ...settings[group], [leaf]: value };
-          else settings[group] = value;
+          record[group] = leaf ? { ...record[group], [leaf]: value } : value;
         } catch (error) {
-          field.refuse(error.message);
-          wrong ??= field;
+          wrong.push([setting, error.message]);
         }
       }
-      if (focus) wrong?.focus();
-      return wrong ? null : settings;
-    },
-
-    // Put in the settings of an earlier job; what it does not name takes its default.
-    fill(settings) {
-      for (const field of every) {
-        const [group, leaf] = field.path.split(".");
-        field.put(leaf ? settings[group]?.[leaf] : settings[group]);
-      }
+      show(wrong, focus);
+      return wrong.length ? null : record;
     },
 
     // Show each fault of a problem at its setting; whether all of them have one.
     refuse(problem, focus) {
-      clear();
-      let placed = 0;
-      const faults = faultsOf(problem);
-      for (const [path, text] of faults) {
-        // The end of a pair belongs to it; a group that is refused as a whole is told at its first setting.
-        const field = every.find((one) => path === one.path || path.startsWith(`${one.path}.`)) ?? every.find((one) => one.path.startsWith(`${path}.`));
-        if (!field) continue;
-        field.refuse(text);
-        if (focus && !placed) field.focus();
-        placed += 1;
-      }
-      return placed > 0 && placed === faults.length;
+      const told = faultsOf(problem);
+      const found = told.map(([path, text]) => [settingAt(settings, path), text]).filter(([setting]) => setting);
+      show(found, focus);
+      return found.length > 0 && found.length === told.length;
     },
   };
+}
+
+// earlier: settings to begin with, in place of the defaults; form: of useSettings.
+export function SettingsForm({ groups, earlier, form, onInput }) {
+  if (!groups) return html`<${Facts}>Reading the settings</${Facts}>`;
+  return html`<div class="all-settings" ref=${form.root} onInput=${onInput}>
+    ${groups.map(([schema, settings]) => {
+      const fields = html`<div class="settings">
+        ${settings.map((setting) => html`<${SettingField} key=${setting.path} setting=${setting} fault=${form.faults[setting.path] ?? ""}
+          value=${valueAt(earlier, setting.path)} />`)}
+      </div>`;
+      if (!schema) return fields;
+      return html`<fieldset class="setting-group">
+        <legend>${schema["x-label"] ?? schema.title}</legend>
+        ${schema.description && html`<${Facts}>${schema.description}</${Facts}>`}
+        ${fields}
+      </fieldset>`;
+    })}
+  </div>`;
 }

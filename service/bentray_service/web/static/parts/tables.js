@@ -1,39 +1,35 @@
-// Tables with a header row that scroll sideways in their own frame.
-import { make } from "./dom.js";
+// Tables in frames of their own that scroll sideways, and bars of shares.
+import { html } from "./view.js";
 
-// label: of the frame, another one than that of the section; columns: headings; rows: lists of texts or elements.
-export function headedTable(label, columns, rows) {
-  const table = make("table", "headed");
-  const head = table.createTHead().insertRow();
-  for (const one of columns) {
-    const cell = make("th", "", one);
-    cell.scope = "col";
-    head.append(cell);
-  }
-  const body = table.createTBody();
-  for (const [first, ...others] of rows) {
-    const row = body.insertRow();
-    const heading = make("th");
-    heading.scope = "row";
-    heading.append(first);
-    row.append(heading);
-    for (const one of others) row.insertCell().append(one);
-  }
-  const frame = make("div", "scroll");
-  frame.tabIndex = 0;
-  frame.setAttribute("role", "region");
-  frame.setAttribute("aria-label", label);
-  frame.append(table);
-  return frame;
+export function Frame({ label, children }) {
+  return html`<div class="scroll" tabindex="0" role="region" aria-label=${label}>${children}</div>`;
+}
+
+// label: of the frame, another one than that of the section; columns: headings; rows: lists of texts or elements, with keys if they move.
+export function HeadedTable({ label, columns, rows, keys = [] }) {
+  return html`<${Frame} label=${label}>
+    <table class="headed">
+      <thead><tr>${columns.map((name) => html`<th scope="col">${name}</th>`)}</tr></thead>
+      <tbody>${rows.map(([first, ...others], number) => html`<tr key=${keys[number] ?? number}>
+        <th scope="row">${first}</th>
+        ${others.map((cell) => html`<td>${cell}</td>`)}
+      </tr>`)}</tbody>
+    </table>
+  </${Frame}>`;
+}
+
+// Names and values.
+export function Pairs({ rows, className = "pairs", caption }) {
+  return html`<table class=${className}>
+    ${caption && html`<caption class="caption">${caption}</caption>`}
+    <tbody>${rows.map(([name, value]) => html`<tr><th scope="row">${name}</th><td>${value}</td></tr>`)}</tbody>
+  </table>`;
 }
 
 // A bar for a part of a whole, with its numbers as text beside it.
-export function share(part, whole, words) {
-  const box = make("div", "share");
-  const bar = make("meter");
-  Object.assign(bar, { min: 0, max: whole, value: Math.min(part, whole) });
-  Object.assign(bar, { low: 0.75 * whole, high: 0.9 * whole, optimum: 0 });
-  bar.setAttribute("aria-label", words);
-  box.append(bar, make("span", "", words));
-  return box;
+export function Share({ part, whole, words }) {
+  return html`<div class="share">
+    <meter min="0" max=${whole} low=${0.75 * whole} high=${0.9 * whole} optimum="0" value=${Math.min(part, whole)} aria-label=${words}></meter>
+    <span>${words}</span>
+  </div>`;
 }

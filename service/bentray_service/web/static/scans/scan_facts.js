@@ -1,5 +1,5 @@
 // What is known about a scan, and what is wrong with it, in words.
-import { make } from "../parts/dom.js";
+import { html } from "../parts/view.js";
 
 const percent = (part, whole) => (whole ? `${((100 * part) / whole).toFixed(1)} %` : "none");
 
@@ -40,15 +40,6 @@ export function factRows(geometry, scan) {
   return rows;
 }
 
-export function fillFacts(list, rows) {
-  list.replaceChildren();
-  for (const [term, value] of rows) {
-    const described = make("dd", "", value);
-    described.dataset.term = term;
-    list.append(make("dt", "", term), described);
-  }
-}
-
 const VERDICTS = {
   clean: "No faults found.",
   usable: "Usable, with the findings below.",
@@ -58,7 +49,7 @@ const VERDICTS = {
 function sentence({ check, elements, role, slice, found, accepted, action }, several) {
   const which = elements.length ? ` (${elements.length === 1 ? "element" : "elements"} ${listed(elements)}${role ? `, ${role}` : ""})` : "";
   const where = several ? `, slice ${slice}` : "";
-  return `${which}${where}: ${found}; accepted: ${accepted}. ${action[0].toUpperCase()}${action.slice(1)}.`.replace(/^/, check);
+  return `${check}${which}${where}: ${found}; accepted: ${accepted}. ${action[0].toUpperCase()}${action.slice(1)}.`;
 }
 
 function listed(elements) {
@@ -66,24 +57,19 @@ function listed(elements) {
   return elements.length > 12 ? `${shown} and ${elements.length - 12} more` : shown;
 }
 
-// The report of GET /v1/datasets/{id}/quality in a place: verdict, share of usable pairs, findings.
-export function showQuality(place, report, several) {
+const Findings = ({ sentences }) => html`<ul class="findings">${sentences.map((words) => html`<li>${words}</li>`)}</ul>`;
+
+// report: of GET /v1/datasets/{id}/quality: verdict, share of usable pairs, findings. several: whether the scan has slices.
+export function Quality({ report, several }) {
   const share = `${report.usable_pairs.toLocaleString("en")} of ${report.pairs.toLocaleString("en")} pairs`;
   const picker = report.picker ? `, arrivals by the picker ${report.picker}` : "";
-  const usable = `Usable: ${share} (${percent(report.usable_pairs, report.pairs)})${picker}.`;
-  place.replaceChildren(make("p", "verdict", VERDICTS[report.verdict]), make("p", "usable", usable));
-  if (report.findings.length) {
-    const list = make("ul", "findings");
-    list.append(...report.findings.map((one) => make("li", "", sentence(one, several))));
-    place.append(list);
-  }
   const skipped = Object.entries(report.not_checked);
-  if (skipped.length) {
-    const more = make("details");
-    more.append(make("summary", "", `${skipped.length} checks do not apply`));
-    const list = make("ul", "findings");
-    list.append(...skipped.map(([check, reason]) => make("li", "", `${check}: ${reason}`)));
-    more.append(list);
-    place.append(more);
-  }
+  return html`
+    <p class="verdict">${VERDICTS[report.verdict]}</p>
+    <p class="usable">Usable: ${share} (${percent(report.usable_pairs, report.pairs)})${picker}.</p>
+    ${report.findings.length > 0 && html`<${Findings} sentences=${report.findings.map((finding) => sentence(finding, several))} />`}
+    ${skipped.length > 0 && html`<details>
+      <summary>${skipped.length} checks do not apply</summary>
+      <${Findings} sentences=${skipped.map(([check, reason]) => `${check}: ${reason}`)} />
+    </details>`}`;
 }

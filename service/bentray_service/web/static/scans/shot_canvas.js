@@ -1,14 +1,8 @@
 // The traces of one emission on a canvas: receivers across, time down, grey by amplitude, arrivals over them.
+import { float32Of } from "../viewer/npy.js";
 import { ticks } from "../viewer/plot.js";
 
 const [LEFT, RIGHT, TOP, BOTTOM] = [52, 8, 8, 40];
-
-// Samples of an answer of GET /v1/datasets/{id}/traces, (receivers, samples).
-export function samplesOf(shot) {
-  const bytes = Uint8Array.from(atob(shot.traces), (one) => one.charCodeAt(0));
-  const view = new DataView(bytes.buffer);
-  return Float32Array.from({ length: bytes.length / 4 }, (_, k) => view.getFloat32(4 * k, true));
-}
 
 function greys(shot, samples) {
   const picture = new OffscreenCanvas(shot.receivers, shot.samples);
@@ -39,10 +33,11 @@ export class ShotCanvas {
     for (const one of this.watching) one.disconnect();
   }
 
-  show(shot) {
-    this.shot = shot;
-    this.picture = greys(shot, samplesOf(shot));
-    this.cursor = Math.min(this.cursor, shot.receivers - 1);
+  // cursor: the receiver that is marked, counted in the picture.
+  show(shot, cursor) {
+    // Receivers, samples.
+    if (shot !== this.shot) this.picture = greys(shot, float32Of(shot.traces));
+    Object.assign(this, { shot, cursor });
     this.draw();
   }
 

@@ -1,6 +1,6 @@
 // One plane on a canvas: colours, zoom and pan in mm, scale bar, cursor, line and region.
 import { coloursOf } from "./colormaps.js";
-import { extent, nodeAt } from "./field.js";
+import { extent } from "./field.js";
 
 const MISSING = 0xffe4e4e4;
 // Of the width of the canvas at most, for the scale bar; and the share of the canvas that the image fills.
@@ -90,11 +90,9 @@ export class ImageView {
     return [width / 2 + (x - this.centre[0]) * this.scale, height / 2 - (y - this.centre[1]) * this.scale];
   }
 
-  // The plane that is shown at a position, and the node there.
-  at(x, y) {
-    const plane = this.other && this.toCanvas(x, y)[0] > this.swipe * this.canvas.clientWidth ? this.other : this.plane;
-    const node = nodeAt(plane, x, y);
-    return { plane, node, value: node ? plane.values[node[0] * plane.nb + node[1]] : NaN };
+  // Whether the other plane is shown at this place across.
+  showsOther(x) {
+    return Boolean(this.other) && this.toCanvas(x, 0)[0] > this.swipe * this.canvas.clientWidth;
   }
 
   draw() {

@@ -1,14 +1,14 @@
 // Measures of a plane: the profile along a line, statistics of a region, and limits for the colours.
 import { interpolated } from "./field.js";
 
-// Values along a line, by linear interpolation at half the smaller node spacing: { distance (mm), value } arrays.
+// Values along a line, by linear interpolation at half the smaller node spacing: x, the distance in mm, and y.
 export function profileOf(plane, [x0, y0, x1, y1]) {
   const length = Math.hypot(x1 - x0, y1 - y0);
   const count = Math.max(2, Math.ceil(length / (0.5 * Math.min(...plane.spacing))) + 1);
   const share = Array.from({ length: count }, (_, k) => k / (count - 1));
   return {
-    distance: share.map((one) => one * length),
-    value: share.map((one) => interpolated(plane, x0 + one * (x1 - x0), y0 + one * (y1 - y0))),
+    x: share.map((one) => one * length),
+    y: share.map((one) => interpolated(plane, x0 + one * (x1 - x0), y0 + one * (y1 - y0))),
   };
 }
 

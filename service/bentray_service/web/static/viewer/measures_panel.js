@@ -1,129 +1,99 @@
 // The profile and the region of a view: their places in mm, plot and statistics, and CSV files of both.
-import { make } from "../parts/dom.js";
+import { saveBlob } from "../parts/key.js";
+import { Frame } from "../parts/tables.js";
+import { Button, Facts, html } from "../parts/view.js";
+import { NumberField } from "./controls.js";
 import { profileOf, regionOf } from "./measures.js";
-import { plot } from "./plot.js";
+import { Plot } from "./plot.js";
 import { shown } from "./quantities.js";
 
 const ENDS = ["x from", "y from", "x to", "y to"];
-
-export function save(name, text) {
-  const link = make("a");
-  link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
-}
+const REGION_COLUMNS = ["image", "quantity_unit", "shape", "x0_mm", "y0_mm", "x1_mm", "y1_mm", "nodes", "area_mm2", "mean", "standard_deviation", "minimum", "maximum", "contrast", "uncertainty"];
 
 const quoted = (text) => `"${String(text).replaceAll('"', '""')}"`;
-const lines = (rows) => `${rows.map((row) => row.join(",")).join("\r\n")}\r\n`;
+const save = (name, rows) => saveBlob(new Blob([`${rows.map((row) => row.join(",")).join("\r\n")}\r\n`], { type: "text/csv" }), name);
+const inUnit = ({ unit }) => (unit ? ` (${unit})` : "");
 
-export function profileCsv(curves, { unit }) {
-  const head = ["distance_mm", ...curves.map((one) => quoted(`${one.title}${unit ? ` (${unit})` : ""}`))];
-  const { distance } = curves[0].profile;
-  return lines([head, ...distance.map((one, k) => [one, ...curves.map(({ profile }) => profile.value[k] ?? "")])]);
+function saveProfile(curves, quantity) {
+  const head = ["distance_mm", ...curves.map(({ title }) => quoted(`${title}${inUnit(quantity)}`))];
+  const rows = curves[0].x.map((distance, k) => [distance, ...curves.map(({ y }) => y[k] ?? "")]);
+  save("profile.csv", [head, ...rows]);
 }
 
-export function regionCsv(found, { unit }, region) {
-  const head = ["image", "quantity_unit", "shape", "x0_mm", "y0_mm", "x1_mm", "y1_mm", "nodes", "area_mm2", "mean", "standard_deviation", "minimum", "maximum", "contrast", "uncertainty"];
+function saveRegion(found, { unit }, region) {
   const rows = found.map(({ title, statistics: s }) => [
     quoted(title), quoted(unit), region.shape, ...region.place, s.nodes, s.area, s.mean, s.deviation, s.minimum, s.maximum, s.contrast, s.uncertainty ?? "",
   ]);
-  return lines([head, ...rows]);
+  save("region.csv", [REGION_COLUMNS, ...rows]);
 }
 
-// set: { setProfile(place), setRegion(region) }. Returns { show(curves, state, quantity, beside, deviations) }.
-export function measuresPanel(root, set) {
-  const parts = {};
-  for (const [name, title] of [["profile", "Profile"], ["region", "Region"]]) {
-    const box = make("section", `measure ${name}`);
-    const head = make("h2", "", title);
-    const none = make("p", "facts", "");
-    const place = make("div", "place");
-    const inputs = ENDS.map((end) => {
-      const label = make("label", "", `${end} `);
-      const input = make("input");
-      Object.assign(input, { type: "number", step: "any" });
-      input.setAttribute("aria-label", `${title}: ${end}, mm`);
-      input.addEventListener("change", () => {
-        const values = inputs.map((one) => one.valueAsNumber);
-        if (!values.every(Number.isFinite)) return;
-        if (name === "profile") set.setProfile(values);
-        else set.setRegion({ shape: parts.region.shape, place: values });
-      });
-      label.append(input);
-      place.append(label);
-      return input;
-    });
-    const result = make("div", "measured");
-    const csv = make("button", "quiet", "Save as CSV");
-    const clear = make("button", "quiet", "Clear");
-    csv.type = clear.type = "button";
-    csv.addEventListener("click", () => parts[name].save());
-    clear.addEventListener("click", () => (name === "profile" ? set.setProfile(null) : set.setRegion(null)));
-    const row = make("div", "links");
-    row.append(csv, clear);
-    box.append(head, none, place, result, row);
-    root.append(box);
-    parts[name] = { box, none, place, inputs, result, row, shape: "ellipse", key: "", save: () => {} };
-  }
-  parts.profile.none.textContent = "Choose Profile and drag a line, or enter its ends in mm.";
-  parts.region.none.textContent = "Choose Rectangle or Ellipse and drag, or enter its corners in mm.";
-
-  function fill(part, place) {
-    part.none.hidden = Boolean(place);
-    part.result.hidden = part.row.hidden = !place;
-    part.inputs.forEach((input, k) => {
-      if (document.activeElement !== input) input.value = place ? Number(place[k].toFixed(3)) : "";
-    });
-  }
-
-  return {
-    // beside: images whose region is measured, too, such as the truth. deviations: of the nodes of the first image, or null.
-    show(curves, { profile, region }, quantity, beside = [], deviations = null) {
-      fill(parts.profile, profile);
-      fill(parts.region, region?.place);
-      const unit = quantity.unit ? ` (${quantity.unit})` : "";
-      if (profile) {
-        const found = curves.map((one) => ({ title: one.title, profile: profileOf(one.plane, profile) }));
-        const drawn = found.map((one) => ({ x: one.profile.distance, y: one.profile.value }));
-        const label = `Profile of ${quantity.words} over ${Number(found[0].profile.distance.at(-1).toFixed(2))} mm`;
-        const legend = make("p", "legend");
-        if (found.length > 1) found.forEach((one, k) => legend.append(make("span", `swatch swatch-${k}`, one.title)));
-        parts.profile.result.replaceChildren(plot(drawn, { across: "distance (mm)", up: `${quantity.words}${unit}`, label }), legend);
-        parts.profile.save = () => save("profile.csv", profileCsv(found, quantity));
-      }
-      if (region) {
-        parts.region.shape = region.shape;
-        const named = beside.length ? curves.map((one) => ({ ...one, title: "Result" })) : curves;
-        const found = [...named, ...beside].map((one) => ({ title: one.title, statistics: regionOf(one.plane, region.shape, region.place) }));
-        // As if the errors of all nodes were the same: see kernels/…/tomography/regions.py.
-        if (deviations) found[0].statistics.uncertainty = regionOf(deviations, region.shape, region.place).mean;
-        const table = make("table", "statistics");
-        const uncertain = found.map(({ statistics: s }) => (s.uncertainty === undefined ? "–" : shown(s.uncertainty, quantity)));
-        const rows = [
-          ["", found.map((one) => one.title)],
-          [`Mean${unit}`, found.map((one) => shown(one.statistics.mean, quantity))],
-          ...(deviations ? [[`Uncertainty of the mean${unit}`, uncertain]] : []),
-          [`Standard deviation${unit}`, found.map((one) => shown(one.statistics.deviation, quantity))],
-          [`Contrast to surroundings${unit}`, found.map((one) => shown(one.statistics.contrast, quantity))],
-          ["Area (mm²)", found.map((one) => one.statistics.area.toFixed(2))],
-          ["Nodes", found.map((one) => one.statistics.nodes)],
-        ].slice(found.length > 1 ? 0 : 1);
-        rows.forEach(([name, cells], number) => {
-          const row = table.insertRow();
-          const head = make("th", "", name);
-          head.scope = "row";
-          row.append(head, ...cells.map((cell) => make(found.length > 1 && number === 0 ? "th" : "td", "", cell)));
-        });
-        // Four results are wider than a telephone.
-        const frame = make("div", "scroll");
-        frame.tabIndex = 0;
-        frame.setAttribute("role", "region");
-        frame.setAttribute("aria-label", "Statistics of the region");
-        frame.append(table);
-        parts.region.result.replaceChildren(frame);
-        parts.region.save = () => save("region.csv", regionCsv(found, quantity, region));
-      }
-    },
+// A place that is measured, or null; onPlace(place) gets another one. hint: without a place.
+function Measure({ title, hint, place, onPlace, onSave, children }) {
+  const change = ({ currentTarget }) => {
+    const values = [...currentTarget.querySelectorAll("input")].map((input) => input.valueAsNumber);
+    if (values.every(Number.isFinite)) onPlace(values);
   };
+  return html`<section class=${`measure ${title.toLowerCase()}`}>
+    <h2>${title}</h2>
+    <${Facts} hidden=${place !== null}>${hint}</${Facts}>
+    <div class="place" onChange=${change}>
+      ${ENDS.map((end, k) => html`<label>${end} <${NumberField} aria-label=${`${title}: ${end}, mm`} value=${place ? Number(place[k].toFixed(3)) : ""} /></label>`)}
+    </div>
+    ${place && html`
+      <div class="measured">${children}</div>
+      <div class="links"><${Button} onClick=${onSave}>Save as CSV</${Button}><${Button} onClick=${() => onPlace(null)}>Clear</${Button}></div>`}
+  </section>`;
+}
+
+function Profile({ curves, place, quantity, onPlace }) {
+  const found = place ? curves.map(({ title, plane }) => ({ title, ...profileOf(plane, place) })) : [];
+  const length = place && Number(found[0].x.at(-1).toFixed(2));
+  return html`<${Measure} title="Profile" hint="Choose Profile and drag a line, or enter its ends in mm." place=${place} onPlace=${onPlace}
+    onSave=${() => saveProfile(found, quantity)}>
+    <${Plot} curves=${found} across="distance (mm)" up=${`${quantity.words}${inUnit(quantity)}`} label=${`Profile of ${quantity.words} over ${length} mm`} />
+    <p class="legend">${found.length > 1 && found.map(({ title }, k) => html`<span class=${`swatch swatch-${k}`}>${title}</span>`)}</p>
+  </${Measure}>`;
+}
+
+function Statistics({ found, quantity }) {
+  const unit = inUnit(quantity);
+  const of = (name) => found.map(({ statistics }) => shown(statistics[name], quantity));
+  const uncertain = found.map(({ statistics: { uncertainty } }) => (uncertainty === undefined ? "–" : shown(uncertainty, quantity)));
+  const rows = [
+    [`Mean${unit}`, of("mean")],
+    ...(found[0].statistics.uncertainty === undefined ? [] : [[`Uncertainty of the mean${unit}`, uncertain]]),
+    [`Standard deviation${unit}`, of("deviation")],
+    [`Contrast to surroundings${unit}`, of("contrast")],
+    ["Area (mm²)", found.map(({ statistics }) => statistics.area.toFixed(2))],
+    ["Nodes", found.map(({ statistics }) => statistics.nodes)],
+  ];
+  // Four results are wider than a telephone.
+  return html`<${Frame} label="Statistics of the region">
+    <table class="statistics"><tbody>
+      ${found.length > 1 && html`<tr><th scope="row"></th>${found.map(({ title }) => html`<th>${title}</th>`)}</tr>`}
+      ${rows.map(([name, cells]) => html`<tr><th scope="row">${name}</th>${cells.map((cell) => html`<td>${cell}</td>`)}</tr>`)}
+    </tbody></table>
+  </${Frame}>`;
+}
+
+// beside: images whose region is measured, too, such as the truth. deviations: of the nodes of the first image, or null.
+function Region({ curves, region, quantity, beside, deviations, onPlace }) {
+  const named = beside.length ? curves.map((curve) => ({ ...curve, title: "Result" })) : curves;
+  const measured = (plane) => regionOf(plane, region.shape, region.place);
+  const found = region ? [...named, ...beside].map(({ title, plane }) => ({ title, statistics: measured(plane) })) : [];
+  // As if the errors of all nodes were the same: see kernels/…/tomography/regions.py.
+  if (region && deviations) found[0].statistics.uncertainty = measured(deviations).mean;
+  return html`<${Measure} title="Region" hint="Choose Rectangle or Ellipse and drag, or enter its corners in mm." place=${region?.place ?? null} onPlace=${onPlace}
+    onSave=${() => saveRegion(found, quantity, region)}>
+    <${Statistics} found=${found} quantity=${quantity} />
+  </${Measure}>`;
+}
+
+// curves: titles and planes of the images at the chosen axis.
+export function Measures({ curves, state, quantity, beside, deviations, change }) {
+  const onRegion = (place) => change({ region: place && { shape: state.region?.shape ?? "ellipse", place } });
+  return html`<div class="measures">
+    <${Profile} curves=${curves} place=${state.profile} quantity=${quantity} onPlace=${(place) => change({ profile: place })} />
+    <${Region} curves=${curves} region=${state.region} quantity=${quantity} beside=${beside} deviations=${deviations} onPlace=${onRegion} />
+  </div>`;
 }

@@ -17,3 +17,9 @@ export function parseNpy(buffer) {
   if (!TYPES[kind] || !shape || !/'fortran_order':\s*False/.test(header)) throw new Error(`Values of an unknown layout: ${header.trim()}`);
   return { values: new TYPES[kind](buffer, end), shape };
 }
+
+// Little-endian 32-bit numbers in base64, as the service writes them in JSON.
+export function float32Of(text) {
+  const view = new DataView(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);
+  return Float32Array.from({ length: view.byteLength / 4 }, (_, k) => view.getFloat32(4 * k, true));
+}

@@ -8,8 +8,8 @@ const STILL = 4;
 // Of the window: by a pixel of dragging, and by a key.
 const [DRAG_SHARE, KEY_SHARE] = [1 / 300, 0.05];
 
-// act: { state(), view(), setView(centre, zoom), setWindow(low, high), window(), hover(place or null), setCursor(x, y), moveCursor(da, db),
-// moveSlice(by), draw(place, done), cursor(), automatic(), reset() }.
+// act: { current } with state, view ({ centre, zoom }), window ([low, high]), cursor, setView(centre, zoom), setWindow(low, high),
+// hover(place or null), setCursor(x, y), moveCursor(da, db), moveSlice(by), draw(place), automatic(), reset().
 export function watch(canvas, image, act) {
   const pressed = new Map();
   let drag = null;
@@ -24,9 +24,9 @@ export function watch(canvas, image, act) {
   // Zoom so that the point under (px, py) stays.
   function zoomAt(px, py, factor) {
     const [x, y] = image.toPlane(px, py);
-    const zoom = clampZoom(act.view().zoom * factor);
-    const share = act.view().zoom / zoom;
-    act.setView([x + (image.centre[0] - x) * share, y + (image.centre[1] - y) * share], zoom);
+    const zoom = clampZoom(act.current.view.zoom * factor);
+    const share = act.current.view.zoom / zoom;
+    act.current.setView([x + (image.centre[0] - x) * share, y + (image.centre[1] - y) * share], zoom);
   }
 
   function begin(event) {
@@ -40,7 +40,7 @@ export function watch(canvas, image, act) {
       return;
     }
     const [px, py] = place(event);
-    drag = { px, py, moved: false, at: image.toPlane(px, py), centre: image.centre, window: act.window(), scale: image.scale };
+    drag = { px, py, moved: false, at: image.toPlane(px, py), centre: image.centre, window: act.current.window, scale: image.scale };
   }
 
   function move(event) {
@@ -53,21 +53,21 @@ export function watch(canvas, image, act) {
       pinch.apart = apart;
       return;
     }
-    act.hover([px, py]);
+    act.current.hover([px, py]);
     if (!drag) return;
     const [dx, dy] = [px - drag.px, py - drag.py];
     drag.moved ||= Math.hypot(dx, dy) > STILL;
     if (!drag.moved) return;
-    const { tool } = act.state();
+    const { tool } = act.current.state;
     if (tool === "pan") {
-      act.setView([drag.centre[0] - dx / drag.scale, drag.centre[1] + dy / drag.scale], act.view().zoom);
+      act.current.setView([drag.centre[0] - dx / drag.scale, drag.centre[1] + dy / drag.scale], act.current.view.zoom);
     } else if (tool === "window") {
       const [low, high] = drag.window;
       const level = (low + high) / 2 - dy * DRAG_SHARE * (high - low);
       const half = ((high - low) / 2) * Math.exp(dx * DRAG_SHARE * 2);
-      act.setWindow(level - half, level + half);
+      act.current.setWindow(level - half, level + half);
     } else {
-      act.draw([...drag.at, ...image.toPlane(px, py)], false);
+      act.current.draw([...drag.at, ...image.toPlane(px, py)]);
     }
   }
 
@@ -75,8 +75,8 @@ export function watch(canvas, image, act) {
     pressed.delete(event.pointerId);
     if (pressed.size < 2) pinch = null;
     if (!drag) return;
-    if (!drag.moved) act.setCursor(...drag.at);
-    else if (!["pan", "window"].includes(act.state().tool)) act.draw([...drag.at, ...image.toPlane(...place(event))], true);
+    if (!drag.moved) act.current.setCursor(...drag.at);
+    else if (!["pan", "window"].includes(act.current.state.tool)) act.current.draw([...drag.at, ...image.toPlane(...place(event))]);
     drag = null;
   }
 
@@ -85,37 +85,37 @@ export function watch(canvas, image, act) {
     const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
     const { clientWidth: width, clientHeight: height } = canvas;
     const shift = (by, spread) => {
-      const [low, high] = act.window();
+      const [low, high] = act.current.window;
       const half = ((high - low) / 2) * spread;
       const level = (low + high) / 2 + by * (high - low);
-      act.setWindow(level - half, level + half);
+      act.current.setWindow(level - half, level + half);
     };
-    const drawing = !["pan", "window"].includes(act.state().tool);
+    const drawing = !["pan", "window"].includes(act.current.state.tool);
     const actions = {
       "+": () => zoomAt(width / 2, height / 2, STEP),
       "=": () => zoomAt(width / 2, height / 2, STEP),
       "-": () => zoomAt(width / 2, height / 2, 1 / STEP),
-      0: () => act.reset(),
-      a: () => act.automatic(),
+      0: () => act.current.reset(),
+      a: () => act.current.automatic(),
       ",": () => shift(-KEY_SHARE, 1),
       ".": () => shift(KEY_SHARE, 1),
       "[": () => shift(0, 1 - 2 * KEY_SHARE),
       "]": () => shift(0, 1 + 2 * KEY_SHARE),
-      PageUp: () => act.moveSlice(1),
-      PageDown: () => act.moveSlice(-1),
+      PageUp: () => act.current.moveSlice(1),
+      PageDown: () => act.current.moveSlice(-1),
     };
     if (arrows[event.key]) {
       const [da, db] = arrows[event.key];
       if (event.shiftKey) {
         const [x, y] = image.centre;
-        act.setView([x + (0.1 * da * width) / image.scale, y + (0.1 * db * height) / image.scale], act.view().zoom);
+        act.current.setView([x + (0.1 * da * width) / image.scale, y + (0.1 * db * height) / image.scale], act.current.view.zoom);
       } else {
-        act.moveCursor(da, db);
-        if (anchor && drawing) act.draw([...anchor, ...act.cursor()], false);
+        act.current.moveCursor(da, db);
+        if (anchor && drawing) act.current.draw([...anchor, ...act.current.cursor]);
       }
     } else if (event.key === "Enter" && drawing) {
-      if (anchor) act.draw([...anchor, ...act.cursor()], true);
-      anchor = anchor ? null : act.cursor();
+      if (anchor) act.current.draw([...anchor, ...act.current.cursor]);
+      anchor = anchor ? null : act.current.cursor;
     } else if (event.key === "Escape" && anchor) {
       anchor = null;
     } else if (actions[event.key]) {
@@ -133,7 +133,7 @@ export function watch(canvas, image, act) {
     pressed.delete(event.pointerId);
     drag = pinch = null;
   });
-  canvas.addEventListener("pointerleave", () => act.hover(null));
+  canvas.addEventListener("pointerleave", () => act.current.hover(null));
   canvas.addEventListener("keydown", key);
   canvas.addEventListener(
     "wheel",

@@ -1,0 +1,119 @@
+// The structure of pages: Preact with htm, and the elements and hooks that all pages share.
+import { useEffect, useRef, useState } from "../vendor/hooks.mjs";
+import htm from "../vendor/htm.mjs";
+import { h } from "../vendor/preact.mjs";
+
+export { render } from "../vendor/preact.mjs";
+export { useEffect, useLayoutEffect, useMemo, useReducer, useRef, useState } from "../vendor/hooks.mjs";
+
+export const html = htm.bind(h);
+
+// error: an Error or its words; without one it is hidden.
+export function Alert({ error, id, className = "" }) {
+  return html`<p id=${id} class=${`error ${className}`.trim()} role="alert" hidden=${!error}>${error?.message ?? error}</p>`;
+}
+
+export function Facts({ children, ...more }) {
+  return html`<p class="facts" ...${more}>${children}</p>`;
+}
+
+// A field below its caption.
+export function Labelled({ caption, children, ...more }) {
+  return html`<label ...${more}><span class="caption">${caption}</span>${children}</label>`;
+}
+
+// entries: [value, words], or words that are their own value. A reset of the form goes back to the chosen one.
+export function Options({ entries, chosen }) {
+  return entries.map((entry) => {
+    const [value, words] = [entry].flat();
+    const selected = value === chosen;
+    return html`<option key=${value} value=${value} selected=${selected} defaultSelected=${selected}>${words ?? value}</option>`;
+  });
+}
+
+export function Button({ children, quiet = true, ...more }) {
+  return html`<button type="button" class=${quiet ? "quiet" : ""} ...${more}>${children}</button>`;
+}
+
+// A form that is handled here: onSubmit(event) in place of the browser.
+export function Form({ onSubmit, children, ...more }) {
+  const submit = (event) => {
+    event.preventDefault();
+    onSubmit(event);
+  };
+  return html`<form onSubmit=${submit} ...${more}>${children}</form>`;
+}
+
+// Whether the component is still shown, as { current }.
+export function useShown() {
+  const shown = useRef(true);
+  useEffect(() => () => {
+    shown.current = false;
+  }, []);
+  return shown;
+}
+
+// The newest value for functions that outlive a drawing, as { current }.
+export function useNewest(value) {
+  const newest = useRef(value);
+  newest.current = value;
+  return newest;
+}
+
+// [error, act, setError]: act(work) waits for work() and keeps what it throws as the error; returns whether it succeeded.
+export function useAct() {
+  const [error, setError] = useState(null);
+  async function act(work) {
+    setError(null);
+    try {
+      await work();
+      return true;
+    } catch (problem) {
+      setError(problem);
+      return false;
+    }
+  }
+  return [error, act, setError];
+}
+
+// [value, error, refresh] of read(), which is read again after waitOf(value) milliseconds while the tab is seen, null: not again; and anew
+// for another key.
+export function useRead(read, waitOf = () => null, key = "") {
+  const [{ value, error }, setState] = useState({ value: null, error: null });
+  const refresh = useRef(null);
+  useEffect(() => {
+    let [closed, timer, last] = [false, 0, null];
+    refresh.current = async () => {
+      clearTimeout(timer);
+      let problem = null;
+      last = await read().catch((thrown) => {
+        problem = thrown;
+        return last;
+      });
+      if (closed) return;
+      setState({ value: last, error: problem });
+      const wait = waitOf(last);
+      if (wait !== null && !document.hidden) timer = setTimeout(refresh.current, wait);
+    };
+    const onVisible = () => document.hidden || waitOf(last) === null || refresh.current();
+    document.addEventListener("visibilitychange", onVisible);
+    refresh.current();
+    return () => {
+      closed = true;
+      clearTimeout(timer);
+      document.removeEventListener("visibilitychange", onVisible);
+      setState({ value: null, error: null });
+    };
+  }, [key]);
+  return [value, error, () => refresh.current()];
+}
+
+// later(work, milliseconds) puts off the work that waited before; none is done once the component is gone.
+export function useLater() {
+  const timer = useRef(0);
+  useEffect(() => () => clearTimeout(timer.current), []);
+  return (work, milliseconds) => {
+    clearTimeout(timer.current);
+    timer.current = setTimeout(work, milliseconds);
+  };
+}
