@@ -1,6 +1,6 @@
 """The colour maps of the page are the tables of Matplotlib, as in the images that the service draws."""
 
-import re
+import json
 
 import numpy as np
 from matplotlib import colormaps
@@ -10,10 +10,9 @@ from bentray_workers.images.slice_style import COLORMAPS
 
 
 def test_the_tables_are_those_of_matplotlib():
-    text = (WEB / "static" / "viewer" / "colormaps.js").read_text()
-    tables = dict(re.findall(r"  (\w+):\n((?:    \"[0-9a-f]+\"(?: \+|,)\n)+)", text))
+    tables = json.loads((WEB / "static" / "viewer" / "colormaps.json").read_text())
     assert set(tables) == {*COLORMAPS, "RdBu_r"}
     for name, table in tables.items():
-        found = np.frombuffer(bytes.fromhex("".join(re.findall("[0-9a-f]{2,}", table))), np.uint8)
+        found = np.frombuffer(bytes.fromhex(table), np.uint8)
         expected = colormaps[name](np.arange(256), bytes=True)[:, :3]
         np.testing.assert_array_equal(found.reshape(256, 3), expected, err_msg=name)

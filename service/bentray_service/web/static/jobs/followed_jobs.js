@@ -12,7 +12,7 @@ export const UNFINISHED = ["queued", "running", "cancelling"];
 
 // Calls onJobs(jobs) with the records of read() whenever one has changed, and onError(error), null once it is over. Returns
 // { ready, refresh, close }; ready is a promise of the first answer.
-export function followJobs({ read, onJobs, onError, historyMs = HISTORY_MS }) {
+function followJobs({ read, onJobs, onError, historyMs = HISTORY_MS }) {
   let timer = 0;
   let due = Infinity;
   let closed = false;

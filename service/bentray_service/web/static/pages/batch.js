@@ -16,13 +16,15 @@ function Choice({ scans, chosen, onChange }) {
     const others = [...chosen].filter((id) => id !== target.value);
     onChange(new Set(target.checked ? [...others, target.value] : others));
   };
+  // In the filter it is no start of a batch.
+  const ignoreEnter = (event) => event.key === "Enter" && event.preventDefault();
   const none = scans.length ? "No scan is chosen." : "No scan is stored yet.";
   return html`<section class="panel" aria-labelledby="choice-title">
     <h2 id="choice-title">Scans</h2>
     <div class="line-form">
       <${Labelled} caption="Show scans with">
         <input id="choice-filter" type="search" autocomplete="off" onInput=${({ target }) => setText(target.value.trim().toLowerCase())}
-          onKeyDown=${(event) => event.key === "Enter" && event.preventDefault()} />
+          onKeyDown=${ignoreEnter} />
       </${Labelled}>
       <${Button} id="choose-all" onClick=${() => onChange(new Set([...chosen, ...scans.filter(shows).map((scan) => scan.id)]))}>Choose all shown</${Button}>
       <${Button} id="choose-none" onClick=${() => onChange(new Set())}>Choose none</${Button}>

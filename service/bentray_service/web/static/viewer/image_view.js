@@ -8,7 +8,7 @@ const BAR_SHARE = 0.3;
 const FILL = 0.97;
 
 // Opacity of a node: 1 where it is known, 0 where two standard deviations reach half the range of the colours.
-export function opacity(deviation, low, high) {
+function opacity(deviation, low, high) {
   return Math.min(1, Math.max(0, 1 - (4 * deviation) / (high - low)));
 }
 
@@ -32,7 +32,7 @@ function coloured(plane, low, high, map, deviations) {
 }
 
 // A round length of at most this many mm: 1, 2 or 5 of a power of ten.
-export function roundLength(most) {
+function roundLength(most) {
   const power = 10 ** Math.floor(Math.log10(most));
   return Math.max(...[0.5, 1, 2, 5].map((step) => step * power).filter((one) => one <= most));
 }

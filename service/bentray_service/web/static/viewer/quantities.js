@@ -4,7 +4,7 @@ import { Field } from "./field.js";
 import { parseNpy } from "./npy.js";
 
 // Decibels per centimetre of one neper per metre.
-export const DB_CM_OF_NP_M = 20 / Math.LN10 / 100;
+const DB_CM_OF_NP_M = 20 / Math.LN10 / 100;
 
 // Quantities of which the uncertainty is known.
 export const FADED = ["speed", "error"];

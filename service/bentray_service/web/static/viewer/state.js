@@ -15,7 +15,7 @@ function numbers(text, count) {
 
 export const clampZoom = (zoom) => Math.min(MOST_ZOOM, Math.max(0.25, zoom));
 
-export function freshState() {
+function freshState() {
   return {
     quantity: "speed", map: null, window: null, axis: "z", planes: false, fade: false, cursor: null, views: {},
     tool: "pan", profile: null, region: null, mode: "side", other: 1, swipe: 0.5,

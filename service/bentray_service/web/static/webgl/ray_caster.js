@@ -10,7 +10,7 @@ const degrees = (angle) => (angle * Math.PI) / 180;
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
 // Unit vectors to the right, down and ahead, with z up.
-export function frameOf(azimuthDeg, elevationDeg) {
+function frameOf(azimuthDeg, elevationDeg) {
   const [azimuth, elevation] = [degrees(azimuthDeg), degrees(elevationDeg)];
   const [east, north] = [Math.cos(azimuth), Math.sin(azimuth)];
   const ahead = [-Math.cos(elevation) * east, -Math.cos(elevation) * north, -Math.sin(elevation)];
@@ -19,7 +19,7 @@ export function frameOf(azimuthDeg, elevationDeg) {
 }
 
 // Least and greatest coefficient around each block of cells: the field is between them. Two numbers per block, z fastest.
-export function rangesOf(values, [nx, ny, nz]) {
+function rangesOf(values, [nx, ny, nz]) {
   const cells = [nx - 3, ny - 3, nz - 3];
   const blocks = cells.map((count) => Math.ceil(count / BLOCK));
   const ranges = new Float32Array(2 * blocks[0] * blocks[1] * blocks[2]);
