@@ -1,8 +1,8 @@
 """Mutation run: faults planted by Cosmic Ray in the numerics one at a time, and which the nearest tests find.
 
-``make mutants`` installs Cosmic Ray into an environment of its own and runs this; ``ARGS="--only rays"`` narrows
-it. It works in a checkout of the last commit in ``build/mutants``, with a session of each module, so that a run
-can be ended at any time and continues where it was.
+``make mutants`` installs Cosmic Ray into an environment of its own and runs this; ``ARGS="--only rays"``
+narrows it. It works in a checkout of the last commit in ``build/mutants``, with a session of each module, so
+that a run can be ended at any time and continues where it was.
 """
 
 from __future__ import annotations
