@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -18,13 +17,6 @@ from .output.exit_codes import WorkFailed
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 
-class Water(StrEnum):
-    """The water speed in a calibration."""
-
-    stated = "stated"
-    fitted = "fitted"
-
-
 @with_scan_options
 def quality(
     file: Annotated[Path, typer.Argument(help="Dataset file, or a scan of another program.")],
@@ -32,7 +24,7 @@ def quality(
     scan_options: ScanOptions,
     picker: Annotated[str, typer.Option(help="Picker of first arrivals in raw traces.")] = DEFAULT_PICKER,
     calibrate: Annotated[
-        Water | None,
+        Literal["stated", "fitted"] | None,
         typer.Option(
             help="Calibrate positions and delays from the water shot, with stated or fitted water speed, "
             "the size of the array as drawn.",
@@ -65,7 +57,7 @@ def quality(
         if calibrate is None:
             found = examine_file(scan, picker, step, max_left_out=max_left_out)
         else:
-            fitted_speed = calibrate is Water.fitted
+            fitted_speed = calibrate == "fitted"
             found, calibration = calibrate_file(
                 scan, picker, step, fit_speed=fitted_speed, max_left_out=max_left_out
             )

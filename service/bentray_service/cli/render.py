@@ -7,9 +7,8 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -33,13 +32,7 @@ ROWS, RAYS = 16, 2**15
 PHANTOM_SIDE_M = 0.1
 
 
-class SampledPhantom(StrEnum):
-    """Synthetic volumes."""
-
-    SPHERE = "sphere"
-    ONE_HOLE = "one-hole"
-    TWO_HOLES = "two-holes"
-    MARSCHNER_LOBB = "marschner-lobb"
+SampledPhantom = Literal["sphere", "one-hole", "two-holes", "marschner-lobb"]
 
 
 @with_view_options
@@ -142,10 +135,10 @@ def _sampled(phantom: SampledPhantom, nodes: int) -> Volume:
     from bentray_workers.files.volume import Volume
 
     fields: dict[SampledPhantom, CubeField] = {
-        SampledPhantom.SPHERE: FringeSphere(0.6, 0.06),
-        SampledPhantom.ONE_HOLE: ONE_HOLE,
-        SampledPhantom.TWO_HOLES: TWO_HOLES,
-        SampledPhantom.MARSCHNER_LOBB: MarschnerLobb(),
+        "sphere": FringeSphere(0.6, 0.06),
+        "one-hole": ONE_HOLE,
+        "two-holes": TWO_HOLES,
+        "marschner-lobb": MarschnerLobb(),
     }
     return Volume.from_values(
         sampled(fields[phantom], nodes), (PHANTOM_SIDE_M / (nodes - 1),) * 3, title=phantom

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from ..interactive.setting_types import PhantomName
 from .options.paths import output_file
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
@@ -19,31 +19,15 @@ if TYPE_CHECKING:
     from bentray_workers.simulation.waves import WaveSimulationSettings
 
 
-class BreastPhantom(StrEnum):
-    """The breast phantoms."""
-
-    TABLE6 = "table6"
-    TABLE6_VERTICAL = "table6-vertical"
-    DETAILED = "detailed"
-    TABLE7 = "table7"
-
-
-class Array(StrEnum):
-    """Arrangement of the rings of a 3-D scan."""
-
-    MOVED = "moved"
-    RINGS = "rings"
-
-
 def simulate(
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (HDF5).")],
     phantom: Annotated[
-        BreastPhantom,
+        PhantomName,
         typer.Option(
             help="2-D breast phantom (Li 2008, Table 6), its vertical slice, 2-D with glandular texture, or "
             "3-D (Table 7)."
         ),
-    ] = BreastPhantom.TABLE6,
+    ] = "table6",
     nodes: Annotated[int, typer.Option(help="Nodes per side of the image that the scan is made for.")] = 128,
     elements: Annotated[int, typer.Option(help="Transducers of a ring; each emits and receives.")] = 256,
     coupling: Annotated[float, typer.Option(help="Speed of the water, m/s.")] = 1500.0,
@@ -55,7 +39,7 @@ def simulate(
         int | None, typer.Option(show_default="40", help="table7: number of ring heights, one node apart.")
     ] = None,
     array: Annotated[
-        Array | None,
+        Literal["moved", "rings"] | None,
         typer.Option(
             show_default="moved",
             help="table7: one moving ring, or rings at all heights that receive each other.",
@@ -122,7 +106,7 @@ def simulate(
         "emissions": emissions,
         "side_m": side,
     }
-    settings = PhantomScan(phantom=phantom.value, waveform=waveform, **request).chosen()
+    settings = PhantomScan(phantom=phantom, waveform=waveform, **request).chosen()
     announce()
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
