@@ -75,7 +75,7 @@ class FieldView:
     elevation_deg: float = setting(
         15.0, "Elevation of the camera above the horizon, degrees.", Range(-89.0, 89.0)
     )
-    zoom: float = setting(1.0, "1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
+    zoom: float = setting(1.0, "Zoom factor: 1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
     up: Literal["z", "y"] = setting("z", "Axis of the mesh that is up.")
     positions_m: tuple[float, ...] = setting(
         (),
@@ -84,9 +84,9 @@ class FieldView:
         schema={"items": {"type": "number", **POSITION_M.schema}, "maxItems": 2 * max(OBJECTS.values())},
         unset="those of the scene",
     )
-    width: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
-    height: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
-    rays: int = setting(1, "Along each side of a pixel.", Range(1, 8))
+    width: int = setting(512, "Width of the picture, pixels.", Range(1, MAX_PIXELS))
+    height: int = setting(512, "Height of the picture, pixels.", Range(1, MAX_PIXELS))
+    rays: int = setting(1, "Rays along each side of a pixel.", Range(1, 8))
     depth: int = setting(4, "Largest number of surfaces on a ray.", Range(0, 64))
     device: DeviceRequest = setting("auto", DESCRIPTION)  # noqa: RUF009 - a string, by its alias
 

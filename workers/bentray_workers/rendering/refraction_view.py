@@ -76,7 +76,7 @@ class RefractionView:
     elevation_deg: float = setting(
         20.0, "Elevation of the camera above the x-y plane, degrees.", Range(-90.0, 90.0)
     )
-    zoom: float = setting(1.0, "1 shows the whole volume, 2 half of it.", Range(0.05, 50.0))
+    zoom: float = setting(1.0, "Zoom factor: 1 shows the whole volume, 2 half of it.", Range(0.05, 50.0))
     backdrop: Literal["checkerboard", "picture", "warped-checkerboard", "warped-picture"] = setting(
         "checkerboard",
         "What is behind the volume: a plane with a checkerboard or a picture, or the same on a wavy surface.",
@@ -111,8 +111,8 @@ class RefractionView:
         False, "Attenuate light by the Fresnel reflection at each surface.", used_when=GLASS
     )
     mode: Literal["refract", "shaded"] = setting("refract", "refract, or shaded: the first surface, lit.")
-    width: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
-    height: int = setting(512, "Pixels.", Range(1, MAX_PIXELS))
+    width: int = setting(512, "Width of the picture, pixels.", Range(1, MAX_PIXELS))
+    height: int = setting(512, "Height of the picture, pixels.", Range(1, MAX_PIXELS))
     depth: int = setting(
         16,
         "Largest number of surfaces on a ray; beyond it the picture is dark grey.",
