@@ -56,7 +56,7 @@ class Range:
 
     @property
     def schema(self) -> dict[str, float]:
-        """The same in JSON Schema."""
+        """This range in JSON Schema."""
         low = "exclusiveMinimum" if self.above else "minimum"
         return {low: self.least, "exclusiveMaximum" if self.below else "maximum": self.most}
 

@@ -288,13 +288,13 @@ class Dataset:
         )
 
     def in_water(self, speed_mps: float) -> Dataset:
-        """The same scan in water of a measured speed, m/s."""
+        """This scan in water of a measured speed, m/s."""
         return replace(
             self, water_speed_mps=speed_mps, water_temperature_c=None, water_temperature_assumed=False
         )
 
     def in_water_of(self, temperature_c: float | None) -> Dataset:
-        """The same scan in water of a stated temperature, °C; None: in the water of the scan.
+        """This scan in water of a stated temperature, °C; None: in the water of the scan.
 
         Raises:
             InvalidInput: for a temperature outside 0 to 95 °C.

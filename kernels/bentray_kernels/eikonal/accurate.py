@@ -80,7 +80,7 @@ def accurate(problem: PointSource, *, supersample: int = 1) -> Floats:
 
 
 def _supersampled(problem: PointSource, times: int) -> PointSource:
-    """The same source in the medium's cubic spline, which may overshoot but not leave the medium's range."""
+    """This source in the medium's cubic spline, which may overshoot but not leave the medium's range."""
     slowness = problem.slowness
     fine = np.clip(refined(slowness, times), slowness.min(), slowness.max())
     return PointSource(SlownessGrid(fine, problem.spacing / times), problem.source)

@@ -157,7 +157,7 @@ class Diagonals:
         crew.share(lambda first, end: self._turn(source, into, first, end), self._padded_planes, 3)
 
     def turn_changed(self, source: Floats, into: Floats, changed: Columns, crew: Crew = ALONE) -> None:
-        """As ``turn`` where no other nodes than ``changed`` differ."""
+        """Like ``turn`` where no other nodes than ``changed`` differ."""
         plane = self.rows * self.width
 
         def some(first: int, end: int) -> None:
@@ -217,7 +217,7 @@ def move(
     border: bool,
     back: bool,
 ) -> None:
-    """As ``store`` or, with ``back``, ``load``, for numbers of any width."""
+    """Like ``store`` or, with ``back``, ``load``, for numbers of any width."""
     planes, nj, nk = shape
     rows, width = stored
     step = np.uint64(width + 1)
@@ -250,7 +250,7 @@ def move(
 
 @kernel
 def turn(source: AnyFloats, into: AnyFloats, shape: tuple[int, int, int], stored: tuple[int, int]) -> None:
-    """As ``Diagonals.turn``, for numbers of any width."""
+    """Like ``Diagonals.turn``, for numbers of any width."""
     planes, nj, nk = shape
     rows, width = stored
     step = np.uint64(width + 1)
@@ -310,7 +310,7 @@ def _exchange(
     flipped: bool,
     back: bool,
 ) -> None:
-    """As ``put`` or, with ``back``, ``take``."""
+    """Like ``put`` or, with ``back``, ``take``."""
     planes, nj, nk = shape
     rows, width = stored
     for which, node in enumerate(nodes):

@@ -37,7 +37,7 @@ def fast_iterative_opencl(problem: PointSource, *, tolerance: float = 1e-12) -> 
 def fast_iterative_opencl_many(
     problems: Sequence[PointSource], times: Floats, *, tolerance: float = 1e-12
 ) -> None:
-    """As ``fast_iterative_opencl`` for several problems of one shape and spacing, in the same launches.
+    """Like ``fast_iterative_opencl`` for several problems of one shape and spacing, in the same launches.
 
     Args:
         problems: as many as the batch of ``times``; each result is bit-for-bit that of a single solve.

@@ -19,7 +19,7 @@ BUCKETS = 1 << 16
 
 
 def fast_marching_untidy(problem: PointSource, *, order: int = 2, width: float = 0.01) -> Floats:
-    """As ``fast_marching``, but nodes of one bucket of times take the queue together.
+    """Like ``fast_marching``, but nodes of one bucket of times take the queue together.
 
     Args:
         problem: the checked problem.

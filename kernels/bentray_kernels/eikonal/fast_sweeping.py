@@ -87,7 +87,7 @@ def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12, threads: in
 def fast_sweeping_many(
     problems: Iterable[PointSource], times: Floats, *, tolerance: float = 1e-12, threads: int = 1
 ) -> None:
-    """As ``fast_sweeping`` for problems of one shape, in the same working arrays one after the other.
+    """Like ``fast_sweeping`` for problems of one shape, in the same working arrays one after the other.
 
     Sixteen solves in lockstep, one vector lane each, took twice the time at 256²: their arrays do not fit the
     cache, and no lane can skip updates that another one needs.

@@ -134,7 +134,7 @@ def _reset_one(node: int, number: int, front: Front, waiting: Waiting) -> int:
 
 @kernel
 def _enter_neighbours(node: int, front: Front, waiting: Waiting) -> None:
-    """As ``_enter`` for the waiting neighbours."""
+    """Like ``_enter`` for the waiting neighbours."""
     for axis in range(3):
         for neighbour in (node - front.strides[axis], node + front.strides[axis]):
             if waiting.place[neighbour] > DONE:

@@ -61,7 +61,7 @@ class SlownessGrid:
 
     @cached_property
     def least_slowness(self) -> float:
-        """Of all nodes, s/m."""
+        """Lowest slowness of all nodes, s/m."""
         return float(self.slowness.min())
 
     def source(self, position: ArrayLike) -> PointSource:
@@ -156,7 +156,7 @@ class PointSource:
         return np.array(nodes, dtype=np.int64), np.array(list(by_node.values()))
 
     def surroundings(self, radius: int, contrast: float) -> tuple[Ints, Floats] | None:
-        """As ``seeds``, for the box of nodes up to ``radius`` from the source, all along straight lines.
+        """Like ``seeds``, for the box of nodes up to ``radius`` from the source, all along straight lines.
 
         None where the slowness in the box varies by more than the factor ``contrast``: there the lines bend.
         """

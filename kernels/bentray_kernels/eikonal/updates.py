@@ -286,7 +286,7 @@ def first_order_2d(a: float, b: float, rhs: float) -> float:
 
 @kernel(inline="always")
 def first_order_3d(a: float, b: float, c: float, rhs: float) -> float:
-    """As ``first_order_2d`` with three axes: take in the axes in order of time while they are upwind."""
+    """Like ``first_order_2d`` with three axes: take in the axes in order of time while they are upwind."""
     low = min(a, min(b, c))
     high = max(a, max(b, c))
     middle = max(min(a, b), min(max(a, b), c))

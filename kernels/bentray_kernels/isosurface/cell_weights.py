@@ -36,7 +36,7 @@ class CellWeights:
 
     @property
     def degree(self) -> int:
-        """Of the pieces."""
+        """Degree of the pieces."""
         return int(self.powers.shape[2]) - 1
 
     def control(self, derivative: int = 0) -> Floats:

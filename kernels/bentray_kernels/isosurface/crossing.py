@@ -257,7 +257,7 @@ def _scan(
 def _solve(
     field: Field, ray: Ray, start: float, stop: float, below: float, above: float
 ) -> tuple[float, int, Vector]:
-    """The same in a trilinear cell, whose field along the ray is the cubic through four values."""
+    """Root in a trilinear cell, whose field along the ray is the cubic through four values."""
     third = (stop - start) / 3.0
     f0, f1 = field_at(field, ray, start), field_at(field, ray, start + third)
     f2, f3 = field_at(field, ray, start + 2.0 * third), field_at(field, ray, stop)

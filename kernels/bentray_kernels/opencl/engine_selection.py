@@ -43,7 +43,7 @@ class Work(NamedTuple):
 
 
 def requested(device: str = "auto") -> str:
-    """What a request means on this machine: ``auto``, ``cpu`` or ``opencl``.
+    """The meaning of a request on this machine: ``auto``, ``cpu`` or ``opencl``.
 
     ``BENTRAY_DEVICE`` takes the place of ``auto``; ``BENTRAY_DEVICE=cpu`` forbids devices.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Program(NamedTuple):
-    """What is built as one. Each engine lists its own; ``device_engines.programs`` has all.
+    """Sources that are built as one. Each engine lists its own; ``device_engines.programs`` has all.
 
     Attributes:
         sources: names of the files ``sources/<source>.cl``, in the order in which the compiler reads them.

@@ -48,7 +48,7 @@ class Session:
         return self._kernels[key]
 
     def own_kernel(self, program: Program, name: str) -> Any:
-        """As ``kernel``, but a new one of the caller's own, whose arguments nobody else sets."""
+        """Like ``kernel``, but a new one of the caller's own, whose arguments nobody else sets."""
         import pyopencl as cl
 
         if program not in self._programs:

@@ -48,7 +48,7 @@ LESIONS = (
 
 
 class Anatomy(NamedTuple):
-    """What distinguishes one breast from another.
+    """Parameters that distinguish one breast from another.
 
     Attributes:
         seed: of outline and texture.
@@ -165,7 +165,7 @@ class DetailedBreast:
         return self._means(nodes, side_m, 0)
 
     def attenuation(self, nodes: int, side_m: float) -> Floats:
-        """As ``speed``, Np/m."""
+        """Like ``speed``, Np/m."""
         return self._means(nodes, side_m, 1)
 
     def inside(self, nodes: int, side_m: float) -> Flags:

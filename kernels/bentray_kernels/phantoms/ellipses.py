@@ -49,7 +49,7 @@ class HalfEllipse(Ellipse):
     """The half of an ellipse before its own second axis, where that coordinate is at most 0."""
 
     def contains(self, x: Floats, y: Floats) -> Flags:
-        """As ``Ellipse``."""
+        """See ``Ellipse``."""
         c, s = math.cos(self.angle_rad), math.sin(self.angle_rad)
         across = c * (y - self.centre_m[1]) - s * (x - self.centre_m[0])
         return super().contains(x, y) & (across <= 0.0)
@@ -90,7 +90,7 @@ class EllipsePhantom:
         return self._average(nodes, side_m, self.coupling_mps, [e.speed_mps for e in self.ellipses])
 
     def attenuation(self, nodes: int, side_m: float) -> Floats:
-        """As ``speed``, Np/m."""
+        """Like ``speed``, Np/m."""
         return self._average(nodes, side_m, self.coupling_np_m, [e.attenuation_np_m for e in self.ellipses])
 
     def inside(self, nodes: int, side_m: float) -> Flags:

@@ -40,14 +40,14 @@ class FringeSphere:
                 raise InvalidInput(name, number, "a number above 0, in half edges of the cube")
 
     def value(self, points: Floats) -> Floats:
-        """As ``CubeField.value``."""
+        """See ``CubeField.value``."""
         product, _ = self._fade(points, (0.0, 0.0, 0.0), self.radius)
         for centre, radius in self.holes:
             product = product * (1.0 - self._fade(points, centre, radius)[0])
         return product
 
     def gradient(self, points: Floats) -> Floats:
-        """As ``CubeField.gradient``; 0 where the field is constant."""
+        """Like ``CubeField.gradient``; 0 where the field is constant."""
         product, slope = self._fade(points, (0.0, 0.0, 0.0), self.radius)
         for centre, radius in self.holes:
             fade, its_slope = self._fade(points, centre, radius)

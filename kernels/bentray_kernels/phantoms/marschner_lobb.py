@@ -26,7 +26,7 @@ class MarschnerLobb:
     modulation: float = 0.25
 
     def value(self, points: Floats) -> Floats:
-        """As ``CubeField.value``."""
+        """See ``CubeField.value``."""
         phase = (
             2.0 * math.pi * self.frequency * np.cos(0.5 * math.pi * np.hypot(points[..., 0], points[..., 1]))
         )
@@ -34,7 +34,7 @@ class MarschnerLobb:
         return np.asarray((along + self.modulation * (1.0 + np.cos(phase))) / (2.0 * (1.0 + self.modulation)))
 
     def gradient(self, points: Floats) -> Floats:
-        """As ``CubeField.gradient``."""
+        """See ``CubeField.gradient``."""
         radius = np.hypot(points[..., 0], points[..., 1])
         turn = 2.0 * math.pi * self.frequency
         # sin(πr/2)/r is finite on the axis.

@@ -34,7 +34,7 @@ class Ellipsoid:
     angle_rad: float = 0.0
 
     def level(self, x: Floats, y: Floats, z: Floats) -> Floats:
-        """As ``Solid.level``."""
+        """See ``Solid.level``."""
         dx, dy, dz = x - self.centre_m[0], y - self.centre_m[1], z - self.centre_m[2]
         c, s = math.cos(self.angle_rad), math.sin(self.angle_rad)
         a, b, h = self.semi_axes_m
@@ -70,7 +70,7 @@ class Dome:
     twist_rad: float = 0.0
 
     def level(self, x: Floats, y: Floats, z: Floats) -> Floats:
-        """As ``Solid.level``; infinite from the tip on."""
+        """Like ``Solid.level``; infinite from the tip on."""
         t = np.maximum((z - self.base_m) / (self.tip_m - self.base_m), 0.0)
         scale = np.maximum(1.0 - t**self.bluntness, 0.0) ** (1.0 / self.bluntness)
         u = (x - self.centre_m[0] - self.drift_m[0] * t * t) / self.semi_axes_m[0]

@@ -74,7 +74,7 @@ class VolumePhantom:
         return self._average(nodes, side_m, z_m, self.speeds_mps)
 
     def attenuation(self, nodes: int, side_m: float, z_m: ArrayLike) -> Floats:
-        """As ``speed``, Np/m."""
+        """Like ``speed``, Np/m."""
         return self._average(nodes, side_m, z_m, self.attenuations_np_m)
 
     def inside(self, nodes: int, side_m: float, z_m: ArrayLike) -> Flags:
@@ -92,12 +92,12 @@ class VolumePhantom:
 
     @property
     def speeds_mps(self) -> tuple[float, ...]:
-        """Of the coupling, then of each part."""
+        """Speeds of the coupling, then of each part, m/s."""
         return (self.coupling_mps, *(part.speed_mps for part in self.parts))
 
     @property
     def attenuations_np_m(self) -> tuple[float, ...]:
-        """As ``speeds_mps``."""
+        """See ``speeds_mps``."""
         return (self.coupling_np_m, *(part.attenuation_np_m for part in self.parts))
 
     def _paint(self, x: ArrayLike, y: ArrayLike, z: ArrayLike, values: Sequence[float]) -> Floats:
@@ -144,11 +144,11 @@ class PhantomSlice:
         return self.volume.speed_at(x, y, self.z_m)
 
     def speed(self, nodes: int, side_m: float) -> Floats:
-        """As ``EllipsePhantom.speed``: means over squares in the plane, (nodes, nodes), m/s."""
+        """Like ``EllipsePhantom.speed``: means over squares in the plane, (nodes, nodes), m/s."""
         return self._average(nodes, side_m, self.volume.speeds_mps)
 
     def attenuation(self, nodes: int, side_m: float) -> Floats:
-        """As ``speed``, Np/m."""
+        """Like ``speed``, Np/m."""
         return self._average(nodes, side_m, self.volume.attenuations_np_m)
 
     def inside(self, nodes: int, side_m: float) -> Flags:

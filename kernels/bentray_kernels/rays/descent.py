@@ -122,7 +122,7 @@ def trace_ray(fan: Fan, k: int, step: float, path: Floats, scratch: Floats) -> i
 
 @kernel(inline="always")
 def trace_curved(fan: Fan, k: int, step: float, path: Floats, scratch: Floats) -> int:
-    """As ``trace_ray`` by second-order Runge-Kutta descent along −∇(T²).
+    """Like ``trace_ray`` by second-order Runge-Kutta descent along −∇(T²).
 
     A descent that does not arrive within the memory of ``path`` is caught where the discrete gradient has no
     downhill direction (a shock, a rough model). It is repeated from node to lower node, which always ends:
@@ -175,7 +175,7 @@ def descend(
 def descend_nodes(
     fan: Fan, most: int, path: Floats, part: Floats, at_receiver: bool, low: float, high: float
 ) -> tuple[int, int]:
-    """As ``descend`` from node to lowest neighbour.
+    """Like ``descend`` from node to lowest neighbour.
 
     Args:
         at_receiver: whether ``path[0]`` is a receiver; otherwise it is a node.
@@ -237,7 +237,7 @@ def _lowest(fan: Fan, node: int, place: Floats) -> int:
 
 @kernel(inline="always")
 def trace_straight(fan: Fan, k: int, path: Floats) -> int:
-    """As ``trace_ray`` in equal steps of at most ``STEP``."""
+    """Like ``trace_ray`` in equal steps of at most ``STEP``."""
     axes = len(fan.shape)
     receiver, source = fan.receivers[k], fan.source
     steps = max(1, math.ceil(_distance(receiver, source, axes) / STEP))

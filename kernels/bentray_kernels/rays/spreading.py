@@ -140,7 +140,7 @@ def _width(path: Floats, count: int, start: float, spline: Floats) -> float:
 
 @kernel(inline="always")
 def _area(path: Floats, count: int, start: float, spline: Floats) -> float:
-    """As ``_width`` in 3-D: det Q, nodes²."""
+    """Like ``_width`` in 3-D: det Q, nodes²."""
     q00 = q01 = q10 = q11 = p01 = p10 = 0.0
     p00 = p11 = start
     det = 0.0

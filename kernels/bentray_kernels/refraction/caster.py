@@ -271,7 +271,7 @@ def _axis(axis: int) -> Vector:
 
 @kernel(inline="always")
 def gradient_at(medium: RefractiveMedium, ray: Ray, s: float, known: Vector) -> Vector:
-    """Of the field at s, per m; read there unless it is known per node, not NaN."""
+    """Gradient of the field at s, per m; read there unless it is known per node, not NaN."""
     slopes = known
     if math.isnan(known[0]):
         _, slopes = value_and_gradient_at(medium.field.coefficients, medium.field.stencil, point_at(ray, s))

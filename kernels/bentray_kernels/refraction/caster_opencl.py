@@ -94,7 +94,7 @@ class OpenCLCaster:
         depth: int,
         traced: Traced,
     ) -> None:
-        """As ``caster.cast``.
+        """See ``caster.cast``.
 
         Raises:
             InvalidInput: for a medium of another scene.
@@ -151,7 +151,7 @@ class OpenCLCaster:
         depth: int,
         traced: Traced,
     ) -> None:
-        """As ``cast``, on the device, without self-test."""
+        """Like ``cast``, on the device, without self-test."""
         # Place, point, direction, weight and the two whole numbers of a ray; its path.
         at_once = max(1, self.session.doubles_at_once() // (10 + 3 * traced.vertices.shape[1]))
         program = _program(self.precision, self._sum.name, medium.field.stencil, _way(search))

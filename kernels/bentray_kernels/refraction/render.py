@@ -166,7 +166,7 @@ def render(
 
 
 class _Found(NamedTuple):
-    """What rays meet, as in ``Picture``; ``where`` in edges of the plane."""
+    """Hits of rays, as in ``Picture``; ``where`` in edges of the plane."""
 
     plane: NDArray[np.int8]
     where: Floats
@@ -176,7 +176,7 @@ class _Found(NamedTuple):
 
 
 def _of_pixels(rays: _Found, settings: RenderSettings) -> _Found:
-    """The same of all pixels, between the rays."""
+    """Hits of all pixels, interpolated between the rays."""
     shape = settings.rows, settings.columns
     pixels = _Found(
         np.empty(shape, dtype=np.int8),

@@ -155,7 +155,7 @@ class Scene:
 
 
 def _ends(axis: int) -> tuple[tuple[slice | int, ...], tuple[slice | int, ...]]:
-    """What selects the first and the last layer of cells across an axis."""
+    """Slices that select the first and the last layer of cells across an axis."""
     before = (slice(None),) * axis
     return (*before, 0), (*before, -1)
 

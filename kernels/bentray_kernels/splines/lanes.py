@@ -169,7 +169,7 @@ class Axis:
         return self.lanes.pick(self.weights, [k] * count)
 
     def slope(self, k: int, count: int) -> Any:
-        """The same for the slope."""
+        """Weights of the slope."""
         return self.lanes.pick(self.weights, [self.lanes.width + k] * count)
 
     def both(self, k: int) -> Any:
@@ -208,7 +208,7 @@ def value(lanes: Lanes, axes: Sequence[Axis], start: Any) -> Any:
 
 
 def value_and_gradient(lanes: Lanes, axes: Sequence[Axis], start: Any) -> list[Any]:
-    """The same and its gradient, for axes with slopes.
+    """Value and gradient of the spline, for axes with slopes.
 
     A vector holds two rows of nodes: summed with the weights of the value, and with those of the slope along
     the second to last axis. So both take one multiplication, and the weights one polynomial.

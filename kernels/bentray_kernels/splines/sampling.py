@@ -125,7 +125,7 @@ def _check(coefficients: Any, weights: Any, point: Any) -> None:
 def _stage(
     context: Any, builder: Any, taken: Any, arguments: Any, *, slopes: bool
 ) -> tuple[Lanes, list[Axis], Any]:
-    """What both intrinsics begin with: the filter's lanes, the axes and the start of the grid."""
+    """Common start of both intrinsics: the filter's lanes, the axes and the start of the grid."""
     coefficients, places, _, weights, _ = taken
     lanes = Lanes(builder, len(places), DOUBLE if coefficients.dtype == types.float64 else FLOAT)
     grid = context.make_array(coefficients)(context, builder, arguments[0])

@@ -65,7 +65,7 @@ class Spline:
         smoothing: float = 0.0,
         dtype: DTypeLike = np.float64,
     ) -> Spline:
-        """The same by any filter of ``filters.FILTERS``, by name.
+        """A spline of a volume by any filter of ``filters.FILTERS``, by name.
 
         Args:
             volume, prefilter, smoothing, dtype: as above. Filters that are no B-spline pass through the nodes

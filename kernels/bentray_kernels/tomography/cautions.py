@@ -47,7 +47,7 @@ FITTED = 3
 def fit_cautions(
     dataset: Dataset, settings: Settings, residuals: Ints, history: Sequence[Iteration]
 ) -> Iterator[Caution]:
-    """What the residuals of an image by rays say against it.
+    """Cautions that follow from the residuals of an image by rays.
 
     The noise is that which the dataset states, else that of pairs measured both ways, else that of the
     roughness of the times.
@@ -160,7 +160,7 @@ def with_settings_caution(result: Reconstruction, requested: Settings, *, picks:
 
 
 def _difference_both_ways(dataset: Dataset, delta: Floats) -> float:
-    """What nine tenths of the times of pairs measured both ways are off by, s; 0 without such pairs."""
+    """Nine tenths of the times of pairs measured both ways differ by less, s; 0 without such pairs."""
     slices = delta.reshape(-1, *delta.shape[-2:])
     differences = np.concatenate([reciprocal_differences(dataset.tx, dataset.rx, one) for one in slices])
     return float(np.quantile(np.abs(differences), TYPICAL)) / math.sqrt(2.0) if differences.size else 0.0

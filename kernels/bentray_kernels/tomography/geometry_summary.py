@@ -23,7 +23,7 @@ BEYOND_NODES = 2 * RIM_NODES + 1
 
 
 def geometry_summary(dataset: Dataset, requested: Settings, settings: Settings, problem: Problem) -> str:
-    """What holds for the geometry of a reconstruction beyond the usual; empty for a plain ring.
+    """Properties of the geometry of a reconstruction beyond the usual; empty for a plain ring.
 
     Args:
         dataset: the scan.

@@ -159,7 +159,7 @@ class Problem:
         return slice(low, min(math.ceil(z.max() - 1e-6) + self.axial_margin + 1, nodes))
 
     def each_pair_once(self) -> Problem:
-        """The same problem without reverse pairs, if every element is emitter and receiver: half the rays.
+        """This problem without reverse pairs, if every element is emitter and receiver: half the rays.
 
         Pairs measured both ways have their mean. Each emitter keeps the half of the elements that follow it,
         as if they were in a circle, in an array of any shape.

@@ -63,7 +63,7 @@ class FinishedGraph(TomographyGraph, Protocol):
     def state(self) -> State | Iterate: ...
 
     def value_of(self, evaluate: Callable[..., Any], /) -> Any:
-        """As ``ReconstructionGraph``."""
+        """See ``ReconstructionGraph``."""
 
 
 # Makes the graph of a slice or volume, by its index.
@@ -185,7 +185,7 @@ def _speed_of(
     samples: int,
     graph_of: GraphOf = ReconstructionGraph,
 ) -> Reconstruction:
-    """As ``run_reconstruction``, without the reflection image."""
+    """Like ``run_reconstruction``, without the reflection image."""
     requested = settings
     settings = with_nodes(dataset, with_decomposition(dataset.element_position_m, settings))
     count = pairs.count(dataset, settings)

@@ -75,7 +75,7 @@ class ReconstructionGraph:
         ]
 
     def _evaluated(self) -> list[Evaluation]:
-        """What is computed along the rays of the finished image."""
+        """Quantities computed along the rays of the finished image."""
         settings, problem = self._plans[-1], self._scan.problem(self._index)
         at = self._scan, self._index
         evaluations = []
@@ -102,7 +102,7 @@ class ReconstructionGraph:
 
     @property
     def state(self) -> State | Iterate:
-        """Of the stage in progress."""
+        """State of the stage in progress."""
         return self._stage.state
 
     def value_of(self, evaluate: Callable[..., Any]) -> Any:
@@ -111,7 +111,7 @@ class ReconstructionGraph:
 
     @property
     def history(self) -> tuple[Iteration, ...]:
-        """Of all stages so far."""
+        """Iterations of all stages so far."""
         return self._history + self._stage.history
 
     @property
@@ -124,7 +124,7 @@ class ReconstructionGraph:
         return ReconstructionCheckpoint(*before, self._stage.state, values, problem.spacing, problem.origin)
 
     def restore(self, checkpoint: ReconstructionCheckpoint) -> None:
-        """As ``task_graph.ResumableGraph``."""
+        """See ``task_graph.ResumableGraph``."""
         self._history, self._passes_before = checkpoint.history, checkpoint.passes_before
         self._stage = self._stage_of(checkpoint.stage, checkpoint.state.slowness)
         self._stage.state = checkpoint.state
@@ -132,11 +132,11 @@ class ReconstructionGraph:
             one.value = value
 
     def first(self) -> list[Task]:
-        """As ``task_graph.TaskGraph``."""
+        """See ``task_graph.TaskGraph``."""
         return self._next() if self._stage.state.done else self._stage.first()
 
     def after(self, task: Task, result: Any) -> list[Task]:
-        """As ``task_graph.TaskGraph``."""
+        """See ``task_graph.TaskGraph``."""
         for one in self._evaluations:
             if task.function in (one.trace, one.evaluate):
                 return one.after(task, result)
@@ -144,7 +144,7 @@ class ReconstructionGraph:
         return following if following or not self._stage.state.done else self._next()
 
     def _next(self) -> list[Task]:
-        """What follows a finished stage."""
+        """Tasks that follow a finished stage."""
         image, number = self._stage.state.slowness, self._stage.number + 1
         if number == len(self._plans):
             pending = [one for one in self._evaluations if one.value is None]

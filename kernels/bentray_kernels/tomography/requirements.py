@@ -1,4 +1,4 @@
-"""What settings require of a scan and its header shows: checked first, without compiled code."""
+"""Requirements of settings on a scan that its header shows: checked first, without compiled code."""
 
 from __future__ import annotations
 

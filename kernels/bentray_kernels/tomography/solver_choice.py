@@ -10,7 +10,7 @@ from .settings import DEVIATION, Settings
 
 
 class Solver(NamedTuple):
-    """What tracks the wave front of an emitter and its rays.
+    """The method that tracks the wave front of an emitter and its rays.
 
     Attributes:
         compiled: whether one compiled call does front, rays and back-projection; see ``sart.emitter_pass``.
@@ -38,7 +38,7 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
 
 
 def sart_engine(settings: Settings, dimensions: int) -> Engine:
-    """What updates slices by SART: a device has the compiled pass, with a wave front in the image itself."""
+    """The engine of SART on slices: a device has the compiled pass, with a wave front in the image itself."""
     changed = settings.sart.speed_range_mps is not None or settings.numerics.front_smoothing_nodes > 0.0
     able = solver_of(settings, dimensions).compiled and not (changed and settings.rays == "curved")
     return "opencl" if settings.device == "opencl" and able else "compiled"
@@ -70,12 +70,12 @@ def undivided_reason(settings: Settings, *, amplitudes: bool) -> str:
 
 
 def wave_engine(settings: Settings) -> Engine:
-    """What simulates full waveforms, for a refinement and for the validation of an image by ``auto``."""
+    """The engine of full waveforms, for a refinement and for the validation of an image by ``auto``."""
     return "opencl" if settings.device == "opencl" and settings.selects_model else "compiled"
 
 
 def echo_engine(settings: Settings) -> Engine:
-    """What sums the echoes of a reflection image."""
+    """The engine that sums the echoes of a reflection image."""
     return "opencl" if settings.device == "opencl" and settings.reflection.enabled else "compiled"
 
 

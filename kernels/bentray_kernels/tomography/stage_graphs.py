@@ -68,7 +68,7 @@ class Stage(ABC):
 
     @property
     def history(self) -> tuple[Iteration, ...]:
-        """Of this stage."""
+        """Iterations of this stage."""
         return tuple(replace(record, stage=self.number) for record in self.state.history)
 
     @abstractmethod

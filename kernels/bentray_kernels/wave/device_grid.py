@@ -87,7 +87,7 @@ class DeviceGrid:
         return self.filled[0] // ROWS
 
     def work_items(self, emitters: int) -> tuple[int, int, int]:
-        """Of a time step."""
+        """Work-items of a time step."""
         if len(self.shape) == 2:
             return self.filled[1], self.blocks, emitters
         return self.filled[2], self.filled[1], self.blocks * emitters

@@ -42,7 +42,7 @@ STORES: dict[Unknown, int] = {"speed": 1, "attenuation": 2}
 
 
 class Scan(NamedTuple):
-    """What all emissions have in common.
+    """Properties that all emissions have in common.
 
     Attributes:
         receivers: on the medium's grid.
@@ -63,7 +63,7 @@ class Scan(NamedTuple):
 
     @property
     def store(self) -> int:
-        """What a step stores if it does."""
+        """The field that a step stores, if it does."""
         return STORES[self.by] if self.every else NOTHING
 
 

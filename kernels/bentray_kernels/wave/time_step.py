@@ -51,7 +51,7 @@ def advance_storing(
     scratch: Any,
     stored: Any,
 ) -> None:
-    """As ``advance``; also stores the Laplacian times spacing squared over the image alone.
+    """Like ``advance``; also stores the Laplacian times spacing squared over the image alone.
 
     Args:
         now, old, keep, fade, drive, weights, spans: as ``advance`` takes them.

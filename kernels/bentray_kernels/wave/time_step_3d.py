@@ -11,7 +11,7 @@ from .time_step import FLUSH, TAPS
 
 @kernel(inline="always")
 def advance_3d(now: Any, old: Any, keep: Any, fade: Any, drive: Any, weights: Any) -> None:
-    """As ``time_step.advance``, for (nx, ny, nz)."""
+    """Like ``time_step.advance``, for (nx, ny, nz)."""
     nx, ny, nz = now.shape
     inner = nz - 2 * HALO
     w0 = weights[0] + weights[0] + weights[0]

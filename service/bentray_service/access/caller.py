@@ -54,7 +54,7 @@ class Caller:
 
     @property
     def member(self) -> str | None:
-        """What members of projects are called; None without authentication, when everything is allowed."""
+        """The name of a member of projects; None without authentication, when everything is allowed."""
         if self.how == "open":
             return None
         return f"{'key' if self.how == 'key' else 'user'}:{self.who}"

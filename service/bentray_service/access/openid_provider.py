@@ -285,7 +285,7 @@ def _is_safe(address: str) -> bool:
 
 
 def _words(error: Exception) -> str:
-    """What is wrong with a token, in words."""
+    """The fault of a token, in words."""
     if isinstance(error, ClaimError):
         return f"a wrong {error.claim}"
     return "an invalid signature" if isinstance(error, JoseError) else "an invalid one"

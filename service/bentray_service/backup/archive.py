@@ -32,7 +32,7 @@ BLOCK = 1 << 20
 
 @dataclass(frozen=True)
 class Description:
-    """What a backup holds.
+    """Contents of a backup.
 
     Attributes:
         bentray: version that wrote it.

@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 class AsyncClient(Operations):
-    """As :class:`Client`; use it with ``async with``, and await its methods."""
+    """Like :class:`Client`; use it with ``async with``, and await its methods."""
 
     def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
         super().__init__(url, key, **options)

@@ -62,7 +62,7 @@ def _document(method: Callable[..., Any], flow: Callable[..., Any]) -> None:
 
 
 class Operations(Connection):
-    """What both clients do; ``_run`` executes the flow of an operation."""
+    """Operations of both clients; ``_run`` executes the flow of an operation."""
 
     upload = _Operation(flows.upload)
     correct_dataset = _Operation(flows.correct_dataset)

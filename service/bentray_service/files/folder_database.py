@@ -58,7 +58,7 @@ def open_folder_database(files: Files, address: str) -> Database:
 
 
 def read_stamp(root: Path) -> Stamp | None:
-    """What a data folder knows of its database; None if it has none or cannot be read."""
+    """The record of a data folder about its database; None if it has none or cannot be read."""
     try:
         content = json.loads((root / STAMP).read_bytes())
         return Stamp(str(content["database"]), int(content["begun"]))

@@ -138,7 +138,7 @@ class Result:
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """What the reader must know, doubts first; raises InvalidInput for an uploaded volume."""
+        """Cautions of the result, doubts first; raises InvalidInput for an uploaded volume."""
         return self._reconstruction().cautions
 
     @property

@@ -24,7 +24,7 @@ def documentation_files() -> StaticFiles | None:
 
 
 def missing_page(version: str) -> str:
-    """What to do where the documentation is not built."""
+    """Instructions for where the documentation is not built."""
     return document(
         "documentation",
         version,

@@ -116,7 +116,7 @@ class Transport(httpx.BaseTransport):
 
 
 class AsyncTransport(httpx.AsyncBaseTransport):
-    """As ``Transport``, asynchronous."""
+    """Like ``Transport``, asynchronous."""
 
     def __init__(self, retries: int = 0) -> None:
         self._routes = _Routes(partial(httpx.AsyncHTTPTransport, retries=retries))

@@ -68,7 +68,7 @@ def capacities_of(client: Client) -> tuple[WorkerCapacity, ...]:
 
 
 def capacities_by_address(client: Client) -> dict[str, WorkerCapacity]:
-    """The same by the address of the worker."""
+    """Capacities of workers by their address."""
     return {
         address: WorkerCapacity(
             int(worker.get("memory_limit") or 0),
@@ -84,7 +84,7 @@ def capacities_by_address(client: Client) -> dict[str, WorkerCapacity]:
 
 
 def probed_capacities(client: Client, settings: Settings) -> tuple[WorkerCapacity, ...]:
-    """As ``capacities_of``, after embedded workers have tested their devices where the settings need one.
+    """Like ``capacities_of``, after embedded workers have tested their devices where the settings need one.
 
     The test takes seconds in a separate process and few jobs need a device, so it is not made at the start
     of every service. Its result is stored on disk. Workers that joined the cluster test at their start.

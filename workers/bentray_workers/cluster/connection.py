@@ -143,7 +143,7 @@ def identity_of(address: str, security: Security, timeout_s: float, workers: int
 
 
 async def identity(address: str, security: Security, timeout_s: float, workers: int) -> dict[str, Any]:
-    """As ``identity_of``, awaited; raises one of ``NO_SCHEDULER``."""
+    """Like ``identity_of``, awaited; raises one of ``NO_SCHEDULER``."""
     async with asyncio.timeout(timeout_s):
         secrets = security.get_connection_args("client")
         async with rpc(address, connection_args=secrets, timeout=timeout_s) as scheduler:

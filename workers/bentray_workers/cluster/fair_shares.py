@@ -113,7 +113,7 @@ class Shares:
             self._leave(share)
 
     def join(self, tenant: str, lane: str, client: Client) -> Share:
-        """As ``of``, without an end."""
+        """Like ``of``, without an end."""
         share = Share(self, tenant, lane, lambda: len(connected_workers(client)))
         with self._changed:
             self._account()
@@ -139,7 +139,7 @@ class Shares:
         self._changed.notify_all()
 
     def decide(self, share: Share, in_flight: int, ready: int, workers: int) -> bool:
-        """As ``Share.may_submit``."""
+        """See ``Share.may_submit``."""
         with self._changed:
             self._account()
             if share.lane == SHORT_LANE and share.used_s > LEAVES_S:

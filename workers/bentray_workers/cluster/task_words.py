@@ -1,4 +1,4 @@
-"""What each kind of task does, in words for plans and errors."""
+"""Descriptions of each kind of task for plans and errors."""
 
 from __future__ import annotations
 
@@ -44,5 +44,5 @@ TASK_WORDS = MappingProxyType(
 
 
 def task_in_words(name: str) -> str:
-    """What a task does, by the name of its function."""
+    """Description of a task, by the name of its function."""
     return TASK_WORDS.get(name, name.replace("_", " "))

@@ -70,7 +70,7 @@ def own_security() -> Security:
 
 
 def _mutual(authority: str, certificate: str, key: str) -> Security:
-    """The same certificate and key for every role."""
+    """One certificate and key for every role."""
     roles = "scheduler", "worker", "client"
     pairs = {f"tls_{role}_cert": certificate for role in roles} | {f"tls_{role}_key": key for role in roles}
     return Security(tls_ca_file=authority, require_encryption=True, **pairs)

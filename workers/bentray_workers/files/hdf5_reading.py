@@ -71,7 +71,7 @@ class Reader:
         return self._object(path) is not None
 
     def contains(self, path: str) -> bool:
-        """As ``has``, and false where an array has the name of a group on the path."""
+        """Like ``has``, and false where an array has the name of a group on the path."""
         parent = path.rpartition("/")[0]
         if parent and not (self.contains(parent) and isinstance(self._object(parent), h5py.Group)):
             return False
@@ -111,14 +111,14 @@ class Reader:
             return np.asarray(stored[()])
 
     def required(self, path: str, kinds: str, accepted: str) -> NDArray[Any]:
-        """As ``array``, and raises for an absent array."""
+        """Like ``array``, and raises for an absent array."""
         array = self.array(path, kinds, accepted)
         if array is None:
             raise InvalidInput(path, "nothing", accepted)
         return array
 
     def checked(self, path: str, kinds: str, accepted: str) -> h5py.Dataset | None:
-        """As ``array``: checked, but not read."""
+        """Like ``array``: checked, but not read."""
         found = self._object(path)
         if found is None:
             return None

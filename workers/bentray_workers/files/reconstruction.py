@@ -199,7 +199,7 @@ def _history(reader: Reader) -> tuple[Iteration, ...]:
 
 
 def _waves(sweep: Iteration) -> tuple[float, ...]:
-    """What is in ``WAVES`` of one sweep."""
+    """The arrays named in ``WAVES`` of one sweep."""
     values = (*(sweep.band_hz or (None, None)), sweep.misfit, sweep.held_out_misfit, sweep.of_attenuation)
     return tuple(math.nan if value is None else value for value in values)
 

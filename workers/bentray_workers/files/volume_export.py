@@ -47,7 +47,7 @@ DB_CM_OF_NP_M = 20.0 / math.log(10.0) / 100.0
 
 @dataclass(frozen=True)
 class Selection:
-    """What is exported of a reconstruction.
+    """The part of a reconstruction to export.
 
     Attributes:
         quantity: of formats with one image, of ``QUANTITIES``; of formats with all images ``reflection``

@@ -72,7 +72,7 @@ INDICES = ("acquisition/tx", "acquisition/rx")
 
 @dataclass(frozen=True)
 class ScanMetadata:
-    """What the user states about a scan.
+    """Statements of the user about a scan.
 
     Attributes:
         variables: name in the file, by place in the upload format.

@@ -63,7 +63,7 @@ def legend_below(axes: Axes, markerscale: float = 1.0) -> None:
 
 
 def _segments(history: tuple[Iteration, ...]) -> list[list[float]]:
-    """Of each stage the residual of every iteration, ns; over slices the root mean square."""
+    """Residual of every iteration of each stage, ns; over slices the root mean square."""
     squares: dict[int, dict[int, list[float]]] = {}
     for s in history:
         squares.setdefault(s.stage, {}).setdefault(s.sweep, []).append(s.residual_rms_s**2)

@@ -7,14 +7,14 @@ from typing import Any
 
 
 def slice_png(path: Path, **how: Any) -> bytes:
-    """As ``bentray_workers.images.slice.slice_png``."""
+    """See ``bentray_workers.images.slice.slice_png``."""
     from .slice import slice_png as draw
 
     return draw(path, **how)
 
 
 def volume_slice_png(path: Path, **how: Any) -> bytes:
-    """As ``bentray_workers.images.slice.volume_slice_png``."""
+    """See ``bentray_workers.images.slice.volume_slice_png``."""
     from .slice import volume_slice_png as draw
 
     return draw(path, **how)

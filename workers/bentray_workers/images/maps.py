@@ -50,7 +50,7 @@ def robust_limits(images: Iterable[Floats], region: Bools | None = None) -> Limi
 
 
 def symmetric_limits(images: Iterable[Floats]) -> Limits:
-    """As ``robust_limits``, with 0 in the middle."""
+    """Like ``robust_limits``, with 0 in the middle."""
     reach = max(map(abs, robust_limits(images)))
     return -reach, reach
 

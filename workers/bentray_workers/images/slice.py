@@ -74,7 +74,7 @@ def volume_slice_png(
     high: float | None = None,
     **style: Any,
 ) -> bytes:
-    """As ``slice_png`` for the values of a volume file, with limits from the slice."""
+    """Like ``slice_png`` for the values of a volume file, with limits from the slice."""
     chosen = SliceStyle(**style)
     volume = read_volume(path)
     plane = plane_of(volume.values, volume.spacing_m, volume.origin_m, axis, index)

@@ -128,7 +128,7 @@ def _estimated(
 
 
 def _water(job: _Job, findings: ScanFindings, scan: Dataset) -> str:
-    """What was estimated or assumed about the water of a scan; empty for water that is stated."""
+    """Estimated or assumed properties of the water of a scan; empty for water that is stated."""
     shot = reference_path(job.folder, 0)
     if shot.exists():
         reference = read_reference(shot)
@@ -142,7 +142,7 @@ def _water(job: _Job, findings: ScanFindings, scan: Dataset) -> str:
 
 
 class _Job(NamedTuple):
-    """What a reconstruction works with; ``runs`` numbers the groups of graphs that are run."""
+    """State of a reconstruction; ``runs`` numbers the groups of graphs that are run."""
 
     pool: Pool
     stop: Callable[[], bool] | None

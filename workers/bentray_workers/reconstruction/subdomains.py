@@ -129,7 +129,7 @@ def solve_in_blocks(
     *,
     tolerance: float = 1e-12,
 ) -> BlockField:
-    """As ``solve``, but the field stays in its blocks, for grids larger than any process."""
+    """Like ``solve``, but the field stays in its blocks, for grids larger than any process."""
     return next(solve_many_in_blocks(client, speed, spacing, [source], blocks, tolerance=tolerance))
 
 

@@ -39,7 +39,7 @@ class Drawn(NamedTuple):
 
 
 def drawn_by(draw: Callable[[], Drawn]) -> Drawn:
-    """What ``draw`` returns; drawn once more on the processor if the device is lost."""
+    """Result of ``draw``; drawn once more on the processor if the device is lost."""
     rows, lost = computed(draw)
     return rows._replace(device=f"{PROCESSOR}: {lost}") if lost else rows
 

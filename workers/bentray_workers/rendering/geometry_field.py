@@ -52,7 +52,7 @@ class GeometryFieldGraph:
         return [self._finish()] if self.done == self.total - 1 else []
 
     def _remaining(self) -> list[Task]:
-        """What can run now, by the files that exist."""
+        """Tasks that can run now, by the files that exist."""
         if not self._files.layout.exists():
             return [Task(parameterise_mesh, (self._mesh_path, self._settings, self.folder))]
         if self._files.figures.exists():

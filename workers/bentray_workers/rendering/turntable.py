@@ -68,7 +68,7 @@ class Turntable(RefractionView):
 
     @property
     def largest_bytes(self) -> int:
-        """Of its pictures and the file made of them, without compression."""
+        """Bytes of its pictures and the file made of them, without compression."""
         return 2 * (self.frames * (PIXEL_BYTES * self.width + 1) * self.height + PICTURE_BYTES * self.frames)
 
     def frame(self, number: int) -> RefractionView:

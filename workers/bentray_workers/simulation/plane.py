@@ -94,7 +94,7 @@ class SimulationSettings:
 
     @property
     def emitters(self) -> int:
-        """Of each of them."""
+        """Emitters of each of them."""
         return self.elements
 
     def medium_number(self, scan: int) -> int:

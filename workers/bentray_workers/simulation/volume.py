@@ -80,7 +80,7 @@ class VolumeSimulationSettings:
 
     @property
     def emitters(self) -> int:
-        """Of each of them."""
+        """Emitters of each of them."""
         return self.slices * self.elements if self.array == "rings" else self.elements
 
     def medium_number(self, scan: int) -> int:

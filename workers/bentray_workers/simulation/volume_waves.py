@@ -21,7 +21,7 @@ from .waves import FREQUENCY_HZ, WaveSimulationSettings
 
 @dataclass(frozen=True)
 class VolumeWaveSettings(WaveSimulationSettings):
-    """As ``WaveSimulationSettings`` in 3-D, with a lower default frequency.
+    """Like ``WaveSimulationSettings`` in 3-D, with a lower default frequency.
 
     The truth of the scan is the section at the height of the ring; the traces also contain waves from above
     and below it. Beyond the chest wall the breast continues unchanged into the absorbing boundary.

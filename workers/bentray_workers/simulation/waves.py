@@ -131,7 +131,7 @@ class WaveSimulationSettings:
 
     @property
     def spacing_m(self) -> float:
-        """Of that grid, m."""
+        """Spacing of that grid, m."""
         return self.side_m / (self.fine_nodes - 1)
 
     @property
@@ -142,12 +142,12 @@ class WaveSimulationSettings:
 
     @property
     def step_s(self) -> float:
-        """Of time, s."""
+        """Time step, s."""
         return 1.0 / (SAMPLES_A_PERIOD * self.frequency_hz * self.skip)
 
     @property
     def samples(self) -> int:
-        """Of each trace."""
+        """Samples of each trace."""
         longest = 2.0 * ring_radius(self.side_m, self.nodes) / self.speeds[0]
         return int(SAMPLES_A_PERIOD * (longest * self.frequency_hz + BEFORE + AFTER))
 
@@ -170,7 +170,7 @@ class WaveSimulationSettings:
 
 @dataclass(frozen=True)
 class VerticalWaveSettings(WaveSimulationSettings):
-    """As ``WaveSimulationSettings`` in the vertical slice of the phantom."""
+    """Like ``WaveSimulationSettings`` in the vertical slice of the phantom."""
 
     phantom_name: ClassVar[str] = "2-D breast phantom (Li 2008, Table 6), vertical slice"
 
@@ -250,7 +250,7 @@ def simulate_emission(
 
 @made_once(1)
 def _media(settings: WaveSimulationSettings) -> tuple[Medium, Medium]:
-    """Of object and water."""
+    """Media of object and water."""
     received, water = (
         Medium.from_speed(
             speed,

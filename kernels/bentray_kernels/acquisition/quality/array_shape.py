@@ -1,4 +1,4 @@
-"""What the shape of the array allows: its angular coverage, and the checks that it excludes."""
+"""Shape of the array: its angular coverage, and the checks that it excludes."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def estimate_from_pulses(
 
 
 def find_estimated_water(dataset: Dataset, reference: ReferenceShot) -> Finding:
-    """What was estimated from the chords that miss the object, beside what the file states."""
+    """Water properties estimated from the chords that miss the object, beside what the file states."""
     found = (
         f"none; from {reference.chords} chords that miss the object: water of {reference.speed_mps:.1f} m/s "
         f"({'assumed' if dataset.water_temperature_assumed else 'stated'}: {dataset.water_speed_mps:.1f}), "

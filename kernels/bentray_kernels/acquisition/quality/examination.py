@@ -79,7 +79,7 @@ def examine_slices(
     progress: Callable[[int, int], None] | None = None,
     max_left_out: float = MAX_LEFT_OUT,
 ) -> Examined:
-    """As ``examine``, with slices from an iterator.
+    """Like ``examine``, with slices from an iterator.
 
     Args:
         dataset: the scan; without traces if they are only in ``slices``.

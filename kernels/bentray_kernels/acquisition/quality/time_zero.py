@@ -83,7 +83,7 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
 
 
 def _correctable(dataset: Dataset, offset_s: float, scatter_s: float) -> tuple[Action, str]:
-    """What to do about an offset of the median of some pairs, and why it is not corrected.
+    """Advice about an offset of the median of some pairs, and why it is not corrected.
 
     Args:
         dataset: of one slice.

@@ -70,7 +70,7 @@ class WaterChords:
         return self.delay_s + distance_m / self.speed_mps
 
     def with_delays(self, emission_s: Floats, reception_s: Floats) -> WaterChords:
-        """The same chords, whose elements are late, (ntx,) and (nrx,), s."""
+        """These chords with late elements, (ntx,) and (nrx,), s."""
         return replace(self, emission_delay_s=emission_s, reception_delay_s=reception_s)
 
 

@@ -12,7 +12,7 @@ TURNS = 90
 
 
 def in_unit_square(places: Floats) -> Floats:
-    """The same shape within [0, 1]²: turned to where its smallest upright square is smallest.
+    """This shape within [0, 1]²: turned to where its smallest upright square is smallest.
 
     Args:
         places: (vertices, 2), not all on one line.

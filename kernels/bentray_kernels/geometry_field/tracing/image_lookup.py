@@ -108,7 +108,7 @@ def next_on_the_image(
 
 @kernel(inline="always")
 def on_the_image(world: World, shape: int, hit: Hit) -> Hit:
-    """The same hit by its (u, v), where the image covers it."""
+    """This hit by its (u, v), where the image covers it."""
     face, distance, first, second, _ = hit
     if face < 0:
         return hit

@@ -142,7 +142,7 @@ def _next_face(
     left: int,
     side: float,
 ) -> Hit:
-    """As ``from_the_surface``, by the weights of the corners."""
+    """Like ``from_the_surface``, by the weights of the corners."""
     n, start = world.shapes[shape, 3], world.shapes[shape, 4]
     if way == EXACT or n == 0:
         return intersect_exactly(world, shape, waiting, origin, direction, left)

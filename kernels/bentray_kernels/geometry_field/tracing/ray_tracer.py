@@ -193,7 +193,7 @@ def _nearest(
     left: int,
     within: int,
 ) -> tuple[int, int, float, float, float, bool]:
-    """What a ray meets first: instance, ``GROUND`` or ``NOTHING``; then as ``Hit``, the distance in m."""
+    """First hit of a ray: instance, ``GROUND`` or ``NOTHING``; then as ``Hit``, the distance in m."""
     met, face, distance, first, second, on_image = NOTHING, -1, np.inf, 0.0, 0.0, False
     for k in range(len(world.instances)):
         if within != NOTHING and k != within:

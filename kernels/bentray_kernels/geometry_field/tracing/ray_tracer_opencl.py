@@ -76,7 +76,7 @@ class OpenCLTracer:
             ]
 
     def trace(self, camera: Camera, settings: TraceSettings) -> Colours:
-        """As ``tracing.ray_tracer.trace``; ``settings.threads`` counts only where the CPU takes over.
+        """Like ``tracing.ray_tracer.trace``; ``settings.threads`` counts only where the CPU takes over.
 
         The lookups of (u, v) always run on the CPU.
 
@@ -121,7 +121,7 @@ class OpenCLTracer:
         )
 
     def follow(self, camera: Camera, settings: TraceSettings) -> Colours:
-        """As ``trace``, on the device, without self-test.
+        """Like ``trace``, on the device, without self-test.
 
         Raises:
             InvalidInput: for a lookup of (u, v).

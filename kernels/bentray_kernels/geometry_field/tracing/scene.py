@@ -50,7 +50,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Material:
-    """What becomes of light at a surface: shares of it are mirrored or refracted, the rest is its own colour.
+    """Optical properties of a surface: shares of light are mirrored or refracted, the rest is its own colour.
 
     Attributes:
         colour: RGB, 0 to 1.

@@ -121,7 +121,7 @@ def linearise(problem: Problem, settings: Settings, slowness: Floats, emitters: 
 
 
 def linearise_losses(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
-    """As ``linearise`` for the amplitudes: the residual, Np, is the log ratio minus that of water on the ray.
+    """Like ``linearise`` for amplitudes: the residual, Np, is the log ratio minus that of water on the ray.
 
     Raises:
         ValueError: for a problem without amplitudes.

@@ -79,7 +79,7 @@ def final_settings(settings: Settings, changes: dict[str, Any]) -> Settings:
 
 
 def _from_coarser_grids(settings: Settings) -> Settings:
-    """The same on coarser grids first, for thin bent rays: on one grid they keep to wrong paths."""
+    """These settings with coarser grids first, for thin bent rays: on one grid they keep to wrong paths."""
     if settings.rays == "straight" or settings.numerics.ray_width_m > 0.0:
         return settings
     grids = 0
@@ -244,7 +244,7 @@ def advice_of(result: Reconstruction) -> str:
 
 
 def label(changes: dict[str, Any]) -> str:
-    """As ``straight rays, SART`` or ``bent finite-frequency rays, Gauss-Newton``."""
+    """Label such as ``straight rays, SART`` or ``bent finite-frequency rays, Gauss-Newton``."""
     rays = "straight" if changes["rays"] == "straight" else "bent"
     wide = " finite-frequency" if changes.get("ray_width_m") else ""
     parts = [f"{rays}{wide} rays"]

@@ -64,12 +64,12 @@ class SliceSize(NamedTuple):
 
     @property
     def bytes(self) -> int:
-        """Of all arrays."""
+        """Bytes of all arrays."""
         return sum(self._buffers())
 
     @property
     def largest_bytes(self) -> int:
-        """Of the largest of them."""
+        """Bytes of the largest array."""
         return max(self._buffers())
 
 
@@ -110,7 +110,7 @@ class Update(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Of one slice.
+    """Residuals of one slice.
 
     Attributes:
         squares: (n,), sum of each emitter's squared residuals, s².
@@ -226,7 +226,7 @@ class DeviceSlices:
         return slowness, coverage
 
     def residuals(self) -> list[Residuals]:
-        """Of each slice, before the updates."""
+        """Residuals of each slice, before the updates."""
         squares = np.empty((len(self._numbers), self._emitters))
         bins = np.empty((len(self._numbers), RESIDUAL_EDGES_S.size - 1), np.uint32)
         self._session.download(squares, self._squares)

@@ -33,7 +33,7 @@ WATER_PART = 0.005
 
 @dataclass(frozen=True)
 class ModelErrors:
-    """What an image and its misfit say about errors of the model.
+    """Errors of the model that follow from an image and its misfit.
 
     Attributes:
         contrast: as the image, m/s: difference of each node to its surroundings.

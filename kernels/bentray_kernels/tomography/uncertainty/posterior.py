@@ -105,7 +105,7 @@ class Posterior:
         return np.asarray(self._root * dctn(self.deviation * image, axes=self._axes, norm="ortho"))
 
     def _blurred(self, images: Floats) -> Floats:
-        """As ``finite_frequency.blurred`` for each lane."""
+        """Like ``finite_frequency.blurred`` for each lane."""
         if self.width > 0.0:
             for axis in self._axes:
                 images = gaussian_filter1d(images, self.width, axis=axis, mode="constant")

@@ -118,5 +118,5 @@ class RefinementCheckpoint:
 
     @property
     def milestone(self) -> tuple[int, ...]:
-        """As ``task_graph.Checkpoint``."""
+        """See ``task_graph.Checkpoint``."""
         return len(self.ends), len(self.state.history) if self.state is not None else -1

@@ -71,7 +71,7 @@ class RefinementGraph:
 
     @property
     def number(self) -> int:
-        """Of the active band, from 0."""
+        """Number of the active band, from 0."""
         return len(self.ends)
 
     @property
@@ -134,11 +134,11 @@ class RefinementGraph:
         return RefinementCheckpoint(self.ends, self._band)
 
     def restore(self, checkpoint: RefinementCheckpoint) -> None:
-        """As ``task_graph.ResumableGraph``."""
+        """See ``task_graph.ResumableGraph``."""
         self.ends, self._band = checkpoint.ends, checkpoint.band
 
     def first(self) -> list[Task]:
-        """As ``task_graph.TaskGraph``."""
+        """See ``task_graph.TaskGraph``."""
         if self.over:
             return []
         if self._band is None:
@@ -151,7 +151,7 @@ class RefinementGraph:
         ]
 
     def after(self, task: Task, result: Any) -> list[Task]:
-        """As ``task_graph.TaskGraph``."""
+        """See ``task_graph.TaskGraph``."""
         if task.function is start_band:
             self._band = result
             if self.ends:

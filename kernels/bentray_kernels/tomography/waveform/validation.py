@@ -74,7 +74,7 @@ class ValidationGraph:
         return self.checkpoint.state
 
     def restore(self, checkpoint: ValidationCheckpoint) -> None:
-        """As ``task_graph.ResumableGraph``."""
+        """See ``task_graph.ResumableGraph``."""
         self.checkpoint = checkpoint
 
     def first(self) -> list[Task]:

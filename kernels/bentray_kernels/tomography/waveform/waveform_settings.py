@@ -161,5 +161,5 @@ class WaveSettings:
         return correlation if of == "speed" else least_squares
 
     def program(self, of: Unknown) -> str:
-        """The same misfit as a program of devices, see ``wave.emissions.Observed``."""
+        """This misfit as a program of devices, see ``wave.emissions.Observed``."""
         return "correlation" if of == "speed" else "least_squares"

@@ -36,7 +36,7 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class ScanOptions:
-    """What a command line states about a scan: values of the options that were given, by name."""
+    """Statements of a command line about a scan: values of the options that were given, by name."""
 
     options: dict[str, Any]
 

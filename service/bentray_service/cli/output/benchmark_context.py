@@ -1,4 +1,4 @@
-"""What a benchmark gets for one run: its size, progress, the folder for pictures and the cluster."""
+"""The context of a benchmark for one run: its size, progress, the folder for pictures and the cluster."""
 
 from __future__ import annotations
 

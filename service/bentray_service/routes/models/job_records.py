@@ -127,7 +127,7 @@ class PlanRecord(BaseModel):
 
 
 class EstimateRecord(BaseModel):
-    """What a job would be, if it were started now."""
+    """Estimate of a job, if it were started now."""
 
     plan: PlanRecord | None = Field(description="Null for kinds of job that are not planned.")
     minutes: float | None = Field(

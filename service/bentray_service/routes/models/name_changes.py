@@ -37,7 +37,7 @@ LengthUnit = Literal["m", "cm", "mm", "um"]
 
 
 class ScanCorrection(BaseModel):
-    """What was stated wrongly about a scan; what is absent or null stays."""
+    """Values of a scan that were stated wrongly; absent or null ones stay."""
 
     model_config = ConfigDict(extra="forbid")
 

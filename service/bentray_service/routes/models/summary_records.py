@@ -64,7 +64,7 @@ class CautionRecord(BaseModel):
 
 
 class SummaryRecord(BaseModel):
-    """What a reconstruction holds, and how its model was chosen."""
+    """Contents of a reconstruction, and how its model was chosen."""
 
     quantities: list[Literal[QuantityName, "truth"]] = Field(
         description="Those that can be shown and downloaded."

@@ -24,7 +24,7 @@ LENGTHS = ("element_position_m", "slice_z_m", "radius_m")
 
 @dataclass(frozen=True)
 class Correction:
-    """What was wrong with a scan; None: as it is stored.
+    """Corrected values of a scan; None: as it is stored.
 
     Attributes:
         times_in: unit of the times in the original file: travel times, deviations, time of the first sample,

@@ -129,7 +129,7 @@ def _impossible_times(reader: Reader) -> dict[str, int]:
 
 
 def _check_plausible(dataset: Dataset) -> None:
-    """As ``check_plausible``; for a likely unit or order the error also states the correcting command."""
+    """Like ``check_plausible``; for a likely unit or order the error also states the correcting command."""
     try:
         check_plausible(dataset)
     except WrongArrangement as error:
@@ -148,7 +148,7 @@ def _check_plausible(dataset: Dataset) -> None:
 
 
 def _shape(reader: Reader, place: str) -> tuple[int, ...]:
-    """Of an array as the file declares it; () where it is absent, or one number."""
+    """Shape of an array as the file declares it; () where it is absent, or one number."""
     stored = reader.checked(place, "iufb", "an array of numbers")
     return () if stored is None else tuple(stored.shape)
 

@@ -34,7 +34,7 @@ def record_of(dataset: Dataset) -> dict[str, Any]:
 
 
 def left_out(dataset: Dataset) -> str:
-    """What became a missing value, in words; empty for nothing."""
+    """Values that became missing, in words; empty for none."""
     words = impossible_words(dataset.impossible_times)
     return f"impossible times left out: {words}" if words else ""
 

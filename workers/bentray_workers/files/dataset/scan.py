@@ -49,7 +49,7 @@ def spectrum_of(path: Path, dataset: Dataset) -> PulseSpectrum | None:
 
 
 def measured_spectrum(path: Path, dataset: Dataset) -> PulseSpectrum | None:
-    """As ``spectrum_of``, also for a scan with a centre frequency."""
+    """Like ``spectrum_of``, also for a scan with a centre frequency."""
     with opened(path, Limits()) as reader:
         return spectrum_in(reader, stacked=dataset.slice_z_m is not None)
 

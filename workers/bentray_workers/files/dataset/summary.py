@@ -63,7 +63,7 @@ def counts_in(path: Path) -> DatasetCounts:
 
 
 def summary_of(path: Path, settings: Settings) -> Summary:
-    """As ``counts_in``, for the plan of a reconstruction."""
+    """Like ``counts_in``, for the plan of a reconstruction."""
     return counts_in(path).summary(settings)
 
 

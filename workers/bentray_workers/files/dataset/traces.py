@@ -35,7 +35,7 @@ def lacks_water(path: Path) -> bool:
 
 
 def samples_in(reader: Reader) -> int:
-    """As ``trace_samples`` for an open file."""
+    """Like ``trace_samples`` for an open file."""
     received = reader.checked("waveform/object", NUMERIC, TRACES)
     return 0 if received is None else int(received.shape[-1])
 

@@ -68,12 +68,12 @@ class BlockSartGraph:
 
     @property
     def total(self) -> int:
-        """As ``stage_graphs.Stage``."""
+        """See ``stage_graphs.Stage``."""
         return self.done if self._state.done else self._emitters * self._settings.iterations
 
     @property
     def done(self) -> int:
-        """As ``stage_graphs.Stage``."""
+        """See ``stage_graphs.Stage``."""
         return self._emitters * self._state.sweep + self._state.emitter
 
     @property
@@ -89,7 +89,7 @@ class BlockSartGraph:
         return replace(self._state, slowness=slowness, coverage=coverage)
 
     def value_of(self, _evaluate: Any) -> None:
-        """As ``ReconstructionGraph``: nothing is evaluated after the last iteration."""
+        """Like ``ReconstructionGraph``: nothing is evaluated after the last iteration."""
         return
 
     @property
@@ -98,12 +98,12 @@ class BlockSartGraph:
         return BlockCheckpoint(self._state, self._updates, self._files.blocks, *grid)
 
     def restore(self, checkpoint: BlockCheckpoint) -> None:
-        """As ``task_graph.ResumableGraph``; from the start if the files are gone or of other blocks."""
+        """Like ``task_graph.ResumableGraph``; from the start if the files are gone or of other blocks."""
         if checkpoint.blocks == self._files.blocks and self._files.complete(checkpoint.updates):
             self._state, self._updates = checkpoint.state, checkpoint.updates
 
     def first(self) -> list[Task]:
-        """As ``task_graph.TaskGraph``."""
+        """See ``task_graph.TaskGraph``."""
         if self._state.done:
             return []
         if not self._updates:
@@ -112,7 +112,7 @@ class BlockSartGraph:
         return self._begin(next(self._rounds))
 
     def after(self, task: Task, result: Any) -> list[Task]:
-        """As ``task_graph.TaskGraph``: the tasks of a round follow when all of the last one are there."""
+        """Like ``task_graph.TaskGraph``: the tasks of a round follow when all of the last one are there."""
         assert self._rounds is not None
         self._results[next(k for k, one in enumerate(self._round) if one is task)] = result
         if len(self._results) < len(self._round):

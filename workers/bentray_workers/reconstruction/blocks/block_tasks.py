@@ -37,7 +37,7 @@ class SweepOrder(NamedTuple):
 
 
 class TracedParts(NamedTuple):
-    """What ``trace_rays_in_block`` returns; the points are in a file. See ``RayParts``."""
+    """Result of ``trace_rays_in_block``; the points are in a file. See ``RayParts``."""
 
     starts: Ints
     ends: Ints
