@@ -11,7 +11,7 @@ const HISTORY_MS = 3000;
 export const UNFINISHED = ["queued", "running", "cancelling"];
 
 // Calls onJobs(jobs) with the records of read() whenever one has changed, and onError(error), null once it is over. Returns
-// { ready, refresh, close }; ready is a promise of the first answer.
+// { refresh, close }.
 function followJobs({ read, onJobs, onError, historyMs = HISTORY_MS }) {
   let timer = 0;
   let due = Infinity;
@@ -66,7 +66,7 @@ function followJobs({ read, onJobs, onError, historyMs = HISTORY_MS }) {
     readIn(historyMs);
   }
 
-  const ready = refresh();
+  refresh();
   const closeEvents = jobEvents({
     onChange: follow,
     onOpen(open) {
@@ -76,7 +76,6 @@ function followJobs({ read, onJobs, onError, historyMs = HISTORY_MS }) {
     },
   });
   return {
-    ready,
     refresh,
     close() {
       closed = true;

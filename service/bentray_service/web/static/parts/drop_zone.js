@@ -8,12 +8,13 @@ const SECTIONS = { scan: "scans", volume: "volumes", mesh: "meshes" };
 // Files that are dragged anywhere on the page; onFiles(files) once they are dropped. Returns whether some are over it.
 function useDrops(onFiles) {
   const [over, setOver] = useState(false);
+  const newest = useNewest(onFiles);
   useEffect(() => {
     const onDrag = (event) => {
       if (!event.dataTransfer?.types.includes("Files")) return;
       event.preventDefault();
       setOver(event.type === "dragover");
-      if (event.type === "drop" && event.dataTransfer.files.length) onFiles([...event.dataTransfer.files]);
+      if (event.type === "drop" && event.dataTransfer.files.length) newest.current([...event.dataTransfer.files]);
     };
     for (const name of DRAGS) document.addEventListener(name, onDrag);
     return () => {
