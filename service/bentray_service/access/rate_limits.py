@@ -1,45 +1,55 @@
-"""Rate limits of accounts and addresses, counted by ``limits`` in windows of one minute."""
+"""Rate limits of accounts and addresses: a token bucket for each, with the capacity of one minute."""
 
 from __future__ import annotations
 
-import math
+import threading
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 
-from limits import RateLimitItemPerMinute
-from limits.storage import MemoryStorage
-from limits.strategies import FixedWindowRateLimiter
+# Full buckets are removed when there are this many.
+MANY = 10_000
 
-# Requests of little work count in tenths.
-TENTHS = 10
+
+@dataclass
+class _TokenBucket:
+    left: float
+    seen: float
 
 
 class RateLimits:
-    """Requests of accounts, or of addresses that sign in; a minute begins with the first request.
-
-    Not a moving window of ``limits``: its storage keeps every key for ever, and anyone may invent addresses.
+    """Token buckets of accounts, or of addresses that sign in.
 
     Args:
-        per_minute: largest number in a minute; 0: unlimited.
+        per_minute: rate limit and capacity; 0: unlimited.
+        clock: seconds.
     """
 
-    def __init__(self, per_minute: int) -> None:
+    def __init__(self, per_minute: int, clock: Callable[[], float] = time.monotonic) -> None:
         self.per_minute = per_minute
-        self._limiter = FixedWindowRateLimiter(MemoryStorage())
-        self._limit = RateLimitItemPerMinute(per_minute * TENTHS)
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._buckets: dict[str, _TokenBucket] = {}
 
     def take(self, key: str, share: float = 1.0) -> float:
-        """0 if a request is allowed, else the seconds until the next minute of its account or address.
-
-        Args:
-            key: account or address.
-            share: what the request counts, rounded up to tenths.
-        """
+        """0 if a request is allowed, else the seconds until it is; one of little work counts a share."""
         if not self.per_minute:
             return 0.0
-        cost = math.ceil(share * TENTHS - 1e-9)
-        # A refused request does not count, hence two calls.
-        if self._limiter.test(self._limit, key, cost=cost) and self._limiter.hit(self._limit, key, cost=cost):
+        with self._lock:
+            now = self._clock()
+            if len(self._buckets) >= MANY:
+                self._forget(now)
+            bucket = self._buckets.setdefault(key, _TokenBucket(self.per_minute, now))
+            bucket.left, bucket.seen = self._level(bucket, now), now
+            if bucket.left < share:
+                return (share - bucket.left) * 60.0 / self.per_minute
+            bucket.left -= share
             return 0.0
-        wait_s = self._limiter.get_window_stats(self._limit, key).reset_time - time.time()
-        # The minute may have ended since.
-        return max(wait_s, 1e-3)
+
+    def _level(self, bucket: _TokenBucket, now: float) -> float:
+        return min(float(self.per_minute), bucket.left + (now - bucket.seen) * self.per_minute / 60.0)
+
+    def _forget(self, now: float) -> None:
+        full = [name for name, one in self._buckets.items() if self._level(one, now) >= self.per_minute]
+        for name in full:
+            del self._buckets[name]
