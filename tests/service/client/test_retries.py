@@ -43,8 +43,10 @@ def answered(status: int, retry_after_s: float | None = None) -> ClientError:
 class Walk:
     """A client whose answers are given, and whose clock only pauses move."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, first: Any = "first") -> None:
-        self.now, self.pauses, self.told = 1000.0, [], list[str]()
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, told: list[str] | None = None, first: Any = "first"
+    ) -> None:
+        self.now, self.pauses, self.told = 1000.0, [], [] if told is None else told
         monkeypatch.setattr(time, "monotonic", lambda: self.now)
         self._retries = Retries(300.0, self.told.append)
         self.ask(LOOK, first)
@@ -100,8 +102,10 @@ def test_wait_timeout_is_honoured(walk: Walk) -> None:
 
 
 def test_service_that_never_answered_fails_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
     with pytest.raises(NoAnswer, match="refused"):
-        Walk(monkeypatch, first=REFUSED)
+        Walk(monkeypatch, told, first=REFUSED)
+    assert told == []
 
 
 @pytest.mark.parametrize("error", [GONE, answered(500), answered(503)])
