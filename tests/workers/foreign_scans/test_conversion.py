@@ -337,6 +337,15 @@ def test_numbers_of_matlab_are_stored_as_numbers(tmp_path, stored, packed):
         Matlab5(tmp_path / "scan.mat")
 
 
+def test_a_cell_that_says_that_it_is_logical_is_not_read(tmp_path):
+    """SciPy names it logical, and its cells would be read."""
+    element = bytearray(_element("<", "delta_tof", (2, 2), "cell", (9, bytes(32))))
+    element[17] = 2
+    (tmp_path / "scan.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + element)
+    with pytest.raises(InvalidInput, match="delta_tof: found logical; accepted: a plain array"):
+        Matlab5(tmp_path / "scan.mat").whole("delta_tof")
+
+
 @pytest.mark.parametrize("kind", ["matlab5", "matlab5-packed", "matlab73", "npz"])
 def test_damage_anywhere_is_rejected_and_never_crashes(tmp_path, kind):
     """Bytes changed at random and files cut short: a dataset, or InvalidInput; nothing else."""

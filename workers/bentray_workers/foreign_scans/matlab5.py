@@ -63,12 +63,15 @@ class Matlab5:
     def __init__(self, path: Path) -> None:
         self._path = path
         with _rejecting_damage("file"), path.open("rb") as file:
-            self._complex = _complex_arrays(file)
+            self._plain = _plain_arrays(file)
             file.seek(0)
             listed = whosmat(file)
         if len(listed) > MAX_VARIABLES:
             raise InvalidInput("file", f"{len(listed)} variables", f"at most {MAX_VARIABLES}")
         self._variables = {name: (shape, kind) for name, shape, kind in listed}
+        for name in self._plain:
+            if sum(name == other for other, *_ in listed) > 1:
+                raise InvalidInput("file", f"two variables {name}", "variables of different names")
 
     def names(self) -> tuple[str, ...]:
         return tuple(self._variables)
@@ -77,9 +80,9 @@ class Matlab5:
         if name not in self._variables:
             return None
         shape, kind = self._variables[name]
-        if kind not in NUMBERS:
+        if kind not in NUMBERS or name not in self._plain:
             raise InvalidInput(name, OTHERS.get(kind, kind), "a plain array of real numbers")
-        if name in self._complex:
+        if self._plain[name]:
             accepted = f"a plain array of real numbers; {ACCEPTED}"
             raise InvalidInput(name, COMPLEX_NUMBERS, accepted)
         dtype = NUMBERS[kind]
@@ -104,13 +107,13 @@ class Matlab5:
         yield from self.whole(name)
 
 
-def _complex_arrays(file: IO[bytes]) -> set[str]:
-    """The names of the arrays of complex numbers.
+def _plain_arrays(file: IO[bytes]) -> dict[str, bool]:
+    """The arrays of numbers by name, and whether the numbers are complex.
 
     Raises:
         InvalidInput: for numbers that are stored as another type, with which SciPy 1.17 ends the process.
     """
-    found = set()
+    found = {}
     order = "<" if file.read(HEADER_BYTES)[-2:] == b"IM" else ">"
     while tag := file.read(8):
         kind, length = struct.unpack(order + "II", tag)
@@ -118,21 +121,22 @@ def _complex_arrays(file: IO[bytes]) -> set[str]:
         array = file.read(min(length, ENOUGH_BYTES))
         if kind == COMPRESSED:
             array = zlib.decompressobj().decompress(array, ENOUGH_BYTES)[8:]
+        file.seek(after)
         # Flags of 16 bytes, dimensions, name, numbers.
         (flags,) = struct.unpack_from(order + "I", array, 8)
+        if flags & 0xFF not in CLASSES:
+            continue
         at, parts = 16, []
-        for _ in range(3 if flags & 0xFF in CLASSES else 0):
+        for _ in range(3):
             stored, count = struct.unpack_from(order + "II", array, at)
             # Short elements have their size in the upper half of the type, and are in the tag.
             short = stored >> 16
             begin, size = (at + 4, short) if short else (at + 8, count)
             parts.append((stored & 0xFFFF, array[begin : begin + size]))
             at += 8 if short else 8 + count + -count % 8
-        if parts and parts[-1][0] not in STORED:
+        if parts[-1][0] not in STORED:
             raise InvalidInput("file", f"numbers stored as type {parts[-1][0]}", "a whole MATLAB file")
-        if parts and flags & COMPLEX:
-            found.add(parts[1][1].decode("latin-1"))
-        file.seek(after)
+        found[parts[1][1].decode("latin-1")] = bool(flags & COMPLEX)
     return found
 
 
