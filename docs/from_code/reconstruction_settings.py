@@ -8,7 +8,8 @@ from dataclasses import fields
 from bentray_kernels.ranges import RANGE
 from bentray_kernels.request_fields import choices_of, effective_when
 from bentray_kernels.tomography.settings import PLACES, Settings
-from bentray_service.cli.options.settings_options import OPTIONS, default_of
+from bentray_service.cli.options.option_tables import default_of
+from bentray_service.cli.options.settings_options import OPTIONS
 
 from .tables import table
 

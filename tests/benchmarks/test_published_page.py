@@ -10,8 +10,9 @@ import pytest
 
 from bentray_kernels.request_fields import choices_of
 from bentray_kernels.tomography import AttenuationSettings, Settings
-from bentray_workers.rendering import field_view, refraction_view
-from bentray_workers.simulation import request
+from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.refraction_view import RefractionView
+from bentray_workers.simulation.request import PhantomScan
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs/reference/published-systems.md").read_text()
@@ -31,14 +32,14 @@ def test_figures_are_the_recorded_ones():
 @pytest.mark.parametrize(
     ("word", "choices"),
     [
-        ("warped-checkerboard", refraction_view.CHOICES["backdrop"]),
-        ("uv-linear", field_view.CHOICES["lookup"]),
+        ("warped-checkerboard", choices_of(RefractionView)["backdrop"]),
+        ("uv-linear", choices_of(FieldView)["lookup"]),
         ("fmm-first-order", choices_of(Settings)["eikonal"]),
         (
             "attenuation_solver=sart",
             ["attenuation_solver=" + one for one in choices_of(AttenuationSettings)["attenuation_solver"]],
         ),
-        ("table6-vertical", request.CHOICES["phantom"]),
+        ("table6-vertical", choices_of(PhantomScan)["phantom"]),
     ],
 )
 def test_settings_exist(word, choices):

@@ -15,7 +15,6 @@ from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import loadmat, whosmat
 
 from bentray_kernels.errors import InvalidInput
 
@@ -65,7 +64,7 @@ class Matlab5:
         with _rejecting_damage("file"), path.open("rb") as file:
             self._plain = _plain_arrays(file)
             file.seek(0)
-            listed = whosmat(file)
+            listed = _scipy_io().whosmat(file)
         if len(listed) > MAX_VARIABLES:
             raise InvalidInput("file", f"{len(listed)} variables", f"at most {MAX_VARIABLES}")
         self._variables = {name: (shape, kind) for name, shape, kind in listed}
@@ -95,7 +94,7 @@ class Matlab5:
             raise InvalidInput(name, "nothing", "an array")
         shape, dtype = declaration
         with _rejecting_damage(name), self._path.open("rb") as file:
-            array = loadmat(file, variable_names=[name])[name]
+            array = _scipy_io().loadmat(file, variable_names=[name])[name]
             # A damaged NaN may signal, which is no reason to warn.
             with np.errstate(invalid="ignore"):
                 return np.asarray(array.T, dtype=dtype).reshape(shape)
@@ -105,6 +104,13 @@ class Matlab5:
         if declaration is not None:
             check_row(name, *declaration)
         yield from self.whole(name)
+
+
+def _scipy_io() -> Any:
+    # Loaded when a file of this format is read: it takes longer than to read most others.
+    from scipy import io
+
+    return io
 
 
 def _plain_arrays(file: IO[bytes]) -> dict[str, bool]:
