@@ -67,14 +67,14 @@ from .rows.accounts import Accounts
 from .rows.ages import ExpiryMarks, ObservedTime
 from .rows.batches import Batches
 from .rows.checksums import Checksums
+from .rows.claims import ClaimedTenants
 from .rows.deliveries import Deliveries
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
 from .rows.keys import Keys
 from .rows.projects import Projects
 from .rows.sessions import Sessions
-from .rows.stored_tables import Datasets, GeometryFields, Meshes, UploadedTable, Volumes
-from .rows.tenants import ClaimedTenants
+from .rows.stored_tables import Datasets, GeometryFields, Meshes, UploadedTable, UploadedVolumes, Volumes
 from .rows.uploads import Uploads
 from .settings import ServiceSettings
 from .web import errors
@@ -239,7 +239,7 @@ def _open(
     pieces, deletion, hold = Uploads(database), Deletion(database, files), UploadLocks()
     stores: dict[str, UploadedTable[Any]] = {
         "dataset": Datasets(database),
-        "volume": Volumes(database),
+        "volume": UploadedVolumes(database),
         "mesh": Meshes(database),
     }
     limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, files.scratch)

@@ -22,7 +22,7 @@ from bentray_workers.rendering.turntable import Turntable
 from bentray_workers.simulation import simulation_planning
 from bentray_workers.simulation.request import PhantomScan
 
-from .rows.typed_rows import VolumeRow
+from .rows.tables import VolumeRow
 
 
 def check_renderable(volume: VolumeRow) -> None:
@@ -31,8 +31,8 @@ def check_renderable(volume: VolumeRow) -> None:
     Raises:
         InvalidInput: naming ``volume``.
     """
-    check_even(tuple(volume["shape"]), tuple(volume["spacing_m"]))
-    check_size(tuple(volume["shape"]))
+    check_even(tuple(volume.shape), tuple(volume.spacing_m))
+    check_size(tuple(volume.shape))
 
 
 class Cluster(Protocol):

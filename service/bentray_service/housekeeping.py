@@ -18,8 +18,8 @@ from .files.direct_uploads import DirectUploads
 from .files.orphans import Orphans
 from .ingest.append import UploadLocks, remove
 from .rows.ages import ExpiredItem, ExpiryMarks, ObservedTime
+from .rows.tables import UploadRow
 from .rows.tenants import Tenant
-from .rows.typed_rows import UploadRow
 from .rows.uploads import Uploads
 
 log = logging.getLogger("bentray.housekeeping")
@@ -125,7 +125,7 @@ class Housekeeper:
     def sweep(self) -> None:
         """Mark expired items, and delete those that have been expired for long enough."""
         now = self._now()
-        uploads = {ExpiredItem(row["tenant"], UPLOAD, row["id"]): row for row in self._uploads.expired(now)}
+        uploads = {ExpiredItem(row.tenant, UPLOAD, row.id): row for row in self._uploads.expired(now)}
         stored: dict[ExpiredItem, StoredItem] = {}
         if self._keep_days is not None:
             old = self._deletion.older_than(now - DAY_S * self._keep_days)
@@ -176,9 +176,9 @@ class Housekeeper:
             InUse: while it is being read.
             StorageUnavailable: when its data cannot be deleted from the bucket now.
         """
-        if row["state"] == "reading":
-            raise InUse("upload", f"{row['id']}, which is being read", "an upload that is not being read")
-        if row["multipart_id"] is not None and self._direct is not None:
+        if row.state == "reading":
+            raise InUse("upload", f"{row.id}, which is being read", "an upload that is not being read")
+        if row.multipart_id is not None and self._direct is not None:
             self._direct.drop(row)
-        remove(self._files.of(row["tenant"]).upload(row["id"]))
-        self._uploads.remove(row["id"])
+        remove(self._files.of(row.tenant).upload(row.id))
+        self._uploads.remove(row.id)

@@ -24,7 +24,7 @@ from .backup.archive import newest_backup
 from .rows import usage
 from .rows.checksums import Checksums
 from .rows.keys import Keys
-from .rows.schema import STATES
+from .rows.tables import STATES
 
 if TYPE_CHECKING:
     from .wiring import Parts

@@ -36,8 +36,8 @@ from .compute import Cluster
 from .errors import Busy, StorageFull
 from .picture_queue import LONG_S, PictureQueue
 from .rows.accounts import Account, Accounts
+from .rows.tables import DatasetRow, FieldRow, VolumeRow
 from .rows.tenants import Tenant
-from .rows.typed_rows import DatasetRow, FieldRow, VolumeRow
 
 # Time limit of an image, s.
 RENDER_SECONDS = 120.0
@@ -85,36 +85,36 @@ class Pictures:
             path: of its file.
             how: arguments of the functions in ``bentray_workers.images.slice``.
         """
-        cost = picture_cost.slice_cost(VolumeFile.of(volume), how.get("size"))
-        draw = drawing_tasks.slice_png if "job_id" in volume else drawing_tasks.volume_slice_png
+        cost = picture_cost.slice_cost(VolumeFile.of(volume.values()), how.get("size"))
+        draw = drawing_tasks.slice_png if volume.job_id is not None else drawing_tasks.volume_slice_png
         return bytes(await self._one(tenant, ("size", "this slice", cost), path, draw, how))
 
     async def refraction_png(
         self, tenant: Tenant, volume: VolumeRow, path: Path, view: RefractionView
     ) -> bytes:
         """Render a volume with refraction."""
-        cost = picture_cost.refraction_cost(VolumeFile.of(volume), view)
-        what = "volume", f"shape {tuple(volume['shape'])}", cost
+        cost = picture_cost.refraction_cost(VolumeFile.of(volume.values()), view)
+        what = "volume", f"shape {tuple(volume.shape)}", cost
         return bytes(await self._made(tenant, what, path, lambda here: refraction.tasks_of(here, view)))
 
     async def coefficients(
         self, tenant: Tenant, volume: VolumeRow, path: Path, view: RefractionView
     ) -> bytes:
         """Filter a volume, see ``bentray_workers.rendering.coefficients``."""
-        cost = picture_cost.coefficients_cost(VolumeFile.of(volume))
-        what = "volume", f"shape {tuple(volume['shape'])}", cost
+        cost = picture_cost.coefficients_cost(VolumeFile.of(volume.values()))
+        what = "volume", f"shape {tuple(volume.shape)}", cost
         return bytes(await self._one(tenant, what, path, coefficients_npy, {"view": view}))
 
     async def histogram(
         self, tenant: Tenant, volume: VolumeRow, path: Path, quantity: str, bins: int
     ) -> dict[str, Any]:
         """Compute the histogram of a volume, see ``volume_histogram``; recent ones are kept."""
-        key = volume["id"], volume["created"], quantity, bins
+        key = volume.id, volume.created, quantity, bins
         if key not in self._histograms:
             what = (
                 "volume",
-                f"shape {tuple(volume['shape'])}",
-                picture_cost.histogram_cost(VolumeFile.of(volume)),
+                f"shape {tuple(volume.shape)}",
+                picture_cost.histogram_cost(VolumeFile.of(volume.values())),
             )
             how = {"quantity": quantity, "bins": bins}
             self._histograms[key] = dict(await self._one(tenant, what, path, volume_histogram, how))
@@ -124,43 +124,47 @@ class Pictures:
 
     async def field_png(self, tenant: Tenant, field: FieldRow, folder: Path, view: FieldView) -> bytes:
         """Render a scene with a geometry field."""
-        what = "field", str(field["id"]), picture_cost.field_cost(field["figures"], view)
+        what = "field", str(field.id), picture_cost.field_cost(field.figures, view)
         return bytes(await self._made(tenant, what, folder, lambda here: field_picture.tasks_of(here, view)))
 
     async def field_map_png(self, tenant: Tenant, field: FieldRow, folder: Path, which: str) -> bytes:
         """Render the geometry image of a field, see ``bentray_workers.rendering.field_picture.map_png``."""
-        what = "field", str(field["id"]), picture_cost.map_cost(field["figures"])
+        what = "field", str(field.id), picture_cost.map_cost(field.figures)
         return bytes(await self._one(tenant, what, folder, field_picture.map_png, {"quantity": which}))
 
     async def quality(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> dict[str, Any]:
         """Create the quality report of a dataset, see ``bentray_workers.reconstruction.quality_report``."""
-        what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
+        what = "dataset", str(dataset.id), picture_cost.quality_cost(dataset.values())
         return dict(
             await self._one(tenant, what, path, quality_report, {"picker": picker, **_water(dataset)})
         )
 
     async def quality_png(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> bytes:
         """Render the quality report of a dataset."""
-        what = "dataset", str(dataset["id"]), picture_cost.quality_cost(dataset)
+        what = "dataset", str(dataset.id), picture_cost.quality_cost(dataset.values())
         return bytes(await self._one(tenant, what, path, quality_page, {"picker": picker, **_water(dataset)}))
 
     async def scan_geometry(self, tenant: Tenant, dataset: DatasetRow, path: Path) -> dict[str, Any]:
         """Read the geometry of a dataset, see ``bentray_workers.reconstruction.scan_views``."""
-        what = "dataset", str(dataset["id"]), picture_cost.geometry_cost(dataset)
+        what = "dataset", str(dataset.id), picture_cost.geometry_cost(dataset.values())
         return dict(await self._one(tenant, what, path, scan_geometry, _water(dataset)))
 
     async def emission_traces(
         self, tenant: Tenant, dataset: DatasetRow, path: Path, how: dict[str, Any]
     ) -> dict[str, Any]:
         """Read the traces of one emission; ``how``: arguments of ``scan_views.emission_traces``."""
-        what = "dataset", str(dataset["id"]), picture_cost.emission_cost(dataset)
+        what = "dataset", str(dataset.id), picture_cost.emission_cost(dataset.values())
         return dict(await self._one(tenant, what, path, emission_traces, {**how, **_water(dataset)}))
 
     async def mesh_volume(
         self, tenant: Tenant, volume: VolumeRow, path: Path, iso: float | None, step: int, target: Path
     ) -> dict[str, Any]:
         """Extract the iso-surface of a volume to a mesh file, see ``isosurface_mesh.mesh_volume``."""
-        what = "volume", f"shape {tuple(volume['shape'])}", picture_cost.mesh_cost(VolumeFile.of(volume))
+        what = (
+            "volume",
+            f"shape {tuple(volume.shape)}",
+            picture_cost.mesh_cost(VolumeFile.of(volume.values())),
+        )
         how = {"iso": iso, "step": step, "target": target}
         return dict(await self._one(tenant, what, path, mesh_volume, how))
 
@@ -174,8 +178,8 @@ class Pictures:
         selection: volume_export.Selection,
     ) -> None:
         """Export a volume to another format, a key of ``volume_export.FORMATS``."""
-        cost = picture_cost.export_cost(VolumeFile.of(volume), name)
-        what = "volume", f"shape {tuple(volume['shape'])}", cost
+        cost = picture_cost.export_cost(VolumeFile.of(volume.values()), name)
+        what = "volume", f"shape {tuple(volume.shape)}", cost
         how = {"target": target, "name": name, "selection": selection}
         await self._one(tenant, what, path, volume_export.export_volume, how)
 
@@ -190,7 +194,7 @@ class Pictures:
         name: str,
     ) -> None:
         """Export the truth of a scan at the nodes of a reconstruction, see ``images.truth_export``."""
-        cost = picture_cost.truth_cost(VolumeFile.of(volume), dataset)
+        cost = picture_cost.truth_cost(VolumeFile.of(volume.values()), dataset.values())
         how = {"scan": scan, "target": target, "name": name}
         await self._one(tenant, ("quantity", "truth", cost), path, export_truth, how)
 
@@ -198,8 +202,8 @@ class Pictures:
         self, tenant: Tenant, volume: VolumeRow, dataset: DatasetRow, path: Path, scan: Path
     ) -> dict[str, Any]:
         """Summarise a reconstruction, see ``images.result_summary``."""
-        cost = picture_cost.truth_cost(VolumeFile.of(volume), dataset)
-        what = "volume", f"shape {tuple(volume['shape'])}", cost
+        cost = picture_cost.truth_cost(VolumeFile.of(volume.values()), dataset.values())
+        what = "volume", f"shape {tuple(volume.shape)}", cost
         return dict(await self._one(tenant, what, path, result_summary, {"scan": scan}))
 
     def waiting(self, tenant: Tenant) -> int:
@@ -277,7 +281,7 @@ class Pictures:
 
 def _water(dataset: DatasetRow) -> dict[str, float]:
     """The water that the user states for a scan, as an argument of tasks; else nothing."""
-    stated = dataset["water_temperature_c"]
+    stated = dataset.water_temperature_c
     return {} if stated is None else {"water_temperature_c": stated}
 
 

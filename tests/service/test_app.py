@@ -16,8 +16,8 @@ from sqlalchemy import update
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.app import create_app
-from bentray_service.rows import schema
 from bentray_service.rows.ids import new_id
+from bentray_service.rows.tables import JobRow
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
@@ -82,8 +82,8 @@ def test_clean_stop_puts_a_running_job_back(tmp_path, cluster, uploaded, submitt
 def left_running(app, job_id, state="running", attempts=1):
     with app.state.parts.database.write() as connection:
         connection.execute(
-            update(schema.jobs)
-            .where(schema.jobs.c.id == job_id)
+            update(JobRow)
+            .where(JobRow.id == job_id)
             .values(state=state, attempts=attempts, started=time.time(), finished=None)
         )
 

@@ -14,8 +14,8 @@ from starlette.requests import HTTPConnection
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import Forbidden, NotAuthenticated
+from ..rows.claims import ClaimedTenants
 from ..rows.sessions import PENDING_S, PendingSignIn, Sessions
-from ..rows.tenants import ClaimedTenants
 from ..settings import ServiceSettings
 from ..web.addresses import names_loopback
 from .caller import Caller
@@ -119,20 +119,20 @@ class BrowserSessions:
         claims = self._provider.claims(
             query["code"],
             self._origin + CALLBACK,
-            pending["nonce"],
-            pending["verifier"],
+            pending.nonce,
+            pending.verifier,
             self._mapping.names(),
         )
         user = self._mapping.identity(claims)
         # A session of before ends, so that nobody finds themselves in that of another.
         self._end(headers)
         secret, row = self._sessions.start(user.tenant, user.who, user.scopes, self._seconds)
-        caller = Caller(row["tenant"], "session", row["who"], frozenset(row["scopes"]), (row["id"],))
+        caller = Caller(row.tenant, "session", row.who, frozenset(row.scopes), (row.id,))
         cookies = [
             Cookie(self._pending, "", 0.0, self._secure, "Lax"),
             Cookie(self._session, secret, self._seconds, self._secure, "Strict"),
         ]
-        return f"{self._origin}/{pending['address']}", caller, cookies
+        return f"{self._origin}/{pending.address}", caller, cookies
 
     def caller(self, headers: Headers, method: str) -> Caller | None:
         """The user of the session of a request; None without a valid session.
@@ -146,7 +146,7 @@ class BrowserSessions:
             return None
         if method not in SAFE_METHODS:
             self._check_origin(headers)
-        return Caller(row["tenant"], "session", row["who"], frozenset(row["scopes"]), (row["id"],))
+        return Caller(row.tenant, "session", row.who, frozenset(row.scopes), (row.id,))
 
     def sign_out(self, headers: Headers) -> tuple[Caller | None, str | None, Cookie]:
         """End the session of a request: who it was, where to sign out at the provider, the cookie to delete.

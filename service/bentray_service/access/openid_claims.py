@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import Forbidden
-from ..rows.tenants import ClaimedTenants, Tenant, checked_tenant
+from ..rows.claims import ClaimedTenants
+from ..rows.tenants import Tenant, checked_tenant
 from ..settings import ServiceSettings
 from .caller import USUAL, checked_scopes
 

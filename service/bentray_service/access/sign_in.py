@@ -14,10 +14,11 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import Forbidden, NotAuthenticated, RateLimited
 from ..rows.accounts import Accounts
 from ..rows.api_key import PREFIX, ApiKey
+from ..rows.claims import ClaimedTenants
 from ..rows.keys import Keys
 from ..rows.projects import ROLES, Projects, membership
 from ..rows.sessions import Sessions
-from ..rows.tenants import LOCAL, ClaimedTenants, Tenant
+from ..rows.tenants import LOCAL, Tenant
 from ..settings import ServiceSettings
 from ..web.addresses import is_loopback, names_loopback, networks, within
 from .browser_sessions import BrowserSessions
@@ -150,14 +151,14 @@ class SignIn:
         if name is None:
             return caller
         project = self._projects.get(caller.tenant, name, caller.member)
-        ends = () if caller.member is None else (membership(project["id"], caller.member),)
+        ends = () if caller.member is None else (membership(project.id, caller.member),)
         return replace(
             caller,
-            tenant=Tenant(project["id"]),
-            scopes=caller.scopes.intersection(ROLES[project["role"]]),
+            tenant=Tenant(project.id),
+            scopes=caller.scopes.intersection(ROLES[project.role]),
             ends=(*caller.ends, *ends),
-            project=project["id"],
-            role=project["role"],
+            project=project.id,
+            role=project.role,
             owner=caller.tenant,
         )
 
@@ -224,7 +225,7 @@ class SignIn:
             raise NotAuthenticated(
                 "Authorization", "a key that is unknown, revoked or expired", "a valid key"
             )
-        return Caller(row["tenant"], "key", row["id"], frozenset(row["scopes"]), (row["id"],))
+        return Caller(row.tenant, "key", row.id, frozenset(row.scopes), (row.id,))
 
     def _create_first_key(self, settings: ServiceSettings) -> None:
         path = settings.first_key_file

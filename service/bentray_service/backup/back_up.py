@@ -15,7 +15,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
-from sqlalchemy import Connection, Table, select
+from sqlalchemy import Connection, select
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import sync, write_bytes
@@ -29,10 +29,20 @@ from ..files.open_store import open_store
 from ..files.private import private_files
 from ..files.store import Store
 from ..files.tenant_files import TenantFiles
-from ..rows import schema
 from ..rows.checksums import Digest
 from ..rows.database import Database, open_database
 from ..rows.table_copies import copy_to_file, snapshot
+from ..rows.tables import (
+    VERSION,
+    ChecksumRow,
+    DatasetRow,
+    FieldRow,
+    JobRow,
+    MeshRow,
+    ResultVolumeRow,
+    StoredRow,
+    UploadedVolumeRow,
+)
 from ..rows.tenants import Tenant
 from ..settings import ServiceSettings
 from .archive import (
@@ -55,12 +65,12 @@ Report = Callable[[int, int], None]
 
 
 # The tables whose rows have files, and the paths of these.
-STORED: tuple[tuple[Table, Callable[[TenantFiles, str], Path]], ...] = (
-    (schema.datasets, TenantFiles.dataset),
-    (schema.uploaded_volumes, TenantFiles.volume),
-    (schema.volumes, TenantFiles.volume),
-    (schema.meshes, TenantFiles.mesh),
-    (schema.geometry_fields, TenantFiles.field),
+STORED: tuple[tuple[type[StoredRow], Callable[[TenantFiles, str], Path]], ...] = (
+    (DatasetRow, TenantFiles.dataset),
+    (UploadedVolumeRow, TenantFiles.volume),
+    (ResultVolumeRow, TenantFiles.volume),
+    (MeshRow, TenantFiles.mesh),
+    (FieldRow, TenantFiles.field),
 )
 
 
@@ -117,7 +127,7 @@ def back_up(
         copier.remove_others()
         finished = Description(
             bentray=__version__,
-            schema=schema.VERSION,
+            schema=VERSION,
             finished=time.time(),
             id=secrets.token_hex(16),
             items=len(items) - len(copier.missing),
@@ -163,17 +173,14 @@ class _Copier:
     def _items(self, source: Connection) -> Iterator[Item]:
         """All stored items."""
         digests = {
-            (row.tenant, row.id): Digest(row.bytes, row.sha256)
-            for row in source.execute(select(schema.checksums))
+            (row.tenant, row.id): Digest(row.bytes, row.sha256) for row in source.execute(select(ChecksumRow))
         }
         for table, place in STORED:
-            for row in source.execute(select(table.c.tenant, table.c.id)):
+            for row in source.execute(select(table.tenant, table.id)):
                 path = place(self._files.of(row.tenant), row.id)
                 yield Item(row.tenant, row.id, path, digests.get((row.tenant, row.id)))
-        jobs = schema.jobs.c
-        turntables = select(jobs.tenant, jobs.id, jobs.settings).where(
-            jobs.kind == "refraction", jobs.state == "succeeded"
-        )
+        finished = {"kind": "refraction", "state": "succeeded"}
+        turntables = select(JobRow.tenant, JobRow.id, JobRow.settings).filter_by(**finished)
         for tenant, name, settings in source.execute(turntables):
             path = self._files.of(tenant).animation(name, settings["format"])
             yield Item(tenant, name, path, digests.get((tenant, name)))
@@ -232,12 +239,10 @@ class _Copier:
 
     def _exists(self, item: Item) -> bool:
         """Whether the service still has the row of an item."""
-        with self._database.read() as connection:
+        with self._database.read() as session:
             return any(
-                connection.execute(
-                    select(table.c.id).where(table.c.tenant == item.tenant, table.c.id == item.id)
-                ).first()
-                for table in (*(table for table, _ in STORED), schema.jobs)
+                session.scalar(select(table.id).filter_by(tenant=item.tenant, id=item.id))
+                for table in (*(table for table, _ in STORED), JobRow)
             )
 
     def _check_space(self, items: list[Item]) -> None:

@@ -12,7 +12,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, delete, insert, select, update
+from sqlalchemy import delete, select, update
+from sqlalchemy.orm import Session
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import sync, write_bytes
@@ -23,9 +24,18 @@ from ..files.folder_database import write_stamp
 from ..files.open_store import open_store
 from ..files.private import private_files
 from ..files.tenant_files import KEPT
-from ..rows import schema
 from ..rows.database import Database, new_mark, open_database
 from ..rows.table_copies import copy_to, has_tables, remove_database, snapshot
+from ..rows.tables import (
+    VERSION,
+    About,
+    ExpiredRow,
+    JobRow,
+    PendingSignInRow,
+    SessionRow,
+    StorageRow,
+    UploadRow,
+)
 from ..settings import ServiceSettings
 from .archive import DATABASE, Description, copy_file, digest_of_file, read_description, read_sums
 
@@ -48,7 +58,7 @@ def restore(
         OSError: when a file cannot be written; the same call continues later.
     """
     folder = folder.resolve()
-    backup = read_description(folder, schema.VERSION)
+    backup = read_description(folder, VERSION)
     sums = read_sums(folder, backup.sums)
     with private_files():
         root = settings.data_dir.resolve()
@@ -120,9 +130,9 @@ def _restore_database(root: Path, settings: ServiceSettings, mark: str) -> int:
     address = f"sqlite:///{path}"
     # A backup of an earlier version is migrated here.
     with closing(open_database(address)) as database:
-        with database.write() as connection:
-            _settle(connection, mark)
-            begun = int(connection.execute(select(schema.about.c.begun)).scalar_one())
+        with database.write() as session:
+            _settle(session, mark)
+            begun = session.scalars(select(About.begun)).one()
         _publish(root, settings, database)
     if settings.database_url is None:
         sync(path)
@@ -135,19 +145,18 @@ def _restore_database(root: Path, settings: ServiceSettings, mark: str) -> int:
     return begun
 
 
-def _settle(connection: Connection, mark: str) -> None:
+def _settle(session: Session, mark: str) -> None:
     """Remove what belongs to the old place or is not in the backup.
 
     These are unfinished uploads, exports, leases, sessions of browsers, and marks of expired items.
     """
-    connection.execute(delete(schema.bucket_mark))
-    connection.execute(insert(schema.bucket_mark).values(database=mark))
-    connection.execute(delete(schema.uploads).where(schema.uploads.c.state.in_(("receiving", "reading"))))
-    connection.execute(update(schema.jobs).values(lease_owner=None, lease_until=None))
-    connection.execute(delete(schema.storage).where(schema.storage.c.lease_owner.is_not(None)))
-    connection.execute(delete(schema.storage).where(schema.storage.c.name.like("%.%")))
-    for table in (schema.too_old, schema.sessions, schema.pending_sign_ins):
-        connection.execute(delete(table))
+    session.execute(update(About).values(database=mark))
+    session.execute(delete(UploadRow).where(UploadRow.state.in_(("receiving", "reading"))))
+    session.execute(update(JobRow).values(lease_owner=None, lease_until=None))
+    session.execute(delete(StorageRow).where(StorageRow.lease_owner.is_not(None)))
+    session.execute(delete(StorageRow).where(StorageRow.name.like("%.%")))
+    for table in (ExpiredRow, SessionRow, PendingSignInRow):
+        session.execute(delete(table))
 
 
 def _publish(root: Path, settings: ServiceSettings, database: Database) -> None:

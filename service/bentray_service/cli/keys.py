@@ -20,7 +20,7 @@ from .output.terminal import AsJson, print_json, print_lines, print_table, remar
 if TYPE_CHECKING:
     from ..rows.database import Database
     from ..rows.keys import Keys
-    from ..rows.typed_rows import KeyRow
+    from ..rows.tables import KeyRow
     from ..settings import ServiceSettings
 
 Data = Annotated[
@@ -162,10 +162,10 @@ def _seconds(text: str) -> float:
 
 
 def _shown(row: KeyRow) -> dict[str, Any]:
-    times = {name: shown_time(row[name]) for name in ("created", "expires", "revoked", "used")}
-    same = {name: row[name] for name in ("id", "tenant", "name", "scopes")}
-    expired = row["expires"] is not None and row["expires"] <= time.time()
-    state = "revoked" if row["revoked"] is not None else "expired" if expired else "valid"
+    times = {name: shown_time(getattr(row, name)) for name in ("created", "expires", "revoked", "used")}
+    same = {name: getattr(row, name) for name in ("id", "tenant", "name", "scopes")}
+    expired = row.expires is not None and row.expires <= time.time()
+    state = "revoked" if row.revoked is not None else "expired" if expired else "valid"
     return {**same, "state": state, **times}
 
 

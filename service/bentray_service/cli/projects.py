@@ -16,7 +16,7 @@ from .output.terminal import AsJson, print_json, print_lines, print_table
 
 if TYPE_CHECKING:
     from ..rows.projects import Projects
-    from ..rows.typed_rows import ProjectRow
+    from ..rows.tables import ProjectRow
 
 NOBODY = "none"
 
@@ -118,6 +118,6 @@ def _opened(data: Any) -> Iterator[Projects]:
 
 
 def _shown(store: Projects, row: ProjectRow) -> dict[str, Any]:
-    members = {one["member"]: one["role"] for one in store.members(row)}
-    same = {"id": row["id"], "tenant": row["tenant"], "name": row["name"]}
-    return {**same, "created": shown_time(row["created"]), "members": members}
+    members = {one.member: one.role for one in store.members(row)}
+    same = {"id": row.id, "tenant": row.tenant, "name": row.name}
+    return {**same, "created": shown_time(row.created), "members": members}

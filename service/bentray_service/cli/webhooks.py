@@ -99,11 +99,11 @@ def retry(
 
 def _shown(row: Any) -> dict[str, Any]:
     return {
-        "id": row["id"],
-        "tenant": row["tenant"],
-        "job": row["job_id"],
-        "state": row["state"],
-        "attempts": row["attempts"],
-        "created": shown_time(row["created"]),
-        "last": (row["log"][-1]["error"] or "accepted") if row["log"] else "",
+        "id": row.id,
+        "tenant": row.tenant,
+        "job": row.job_id,
+        "state": row.state,
+        "attempts": row.attempts,
+        "created": shown_time(row.created),
+        "last": (row.log[-1]["error"] or "accepted") if row.log else "",
     }

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from ..errors import Damaged, DatabaseFull, DatabaseUnavailable, Deleted
 from ..rows.checksums import Checksums, Digest
+from ..rows.tables import ChecksumRow
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import ChecksumRow
 from .digests import digest_of, stamp_of
 from .store import Store
 from .tenant_files import KEPT
@@ -65,7 +65,7 @@ class CheckedStore(Store):
             self._inner.fetch(path)
             if row is None:
                 self._first_seen(tenant, name, place, path)
-            elif row["damaged"] is not None or not self._is_sound(path, row):
+            elif row.damaged is not None or not self._is_sound(path, row):
                 self._restore(path, row)
         except FileNotFoundError as error:
             # A deletion removes the checksum before the file.
@@ -99,7 +99,7 @@ class CheckedStore(Store):
     def _is_sound(self, path: Path, row: ChecksumRow) -> bool:
         """Whether the content matches the checksum; read again only after a modification."""
         with self._locked(path):
-            known = row["sha256"], stamp_of(path)
+            known = row.sha256, stamp_of(path)
             if self._compared.get(path) == known:
                 return True
             if digest_of(path) != _of(row):
@@ -131,17 +131,17 @@ class CheckedStore(Store):
         whole = self._is_sound(path, row) or (self._inner.refetch(path) and self._is_sound(path, row))
         if not whole:
             digest = digest_of(path)
-            other = f"{digest.bytes} bytes instead of {row['bytes']}"
-            raise self._damaged(row, other if digest.bytes != row["bytes"] else "different content")
-        if row["damaged"] is not None:
-            self._checksums.damaged(row["tenant"], row["id"], None)
+            other = f"{digest.bytes} bytes instead of {row.bytes}"
+            raise self._damaged(row, other if digest.bytes != row.bytes else "different content")
+        if row.damaged is not None:
+            self._checksums.damaged(row.tenant, row.id, None)
 
     def _damaged(self, row: ChecksumRow, found: str) -> Damaged:
-        if row["damaged"] is None:
-            log.error("%s of %s is damaged: %s", row["id"], row["tenant"], found)
+        if row.damaged is None:
+            log.error("%s of %s is damaged: %s", row.id, row.tenant, found)
             with suppress(DatabaseUnavailable, DatabaseFull):
-                self._checksums.damaged(row["tenant"], row["id"], time.time())
-        return Damaged(row["id"], found)
+                self._checksums.damaged(row.tenant, row.id, time.time())
+        return Damaged(row.id, found)
 
     @contextmanager
     def _locked(self, path: Path) -> Iterator[None]:
@@ -160,4 +160,4 @@ class CheckedStore(Store):
 
 
 def _of(row: ChecksumRow) -> Digest:
-    return Digest(row["bytes"], row["sha256"])
+    return Digest(row.bytes, row.sha256)

@@ -6,31 +6,35 @@ import logging
 from collections.abc import Callable, Collection, Iterator
 from typing import NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, Table, and_, delete, or_, select, update
+from sqlalchemy import ColumnElement, and_, delete, or_, select, update
+from sqlalchemy.orm import Session
 
 from ..errors import DatabaseUnavailable, InUse, StorageUnavailable, UnknownId
 from ..rows import usage
 from ..rows.checksums import delete_checksums
 from ..rows.database import Database
 from ..rows.ids import checked
-from ..rows.schema import (
+from ..rows.tables import (
     ENDED,
-    batches,
-    datasets,
-    deliveries,
-    events,
-    geometry_fields,
-    jobs,
-    meshes,
-    too_old,
-    uploaded_volumes,
-    uploads,
-    volumes,
+    BatchRow,
+    DatasetRow,
+    DeliveryRow,
+    EventRow,
+    ExpiredRow,
+    FieldRow,
+    JobRow,
+    MeshRow,
+    ResultVolumeRow,
+    UploadedVolumeRow,
+    UploadRow,
 )
 from ..rows.tenants import Tenant
 from .data_folder import Files
 
 log = logging.getLogger("bentray.storage")
+
+
+Deletable = DatasetRow | ResultVolumeRow | UploadedVolumeRow | MeshRow | JobRow
 
 
 class StoredItem(NamedTuple):
@@ -67,18 +71,17 @@ class Deletion:
         if fault := self._files.store.fault():
             # Before the write transaction, which must be short.
             raise StorageUnavailable(fault)
-        with self._database.write() as connection:
-            if not any(_has(connection, table, stored.tenant, name) for table in _TABLES[stored.what]):
+        with self._database.write() as session:
+            if not any(_has(session, table, stored.tenant, name) for table in _TABLES[stored.what]):
                 raise UnknownId(stored.what, stored.id)
-            gone = _JOBS[stored.what](connection, stored.tenant, name)
-            results = set(
-                connection.execute(select(volumes.c.id).where(volumes.c.job_id.in_(gone))).scalars()
-            )
-            gone |= _of(connection, stored.tenant, jobs.c.volume_id.in_(results))
-            self._check_finished(connection, stored, gone)
-            fields = _fields(connection, stored.tenant, name, gone)
-            _forget(connection, stored.tenant, {name, *results}, fields, gone)
-            usage.forget(connection, stored.tenant, [name, *results, *fields, *gone])
+            gone = _JOBS[stored.what](session, stored.tenant, name)
+            made = select(ResultVolumeRow.id).where(ResultVolumeRow.job_id.in_(gone))
+            results = set(session.scalars(made))
+            gone |= _of(session, stored.tenant, JobRow.volume_id.in_(results))
+            self._check_finished(session, stored, gone)
+            fields = _fields(session, stored.tenant, name, gone)
+            _forget(session, stored.tenant, {name, *results}, fields, gone)
+            usage.forget(session, stored.tenant, [name, *results, *fields, *gone])
         try:
             self._files.of(stored.tenant).remove([name, *results, *fields, *gone])
         except (StorageUnavailable, DatabaseUnavailable, OSError) as error:
@@ -88,104 +91,100 @@ class Deletion:
         """The items of all tenants created before a time, s since 1970."""
         for what, tables in _TABLES.items():
             for table in tables:
-                old = _ended_without_result(time) if table is jobs else table.c.created < time
-                query = select(table.c.tenant, table.c.id).where(old)
-                with self._database.read() as connection:
-                    rows = connection.execute(query).all()
-                yield from (StoredItem(Tenant(tenant), what, name) for tenant, name in rows)
+                old = _ended_without_result(time) if table is JobRow else table.created < time
+                query = select(table.tenant, table.id).where(old)
+                with self._database.read() as session:
+                    rows = session.execute(query).all()
+                yield from (StoredItem(tenant, what, name) for tenant, name in rows)
 
-    def _check_finished(self, connection: Connection, stored: StoredItem, gone: Collection[str]) -> None:
-        needing = jobs.c.id.in_(gone), jobs.c.state.not_in(ENDED)
-        busy = connection.execute(select(jobs.c.id, jobs.c.state).where(*needing)).first()
+    def _check_finished(self, session: Session, stored: StoredItem, gone: Collection[str]) -> None:
+        needing = JobRow.id.in_(gone), JobRow.state.not_in(ENDED)
+        busy = session.execute(select(JobRow.id, JobRow.state).where(*needing)).first()
         if busy is not None:
             found = f"{stored.id}, needed by {busy.id} ({busy.state})"
             raise InUse(stored.what, found, "an item that no unfinished job needs; cancel the job first")
 
 
-def _has(connection: Connection, table: Table, tenant: Tenant, name: str) -> bool:
-    mine = select(table.c.id).where(table.c.tenant == tenant, table.c.id == name)
+def _has(session: Session, table: type[Deletable], tenant: Tenant, name: str) -> bool:
+    query = select(table.id).filter_by(tenant=tenant, id=name)
     # Locked, so that a concurrent submission of a job waits and finds the row deleted.
-    return connection.execute(mine.with_for_update()).first() is not None
+    return session.scalar(query.with_for_update()) is not None
 
 
-def _of(connection: Connection, tenant: Tenant, condition: ColumnElement[bool]) -> set[str]:
+def _of(session: Session, tenant: Tenant, condition: ColumnElement[bool]) -> set[str]:
     """The ids of the jobs of a tenant that fulfil a condition."""
-    return set(connection.execute(select(jobs.c.id).where(jobs.c.tenant == tenant, condition)).scalars())
+    return set(session.scalars(select(JobRow.id).where(JobRow.tenant == tenant, condition)))
 
 
-def _of_dataset(connection: Connection, tenant: Tenant, name: str) -> set[str]:
-    made_it = select(datasets.c.job_id).where(datasets.c.id == name)
-    return _of(connection, tenant, or_(jobs.c.dataset_id == name, jobs.c.id.in_(made_it)))
+def _of_dataset(session: Session, tenant: Tenant, name: str) -> set[str]:
+    made_it = select(DatasetRow.job_id).where(DatasetRow.id == name)
+    return _of(session, tenant, or_(JobRow.dataset_id == name, JobRow.id.in_(made_it)))
 
 
-def _of_volume(connection: Connection, tenant: Tenant, name: str) -> set[str]:
-    made_it = select(volumes.c.job_id).where(volumes.c.id == name)
-    return _of(connection, tenant, or_(jobs.c.volume_id == name, jobs.c.id.in_(made_it)))
+def _of_volume(session: Session, tenant: Tenant, name: str) -> set[str]:
+    made_it = select(ResultVolumeRow.job_id).where(ResultVolumeRow.id == name)
+    return _of(session, tenant, or_(JobRow.volume_id == name, JobRow.id.in_(made_it)))
 
 
 def _ended_without_result(time: float) -> ColumnElement[bool]:
     """Jobs that ended before a time and are not deleted together with a stored item."""
-    read = jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id
-    made = select(datasets.c.id).where(datasets.c.job_id == jobs.c.id).exists()
-    return and_(jobs.c.finished < time, *(one.is_(None) for one in read), ~made)
+    read = JobRow.dataset_id, JobRow.volume_id, JobRow.mesh_id
+    made = select(DatasetRow.id).where(DatasetRow.job_id == JobRow.id).exists()
+    return and_(JobRow.finished < time, *(one.is_(None) for one in read), ~made)
 
 
-def _fields(connection: Connection, tenant: Tenant, mesh: str, gone: Collection[str]) -> set[str]:
+def _fields(session: Session, tenant: Tenant, mesh: str, gone: Collection[str]) -> set[str]:
     """The geometry fields to delete with a mesh; a field used by another mesh is assigned to that one."""
-    mine = geometry_fields.c.tenant == tenant
-    rows = connection.execute(
-        select(geometry_fields.c.id).where(
-            mine, or_(geometry_fields.c.mesh_id == mesh, geometry_fields.c.job_id.in_(gone))
-        )
-    )
+    mine = FieldRow.tenant == tenant
+    query = select(FieldRow.id).where(mine, or_(FieldRow.mesh_id == mesh, FieldRow.job_id.in_(gone)))
     going = set()
-    for field in rows.scalars().all():
-        sharing = jobs.c.tenant == tenant, jobs.c.field_id == field, jobs.c.id.not_in(gone)
-        heir = connection.execute(
-            select(jobs.c.id, jobs.c.mesh_id).where(*sharing, jobs.c.state == "succeeded").limit(1)
+    for field in session.scalars(query).all():
+        sharing = JobRow.tenant == tenant, JobRow.field_id == field, JobRow.id.not_in(gone)
+        heir = session.execute(
+            select(JobRow.id, JobRow.mesh_id).where(*sharing, JobRow.state == "succeeded").limit(1)
         ).first()
         if heir is None:
             going.add(field)
         else:
             now = {"job_id": heir.id, "mesh_id": heir.mesh_id}
-            connection.execute(update(geometry_fields).where(mine, geometry_fields.c.id == field).values(now))
+            session.execute(update(FieldRow).where(mine, FieldRow.id == field).values(now))
     return going
 
 
 def _forget(
-    connection: Connection,
+    session: Session,
     tenant: Tenant,
     names: Collection[str],
     fields: Collection[str],
     gone: Collection[str],
 ) -> None:
     """Delete the rows, those with references first."""
-    mine = geometry_fields.c.tenant == tenant, geometry_fields.c.id.in_(fields)
-    connection.execute(delete(geometry_fields).where(*mine))
-    delete_checksums(connection, tenant, {*names, *fields, *gone})
-    connection.execute(delete(too_old).where(too_old.c.tenant == tenant, too_old.c.id.in_(names)))
-    for table in (events, deliveries):
-        connection.execute(delete(table).where(table.c.job_id.in_(gone)))
-    connection.execute(delete(volumes).where(volumes.c.id.in_(names)))
-    connection.execute(delete(jobs).where(jobs.c.id.in_(gone)))
-    left = select(jobs.c.id).where(jobs.c.batch_id == batches.c.id).exists()
-    connection.execute(delete(batches).where(batches.c.tenant == tenant, ~left))
-    for table in (datasets, uploaded_volumes, meshes):
-        connection.execute(delete(table).where(table.c.id.in_(names)))
-    connection.execute(delete(uploads).where(uploads.c.result_id.in_(names), uploads.c.state == "done"))
-    connection.execute(update(meshes).where(meshes.c.volume_id.in_(names)).values(volume_id=None))
-    connection.execute(update(datasets).where(datasets.c.job_id.in_(gone)).values(job_id=None))
+    mine = FieldRow.tenant == tenant, FieldRow.id.in_(fields)
+    session.execute(delete(FieldRow).where(*mine))
+    delete_checksums(session, tenant, {*names, *fields, *gone})
+    session.execute(delete(ExpiredRow).where(ExpiredRow.tenant == tenant, ExpiredRow.id.in_(names)))
+    for table in (EventRow, DeliveryRow):
+        session.execute(delete(table).where(table.job_id.in_(gone)))
+    session.execute(delete(ResultVolumeRow).where(ResultVolumeRow.id.in_(names)))
+    session.execute(delete(JobRow).where(JobRow.id.in_(gone)))
+    left = select(JobRow.id).where(JobRow.batch_id == BatchRow.id).exists()
+    session.execute(delete(BatchRow).where(BatchRow.tenant == tenant, ~left))
+    for item in (DatasetRow, UploadedVolumeRow, MeshRow):
+        session.execute(delete(item).where(item.id.in_(names)))
+    session.execute(delete(UploadRow).where(UploadRow.result_id.in_(names), UploadRow.state == "done"))
+    session.execute(update(MeshRow).where(MeshRow.volume_id.in_(names)).values(volume_id=None))
+    session.execute(update(DatasetRow).where(DatasetRow.job_id.in_(gone)).values(job_id=None))
 
 
-_TABLES = {
-    "dataset": (datasets,),
-    "volume": (volumes, uploaded_volumes),
-    "mesh": (meshes,),
-    "job": (jobs,),
+_TABLES: dict[str, tuple[type[Deletable], ...]] = {
+    "dataset": (DatasetRow,),
+    "volume": (ResultVolumeRow, UploadedVolumeRow),
+    "mesh": (MeshRow,),
+    "job": (JobRow,),
 }
-_JOBS: dict[str, Callable[[Connection, Tenant, str], set[str]]] = {
+_JOBS: dict[str, Callable[[Session, Tenant, str], set[str]]] = {
     "dataset": _of_dataset,
     "volume": _of_volume,
-    "mesh": lambda connection, tenant, name: _of(connection, tenant, jobs.c.mesh_id == name),
-    "job": lambda connection, tenant, name: {name},
+    "mesh": lambda session, tenant, name: _of(session, tenant, JobRow.mesh_id == name),
+    "job": lambda session, tenant, name: {name},
 }

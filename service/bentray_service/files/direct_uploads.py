@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import StorageUnavailable
-from ..rows.typed_rows import UploadRow
+from ..rows.tables import UploadRow
 
 if TYPE_CHECKING:
     from .bucket import Bucket
@@ -36,7 +36,7 @@ class DirectUploads:
 
     def part_url(self, row: UploadRow, number: int) -> str:
         """Address to which a client sends part ``number`` (from 1) with PUT."""
-        left_s = max(1.0, min(VALID_S, row["expires"] - time.time()))
+        left_s = max(1.0, min(VALID_S, row.expires - time.time()))
         return self._bucket.put_url(_key(row, number), int(left_s))
 
     def received(self, row: UploadRow) -> dict[int, int]:
@@ -52,7 +52,7 @@ class DirectUploads:
             StorageUnavailable: when they cannot be fetched now.
         """
         path.write_bytes(b"")
-        for number, _ in enumerate(part_sizes(row["length"]), 1):
+        for number, _ in enumerate(part_sizes(row.length), 1):
             self._bucket.get(_key(row, number), path, "ab")
 
     def drop(self, row: UploadRow) -> None:
@@ -68,7 +68,7 @@ class DirectUploads:
         try:
             self.drop(row)
         except StorageUnavailable as error:
-            log.warning("data of %s remains in the bucket for a day: %s", row["id"], error)
+            log.warning("data of %s remains in the bucket for a day: %s", row.id, error)
 
     def tidy(self, ids: Callable[[], Collection[str]]) -> None:
         """Delete old data of uploads that are not among ``ids()``, from services that died."""
@@ -86,7 +86,7 @@ def part_sizes(length: int) -> list[int]:
 
 
 def _folder(row: UploadRow) -> str:
-    return f"{FOLDER}{row['id']}/"
+    return f"{FOLDER}{row.id}/"
 
 
 def _key(row: UploadRow, number: int) -> str:

@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from sqlalchemy import select, update
+from sqlalchemy import select
 
-from ..rows.database import Database, mark_of
+from ..rows.database import Database
 from ..rows.live_ids import LiveIds
-from ..rows.schema import about
+from ..rows.tables import About
 from ..rows.tenants import Tenant
 from .data_folder import Files
 from .folder_database import read_stamp, write_stamp
@@ -92,17 +92,17 @@ class Orphans:
 
     def _stamp(self) -> None:
         """Record that the folder and the database are used together."""
-        with self._database.write() as connection:
-            begun = int(connection.execute(select(about.c.begun).with_for_update()).scalar_one()) + 1
-            connection.execute(update(about).values(begun=begun))
-        write_stamp(self._files.root, mark_of(self._database), begun)
+        with self._database.write() as session:
+            about = session.scalars(select(About).with_for_update()).one()
+            about.begun += 1
+        write_stamp(self._files.root, about.database, about.begun)
         self._agreed = True
 
     def _used_together(self) -> bool:
-        with self._database.read() as connection:
-            begun = int(connection.execute(select(about.c.begun)).scalar_one())
+        with self._database.read() as session:
+            about = session.scalars(select(About)).one()
         stamp = read_stamp(self._files.root)
-        return stamp is not None and stamp.database == mark_of(self._database) and stamp.begun <= begun
+        return stamp is not None and stamp.database == about.database and stamp.begun <= about.begun
 
     def _stored_files(self) -> Iterator[Path]:
         for folder in self._files.root.glob("tenants/*/*"):

@@ -39,7 +39,7 @@ def scrub(files: Files, checksums: Checksums, orphans: Orphans) -> Iterator[Find
         orphans: finds files without a row.
     """
     assert isinstance(files.store, CheckedStore)
-    rows = {(row["tenant"], row["path"]) for row in checksums.all()}
+    rows = {(row.tenant, row.path) for row in checksums.all()}
     unknown = {_place(path) for path in orphans.found()}
     lying = {_place(path) for path in files.root.glob("tenants/*/*/*") if _kept(path)}
     for tenant, place in sorted(rows | lying | unknown):

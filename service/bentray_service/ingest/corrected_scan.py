@@ -10,8 +10,8 @@ from ..files.digests import digest_of
 from ..files.tenant_files import TenantFiles
 from ..rows.idempotency import RequestKey
 from ..rows.stored_tables import Datasets
+from ..rows.tables import DatasetRow
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import DatasetRow
 from .canonical import IngestLimits, make_canonical
 from .ingest_process import CORRECTION
 
@@ -47,14 +47,14 @@ def add_corrected(
         KeyReused: when the key was used with another request.
         InvalidInput, QuotaExceeded, StorageFull, StorageUnavailable: as ``make_canonical``.
     """
-    given = {CORRECTION: dict(correction), "origin": scan["id"]}
-    summary = make_canonical("dataset", files.dataset(scan["id"]), new_id, files, limits, given, reserve)
+    given = {CORRECTION: dict(correction), "origin": scan.id}
+    summary = make_canonical("dataset", files.dataset(scan.id), new_id, files, limits, given, reserve)
     path = files.dataset(new_id)
     statement = summary["source"].partition(". ")[0]
     own = {
-        "name": (scan["name"] or scan["title"] or scan["id"])[: LONGEST_NAME - len(ENDING)] + ENDING,
-        "notes": "\n".join(part for part in (statement, scan["notes"]) if part)[:LONGEST_NOTES],
-        "water_temperature_c": scan["water_temperature_c"],
+        "name": (scan.name or scan.title or scan.id)[: LONGEST_NAME - len(ENDING)] + ENDING,
+        "notes": "\n".join(part for part in (statement, scan.notes) if part)[:LONGEST_NOTES],
+        "water_temperature_c": scan.water_temperature_c,
     }
     size, digest = path.stat().st_size, digest_of(path).sha256
     try:
@@ -62,6 +62,6 @@ def add_corrected(
     except KeyReused:
         files.remove([new_id])
         raise
-    if made["id"] != new_id:
+    if made.id != new_id:
         files.remove([new_id])
     return made

@@ -26,8 +26,8 @@ from ..files.digests import digest_of
 from ..files.direct_uploads import DirectUploads
 from ..rows.accounts import Account, Accounts
 from ..rows.stored_tables import UploadedTable
+from ..rows.tables import UploadRow
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import UploadRow
 from ..rows.uploads import Uploads
 from ..web.errors import INTERNAL, make_problem, problem_of
 from ..web.problem import Problem
@@ -93,11 +93,11 @@ class UploadIngest:
     def start(self) -> None:
         """Continue the uploads of a dead service, then start the thread."""
         for row in self._uploads.receiving():
-            path = self._files.of(row["tenant"]).upload(row["id"])
+            path = self._files.of(row.tenant).upload(row.id)
             discard_unverified(path)
             # The service died before it marked the upload as complete.
-            if received_bytes(path) == row["length"]:
-                self._uploads.mark_complete(row["id"])
+            if received_bytes(path) == row.length:
+                self._uploads.mark_complete(row.id)
         self._thread.start()
 
     def notify(self) -> None:
@@ -137,14 +137,14 @@ class UploadIngest:
             queued = set(self._queued)
             room = Counter({account: -count for account, count in Counter(self._queued.values()).items()})
         for row in self._uploads.unread():
-            account = self._accounts.of(row["tenant"])
-            if row["id"] in queued or room[account] + self._queue.share <= 0 or not self._is_local(row):
+            account = self._accounts.of(row.tenant)
+            if row.id in queued or room[account] + self._queue.share <= 0 or not self._is_local(row):
                 continue
             room[account] -= 1
             with self._lock:
-                self._queued[row["id"]] = account
-            future = self._queue.submit(row["tenant"], partial(self._read, row))
-            future.add_done_callback(partial(self._ended, row["id"]))
+                self._queued[row.id] = account
+            future = self._queue.submit(row.tenant, partial(self._read, row))
+            future.add_done_callback(partial(self._ended, row.id))
 
     def _ended(self, upload_id: str, future: Future[None]) -> None:
         with self._lock:
@@ -161,37 +161,35 @@ class UploadIngest:
 
     def _is_local(self, row: UploadRow) -> bool:
         """Whether the data is in this data folder, not in that of another service."""
-        tenant = row["tenant"]
-        path = self._files.of(tenant).upload(row["id"])
-        return path.exists() or self._known(self._stores[row["what"]], tenant, row["result_id"])
+        tenant = row.tenant
+        path = self._files.of(tenant).upload(row.id)
+        return path.exists() or self._known(self._stores[row.what], tenant, row.result_id)
 
     def _read(self, row: UploadRow) -> None:
         if self._leaving.is_set():
             return
-        tenant, store = row["tenant"], self._stores[row["what"]]
-        path = self._files.of(tenant).upload(row["id"])
-        if not self._known(store, tenant, row["result_id"]):
+        tenant, store = row.tenant, self._stores[row.what]
+        path = self._files.of(tenant).upload(row.id)
+        if not self._known(store, tenant, row.result_id):
             problem = self._refusal(row, tenant, store, path)
             if problem is not None:
                 if not self._leaving.is_set():
                     self._drop(row)
-                    self._uploads.mark_rejected(
-                        row["id"], problem.model_dump(exclude_none=True), self._keep_s
-                    )
+                    self._uploads.mark_rejected(row.id, problem.model_dump(exclude_none=True), self._keep_s)
                     path.unlink(missing_ok=True)
                 return
         self._drop(row)
-        self._uploads.mark_done(row["id"], self._keep_s)
+        self._uploads.mark_done(row.id, self._keep_s)
         path.unlink(missing_ok=True)
 
     def _drop(self, row: UploadRow) -> None:
         """Delete what is in the bucket, before the row says so; the file here is still complete."""
-        if row["multipart_id"] is not None and self._direct is not None:
+        if row.multipart_id is not None and self._direct is not None:
             self._direct.drop_later(row)
 
     def _fetch(self, row: UploadRow, path: Path) -> None:
         """Get the data of a direct upload from the bucket, unless that was done before."""
-        if row["multipart_id"] is None or path.stat().st_size == row["length"]:
+        if row.multipart_id is None or path.stat().st_size == row.length:
             return
         if self._direct is None:
             raise StorageUnavailable("no bucket; BENTRAY_STORAGE_URL named one before")
@@ -204,22 +202,20 @@ class UploadIngest:
         self, row: UploadRow, tenant: Tenant, store: UploadedTable[Any], path: Path
     ) -> Problem | None:
         """Ingest an upload; returns the problem of a refused one, else None."""
-        instance, files = f"/v1/uploads/{row['id']}", self._files.of(tenant)
+        instance, files = f"/v1/uploads/{row.id}", self._files.of(tenant)
         try:
             self._fetch(row, path)
             summary = make_canonical(
-                row["what"],
+                row.what,
                 path,
-                row["result_id"],
+                row.result_id,
                 files,
                 self._limits,
-                row["given"],
-                partial(self._quota.resize, tenant, row["result_id"]),
-                partial(self._started, row["id"]),
+                row.given,
+                partial(self._quota.resize, tenant, row.result_id),
+                partial(self._started, row.id),
             )
-            store.add(
-                tenant, row["result_id"], size=row["length"], sha256=digest_of(path).sha256, summary=summary
-            )
+            store.add(tenant, row.result_id, size=row.length, sha256=digest_of(path).sha256, summary=summary)
         except (StorageUnavailable, StorageFull, SQLAlchemyError):
             raise
         except InvalidInput as error:
@@ -227,12 +223,12 @@ class UploadIngest:
         except Exception:
             # An unexpected error must not stop the thread.
             number = secrets.token_hex(8)
-            log.exception("%s could not be ingested [%s]", row["id"], number)
+            log.exception("%s could not be ingested [%s]", row.id, number)
             words = f"internal error of the service; see the log entry {number}"
             return make_problem(INTERNAL, words, instance=instance, correlation_id=number)
         finally:
             with self._lock:
-                self._children.pop(row["id"], None)
+                self._children.pop(row.id, None)
         return None
 
     def _known(self, store: UploadedTable[Any], tenant: Tenant, name: str) -> bool:

@@ -122,7 +122,7 @@ class EventFeed:
         watched = dict(self._watched)
         if not watched:
             return
-        known = {job_id: one.events[-1]["number"] if one.events else 0 for job_id, one in watched.items()}
+        known = {job_id: one.events[-1].number if one.events else 0 for job_id, one in watched.items()}
         progress, events = await anyio.to_thread.run_sync(self._jobs.updates, known, limiter=limiter)
         for job_id, one in watched.items():
             one.update(progress.get(job_id), events.get(job_id, []))

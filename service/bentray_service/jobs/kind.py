@@ -17,8 +17,8 @@ from ..compute import Compute
 from ..files.data_folder import Files
 from ..files.tenant_files import TenantFiles
 from ..rows.stored_tables import Datasets, Meshes, Volumes
+from ..rows.tables import JobRow, Plain, ResultRow
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import JobRow, Plain
 from ..settings_request import check_setting_names
 
 
@@ -116,14 +116,14 @@ class Kind(ABC, Generic[R]):
         request: model of the request.
         example: request for the OpenAPI description.
         settings: parses the settings stored with a job.
-        table: name of the table of results.
+        table: of its results.
         lane: worker resource of its tasks, a key of ``cluster.resources.OFFERED``.
     """
 
     request: ClassVar[type[JobRequest]]
     example: ClassVar[Example]
     settings: ClassVar[TypeAdapter[Any]]
-    table: ClassVar[str]
+    table: ClassVar[type[ResultRow]]
     lane: ClassVar[str]
 
     @abstractmethod

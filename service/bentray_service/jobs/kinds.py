@@ -27,10 +27,9 @@ from bentray_workers.simulation.simulation_run import simulate_to_file
 
 from ..compute import check_renderable
 from ..files.tenant_files import TenantFiles
-from ..rows import schema
 from ..rows.ids import dataset_of, field_of, volume_of
+from ..rows.tables import DatasetRow, FieldRow, JobRow, Plain, ResultVolumeRow
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import DatasetRow, JobRow, Plain
 from .kind import JobRequest, JobRun, Kind, Order, Sources
 from .request_words import DEFAULTS
 
@@ -47,7 +46,7 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
     """Sound speed from one dataset."""
 
     request, settings = ReconstructionRequest, TypeAdapter(Settings)
-    table, lane = schema.volumes.name, "recon"
+    table, lane = ResultVolumeRow, "recon"
     example: ClassVar[Example] = {
         "summary": "Sound speed from a scan",
         "value": {
@@ -59,16 +58,16 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
 
     def plan(self, request: ReconstructionRequest, tenant: Tenant, sources: Sources) -> Order:
         dataset = sources.datasets.get(tenant, request.dataset)
-        path = sources.files.of(tenant).dataset(dataset["id"])
+        path = sources.files.of(tenant).dataset(dataset.id)
         settings = in_stated_water(request.settings, dataset)
-        plan = sources.compute.plan(dataset["counts"], path, settings)
-        return Order(settings.to_dict(), plan["stored_bytes"], {"dataset_id": dataset["id"]}, plan)
+        plan = sources.compute.plan(dataset.counts, path, settings)
+        return Order(settings.to_dict(), plan["stored_bytes"], {"dataset_id": dataset.id}, plan)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
-        return files.dataset(job["dataset_id"] or "")
+        return files.dataset(job.dataset_id or "")
 
     def target(self, files: TenantFiles, job: JobRow) -> Path:
-        return files.volume(volume_of(job["id"]))
+        return files.volume(volume_of(job.id))
 
     def run(self, run: JobRun) -> Plain | None:
         # A job may have been stored by an earlier version.
@@ -84,14 +83,14 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
         return {"id": run.target.stem, **_describe(result), "bytes": run.target.stat().st_size}
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
-        volume = volume_of(job["id"])
+        volume = volume_of(job.id)
         here = f"/v1/volumes/{volume}"
         return {"volume": volume}, {"volume": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
 
 
 def in_stated_water(settings: Settings, dataset: DatasetRow) -> Settings:
     """The settings with the temperature that the user states for the scan, unless they have their own."""
-    stated = dataset["water_temperature_c"]
+    stated = dataset.water_temperature_c
     if stated is None or settings.water_temperature_c is not None:
         return settings
     return settings.changed(water_temperature_c=stated)
@@ -108,7 +107,7 @@ class SimulationKind(Kind[SimulationRequest]):
     """A simulated scan as a dataset."""
 
     request, settings = SimulationRequest, TypeAdapter(PhantomScan)
-    table, lane = schema.datasets.name, "recon"
+    table, lane = DatasetRow, "recon"
     example: ClassVar[Example] = {
         "summary": "A scan of a phantom, with noise on its travel times",
         "value": {"kind": "simulation", "settings": {"nodes": 64, "elements": 64, "noise_s": 2e-8}},
@@ -120,10 +119,10 @@ class SimulationKind(Kind[SimulationRequest]):
         return Order(request.settings.plain(), 2 * plan["result_bytes"], plan=plan)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
-        return files.work(job["id"])
+        return files.work(job.id)
 
     def target(self, files: TenantFiles, job: JobRow) -> Path:
-        return files.dataset(dataset_of(job["id"]))
+        return files.dataset(dataset_of(job.id))
 
     def run(self, run: JobRun) -> Plain | None:
         request = self.settings.validate_python(run.settings)
@@ -131,7 +130,7 @@ class SimulationKind(Kind[SimulationRequest]):
         return {"id": run.target.stem, **record}
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
-        dataset = dataset_of(job["id"])
+        dataset = dataset_of(job.id)
         return {"dataset": dataset}, {"dataset": f"/v1/datasets/{dataset}"}
 
 
@@ -147,7 +146,7 @@ class RefractionKind(Kind[RefractionRequest]):
     """A turntable animation of one volume; it has no row of its own."""
 
     request, settings = RefractionRequest, TypeAdapter(Turntable)
-    table, lane = schema.volumes.name, "render"
+    table, lane = ResultVolumeRow, "render"
     example: ClassVar[Example] = {
         "summary": "A turntable animation of a volume",
         "value": {"kind": "refraction", "volume": "vol-0123456789abcdef0123", "settings": {"format": "zip"}},
@@ -156,16 +155,16 @@ class RefractionKind(Kind[RefractionRequest]):
     def plan(self, request: RefractionRequest, tenant: Tenant, sources: Sources) -> Order:
         volume, settings = sources.volumes.get(tenant, request.volume), request.settings
         check_renderable(volume)
-        plan = sources.compute.plan_turntable(volume["shape"], settings)
-        low, high = volume["value_range"]
+        plan = sources.compute.plan_turntable(volume.shape, settings)
+        low, high = volume.value_range
         stored = settings.within(low, high).plain()
-        return Order(stored, settings.largest_bytes, {"volume_id": volume["id"]}, plan)
+        return Order(stored, settings.largest_bytes, {"volume_id": volume.id}, plan)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
-        return files.volume(job["volume_id"] or "")
+        return files.volume(job.volume_id or "")
 
     def target(self, files: TenantFiles, job: JobRow) -> Path:
-        return files.animation(job["id"], job["settings"]["format"])
+        return files.animation(job.id, job.settings["format"])
 
     def run(self, run: JobRun) -> Plain | None:
         settings = self.settings.validate_python(run.settings)
@@ -173,7 +172,7 @@ class RefractionKind(Kind[RefractionRequest]):
         return None
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
-        return {}, {"animation": f"/v1/jobs/{job['id']}/animation"}
+        return {}, {"animation": f"/v1/jobs/{job.id}/animation"}
 
 
 class GeometryFieldRequest(JobRequest):
@@ -188,7 +187,7 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
     """The geometry field of one mesh."""
 
     request, settings = GeometryFieldRequest, TypeAdapter(FieldSettings)
-    table, lane = schema.geometry_fields.name, "render"
+    table, lane = FieldRow, "render"
     example: ClassVar[Example] = {
         "summary": "The geometry field of a mesh",
         "value": {"kind": "geometry-field", "mesh": "mesh-0123456789abcdef0123"},
@@ -196,15 +195,15 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
 
     def plan(self, request: GeometryFieldRequest, tenant: Tenant, sources: Sources) -> Order:
         mesh, settings = sources.meshes.get(tenant, request.mesh), request.settings
-        check_faces(mesh["faces"])
-        references = {"mesh_id": mesh["id"], "field_id": field_of(settings.content(mesh["content"]))}
-        return Order(settings.plain(), settings.largest_bytes(mesh["faces"]), references)
+        check_faces(mesh.faces)
+        references = {"mesh_id": mesh.id, "field_id": field_of(settings.content(mesh.content))}
+        return Order(settings.plain(), settings.largest_bytes(mesh.faces), references)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
-        return files.mesh(job["mesh_id"] or "")
+        return files.mesh(job.mesh_id or "")
 
     def target(self, files: TenantFiles, job: JobRow) -> Path:
-        return files.field(job["field_id"] or "")
+        return files.field(job.field_id or "")
 
     def run(self, run: JobRun) -> Plain | None:
         settings = self.settings.validate_python(run.settings)
@@ -215,7 +214,7 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
         return {**row, "settings": settings.plain(), "figures": figures}
 
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
-        field = job["field_id"] or ""
+        field = job.field_id or ""
         return {"field": field}, field_links(field)
 
     def discard(self, files: TenantFiles, target: Path) -> None:

@@ -32,8 +32,7 @@ from ..files.tenant_files import TenantFiles
 from ..logs import about
 from ..rows.accounts import Accounts
 from ..rows.job_queue import LEASE_S, Queue
-from ..rows.schema import ENDED
-from ..rows.typed_rows import JobRow, Plain
+from ..rows.tables import ENDED, JobRow, Plain
 from .estimate import estimate
 from .failures import CRASHED, explain
 from .job_metrics import JobMetrics
@@ -183,8 +182,8 @@ class Runner:
         job = self._queue.claim(idle_only=running >= self._at_once)
         if job is None:
             return False
-        thread = threading.Thread(target=self._run_to_end, args=(job,), name=job["id"], daemon=True)
-        self._running[thread] = job["id"]
+        thread = threading.Thread(target=self._run_to_end, args=(job,), name=job.id, daemon=True)
+        self._running[thread] = job.id
         try:
             thread.start()
         except BaseException:
@@ -197,7 +196,7 @@ class Runner:
             self._run(job)
         except Exception:
             # The lease expires, and the job is claimed again.
-            log.exception("the outcome of %s could not be stored", job["id"])
+            log.exception("the outcome of %s could not be stored", job.id)
         finally:
             del self._running[threading.current_thread()]
             self._wake.set()
@@ -206,15 +205,15 @@ class Runner:
         return shutil.disk_usage(self._files.root).free >= self._min_free_bytes
 
     def _run(self, job: JobRow) -> None:
-        with about(job=job["id"]), self._traces.attempt(job):
+        with about(job=job.id), self._traces.attempt(job):
             self._run_logged(job)
 
     def _run_logged(self, job: JobRow) -> None:
-        job_id, files = job["id"], self._files.of(job["tenant"])
+        job_id, files = job.id, self._files.of(job.tenant)
         reporter = Reporter(
             self._queue, job_id, self._leaving.is_set, taken=lambda: bytes_in(files.work(job_id))
         )
-        kind = KINDS[job["kind"]]
+        kind = KINDS[job.kind]
         target = kind.target(files, job)
         try:
             source = self._files.store.fetch(kind.source(files, job))
@@ -227,15 +226,15 @@ class Runner:
                 # The damaged file is replaced.
                 self._files.store.remove([target])
             client = self._compute.client
-            plan, lane = job["plan"] or {}, kind.lane
+            plan, lane = job.plan or {}, kind.lane
             if is_short(plan, _seconds(plan), capacities_of(client)):
                 lane = SHORT_LANE
-            with self._shares.of(self._accounts.of(job["tenant"]), lane, client) as share:
+            with self._shares.of(self._accounts.of(job.tenant), lane, client) as share:
                 control = JobControl(
                     on_progress=reporter.report, on_saved=reporter.saved, stop=reporter.stop, share=share
                 )
                 work_dir = files.work(job_id)
-                result = kind.run(JobRun(client, source, job["settings"], target, work_dir, control))
+                result = kind.run(JobRun(client, source, job.settings, target, work_dir, control))
             self._publish_result(target, reporter)
         except Cancelled:
             if not reporter.lost:
@@ -269,11 +268,11 @@ class Runner:
     def _count_end(self, job: JobRow) -> None:
         """Count a job in the metrics in the state that was stored; it may have been queued again."""
         try:
-            state = self._queue.state(job["id"])
+            state = self._queue.state(job.id)
         except (SQLAlchemyError, DatabaseUnavailable):
             return
         if state in ENDED:
-            self.metrics.observe_end(job["kind"], state, time.time() - (job["started"] or time.time()))
+            self.metrics.observe_end(job.kind, state, time.time() - (job.started or time.time()))
         else:
             self.metrics.count_retries("service")
 

@@ -20,7 +20,7 @@ from opentelemetry.util.types import AnyValue
 
 from bentray_kernels.errors import InvalidInput
 
-from ..rows.typed_rows import JobRow
+from ..rows.tables import JobRow
 
 TRACER = trace.get_tracer("bentray")
 ENDPOINTS = ("OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT")
@@ -76,8 +76,8 @@ class JobTraces:
     def attempt(self, job: JobRow) -> Iterator[None]:
         """The span of an attempt; spans of its tasks are below it."""
         with self._changing:
-            origin = self._origins.get(job["id"]) or self._origins.get(job["batch_id"] or "")
+            origin = self._origins.get(job.id) or self._origins.get(job.batch_id or "")
         parent = trace.set_span_in_context(trace.NonRecordingSpan(origin)) if origin else None
-        attributes: dict[str, AnyValue] = {"bentray.job": job["id"], "bentray.attempt": job["attempts"]}
-        with TRACER.start_as_current_span(f"job {job['kind']}", parent, attributes=attributes):
+        attributes: dict[str, AnyValue] = {"bentray.job": job.id, "bentray.attempt": job.attempts}
+        with TRACER.start_as_current_span(f"job {job.kind}", parent, attributes=attributes):
             yield

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Sequence
 from contextlib import suppress
 
-from ..rows.schema import ENDED
-from ..rows.typed_rows import EventRow, JobProgress
+from ..rows.jobs import JobProgress
+from ..rows.tables import ENDED, EventRow
 
 # Ended jobs that a tenant's streams remember, for streams that lag behind.
 MAX_ENDED = 1000
@@ -76,7 +76,7 @@ class WatchedTenant(Watched):
 
     def unfinished(self) -> list[str]:
         """Ids of the jobs that had not ended at the last query."""
-        return [name for name, (_, row) in self._changes.items() if row["state"] not in ENDED]
+        return [name for name, (_, row) in self._changes.items() if row.state not in ENDED]
 
     def since(self, serial: int) -> tuple[int, list[JobProgress]]:
         """Jobs that have changed since the change ``serial``, and the number of the last change."""
@@ -86,14 +86,14 @@ class WatchedTenant(Watched):
         """Store the result of a query."""
         self.newest, before = newest, self._serial
         for row in rows:
-            if row != self._changes.get(row["id"], (0, None))[1]:
+            if row != self._changes.get(row.id, (0, None))[1]:
                 self._serial += 1
-                self._changes.pop(row["id"], None)
-                self._changes[row["id"]] = self._serial, row
-        found = {row["id"] for row in rows}
+                self._changes.pop(row.id, None)
+                self._changes[row.id] = self._serial, row
+        found = {row.id for row in rows}
         for deleted in [name for name in self.unfinished() if name not in found]:
             del self._changes[deleted]
-        ended = [name for name, (_, row) in self._changes.items() if row["state"] in ENDED]
+        ended = [name for name, (_, row) in self._changes.items() if row.state in ENDED]
         for name in ended[:-MAX_ENDED]:
             del self._changes[name]
         if self._serial != before:

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..rows.keys import Keys
-from ..rows.storage_kinds import StoredKind, usage_by_kind
+from ..rows.usage import StoredKind, usage_by_kind
 from ..web.errors import problems
 from ..wiring import CurrentCaller, Service
 

@@ -14,7 +14,7 @@ from ..errors import InUse
 from ..files.deletion import StoredItem
 from ..jobs.kinds import KINDS, ReconstructionRequest
 from ..rows.jobs import NewJob, Submission
-from ..rows.schema import ENDED
+from ..rows.tables import ENDED
 from ..web.errors import problems
 from ..wiring import CallerTenant, CurrentCaller, Service
 from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types
@@ -74,8 +74,8 @@ def start_batch(
     limits = service.quota.most_bytes, service.settings.max_queued_jobs
     how = Submission(*limits, idempotency_key, caller.who, webhook)
     row = service.batches.add(caller.tenant, batch_request.name, settings.to_dict(), new, how)
-    log.info("%s queued, %d jobs", row["id"], row["size"], extra={"figures": {"batch": row["id"]}})
-    service.runner.notify(row["id"])
+    log.info("%s queued, %d jobs", row.id, row.size, extra={"figures": {"batch": row.id}})
+    service.runner.notify(row.id)
     batch = batch_record(row)
     response.headers["Location"] = batch.links["self"]
     return batch
@@ -106,8 +106,8 @@ def delete_batch(batch_id: str, service: Service, tenant: CallerTenant) -> None:
     If the service dies in between, the remaining jobs keep the batch, and it can be deleted again.
     """
     batch = service.batches.get(tenant, batch_id)
-    busy = next((job for job in batch["jobs"] if job["state"] not in ENDED), None)
+    busy = next((job for job in batch.jobs if job.state not in ENDED), None)
     if busy is not None:
-        raise InUse("batch", f"{batch['id']} with {busy['id']} ({busy['state']})", "a batch that has ended")
-    for job in batch["jobs"]:
-        service.deletion.delete(StoredItem(tenant, "job", job["id"]))
+        raise InUse("batch", f"{batch.id} with {busy.id} ({busy.state})", "a batch that has ended")
+    for job in batch.jobs:
+        service.deletion.delete(StoredItem(tenant, "job", job.id))

@@ -55,13 +55,13 @@ async def show_coefficients(
     """Filter a volume on a worker, and return its coefficients as a NumPy file."""
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_renderable(volume)
-    check_nodes(tuple(volume["shape"]))
+    check_nodes(tuple(volume.shape))
     view = RefractionView(filter=filter, smoothing=smoothing)
-    seed = repr((__version__, volume["id"], volume["created"], filter, smoothing))
+    seed = repr((__version__, volume.id, volume.created, filter, smoothing))
     tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
     if (response := unchanged(request, tag)) is not None:
         return response
     parts_of(request).sign_in.check_render(caller_of(request))
-    path = service.files.of(tenant).volume(volume["id"])
+    path = service.files.of(tenant).volume(volume.id)
     work = service.pictures.coefficients(tenant, volume, path, view)
     return Response(await while_connected(request, work), media_type=NPY, headers=headers_of(tag))

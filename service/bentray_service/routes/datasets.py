@@ -125,8 +125,8 @@ def dataset_file(dataset_id: str, request: Request, service: Service, tenant: Ca
     Interrupted downloads can be resumed with Range and If-Range.
     """
     row = service.datasets.get(tenant, dataset_id)
-    path = service.files.store.fetch(service.files.of(tenant).dataset(row["id"]))
-    return download(request, path, repr((row["id"], row["sha256"])), HDF5)
+    path = service.files.store.fetch(service.files.of(tenant).dataset(row.id))
+    return download(request, path, repr((row.id, row.sha256)), HDF5)
 
 
 @router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))

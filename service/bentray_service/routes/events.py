@@ -15,8 +15,8 @@ from starlette.types import Receive, Scope, Send
 
 from ..jobs.feed import EventFeed
 from ..jobs.watched import Watched, WatchedJob, WatchedTenant
-from ..rows.schema import ENDED
-from ..rows.typed_rows import JobProgress
+from ..rows.jobs import JobProgress
+from ..rows.tables import ENDED
 from ..web.errors import problems
 from ..wiring import CallerTenant, Service
 
@@ -109,8 +109,8 @@ async def _of_tenant(feed: EventFeed, jobs: WatchedTenant, end: float) -> AsyncI
 
 
 def _progress_of(row: JobProgress) -> dict[str, Any]:
-    progress = {"done": row["done"], "total": row["total"], "phase": row["phase"] or ""}
-    return {"id": row["id"], "state": row["state"], "progress": progress}
+    progress = {"done": row.done, "total": row.total, "phase": row.phase or ""}
+    return {"id": row.id, "state": row.state, "progress": progress}
 
 
 async def _of_job(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[str]:
@@ -119,15 +119,13 @@ async def _of_job(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[
     while not feed.leaving() and not job.gone:
         messages = []
         for event in job.events:
-            if event["number"] > last:
-                last = event["number"]
-                at = datetime.fromtimestamp(event["time"], UTC).isoformat()
-                messages.append(
-                    _event("state", {"state": event["state"], "note": event["note"], "time": at}, last)
-                )
-        row = job.row or {"state": "", "done": 0, "total": 0, "phase": ""}
-        progress = {"done": row["done"], "total": row["total"], "phase": row["phase"] or ""}
-        if row["state"] == "running" and row["total"] and progress != sent:
+            if event.number > last:
+                last = event.number
+                at = datetime.fromtimestamp(event.time, UTC).isoformat()
+                messages.append(_event("state", {"state": event.state, "note": event.note, "time": at}, last))
+        row = job.row or JobProgress("", "", 0, 0, "")
+        progress = {"done": row.done, "total": row.total, "phase": row.phase or ""}
+        if row.state == "running" and row.total and progress != sent:
             messages.append(_event("progress", progress))
             sent = progress
         if not messages and time.monotonic() - spoken > SILENCE_SECONDS:
@@ -135,7 +133,7 @@ async def _of_job(feed: EventFeed, job: WatchedJob, last: int) -> AsyncIterator[
         if messages:
             spoken = time.monotonic()
             yield "".join(messages)
-        elif row["state"] in ENDED:
+        elif row.state in ENDED:
             return
         else:
             await job.wait_for_change(SILENCE_SECONDS)

@@ -44,8 +44,8 @@ async def image_png(
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
     field = await run_in_threadpool(service.geometry_fields.get, tenant, field_id)
-    view.check_samples(field["settings"]["samples"])
-    folder = service.files.of(tenant).field(field["id"])
+    view.check_samples(field.settings["samples"])
+    folder = service.files.of(tenant).field(field.id)
     return await picture(
         request, field, view.plain(), lambda: service.pictures.field_png(tenant, field, folder, view)
     )
@@ -69,7 +69,7 @@ async def normal_map_png(field_id: str, request: Request, service: Service, tena
 
 async def _map(field_id: str, request: Request, service: Parts, tenant: Tenant, which: str) -> Response:
     field = await run_in_threadpool(service.geometry_fields.get, tenant, field_id)
-    folder = service.files.of(tenant).field(field["id"])
+    folder = service.files.of(tenant).field(field.id)
     return await picture(
         request, field, {"map": which}, lambda: service.pictures.field_map_png(tenant, field, folder, which)
     )

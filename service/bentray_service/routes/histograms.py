@@ -47,11 +47,11 @@ async def show_histogram(
 ) -> HistogramRecord:
     """Count the nodes of a volume by value, on a worker; and the surface that a picture shows by default."""
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
-    uploaded = "job_id" not in volume
+    uploaded = volume.job_id is None
     chosen = quantity or ("value" if uploaded else "speed")
     if (chosen == "value") != uploaded:
         accepted = "value: this is an uploaded volume" if uploaded else "one of " + ", ".join(QUANTITIES)
         raise InvalidInput("quantity", repr(quantity), accepted)
-    path = service.files.of(tenant).volume(volume["id"])
+    path = service.files.of(tenant).volume(volume.id)
     work = service.pictures.histogram(tenant, volume, path, chosen, bins)
     return HistogramRecord.model_validate(await while_connected(request, work))

@@ -12,8 +12,7 @@ from ..errors import NoAnimation
 from ..files.deletion import StoredItem
 from ..jobs.estimate import READ, estimate
 from ..jobs.kinds import KINDS
-from ..rows.schema import ENDED
-from ..rows.typed_rows import JobRow
+from ..rows.tables import ENDED, JobRow
 from ..web.errors import problems
 from ..wiring import CallerTenant, CurrentCaller, Parts, Service
 from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types
@@ -125,11 +124,11 @@ def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
 def _shown(service: Parts, row: JobRow) -> JobRecord:
     """The record of one job, with its place in the queue, its estimate and its webhook."""
     minutes = None
-    if row["state"] == "queued":
-        minutes = estimate(row["plan"], service.jobs.durations(row["tenant"], row["kind"], READ)).minutes
+    if row.state == "queued":
+        minutes = estimate(row.plan, service.jobs.durations(row.tenant, row.kind, READ)).minutes
     delivery = None
-    if row["webhook"] is not None and row["state"] in ENDED:
-        delivery = service.deliveries.of_job(row["tenant"], row["id"])
+    if row.webhook is not None and row.state in ENDED:
+        delivery = service.deliveries.of_job(row.tenant, row.id)
     return job_record(row, service.jobs.place(row), minutes, delivery)
 
 
@@ -164,8 +163,8 @@ def animation(job_id: str, request: Request, service: Service, tenant: CallerTen
     Interrupted downloads can be resumed with Range and If-Range.
     """
     job = service.jobs.get(tenant, job_id)
-    if job["kind"] != "refraction" or job["state"] != "succeeded":
-        raise NoAnimation(job["id"], job["kind"], job["state"])
-    extension = job["settings"]["format"]
-    path = service.files.store.fetch(service.files.of(tenant).animation(job["id"], extension))
-    return download(request, path, repr((job["id"], job["finished"])), ANIMATIONS[extension])
+    if job.kind != "refraction" or job.state != "succeeded":
+        raise NoAnimation(job.id, job.kind, job.state)
+    extension = job.settings["format"]
+    path = service.files.store.fetch(service.files.of(tenant).animation(job.id, extension))
+    return download(request, path, repr((job.id, job.finished)), ANIMATIONS[extension])

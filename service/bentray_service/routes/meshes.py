@@ -16,7 +16,7 @@ from bentray_workers.rendering.isosurface_mesh import MAX_STEP, check_nodes, lar
 from ..compute import check_renderable
 from ..files.deletion import StoredItem
 from ..rows.ids import new_id
-from ..rows.typed_rows import MeshRow
+from ..rows.tables import MeshRow
 from ..web.errors import problems
 from ..wiring import CallerTenant, CurrentCaller, Service
 from .bodies import Limit, accept_media_types
@@ -99,23 +99,23 @@ async def mesh_of_volume(
     """Extract an iso-surface of a volume as a mesh: the largest component, closed at the boundary."""
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_renderable(volume)
-    check_nodes(tuple(volume["shape"]), step)
-    low, high = volume["value_range"]
+    check_nodes(tuple(volume.shape), step)
+    low, high = volume.value_range
     # NaN fails both comparisons.
     if iso is not None and not (math.isfinite(iso) and low <= iso < high):
         raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
     mesh_id, files = new_id("mesh"), service.files.of(tenant)
     service.sign_in.check_render(caller)
-    path = files.volume(volume["id"])
+    path = files.volume(volume.id)
 
     def store(made: Path, summary: dict[str, Any]) -> MeshRow:
         service.quota.resize(tenant, mesh_id, made.stat().st_size)
         content = files.adopt(mesh_id).read_bytes()
         digest = hashlib.sha256(content).hexdigest()
-        columns = summary | {"title": volume["title"], "volume_id": volume["id"]}
+        columns = summary | {"title": volume.title, "volume_id": volume.id}
         return service.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=columns)
 
-    async with service.quota.reserved(tenant, mesh_id, largest_bytes(volume["shape"], step)):
+    async with service.quota.reserved(tenant, mesh_id, largest_bytes(volume.shape, step)):
         try:
             made = files.candidate(mesh_id)
             work = service.pictures.mesh_volume(tenant, volume, path, iso, step, made)

@@ -15,8 +15,8 @@ from ..ingest.canonical import IngestLimits
 from ..ingest.corrected_scan import add_corrected
 from ..rows.idempotency import RequestKey
 from ..rows.ids import new_id
+from ..rows.tables import DatasetRow
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import DatasetRow
 from ..web.errors import problems
 from ..wiring import CallerTenant, Parts, Service
 from .bodies import IdempotencyKey, SmallBody, accept_media_types
@@ -108,11 +108,11 @@ async def _corrected(
     limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
 
     def work() -> DatasetRow:
-        service.files.store.fetch(files.dataset(scan["id"]))
+        service.files.store.fetch(files.dataset(scan.id))
         return add_corrected(tenant, scan, given, key, copy_id, service.datasets, files, limits, reserve)
 
     with service.upload_limits(tenant):
-        async with service.quota.reserved(tenant, copy_id, scan["bytes"]):
+        async with service.quota.reserved(tenant, copy_id, scan.bytes):
             return await run_in_turn(request, service.ingest_queue, tenant, work)
 
 

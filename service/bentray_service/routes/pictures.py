@@ -12,6 +12,7 @@ from fastapi import Request, Response
 from starlette.requests import ClientDisconnect
 
 from .. import __version__
+from ..rows.tables import StoredRow
 from ..web.errors import problems
 from ..wiring import caller_of, parts_of
 from .downloads import headers_of, unchanged, without_length
@@ -31,17 +32,17 @@ PICTURE: dict[int | str, dict[str, Any]] = {
 
 
 async def picture(
-    request: Request, volume: Mapping[str, Any], how: Mapping[str, Any], draw: Callable[[], Awaitable[bytes]]
+    request: Request, item: StoredRow, how: Mapping[str, Any], draw: Callable[[], Awaitable[bytes]]
 ) -> Response:
     """The response with a PNG, or 304.
 
     Args:
         request: HEAD is answered without rendering, hence without Content-Length.
-        volume: its row.
+        item: what is shown.
         how: all other parameters of the image.
         draw: renders the image; cancelled when the client disconnects.
     """
-    seed = repr((__version__, volume["id"], volume["created"], sorted(how.items())))
+    seed = repr((__version__, item.id, item.created, sorted(how.items())))
     tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
     if (response := unchanged(request, tag)) is not None:
         return response

@@ -22,10 +22,10 @@ def show_preview(job_id: str, response: Response, service: Service, tenant: Call
     There is one after the first iteration, or after some seconds of a longer one.
     """
     job = service.jobs.get(tenant, job_id)
-    if job["kind"] != "reconstruction" or job["state"] not in ("running", "cancelling"):
-        raise NoPreview(job["id"], job["kind"], job["state"])
-    image = checkpoint_image(service.files.of(tenant).checkpoints(job["id"]))
+    if job.kind != "reconstruction" or job.state not in ("running", "cancelling"):
+        raise NoPreview(job.id, job.kind, job.state)
+    image = checkpoint_image(service.files.of(tenant).checkpoints(job.id))
     if image is None:
-        raise NoPreview(job["id"], "reconstruction", "before its first image")
+        raise NoPreview(job.id, "reconstruction", "before its first image")
     response.headers["Cache-Control"] = "no-store"
     return PreviewRecord.model_validate(image)

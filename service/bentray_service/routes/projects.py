@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 from fastapi import APIRouter, Body, Depends, Response, status
 from fastapi.openapi.models import Example
@@ -10,7 +10,7 @@ from fastapi.openapi.models import Example
 from ..access.caller import Caller
 from ..errors import Forbidden
 from ..rows.projects import OWNER
-from ..rows.typed_rows import ProjectRow
+from ..rows.tables import ProjectRow
 from ..web.errors import problems
 from ..wiring import CurrentCaller, Service
 from .bodies import SmallBody, accept_media_types
@@ -23,6 +23,7 @@ from .models.project_records import (
     ProjectRecord,
     ProjectRequest,
 )
+from .record_conversion import record_of
 
 NAMES: dict[str, Example] = {"name": {"summary": "A name", "value": {"name": "Trial 7"}}}
 MEMBERS: dict[str, Example] = {
@@ -30,6 +31,8 @@ MEMBERS: dict[str, Example] = {
     "key": {"summary": "A key", "value": {"member": "key:0123456789ab", "role": "reader"}},
 }
 JSON = [Depends(accept_media_types("application/json"))]
+
+Shown = TypeVar("Shown", bound=ProjectRecord)
 
 router = APIRouter(prefix="/v1/projects", tags=["projects"], route_class=SmallBody)
 
@@ -53,7 +56,7 @@ def create_project(
 def list_projects(service: Service, caller: CurrentCaller) -> ProjectList:
     """List the projects that the caller is a member of."""
     found = service.projects.all(caller.home, caller.member)
-    return ProjectList(projects=[ProjectRecord.model_validate(_with_links(row)) for row in found])
+    return ProjectList(projects=[_record(ProjectRecord, row) for row in found])
 
 
 @router.get("/{project_id}", responses=problems(404))
@@ -97,7 +100,7 @@ def put_member(
         _check_owner(project)
         service.projects.put_member(project, member.member, member.role)
     found = service.projects.members(project)
-    return MemberList(members=[MemberRecord.model_validate(one) for one in found])
+    return MemberList(members=[record_of(MemberRecord, row) for row in found])
 
 
 def _owned(service: Service, caller: Caller, project_id: str) -> ProjectRow:
@@ -107,16 +110,15 @@ def _owned(service: Service, caller: Caller, project_id: str) -> ProjectRow:
 
 
 def _check_owner(project: ProjectRow) -> None:
-    if project["role"] != OWNER:
-        raise Forbidden("role", project["role"], f"{OWNER} of the project")
+    if project.role != OWNER:
+        raise Forbidden("role", project.role, f"{OWNER} of the project")
 
 
 def _details(service: Service, project: ProjectRow) -> ProjectDetails:
-    return ProjectDetails.model_validate(
-        {**_with_links(project), "members": service.projects.members(project)}
-    )
+    members = [record_of(MemberRecord, row) for row in service.projects.members(project)]
+    return _record(ProjectDetails, project, members=members)
 
 
-def _with_links(project: ProjectRow) -> dict[str, object]:
-    here = f"/v1/projects/{project['id']}"
-    return {**project, "links": {"self": here, "members": f"{here}/members"}}
+def _record(model: type[Shown], project: ProjectRow, **given: Any) -> Shown:
+    here = f"/v1/projects/{project.id}"
+    return record_of(model, project, links={"self": here, "members": f"{here}/members"}, **given)

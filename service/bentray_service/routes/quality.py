@@ -37,7 +37,7 @@ async def show_quality(
 ) -> QualityRecord:
     """Check the quality of a scan on a worker: faulty elements and times, and the action taken for each."""
     dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
-    path = service.files.of(tenant).dataset(dataset["id"])
+    path = service.files.of(tenant).dataset(dataset.id)
     work = service.pictures.quality(tenant, dataset, path, picker)
     return QualityRecord.model_validate(await while_connected(request, work))
 
@@ -49,8 +49,8 @@ async def quality_png(
 ) -> Response:
     """The quality report as an image: gathers with picks, matrix of times, findings."""
     dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
-    path = service.files.of(tenant).dataset(dataset["id"])
-    how = {"picker": picker, "what": "quality", "water_temperature_c": dataset["water_temperature_c"]}
+    path = service.files.of(tenant).dataset(dataset.id)
+    how = {"picker": picker, "what": "quality", "water_temperature_c": dataset.water_temperature_c}
     return await picture(
         request, dataset, how, lambda: service.pictures.quality_png(tenant, dataset, path, picker)
     )

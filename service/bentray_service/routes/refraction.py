@@ -29,8 +29,8 @@ async def refraction_png(
     """
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     check_renderable(volume)
-    view = view.within(*volume["value_range"])
-    path = service.files.of(tenant).volume(volume["id"])
+    view = view.within(*volume.value_range)
+    path = service.files.of(tenant).volume(volume.id)
     return await picture(
         request, volume, view.plain(), lambda: service.pictures.refraction_png(tenant, volume, path, view)
     )

@@ -26,7 +26,7 @@ async def show_geometry(
 ) -> GeometryRecord:
     """Show the elements, the acquisition and the water of a scan, read by a worker."""
     dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
-    path = service.files.of(tenant).dataset(dataset["id"])
+    path = service.files.of(tenant).dataset(dataset.id)
     work = service.pictures.scan_geometry(tenant, dataset, path)
     return GeometryRecord.model_validate(await while_connected(request, work))
 
@@ -47,7 +47,7 @@ async def show_traces(
 ) -> EmissionRecord:
     """Show the traces of one emission, at most 512 receivers and 1024 samples, and their picks."""
     dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
-    path = service.files.of(tenant).dataset(dataset["id"])
+    path = service.files.of(tenant).dataset(dataset.id)
     how = {"emission": emission, "index": slice, "what": quantity}
     work = service.pictures.emission_traces(tenant, dataset, path, how)
     return EmissionRecord.model_validate(await while_connected(request, work))

@@ -91,17 +91,17 @@ async def slice_png(
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
-    check_plane(volume["shape"], volume["spacing_m"], axis, index)
+    check_plane(volume.shape, volume.spacing_m, axis, index)
     for name, value in (("low", low), ("high", high)):
         if value is not None:
             COLOUR_VALUE.check(name, value)
     how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(style)}
-    if "job_id" in volume:
+    if volume.job_id is not None:
         if quantity == "value":
             accepted = "one of " + ", ".join(QUANTITIES)
             raise InvalidInput("quantity", "'value'", accepted)
         how["quantity"] = quantity or "speed"
     elif quantity not in (None, "value"):
         raise InvalidInput("quantity", repr(quantity), "value: this is an uploaded volume")
-    path = service.files.of(tenant).volume(volume["id"])
+    path = service.files.of(tenant).volume(volume.id)
     return await picture(request, volume, how, lambda: service.pictures.slice_png(tenant, volume, path, how))

@@ -79,13 +79,13 @@ async def volume_data(
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     files = service.files.of(tenant)
     # Exports are deleted together with the volume.
-    path = await run_in_threadpool(service.files.store.fetch, files.volume(volume["id"]))
-    seed = repr((volume["id"], volume["created"], "hdf5" if format == "h5" else format))
+    path = await run_in_threadpool(service.files.store.fetch, files.volume(volume.id))
+    seed = repr((volume.id, volume.created, "hdf5" if format == "h5" else format))
     of_truth = quantity == "truth"
     selection = Selection(
         "speed" if of_truth else quantity, attenuation, None if attenuation == "Np/m" else frequency_hz
     )
-    if of_truth and "job_id" not in volume:
+    if of_truth and volume.job_id is None:
         raise InvalidInput("quantity", "truth of an uploaded volume", "none: it has values only")
     if format in ("hdf5", "h5"):
         if selection != Selection() or of_truth:
@@ -104,15 +104,15 @@ async def volume_data(
     tag = tag_of(path, repr((__version__, REVISION, seed)))
     if (response := unchanged(request, tag)) is not None:
         return response
-    name = f"{volume['id']}-{quantity if 'job_id' in volume else 'values'}.{chosen.extension}"
-    made = files.export(volume["id"], f"{which}{REVISION}.{chosen.extension}")
+    name = f"{volume.id}-{'values' if volume.job_id is None else quantity}.{chosen.extension}"
+    made = files.export(volume.id, f"{which}{REVISION}.{chosen.extension}")
     if not made.exists():
         if request.method == "HEAD":
             headers = {"Accept-Ranges": "bytes", "Content-Disposition": f'attachment; filename="{name}"'}
             return without_length(chosen.media_type, headers_of(tag) | headers)
         parts_of(request).sign_in.check_render(caller_of(request))
-        uploaded, held = "job_id" not in volume, "speed" if of_truth else quantity
-        shape = await run_in_threadpool(shape_of_quantity, path, held, tuple(volume["shape"]))
+        uploaded, held = volume.job_id is None, "speed" if of_truth else quantity
+        shape = await run_in_threadpool(shape_of_quantity, path, held, tuple(volume.shape))
         most = largest_bytes(shape, uploaded=uploaded)
         async with service.quota.reserved(tenant, made.name, most):
             try:
@@ -124,12 +124,12 @@ async def volume_data(
                 await while_connected(request, work)
             except InvalidInput:
                 # Report a volume that was deleted in the meantime as unknown.
-                await run_in_threadpool(service.volumes.get, tenant, volume["id"])
+                await run_in_threadpool(service.volumes.get, tenant, volume.id)
                 raise
             await run_in_threadpool(service.quota.stored, tenant, made.name, file_status(made).st_size)
     response = download(request, made, seed, chosen.media_type, name, tag)
     try:
-        await run_in_threadpool(service.volumes.get, tenant, volume["id"])
+        await run_in_threadpool(service.volumes.get, tenant, volume.id)
     except UnknownId:
         # The export was written after the files of the volume had been deleted.
         made.unlink(missing_ok=True)

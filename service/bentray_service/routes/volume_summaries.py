@@ -9,8 +9,8 @@ from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
 
+from ..rows.tables import DatasetRow, VolumeRow
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import DatasetRow, VolumeRow
 from ..web.errors import problems
 from ..wiring import CallerTenant, Parts, Service
 from .models.summary_records import SummaryRecord
@@ -26,10 +26,10 @@ def scan_of(service: Parts, tenant: Tenant, volume: VolumeRow) -> tuple[DatasetR
     Raises:
         InvalidInput: naming ``volume``, for an uploaded one.
     """
-    if "job_id" not in volume:
-        raise InvalidInput("volume", f"{volume['id']}, an upload", "the result of a reconstruction")
-    dataset = service.datasets.get(tenant, volume["dataset_id"])
-    return dataset, service.files.store.fetch(service.files.of(tenant).dataset(dataset["id"]))
+    if volume.job_id is None:
+        raise InvalidInput("volume", f"{volume.id}, an upload", "the result of a reconstruction")
+    dataset = service.datasets.get(tenant, volume.dataset_id)
+    return dataset, service.files.store.fetch(service.files.of(tenant).dataset(dataset.id))
 
 
 @router.get(
@@ -43,6 +43,6 @@ async def show_summary(
     """Summarise a reconstruction on a worker: quantities, what auto compared, errors against the truth."""
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     dataset, scan = await run_in_threadpool(scan_of, service, tenant, volume)
-    path = service.files.of(tenant).volume(volume["id"])
+    path = service.files.of(tenant).volume(volume.id)
     work = service.pictures.summary(tenant, volume, dataset, path, scan)
     return SummaryRecord.model_validate(await while_connected(request, work))

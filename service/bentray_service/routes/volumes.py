@@ -68,7 +68,7 @@ async def upload_volume(
 ) -> VolumeRecord:
     """Upload a volume. The format is detected from the content; a separate process validates it."""
     given = volume_metadata(title, spacing_m, shape, dtype)
-    row = await receive_upload(request, service, tenant, service.volumes, given)
+    row = await receive_upload(request, service, tenant, service.volumes.uploaded, given)
     record = volume_record(row)
     response.headers["Location"] = record.links["self"]
     return record

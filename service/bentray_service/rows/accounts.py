@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import NewType
 
-from sqlalchemy import ColumnElement, Connection, func, select
+from sqlalchemy import ColumnElement, SQLColumnExpression, func, select
+from sqlalchemy.orm import Session
 
 from .database import Database
-from .schema import projects
+from .tables import ProjectRow
 from .tenants import Tenant
 
 # A tenant with all its projects. Limits are counted by account and rows are owned by tenant: the two types
@@ -15,24 +16,23 @@ from .tenants import Tenant
 Account = NewType("Account", str)
 
 
-def account_of(connection: Connection, tenant: Tenant) -> Account:
+def account_of(session: Session, tenant: Tenant) -> Account:
     """The account of a tenant or project."""
-    owner = connection.execute(select(projects.c.tenant).where(projects.c.id == tenant)).scalar_one_or_none()
-    return Account(owner or tenant)
+    return Account(session.scalar(select(ProjectRow.tenant).where(ProjectRow.id == tenant)) or tenant)
 
 
-def account_in(tenant: ColumnElement[str]) -> ColumnElement[str]:
+def account_in(tenant: SQLColumnExpression[Tenant]) -> ColumnElement[str]:
     """The same for a column of tenants, in a query."""
-    owner = select(projects.c.tenant).where(projects.c.id == tenant)
+    owner = select(ProjectRow.tenant).where(ProjectRow.id == tenant)
     # Otherwise the table of a query two levels up would be joined again.
-    return func.coalesce(owner.correlate_except(projects).scalar_subquery(), tenant)
+    return func.coalesce(owner.correlate_except(ProjectRow).scalar_subquery(), tenant)
 
 
-def family_of(connection: Connection, tenant: Tenant) -> list[Tenant]:
+def family_of(session: Session, tenant: Tenant) -> list[Tenant]:
     """The tenants of an account: itself, which comes first, and its projects."""
-    account = account_of(connection, tenant)
-    mine = select(projects.c.id).where(projects.c.tenant == account).order_by(projects.c.number)
-    return [Tenant(account), *(Tenant(one) for one in connection.execute(mine).scalars())]
+    account = account_of(session, tenant)
+    mine = select(ProjectRow.id).where(ProjectRow.tenant == account).order_by(ProjectRow.number)
+    return [Tenant(account), *(Tenant(project) for project in session.scalars(mine))]
 
 
 class Accounts:
@@ -49,7 +49,7 @@ class Accounts:
         """The account of a tenant or project. Of the caller of a request it is known since the sign-in."""
         known = self._known.get(tenant)
         if known is None:
-            with self._database.read() as connection:
-                known = account_of(connection, tenant)
+            with self._database.read() as session:
+                known = account_of(session, tenant)
             self._known[tenant] = known
         return known

@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable, Collection
 from typing import NamedTuple
 
-from sqlalchemy import delete, insert, select, update
+from sqlalchemy import delete, select
 
 from .database import Database
-from .schema import about, too_old
+from .tables import About, ExpiredRow
 from .tenants import Tenant
 
 
@@ -42,21 +42,20 @@ class ExpiryMarks:
             for each item, for how long it has been found expired, s.
         """
         now = set(expired)
-        with self._database.write() as connection:
-            rows = connection.execute(select(too_old)).all()
-            marked = {ExpiredItem(Tenant(row.tenant), row.what, row.id): row.noticed_s for row in rows}
-            for one in marked.keys() - now:
-                mine = too_old.c.tenant == one.tenant, too_old.c.id == one.id
-                connection.execute(delete(too_old).where(*mine))
-            fresh = [{**one._asdict(), "noticed_s": observed_s} for one in now - marked.keys()]
-            if fresh:
-                connection.execute(insert(too_old), fresh)
-        return {one: observed_s - marked.get(one, observed_s) for one in now}
+        with self._database.write() as session:
+            rows = {
+                ExpiredItem(row.tenant, row.what, row.id): row for row in session.scalars(select(ExpiredRow))
+            }
+            for item in rows.keys() - now:
+                session.delete(rows[item])
+            fresh = [ExpiredRow(**item._asdict(), noticed_s=observed_s) for item in now - rows.keys()]
+            session.add_all(fresh)
+        return {item: observed_s - rows[item].noticed_s if item in rows else 0.0 for item in now}
 
     def clear(self) -> None:
         """Remove all marks, after the system clock was found to be wrong."""
-        with self._database.write() as connection:
-            connection.execute(delete(too_old))
+        with self._database.write() as session:
+            session.execute(delete(ExpiredRow))
 
 
 class ObservedTime:
@@ -77,12 +76,13 @@ class ObservedTime:
 
     def count(self) -> float:
         """Add the time since the last call; returns the count, s."""
-        with self._database.write() as connection:
-            total = float(connection.execute(select(about.c.observed_s).with_for_update()).scalar_one())
+        with self._database.write() as session:
+            about = session.scalars(select(About).with_for_update()).one()
+            total = about.observed_s
             now = self._clock()
             if self._last is not None:
                 counted, then = self._last
                 total = max(total, counted + now - then)
-            connection.execute(update(about).values(observed_s=total))
+            about.observed_s = total
         self._last = total, now
         return total

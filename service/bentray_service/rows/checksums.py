@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import delete, func, select, update
+from sqlalchemy.orm import Session
 
 from .database import Database
-from .schema import checksums, datasets, geometry_fields, jobs, meshes, uploaded_volumes, volumes
+from .tables import (
+    ChecksumRow,
+    DatasetRow,
+    FieldRow,
+    JobRow,
+    MeshRow,
+    Plain,
+    ResultVolumeRow,
+    UploadedVolumeRow,
+)
 from .tenants import Tenant
-from .typed_rows import ChecksumRow, Plain
 
 # Tables whose rows have stored files; the file of a turntable belongs to its job.
-STORED = (datasets, uploaded_volumes, volumes, meshes, geometry_fields, jobs)
+STORED = (DatasetRow, UploadedVolumeRow, ResultVolumeRow, MeshRow, FieldRow, JobRow)
 
 
 class Digest(NamedTuple):
@@ -45,8 +54,8 @@ class Checksums:
             digest: the checksum.
             as_written: whether it was computed when the file was written.
         """
-        with self._database.write() as connection:
-            _record(connection, tenant, name, path, digest, as_written)
+        with self._database.write() as session:
+            _record(session, tenant, name, path, digest, as_written)
 
     def record_first_seen(self, tenant: Tenant, name: str, path: str, digest: Digest) -> bool:
         """Insert the checksum of an item stored before version 4.
@@ -54,57 +63,48 @@ class Checksums:
         Returns:
             False, without a change, if the item has been deleted; its file may remain for a moment.
         """
-        with self._database.write() as connection:
+        with self._database.write() as session:
             known = any(
-                connection.execute(
-                    # A concurrent deletion finishes first.
-                    select(table.c.id).where(table.c.tenant == tenant, table.c.id == name).with_for_update()
-                ).first()
+                # A concurrent deletion finishes first.
+                session.scalar(select(table.id).filter_by(tenant=tenant, id=name).with_for_update())
                 for table in STORED
             )
             if known:
-                _record(connection, tenant, name, path, digest, as_written=False)
+                _record(session, tenant, name, path, digest, as_written=False)
             return known
 
     def get(self, tenant: Tenant, name: str) -> ChecksumRow | None:
         """The checksum of an item; None if it was stored before version 4 or has been deleted."""
-        mine = select(checksums).where(checksums.c.tenant == tenant, checksums.c.id == name)
-        rows = self._database.rows(mine)
-        return cast(ChecksumRow, rows[0]) if rows else None
+        with self._database.read() as session:
+            return session.get(ChecksumRow, (tenant, name))
 
     def all(self) -> list[ChecksumRow]:
         """The checksums of all tenants."""
-        query = select(checksums).order_by(checksums.c.tenant, checksums.c.path)
-        return cast(list[ChecksumRow], self._database.rows(query))
+        return self._database.rows(select(ChecksumRow).order_by(ChecksumRow.tenant, ChecksumRow.path))
 
     def count_damaged(self) -> int:
         """The number of items of all tenants that are known to be damaged."""
-        query = select(func.count()).select_from(checksums).where(checksums.c.damaged.is_not(None))
-        with self._database.read() as connection:
-            return int(connection.execute(query).scalar_one())
+        query = select(func.count()).where(ChecksumRow.damaged.is_not(None))
+        with self._database.read() as session:
+            return session.scalars(query).one()
 
     def damaged(self, tenant: Tenant, name: str, since: float | None) -> None:
         """Store since when an item is damaged, s since 1970; None: it is not damaged."""
-        mine = checksums.c.tenant == tenant, checksums.c.id == name
-        with self._database.write() as connection:
-            connection.execute(update(checksums).where(*mine).values(damaged=since))
+        with self._database.write() as session:
+            session.execute(update(ChecksumRow).filter_by(tenant=tenant, id=name).values(damaged=since))
 
     def delete(self, tenant: Tenant, names: Collection[str]) -> None:
         """Delete the checksums of items by id."""
-        with self._database.write() as connection:
-            delete_checksums(connection, tenant, names)
+        with self._database.write() as session:
+            delete_checksums(session, tenant, names)
 
 
-def _record(
-    connection: Connection, tenant: Tenant, name: str, path: str, digest: Digest, as_written: bool
-) -> None:
-    now: Plain = {"path": path, "bytes": digest.bytes, "sha256": digest.sha256, "noted": time.time()}
-    now |= {"as_written": as_written, "damaged": None}
-    mine = checksums.c.tenant == tenant, checksums.c.id == name
-    if not connection.execute(update(checksums).where(*mine).values(**now)).rowcount:
-        connection.execute(insert(checksums).values(tenant=tenant, id=name, **now))
+def _record(session: Session, tenant: Tenant, name: str, path: str, digest: Digest, as_written: bool) -> None:
+    now: Plain = {"path": path, **digest._asdict(), "noted": time.time()}
+    # An existing row is replaced.
+    session.merge(ChecksumRow(tenant=tenant, id=name, **now, as_written=as_written, damaged=None))
 
 
-def delete_checksums(connection: Connection, tenant: Tenant, names: Collection[str]) -> None:
+def delete_checksums(session: Session, tenant: Tenant, names: Collection[str]) -> None:
     """The same within the transaction of the caller."""
-    connection.execute(delete(checksums).where(checksums.c.tenant == tenant, checksums.c.id.in_(names)))
+    session.execute(delete(ChecksumRow).where(ChecksumRow.tenant == tenant, ChecksumRow.id.in_(names)))

@@ -10,18 +10,32 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from sqlalchemy import Connection, Engine, Select, create_engine, event, exc, insert, inspect, select, update
+from sqlalchemy import (
+    Connection,
+    CursorResult,
+    Engine,
+    Select,
+    UpdateBase,
+    create_engine,
+    event,
+    exc,
+    func,
+    inspect,
+    select,
+    text,
+    update,
+)
 from sqlalchemy.engine import URL, make_url
+from sqlalchemy.orm import Session
 from sqlalchemy.pool import QueuePool
 
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import DatabaseFull, DatabaseUnavailable
-from . import schema
 from .admission import MAX_CONCURRENT, Admission
-from .migration import SQLITE_PRAGMAS, STEPS, migrate
+from .tables import VERSION, About, Base, SchemaVersion
 
 log = logging.getLogger("bentray.storage")
 
@@ -33,8 +47,19 @@ KEPT_CONNECTIONS, MORE_CONNECTIONS = 5, 10
 # Shortest interval between two log lines about an unavailable database, s.
 SILENCE_SECONDS = 60.0
 
+# Versions of before Alembic that its first revision takes over.
+TAKEN_OVER = ("12", "13")
+# SQLite rebuilds a table to change a column; references to the old table must not be rewritten meanwhile.
+SQLITE_PRAGMAS = ("foreign_keys=OFF", "legacy_alter_table=ON")
+
+# Key of the lock for the migration of a database of PostgreSQL, in which others may have locks.
+UPGRADE_LOCK = 0x62656E747261
+
 # Error messages of SQLite and PostgreSQL for a full disk.
 FULL = ("database or disk is full", "No space left on device")
+
+
+Row = TypeVar("Row")
 
 
 class Database:
@@ -52,16 +77,16 @@ class Database:
         self._logged = -SILENCE_SECONDS
 
     @contextmanager
-    def read(self) -> Iterator[Connection]:
-        """A read-only transaction; it never waits for a writer."""
-        with self._checked(), self._reader.begin() as connection:
-            yield connection
+    def read(self) -> Iterator[Session]:
+        """A read-only transaction; it never waits for a writer. Its rows can be used afterwards."""
+        with self._checked(), _session(self._reader) as session:
+            yield session
 
     @contextmanager
-    def write(self) -> Iterator[Connection]:
+    def write(self) -> Iterator[Session]:
         """A transaction that is committed when the block ends without an error."""
-        with self._checked(), self._writer.begin() as connection:
-            yield connection
+        with self._checked(), _session(self._writer) as session:
+            yield session
 
     @contextmanager
     def _checked(self) -> Iterator[None]:
@@ -79,10 +104,10 @@ class Database:
                     log.warning("the database is unavailable: %s", getattr(error, "orig", None) or error)
                 raise refusal from error
 
-    def rows(self, query: Select[Any]) -> list[dict[str, Any]]:
-        """The rows of a query, in a transaction of its own."""
-        with self.read() as connection:
-            return [dict(row) for row in connection.execute(query).mappings()]
+    def rows(self, query: Select[Row]) -> list[Row]:
+        """The rows of a query for one table, in a transaction of its own."""
+        with self.read() as session:
+            return list(session.scalars(query))
 
     def connections(self) -> tuple[int, int]:
         """Connections in use now, and their maximum."""
@@ -95,8 +120,8 @@ class Database:
 
     def probe(self) -> None:
         """Write one number to verify that writing works; any error is raised."""
-        with self.write() as connection:
-            connection.execute(update(schema.about).values(probed=time.time()))
+        with self.write() as session:
+            session.execute(update(About).values(probed=time.time()))
 
     def close(self) -> None:
         self._writer.dispose()
@@ -122,7 +147,7 @@ def open_database(address: str, way_back: str | None = None) -> Database:
         with engine.begin() as connection:
             current = _make_or_check(connection, shown, way_back)
         if not current:
-            _update(address, shown)
+            _upgrade(address, shown)
     except (exc.SQLAlchemyError, ImportError) as error:
         reason = str(getattr(error, "orig", None) or error).splitlines()[0]
         raise InvalidInput(
@@ -227,52 +252,81 @@ def _check_file(url: URL, way_back: str) -> None:
 def _make_or_check(connection: Connection, shown: str, way_back: str | None) -> bool:
     """Create the tables of a new database; returns whether the schema is current."""
     tables = inspect(connection).get_table_names()
-    if schema.about.name not in tables:
+    if About.__tablename__ not in tables:
         # A server may hold the tables of several programs in one database, a file belongs to one.
         others = connection.dialect.name == "sqlite" and tables
         if way_back is not None or others:
             found = f"with tables of another program ({tables[0]})" if tables else "without tables"
             raise InvalidInput("database_url", f"{shown}, {found}", way_back or "a database of its own")
-        schema.metadata.create_all(connection)
-        connection.execute(insert(schema.about).values(version=schema.VERSION, probed=time.time()))
+        Base.metadata.create_all(connection)
+        with Session(connection) as session, session.begin():
+            session.add(SchemaVersion(version_num=str(VERSION)))
+            session.add(About(database=new_mark(), probed=time.time()))
         return True
     version = version_of(connection)
-    if version != schema.VERSION and version not in STEPS:
+    if version != str(VERSION) and version not in TAKEN_OVER:
         raise InvalidInput(
             "database_url",
             f"{shown} with schema version {version}",
-            f"{min(STEPS)} to {schema.VERSION}: use the Bentray version that created it, or another database",
+            f"{TAKEN_OVER[0]} to {VERSION}: use the Bentray version that created it, or another database",
         )
-    return version == schema.VERSION
+    return version == str(VERSION)
 
 
-def _update(address: str, shown: str) -> None:
+def _upgrade(address: str, shown: str) -> None:
     """Migrate over a separate connection: SQLite accepts the pragmas only outside of a transaction."""
+    from alembic import command
+    from alembic.config import Config
+
     # Migration of a large table may take long.
     engine = engine_of(address, SQLITE_PRAGMAS, patient=False)
     try:
         with engine.begin() as connection:
-            version = version_of(connection)
-            log.warning("migrating %s from schema version %d to %d", shown, version, schema.VERSION)
-            migrate(connection, version)
+            if connection.dialect.name != "sqlite":
+                # Another service may start on it. Write transactions of SQLite are serialised.
+                connection.execute(select(func.pg_advisory_xact_lock(UPGRADE_LOCK)))
+            log.warning("migrating %s from schema version %s to %d", shown, version_of(connection), VERSION)
+            config = Config(attributes={"connection": connection})
+            config.set_main_option("script_location", "bentray_service.rows:alembic")
+            command.upgrade(config, "head")
+            if connection.dialect.name == "sqlite":
+                lost = connection.execute(text("PRAGMA foreign_key_check")).all()
+                if lost:
+                    raise RuntimeError(f"{len(lost)} rows with invalid references")
     finally:
         engine.dispose()
 
 
-def version_of(connection: Connection) -> int:
-    return int(connection.execute(select(schema.about.c.version)).scalar_one())
+def version_of(connection: Connection) -> str:
+    """The version of the tables of a database, which those of before Alembic have in another table."""
+    if inspect(connection).has_table(SchemaVersion.__tablename__):
+        return connection.execute(select(SchemaVersion.version_num)).scalar_one()
+    return str(connection.execute(text("SELECT version FROM about")).scalar_one())
+
+
+def rows_changed(session: Session, statement: UpdateBase) -> int:
+    """Execute an UPDATE or DELETE; returns the number of its rows."""
+    result = session.execute(statement)
+    assert isinstance(result, CursorResult)
+    return int(result.rowcount)
 
 
 def new_mark() -> str:
-    """A new random id."""
+    """A new random id of a database."""
     return secrets.token_hex(16)
 
 
 def mark_of(database: Database) -> str:
-    """The id of a database, created on first use."""
-    with database.write() as connection:
-        database_id = connection.execute(select(schema.bucket_mark.c.database)).scalar_one_or_none()
-        if database_id is None:
-            database_id = new_mark()
-            connection.execute(insert(schema.bucket_mark).values(database=database_id))
-        return str(database_id)
+    """The id of a database."""
+    with database.read() as session:
+        return session.scalars(select(About.database)).one()
+
+
+@contextmanager
+def _session(engine: Engine) -> Iterator[Session]:
+    # Statements change no rows in memory: sessions are short, and rows are read anew.
+    options = {"synchronize_session": False}
+    with Session(engine, expire_on_commit=False, execution_options=options) as session, session.begin():
+        # The transaction of the database begins here, not with the first statement.
+        session.connection()
+        yield session

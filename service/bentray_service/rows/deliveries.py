@@ -8,15 +8,14 @@ import secrets
 import time
 from collections.abc import Collection
 from datetime import UTC, datetime
-from typing import cast
 
-from sqlalchemy import Connection, delete, func, insert, or_, select, update
+from sqlalchemy import delete, func, or_, select, update
+from sqlalchemy.orm import Session, aliased
 
 from .accounts import account_in
-from .database import Database
-from .schema import deliveries, jobs, webhook_secrets
+from .database import Database, rows_changed
+from .tables import DeliveryRow, JobRow, Plain, WebhookSecretRow
 from .tenants import Tenant
-from .typed_rows import DeliveryRow, Plain
 
 # Time after which an attempt whose service died is repeated, s.
 LEASE_S = 60.0
@@ -28,11 +27,9 @@ STATES = ("waiting", "delivered", "failed")
 SECRET_PREFIX = "whsec_"  # noqa: S105 - the prefix of Standard Webhooks
 
 
-def announce(connection: Connection, job_id: str, state: str) -> None:
+def announce(session: Session, job_id: str, state: str) -> None:
     """Store the message that a job has ended, if it has a webhook; in the transaction of that change."""
-    job = connection.execute(
-        select(jobs.c.tenant, jobs.c.kind, jobs.c.webhook).where(jobs.c.id == job_id)
-    ).one()
+    job = session.execute(select(JobRow.tenant, JobRow.kind, JobRow.webhook).where(JobRow.id == job_id)).one()
     if job.webhook is None:
         return
     now = time.time()
@@ -40,9 +37,11 @@ def announce(connection: Connection, job_id: str, state: str) -> None:
     data = {"job": job_id, "kind": job.kind, "state": state, "address": f"/v1/jobs/{job_id}"}
     when = datetime.fromtimestamp(now, UTC).isoformat(timespec="milliseconds")
     body = json.dumps({"type": f"job.{state}", "timestamp": when, "data": data}, separators=(",", ":"))
-    row = {"id": f"msg-{secrets.token_hex(10)}", "tenant": job.tenant, "job_id": job_id, "url": job.webhook}
-    row |= {"body": body, "state": "waiting", "created": now, "due": now}
-    connection.execute(insert(deliveries).values(**row))
+    message = DeliveryRow(
+        id=f"msg-{secrets.token_hex(10)}", tenant=job.tenant, job_id=job_id, url=job.webhook
+    )
+    message.body, message.state, message.created, message.due = body, "waiting", now, now
+    session.add(message)
 
 
 class Deliveries:
@@ -53,52 +52,49 @@ class Deliveries:
 
     def of_job(self, tenant: Tenant, job_id: str) -> DeliveryRow | None:
         """The message of a job of this tenant; None before its end, or without a webhook."""
-        mine = select(deliveries).where(deliveries.c.tenant == tenant, deliveries.c.job_id == job_id)
-        rows = self._database.rows(mine)
-        return cast(DeliveryRow, rows[0]) if rows else None
+        with self._database.read() as session:
+            return session.scalar(select(DeliveryRow).filter_by(tenant=tenant, job_id=job_id))
 
     def newest(self, tenant: Tenant | None, state: str | None, limit: int) -> list[DeliveryRow]:
         """Messages of one tenant or all, in one state or any, newest first."""
-        query = select(deliveries).order_by(deliveries.c.number.desc()).limit(limit)
+        query = select(DeliveryRow).order_by(DeliveryRow.number.desc()).limit(limit)
         if tenant is not None:
-            query = query.where(deliveries.c.tenant == tenant)
+            query = query.where(DeliveryRow.tenant == tenant)
         if state is not None:
-            query = query.where(deliveries.c.state == state)
-        return cast(list[DeliveryRow], self._database.rows(query))
+            query = query.where(DeliveryRow.state == state)
+        return self._database.rows(query)
 
     def counts(self) -> dict[str, int]:
         """The number of messages in each state."""
-        query = select(deliveries.c.state, func.count()).group_by(deliveries.c.state)
-        with self._database.read() as connection:
-            return {**dict.fromkeys(STATES, 0), **{state: int(n) for state, n in connection.execute(query)}}
+        query = select(DeliveryRow.state, func.count().label("number")).group_by(DeliveryRow.state)
+        with self._database.read() as session:
+            return {**dict.fromkeys(STATES, 0), **{row.state: row.number for row in session.execute(query)}}
 
     def take_over(self) -> None:
         """Repeat the attempts of a dead service at once, if no other service uses the database."""
-        with self._database.write() as connection:
-            connection.execute(update(deliveries).values(lease_until=None))
+        with self._database.write() as session:
+            session.execute(update(DeliveryRow).values(lease_until=None))
 
     def claim(self) -> DeliveryRow | None:
         """Begin an attempt of a message that is due; None if there is none."""
         now = time.time()
-        other = deliveries.alias()
+        other = aliased(DeliveryRow)
         busy = (
             select(func.count())
-            .where(account_in(other.c.tenant) == account_in(deliveries.c.tenant), other.c.lease_until > now)
+            .where(account_in(other.tenant) == account_in(DeliveryRow.tenant), other.lease_until > now)
             .scalar_subquery()
         )
-        free = or_(deliveries.c.lease_until.is_(None), deliveries.c.lease_until <= now)
-        due = deliveries.c.state == "waiting", deliveries.c.due <= now, free, busy < OF_ACCOUNT
-        next_one = select(deliveries).where(*due).order_by(busy, deliveries.c.due).limit(1)
+        free = or_(DeliveryRow.lease_until.is_(None), DeliveryRow.lease_until <= now)
+        due = DeliveryRow.state == "waiting", DeliveryRow.due <= now, free, busy < OF_ACCOUNT
+        next_one = select(DeliveryRow).where(*due).order_by(busy, DeliveryRow.due).limit(1)
         # Most queries find nothing, and take no write lock.
         if not self._database.rows(next_one):
             return None
-        with self._database.write() as connection:
-            row = connection.execute(next_one.with_for_update(skip_locked=True)).mappings().one_or_none()
-            if row is None:
-                return None
-            begun = {"attempts": row["attempts"] + 1, "lease_until": now + LEASE_S}
-            connection.execute(update(deliveries).where(deliveries.c.id == row["id"]).values(**begun))
-            return cast(DeliveryRow, {**row, **begun})
+        with self._database.write() as session:
+            row = session.scalar(next_one.with_for_update(skip_locked=True))
+            if row is not None:
+                row.attempts, row.lease_until = row.attempts + 1, now + LEASE_S
+            return row
 
     def settle(self, delivery: DeliveryRow, state: str, entry: Plain, due: float) -> None:
         """End an attempt.
@@ -109,16 +105,16 @@ class Deliveries:
             entry: of the log.
             due: time of the next attempt of a waiting message.
         """
-        now: Plain = {"state": state, "log": [*delivery["log"], entry], "due": due, "lease_until": None}
-        with self._database.write() as connection:
-            connection.execute(update(deliveries).where(deliveries.c.id == delivery["id"]).values(**now))
+        now: Plain = {"state": state, "log": [*delivery.log, entry], "due": due, "lease_until": None}
+        with self._database.write() as session:
+            session.execute(update(DeliveryRow).where(DeliveryRow.id == delivery.id).values(**now))
 
     def retry(self, ids: Collection[str]) -> int:
         """Send failed messages again, with all attempts; returns their number."""
         again: Plain = {"state": "waiting", "attempts": 0, "due": time.time()}
-        failed = deliveries.c.id.in_(ids), deliveries.c.state == "failed"
-        with self._database.write() as connection:
-            return connection.execute(update(deliveries).where(*failed).values(**again)).rowcount
+        failed = DeliveryRow.id.in_(ids), DeliveryRow.state == "failed"
+        with self._database.write() as session:
+            return rows_changed(session, update(DeliveryRow).where(*failed).values(**again))
 
 
 class WebhookSecrets:
@@ -130,17 +126,16 @@ class WebhookSecrets:
     def create(self, tenant: Tenant) -> str:
         """A new secret of a tenant; those before it still sign for ``OVERLAP_S``."""
         secret, now = SECRET_PREFIX + base64.b64encode(secrets.token_bytes(32)).decode(), time.time()
-        mine = webhook_secrets.c.tenant == tenant
-        with self._database.write() as connection:
-            connection.execute(delete(webhook_secrets).where(mine, webhook_secrets.c.expires <= now))
-            replaced = mine, webhook_secrets.c.expires.is_(None)
-            connection.execute(update(webhook_secrets).where(*replaced).values(expires=now + OVERLAP_S))
-            connection.execute(insert(webhook_secrets).values(tenant=tenant, secret=secret, created=now))
+        mine = WebhookSecretRow.tenant == tenant
+        with self._database.write() as session:
+            session.execute(delete(WebhookSecretRow).where(mine, WebhookSecretRow.expires <= now))
+            replaced = mine, WebhookSecretRow.expires.is_(None)
+            session.execute(update(WebhookSecretRow).where(*replaced).values(expires=now + OVERLAP_S))
+            session.add(WebhookSecretRow(tenant=tenant, secret=secret, created=now))
         return secret
 
     def of(self, tenant: Tenant) -> list[str]:
         """The valid secrets of a tenant, the newest first."""
-        valid = or_(webhook_secrets.c.expires.is_(None), webhook_secrets.c.expires > time.time())
-        query = select(webhook_secrets.c.secret).where(webhook_secrets.c.tenant == tenant, valid)
-        rows = self._database.rows(query.order_by(webhook_secrets.c.number.desc()))
-        return [row["secret"] for row in rows]
+        valid = or_(WebhookSecretRow.expires.is_(None), WebhookSecretRow.expires > time.time())
+        query = select(WebhookSecretRow.secret).where(WebhookSecretRow.tenant == tenant, valid)
+        return self._database.rows(query.order_by(WebhookSecretRow.number.desc()))

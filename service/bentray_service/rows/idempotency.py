@@ -5,12 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from typing import TypeVar
 
-from sqlalchemy import Connection, Table, func, select
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
 
 from ..errors import KeyReused
+from .tables import BatchRow, DatasetRow, JobRow, Plain
 from .tenants import Tenant
-from .typed_rows import Plain
+
+# The tables of what a request with a key makes.
+Row = TypeVar("Row", DatasetRow, JobRow, BatchRow)
 
 
 @dataclass(frozen=True)
@@ -34,11 +39,11 @@ class RequestKey:
         """The values of a row that the request inserts."""
         return {"idempotency_key": self.key, "request_sha256": self.digest}
 
-    def earlier(self, connection: Connection, table: Table, tenant: Tenant) -> Plain | None:
+    def earlier(self, session: Session, table: type[Row], tenant: Tenant) -> Row | None:
         """The row that an earlier request with this key inserted; concurrent requests with it wait.
 
         Args:
-            connection: in a write transaction.
+            session: in a write transaction.
             table: with the columns of ``columns``.
             tenant: owner.
 
@@ -47,14 +52,14 @@ class RequestKey:
         """
         if self.key is None:
             return None
-        if connection.dialect.name != "sqlite":
+        if session.get_bind().dialect.name != "sqlite":
             # Write transactions of SQLite are serialised; this lock serialises those of PostgreSQL.
             words = f"{tenant}/{self.key}".encode()
             lock = int.from_bytes(hashlib.sha256(words).digest()[:8], signed=True)
-            connection.execute(select(func.pg_advisory_xact_lock(lock)))
-        mine = select(table).where(table.c.tenant == tenant, table.c.idempotency_key == self.key)
-        row = connection.execute(mine).mappings().one_or_none()
-        if row is not None and row["request_sha256"] != self.digest:
+            session.execute(select(func.pg_advisory_xact_lock(lock)))
+        mine = select(table).filter_by(tenant=tenant, idempotency_key=self.key)
+        row = session.scalars(mine).one_or_none()
+        if row is not None and row.request_sha256 != self.digest:
             accepted = "a unique key for every request; this key was used with another request"
             raise KeyReused("Idempotency-Key", repr(self.key), accepted)
-        return None if row is None else dict(row)
+        return row

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import ColumnElement, func, literal, or_, select
+from sqlalchemy import ColumnElement, SQLColumnExpression, func, literal, or_, select
+from sqlalchemy.orm import aliased
 
-from .schema import datasets, jobs, meshes, uploaded_volumes, volumes
+from .tables import DatasetRow, JobRow, MeshRow, ResultVolumeRow, UploadedVolumeRow
 from .tenants import Tenant
 
 ESCAPE = "\\"
@@ -21,32 +22,35 @@ def matches(tenant: Tenant, words: str) -> ColumnElement[bool]:
         tenant: owner.
         words: without NUL, which PostgreSQL stores in no text.
     """
-    scans = select(datasets.c.id).where(
-        datasets.c.tenant == tenant, contains(words, datasets.c.name, datasets.c.title)
+    scans = select(DatasetRow.id).where(
+        DatasetRow.tenant == tenant, contains(words, DatasetRow.name, DatasetRow.title)
     )
-    made_here = select(datasets.c.job_id).where(datasets.c.id.in_(scans), datasets.c.job_id.is_not(None))
-    made = jobs.alias()
+    made_here = select(DatasetRow.job_id).where(DatasetRow.id.in_(scans), DatasetRow.job_id.is_not(None))
+    made = aliased(JobRow)
     reconstructed = (
-        select(volumes.c.id)
-        .join(made, made.c.id == volumes.c.job_id)
-        .where(volumes.c.tenant == tenant, made.c.dataset_id.in_(scans))
+        select(ResultVolumeRow.id)
+        .join(made, made.id == ResultVolumeRow.job_id)
+        .where(ResultVolumeRow.tenant == tenant, made.dataset_id.in_(scans))
     )
     return or_(
-        contains(words, jobs.c.id, jobs.c.name, jobs.c.notes, jobs.c.started_by),
-        contains(words, jobs.c.dataset_id, jobs.c.volume_id, jobs.c.mesh_id),
-        jobs.c.dataset_id.in_(scans),
-        jobs.c.id.in_(made_here),
-        jobs.c.volume_id.in_(reconstructed),
-        jobs.c.volume_id.in_(_titled(uploaded_volumes, tenant, words)),
-        jobs.c.mesh_id.in_(_titled(meshes, tenant, words)),
+        contains(words, JobRow.id, JobRow.name, JobRow.notes, JobRow.started_by),
+        contains(words, JobRow.dataset_id, JobRow.volume_id, JobRow.mesh_id),
+        JobRow.dataset_id.in_(scans),
+        JobRow.id.in_(made_here),
+        JobRow.volume_id.in_(reconstructed),
+        JobRow.volume_id.in_(_titled(UploadedVolumeRow, tenant, words)),
+        JobRow.mesh_id.in_(_titled(MeshRow, tenant, words)),
     )
 
 
 def _titled(table: Any, tenant: Tenant, words: str) -> Any:
-    return select(table.c.id).where(table.c.tenant == tenant, contains(words, table.c.title))
+    return select(table.id).where(table.tenant == tenant, contains(words, table.title))
 
 
-def contains(words: str, *columns: ColumnElement[str]) -> ColumnElement[bool]:
+Text = SQLColumnExpression[str] | SQLColumnExpression[str | None]
+
+
+def contains(words: str, *columns: Text) -> ColumnElement[bool]:
     """Whether one of the columns contains the words, as they are: no character is a pattern."""
     for special in (ESCAPE, "%", "_"):
         words = words.replace(special, ESCAPE + special)

@@ -8,17 +8,18 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, delete, insert, select, update
+from sqlalchemy import ColumnElement, delete, select, update
+from sqlalchemy.orm import Session
 
-from . import schema
+from .database import rows_changed
 from .deliveries import announce
-from .schema import ENDED, jobs, storage
+from .tables import ENDED, EventRow, JobRow, StorageRow
 
 RUNNING = ("running", "cancelling")
 
 
 def change(
-    connection: Connection,
+    session: Session,
     job_id: str,
     before: tuple[str, ...],
     after: str,
@@ -27,20 +28,20 @@ def change(
     **values: Any,
 ) -> bool:
     """Change the state if it is one of ``before`` and ``only`` holds; returns whether it was changed."""
-    where = [jobs.c.id == job_id, jobs.c.state.in_(before)]
+    where = [JobRow.id == job_id, JobRow.state.in_(before)]
     if only is not None:
         where.append(only)
-    changed = connection.execute(update(jobs).where(*where).values(state=after, **values))
-    if changed.rowcount:
-        append_event(connection, job_id, after, note)
+    changed = rows_changed(session, update(JobRow).where(*where).values(state=after, **values))
+    if changed:
+        append_event(session, job_id, after, note)
         if after in ENDED:
-            announce(connection, job_id, after)
-            mine = select(jobs.c.tenant).where(jobs.c.id == job_id).scalar_subquery()
-            reserved = storage.c.tenant == mine, storage.c.name == job_id, storage.c.reserved
-            connection.execute(delete(storage).where(*reserved))
-    return bool(changed.rowcount)
+            announce(session, job_id, after)
+            owner = select(JobRow.tenant).where(JobRow.id == job_id).scalar_subquery()
+            reserved = StorageRow.tenant == owner, StorageRow.name == job_id, StorageRow.reserved
+            session.execute(delete(StorageRow).where(*reserved))
+    return bool(changed)
 
 
-def append_event(connection: Connection, job_id: str, state: str, note: str = "") -> None:
+def append_event(session: Session, job_id: str, state: str, note: str = "") -> None:
     """Append an event."""
-    connection.execute(insert(schema.events).values(job_id=job_id, time=time.time(), state=state, note=note))
+    session.add(EventRow(job_id=job_id, time=time.time(), state=state, note=note))

@@ -5,31 +5,44 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import cast
+from dataclasses import asdict, dataclass
+from typing import NamedTuple
 
-from sqlalchemy import Connection, func, insert, select
+from sqlalchemy import func, select
 from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
 
 from ..errors import JobFinished, QueueFull, UnknownId
-from . import job_search, schema, usage
+from . import job_search, usage
 from .accounts import account_of, family_of
 from .idempotency import RequestKey
 from .ids import checked, new_id
 from .job_states import append_event, change
-from .schema import ENDED, UNFINISHED, jobs
 from .stored_tables import NamedTable
+from .tables import ENDED, UNFINISHED, EventRow, JobRow, Plain
 from .tenants import Tenant
 from .turns import turns_of
-from .typed_rows import EventRow, JobProgress, JobRow, Plain
 
 BATCH = 500
+
+
+class JobProgress(NamedTuple):
+    """How far a job is."""
+
+    id: str
+    state: str
+    done: int
+    total: int
+    phase: str | None
+
+
+PROGRESS = JobRow.id, JobRow.state, JobRow.done, JobRow.total, JobRow.phase
 
 
 class Jobs(NamedTable[JobRow]):
     """Jobs of a tenant; :class:`bentray_service.rows.job_queue.Queue` runs them."""
 
-    table, what = jobs, "job"
+    table, what = JobRow, "job"
 
     def add(
         self,
@@ -78,12 +91,12 @@ class Jobs(NamedTable[JobRow]):
         how = Submission(None if reserve is None else reserve[1], most_queued, key, started_by, webhook)
         called = [] if webhook is None else [webhook]
         request = RequestKey.from_header(key, [kind, settings, dataset_id, volume_id, mesh_id, *called])
-        with self._database.write() as connection:
-            before = request.earlier(connection, jobs, tenant)
+        with self._database.write() as session:
+            before = request.earlier(session, JobRow, tenant)
             if before is None:
-                job_id = insert_jobs(connection, tenant, [new], how, request=request)[0]
+                job_id = insert_jobs(session, tenant, [new], how, request=request)[0]
             else:
-                job_id = before["id"]
+                job_id = before.id
         return self.get(tenant, job_id)
 
     def newest(
@@ -109,27 +122,27 @@ class Jobs(NamedTable[JobRow]):
         Raises:
             UnknownId: when the tenant has no such job.
         """
-        query = select(jobs).where(jobs.c.tenant == tenant).order_by(jobs.c.number.desc()).limit(limit)
+        query = select(JobRow).where(JobRow.tenant == tenant).order_by(JobRow.number.desc()).limit(limit)
         if state is not None:
-            query = query.where(jobs.c.state == state)
+            query = query.where(JobRow.state == state)
         if kind is not None:
-            query = query.where(jobs.c.kind == kind)
+            query = query.where(JobRow.kind == kind)
         if batch is not None:
-            query = query.where(jobs.c.batch_id == checked("batch", batch))
+            query = query.where(JobRow.batch_id == checked("batch", batch))
         if text:
             query = query.where(job_search.matches(tenant, text))
         if before is not None:
-            query = query.where(jobs.c.number < self.get(tenant, before)["number"])
-        return cast(list[JobRow], self._database.rows(query))
+            query = query.where(JobRow.number < self.get(tenant, before).number)
+        return self._database.rows(query)
 
     def place(self, job: JobRow) -> int | None:
         """How many queued jobs of all tenants start before this one if jobs run one at a time.
 
         The order is that of ``Queue.claim``; None of a job that is not queued.
         """
-        if job["state"] != "queued":
+        if job.state != "queued":
             return None
-        return self._place(job["tenant"], job["number"])
+        return self._place(job.tenant, job.number)
 
     def next_place(self, tenant: Tenant) -> int:
         """The ``place`` of a job that this tenant would submit now."""
@@ -137,38 +150,37 @@ class Jobs(NamedTable[JobRow]):
 
     def _place(self, tenant: Tenant, number: int | None) -> int:
         """The place of a queued job of a tenant, or without a number of one after all others."""
-        with self._database.read() as connection:
-            account = account_of(connection, tenant)
-            turns = turns_of(connection, account)
+        with self._database.read() as session:
+            account = account_of(session, tenant)
+            turns = turns_of(session, account)
             own = turns.pop(account)
-            older = [jobs.c.tenant.in_(own.tenants), jobs.c.state == "queued"]
+            older = [JobRow.tenant.in_(own.tenants), JobRow.state == "queued"]
             if number is not None:
-                older.append(jobs.c.number < number)
-            mine = int(connection.execute(select(func.count()).where(*older)).scalar_one())
+                older.append(JobRow.number < number)
+            mine = session.scalars(select(func.count()).where(*older)).one()
         # Accounts take turns: one that goes first starts a job more before this one.
         return mine + sum(min(turn.queued, mine + (turn < own)) for turn in turns.values())
 
     def durations(self, tenant: Tenant, kind: str, limit: int) -> list[tuple[Plain, float]]:
         """Plan and running time, s, of up to ``limit`` successful jobs of this tenant, the newest first."""
         query = (
-            select(jobs.c.plan, jobs.c.started, jobs.c.finished)
-            .where(jobs.c.tenant == tenant, jobs.c.kind == kind, jobs.c.state == "succeeded")
-            .where(jobs.c.started.is_not(None), jobs.c.finished.is_not(None))
-            .order_by(jobs.c.number.desc())
+            select(JobRow.plan, JobRow.finished - JobRow.started)
+            .where(JobRow.tenant == tenant, JobRow.kind == kind, JobRow.state == "succeeded")
+            .where(JobRow.started.is_not(None), JobRow.finished.is_not(None))
+            .order_by(JobRow.number.desc())
             .limit(limit)
         )
-        return [(row["plan"] or {}, row["finished"] - row["started"]) for row in self._database.rows(query)]
+        with self._database.read() as session:
+            return [(plan or {}, took or 0.0) for plan, took in session.execute(query)]
 
     def events(self, tenant: Tenant, job_id: str, after: int = 0) -> list[EventRow]:
         """The events of one job of this tenant after event ``after``, oldest first."""
-        table = schema.events
-        mine = (
-            select(table)
-            .join(jobs, jobs.c.id == table.c.job_id)
-            .where(jobs.c.tenant == tenant, table.c.job_id == job_id, table.c.number > after)
-            .order_by(table.c.number)
+        query = (
+            select(EventRow)
+            .join(JobRow, JobRow.id == EventRow.job_id)
+            .where(JobRow.tenant == tenant, EventRow.job_id == job_id, EventRow.number > after)
         )
-        return cast(list[EventRow], self._database.rows(mine))
+        return self._database.rows(query.order_by(EventRow.number))
 
     def updates(self, known: Mapping[str, int]) -> tuple[dict[str, JobProgress], dict[str, list[EventRow]]]:
         """The progress of jobs, and their new events, of all tenants.
@@ -181,26 +193,24 @@ class Jobs(NamedTable[JobRow]):
         """
         progress: dict[str, JobProgress] = {}
         events: dict[str, list[EventRow]] = {}
-        table = schema.events
         # Jobs before events: an event in between is returned next time, and none is lost at the end.
         for ids in _batches(list(known)):
-            with self._database.read() as connection:
-                columns = jobs.c.id, jobs.c.state, jobs.c.done, jobs.c.total, jobs.c.phase
-                rows = connection.execute(select(*columns).where(jobs.c.id.in_(ids))).mappings()
-                progress.update({row["id"]: cast(JobProgress, dict(row)) for row in rows})
+            with self._database.read() as session:
+                rows = session.execute(select(*PROGRESS).where(JobRow.id.in_(ids)))
+                progress.update({row.id: JobProgress(*row) for row in rows})
                 last = (
-                    select(table.c.job_id, func.max(table.c.number))
-                    .where(table.c.job_id.in_(ids))
-                    .group_by(table.c.job_id)
+                    select(EventRow.job_id, func.max(EventRow.number))
+                    .where(EventRow.job_id.in_(ids))
+                    .group_by(EventRow.job_id)
                 )
-                newer = [job for job, number in connection.execute(last) if number > known[job]]
+                newer = [job for job, number in session.execute(last) if number > known[job]]
                 if not newer:
                     continue
                 least = min(known[job] for job in newer)
-                query = select(table).where(table.c.job_id.in_(newer), table.c.number > least)
-                for row in connection.execute(query.order_by(table.c.number)).mappings():
-                    if row["number"] > known[row["job_id"]]:
-                        events.setdefault(row["job_id"], []).append(cast(EventRow, dict(row)))
+                query = select(EventRow).where(EventRow.job_id.in_(newer), EventRow.number > least)
+                for event in session.scalars(query.order_by(EventRow.number)):
+                    if event.number > known[event.job_id]:
+                        events.setdefault(event.job_id, []).append(event)
         return progress, events
 
     def changes(
@@ -216,24 +226,16 @@ class Jobs(NamedTable[JobRow]):
         Returns:
             the number of the newest job; the jobs, oldest first.
         """
-        columns = jobs.c.number, jobs.c.id, jobs.c.state, jobs.c.done, jobs.c.total, jobs.c.phase
-        mine = select(*columns).where(jobs.c.tenant == tenant)
-        with self._database.read() as connection:
-            last = connection.execute(select(func.max(jobs.c.number)).where(jobs.c.tenant == tenant))
-            number = last.scalar_one() or 0
-            rows = connection.execute(mine.where(jobs.c.state.in_(UNFINISHED))).mappings().all()
-            found = {row["id"]: row for row in rows}
-            if newest is not None and newest < number:
+        mine = select(JobRow.number, *PROGRESS).where(JobRow.tenant == tenant)
+        with self._database.read() as session:
+            last = session.scalar(select(func.max(JobRow.number)).where(JobRow.tenant == tenant)) or 0
+            rows = {row.id: row for row in session.execute(mine.where(JobRow.state.in_(UNFINISHED)))}
+            if newest is not None and newest < last:
                 # A job may begin and end between two calls.
-                later = connection.execute(mine.where(jobs.c.number > newest)).mappings()
-                found.update({row["id"]: row for row in later})
-            for ids in _batches([one for one in unfinished if one not in found]):
-                ended = connection.execute(mine.where(jobs.c.id.in_(ids))).mappings()
-                found.update({row["id"]: row for row in ended})
-        ordered = sorted(found.values(), key=lambda row: int(row["number"]))
-        return number, [
-            cast(JobProgress, {name: row[name] for name in row if name != "number"}) for row in ordered
-        ]
+                rows |= {row.id: row for row in session.execute(mine.where(JobRow.number > newest))}
+            for ids in _batches([job for job in unfinished if job not in rows]):
+                rows |= {row.id: row for row in session.execute(mine.where(JobRow.id.in_(ids)))}
+        return last, [JobProgress(*row[1:]) for row in sorted(rows.values(), key=lambda row: row.number)]
 
     def request_cancel(self, tenant: Tenant, job_id: str) -> JobRow:
         """Cancel a job: a queued one ends at once, a running one after its next poll.
@@ -242,16 +244,15 @@ class Jobs(NamedTable[JobRow]):
             UnknownId: when this tenant has no such job.
             JobFinished: when it has ended.
         """
-        with self._database.write() as connection:
-            mine = jobs.c.tenant == tenant, jobs.c.id == checked("job", job_id)
-            query = select(jobs.c.state).where(*mine).with_for_update()
-            state = connection.execute(query).scalar_one_or_none()
+        with self._database.write() as session:
+            query = select(JobRow.state).filter_by(tenant=tenant, id=checked("job", job_id))
+            state = session.scalar(query.with_for_update())
             if state is None:
                 raise UnknownId("job", job_id)
             if state in ENDED:
                 raise JobFinished("state", state, "queued or running; the job has ended")
-            change(connection, job_id, ("queued",), "cancelled", finished=time.time())
-            change(connection, job_id, ("running",), "cancelling")
+            change(session, job_id, ("queued",), "cancelled", finished=time.time())
+            change(session, job_id, ("running",), "cancelling")
         return self.get(tenant, job_id)
 
 
@@ -298,7 +299,7 @@ class Submission:
 
 
 def insert_jobs(
-    connection: Connection,
+    session: Session,
     tenant: Tenant,
     new: Sequence[NewJob],
     how: Submission,
@@ -308,7 +309,7 @@ def insert_jobs(
     """Insert queued jobs; returns their ids.
 
     Args:
-        connection: in a write transaction.
+        session: in a write transaction.
         tenant: owner.
         new: the jobs.
         how: limits and user.
@@ -319,39 +320,29 @@ def insert_jobs(
         QuotaExceeded, QueueFull, UnknownId: as for ``Jobs.add``; the transaction must be rolled back.
     """
     if how.most_queued is not None:
-        family = family_of(connection, tenant)
-        mine = select(func.count()).where(jobs.c.tenant.in_(family), jobs.c.state == "queued")
-        waiting = connection.execute(mine).scalar_one()
+        family = family_of(session, tenant)
+        mine = select(func.count()).where(JobRow.tenant.in_(family), JobRow.state == "queued")
+        waiting = session.scalars(mine).one()
         if waiting + len(new) > how.most_queued:
             more = f" and {len(new)} more" if len(new) > 1 else ""
             accepted = f"fewer than {how.most_queued} queued; try again later"
             raise QueueFull("jobs", f"{waiting} queued{more}", accepted)
     ids = []
-    for one in new:
+    for job in new:
         job_id = new_id("job")
         if how.most_bytes is not None:
-            usage.reserve(connection, tenant, job_id, one.reserved, how.most_bytes)
-        with _dataset_exists(one.dataset_id):
-            connection.execute(
-                insert(jobs).values(
-                    id=job_id,
-                    kind=one.kind,
-                    dataset_id=one.dataset_id,
-                    volume_id=one.volume_id,
-                    mesh_id=one.mesh_id,
-                    field_id=one.field_id,
-                    batch_id=batch_id,
-                    settings=one.settings,
-                    plan=one.plan,
-                    tenant=tenant,
-                    **(request.columns() if request else {}),
-                    started_by=how.started_by[:200],
-                    webhook=how.webhook,
-                    state="queued",
-                    created=time.time(),
-                )
-            )
-        append_event(connection, job_id, "queued")
+            usage.reserve(session, tenant, job_id, job.reserved, how.most_bytes)
+        columns = asdict(job)
+        del columns["reserved"]
+        row = JobRow(id=job_id, tenant=tenant, batch_id=batch_id, **columns)
+        row.started_by, row.webhook = how.started_by[:200], how.webhook
+        row.state, row.created = "queued", time.time()
+        if request is not None:
+            row.idempotency_key, row.request_sha256 = request.key, request.digest
+        with _dataset_exists(job.dataset_id):
+            session.add(row)
+            session.flush()
+        append_event(session, job_id, "queued")
         ids.append(job_id)
     return ids
 

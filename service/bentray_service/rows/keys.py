@@ -6,18 +6,17 @@ import hmac
 import logging
 import time
 from collections.abc import Sequence
-from typing import cast
 
-from sqlalchemy import func, insert, or_, select, update
+from sqlalchemy import func, or_, select, update
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
 
 from .api_key import ApiKey
+from .claims import is_claimed, keep_from_claims
 from .database import Database
-from .schema import keys
-from .tenants import GIVEN, Tenant, is_claimed, keep_from_claims
-from .typed_rows import KeyRow
+from .tables import KeyRow
+from .tenants import GIVEN, Tenant
 
 log = logging.getLogger("bentray.access")
 
@@ -42,56 +41,55 @@ class Keys:
         row = {"id": token.id, "tenant": tenant, "name": name, "scopes": list(scopes)}
         made = {"sha256": token.digest(), "created": time.time(), "expires": expires}
         try:
-            with self._database.write() as connection:
-                if GIVEN.fullmatch(tenant) or is_claimed(connection, tenant):
+            with self._database.write() as session:
+                if GIVEN.fullmatch(tenant) or is_claimed(session, tenant):
                     accepted = "another name; for users and programs together, BENTRAY_OIDC_TENANTS"
                     raise InvalidInput("tenant", f"{tenant}, of a user who signs in or a project", accepted)
-                keep_from_claims(connection, [tenant])
-                connection.execute(insert(keys).values(**row, **made))
+                keep_from_claims(session, [tenant])
+                session.add(KeyRow(**row, **made))
         except IntegrityError:
             raise InvalidInput("key", f"{token.id}, which exists", "a key with a new id") from None
         return self._row(token.id)
 
     def any(self) -> bool:
         """Whether a key exists or existed; authentication is required from then on."""
-        with self._database.read() as connection:
-            return connection.execute(select(keys.c.number).limit(1)).first() is not None
+        with self._database.read() as session:
+            return session.scalar(select(KeyRow.number).limit(1)) is not None
 
     def owner(self, token: ApiKey) -> KeyRow | None:
         """The row of a valid key; None if it is unknown, revoked or expired."""
         row = self._find(token.id)
         # Constant time, also for an unknown key.
-        same = hmac.compare_digest(token.digest(), row["sha256"] if row is not None else "0" * 64)
+        same = hmac.compare_digest(token.digest(), row.sha256 if row is not None else "0" * 64)
         now = time.time()
-        if row is None or not same or row["revoked"] is not None:
+        if row is None or not same or row.revoked is not None:
             return None
-        if row["expires"] is not None and row["expires"] <= now:
+        if row.expires is not None and row.expires <= now:
             return None
-        if row["used"] is None or now - row["used"] > USED_S:
+        if row.used is None or now - row.used > USED_S:
             self._note(token.id, now)
         return row
 
     def ended(self, key_ids: Sequence[str]) -> list[str]:
         """The keys among ``key_ids`` that are revoked or expired."""
-        query = select(keys.c.id).where(
-            keys.c.id.in_(key_ids), or_(keys.c.revoked.is_not(None), keys.c.expires <= time.time())
+        query = select(KeyRow.id).where(
+            KeyRow.id.in_(key_ids), or_(KeyRow.revoked.is_not(None), KeyRow.expires <= time.time())
         )
-        with self._database.read() as connection:
-            return list(connection.execute(query).scalars())
+        with self._database.read() as session:
+            return list(session.scalars(query))
 
     def next_expiry(self) -> float | None:
         """When the next valid key expires, s since 1970; None if none does."""
-        valid = keys.c.revoked.is_(None), keys.c.expires > time.time()
-        with self._database.read() as connection:
-            expiry = connection.execute(select(func.min(keys.c.expires)).where(*valid)).scalar_one()
-        return None if expiry is None else float(expiry)
+        valid = KeyRow.revoked.is_(None), KeyRow.expires > time.time()
+        with self._database.read() as session:
+            return session.scalar(select(func.min(KeyRow.expires)).where(*valid))
 
     def all(self, tenant: Tenant | None = None) -> list[KeyRow]:
         """All keys, or those of one tenant, oldest first."""
-        query = select(keys).order_by(keys.c.number)
+        query = select(KeyRow).order_by(KeyRow.number)
         if tenant is not None:
-            query = query.where(keys.c.tenant == tenant)
-        return cast(list[KeyRow], self._database.rows(query))
+            query = query.where(KeyRow.tenant == tenant)
+        return self._database.rows(query)
 
     def revoke(self, key_id: str) -> KeyRow:
         """Revoke a key permanently.
@@ -99,9 +97,9 @@ class Keys:
         Raises:
             InvalidInput: when the id is unknown.
         """
-        with self._database.write() as connection:
-            mine = update(keys).where(keys.c.id == key_id, keys.c.revoked.is_(None))
-            connection.execute(mine.values(revoked=time.time()))
+        with self._database.write() as session:
+            mine = update(KeyRow).where(KeyRow.id == key_id, KeyRow.revoked.is_(None))
+            session.execute(mine.values(revoked=time.time()))
         return self._row(key_id)
 
     def _row(self, key_id: str) -> KeyRow:
@@ -111,12 +109,12 @@ class Keys:
         return row
 
     def _find(self, key_id: str) -> KeyRow | None:
-        rows = self._database.rows(select(keys).where(keys.c.id == key_id))
-        return cast(KeyRow, rows[0]) if rows else None
+        with self._database.read() as session:
+            return session.scalar(select(KeyRow).where(KeyRow.id == key_id))
 
     def _note(self, key_id: str, now: float) -> None:
         try:
-            with self._database.write() as connection:
-                connection.execute(update(keys).where(keys.c.id == key_id).values(used=now))
+            with self._database.write() as session:
+                session.execute(update(KeyRow).where(KeyRow.id == key_id).values(used=now))
         except SQLAlchemyError as error:
             log.warning("the last use of key %s could not be stored: %s", key_id, error)

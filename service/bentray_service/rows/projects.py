@@ -9,19 +9,28 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Sequence
-from typing import cast
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import SQLColumnExpression, delete, func, literal, select, update
+from sqlalchemy.orm import Session, with_expression
 
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import InUse, UnknownId
-from . import schema
-from .database import Database
+from .database import Database, rows_changed
 from .ids import checked, new_id
-from .schema import project_members, projects
+from .tables import (
+    DatasetRow,
+    FieldRow,
+    JobRow,
+    MemberRow,
+    MeshRow,
+    ProjectRow,
+    ResultVolumeRow,
+    StorageRow,
+    UploadedVolumeRow,
+    UploadRow,
+)
 from .tenants import Tenant
-from .typed_rows import MemberRow, Plain, ProjectRow
 
 # Permissions of each role; owners also change the project and its members.
 ROLES = {"reader": ("read",), "contributor": ("read", "write"), "owner": ("read", "write")}
@@ -34,15 +43,9 @@ MOST_PROJECTS = 1000
 MOST_MEMBERS = 1000
 
 # Tables that have items of a project.
-_HOLDING = (
-    "datasets",
-    "jobs",
-    "volumes",
-    "uploaded_volumes",
-    "meshes",
-    "geometry_fields",
-    "uploads",
-    "storage",
+HOLDING = (
+    *(DatasetRow, JobRow, ResultVolumeRow, UploadedVolumeRow, MeshRow, FieldRow, UploadRow),
+    StorageRow,
 )
 
 
@@ -62,14 +65,15 @@ class Projects:
             InvalidInput: when the tenant has too many.
         """
         project_id = new_id("project")
-        row = {"id": project_id, "tenant": tenant, "name": name, "created": time.time()}
-        with self._database.write() as connection:
-            mine = select(func.count()).where(projects.c.tenant == tenant)
-            if (count := connection.execute(mine).scalar_one()) >= MOST_PROJECTS:
+        row = ProjectRow(id=project_id, tenant=tenant, name=name, created=time.time())
+        with self._database.write() as session:
+            mine = select(func.count()).where(ProjectRow.tenant == tenant)
+            if (count := session.scalars(mine).one()) >= MOST_PROJECTS:
                 raise InvalidInput("projects", f"{count} of this tenant", f"at most {MOST_PROJECTS}")
-            connection.execute(insert(projects).values(**row))
+            session.add(row)
+            session.flush()
             if member is not None:
-                _put(connection, project_id, member, OWNER)
+                _put(session, project_id, member, OWNER)
         return self.get(tenant, project_id, member)
 
     def get(self, tenant: Tenant, name: str, member: str | None) -> ProjectRow:
@@ -89,14 +93,13 @@ class Projects:
 
     def members(self, project: ProjectRow) -> list[MemberRow]:
         """The members of a project, the first first."""
-        table = project_members.c
-        query = select(project_members).where(table.project_id == project["id"]).order_by(table.number)
-        return cast(list[MemberRow], self._database.rows(query))
+        query = select(MemberRow).where(MemberRow.project_id == project.id).order_by(MemberRow.number)
+        return self._database.rows(query)
 
     def rename(self, project: ProjectRow, name: str) -> None:
         """Rename a project."""
-        with self._database.write() as connection:
-            connection.execute(update(projects).where(projects.c.id == project["id"]).values(name=name))
+        with self._database.write() as session:
+            session.execute(update(ProjectRow).where(ProjectRow.id == project.id).values(name=name))
 
     def put_member(self, project: ProjectRow, member: str, role: str) -> None:
         """Add a member, or change their role.
@@ -108,11 +111,11 @@ class Projects:
             raise InvalidInput("member", repr(member[:80]), ACCEPTED)
         if role not in ROLES:
             raise InvalidInput("role", repr(role[:80]), ", ".join(ROLES))
-        with self._database.write() as connection:
-            owned = _is_owner(connection, project["id"], member)
-            _put(connection, project["id"], member, role)
+        with self._database.write() as session:
+            owned = _is_owner(session, project.id, member)
+            _put(session, project.id, member, role)
             if owned:
-                _check_owner(connection, project["id"])
+                _check_owner(session, project.id)
 
     def remove_member(self, project: ProjectRow, member: str) -> None:
         """Remove a member; their requests in progress end within a second.
@@ -120,14 +123,13 @@ class Projects:
         Raises:
             InvalidInput: for someone who is no member, or for the last owner.
         """
-        table = project_members.c
-        with self._database.write() as connection:
-            mine = table.project_id == project["id"], table.member == member
-            owned = _is_owner(connection, project["id"], member)
-            if not connection.execute(delete(project_members).where(*mine)).rowcount:
+        with self._database.write() as session:
+            owned = _is_owner(session, project.id, member)
+            mine = delete(MemberRow).filter_by(project_id=project.id, member=member)
+            if not rows_changed(session, mine):
                 raise InvalidInput("member", repr(member[:80]), "a member of the project")
             if owned:
-                _check_owner(connection, project["id"])
+                _check_owner(session, project.id)
 
     def delete(self, project: ProjectRow) -> None:
         """Delete an empty project.
@@ -135,37 +137,36 @@ class Projects:
         Raises:
             InUse: while it has items.
         """
-        with self._database.write() as connection:
-            for name in _HOLDING:
-                table = schema.metadata.tables[name]
-                held = select(table.c.tenant).where(table.c.tenant == project["id"]).limit(1)
-                if connection.execute(held).first() is not None:
-                    found = f"{project['id']} with {name.replace('_', ' ')}"
+        with self._database.write() as session:
+            for table in HOLDING:
+                held = select(table.tenant).where(table.tenant == project.id).limit(1)
+                if session.execute(held).first() is not None:
+                    found = f"{project.id} with {table.__tablename__.replace('_', ' ')}"
                     raise InUse(
                         "project", found, "an empty project; delete its scans, volumes, meshes and jobs"
                     )
-            connection.execute(delete(project_members).where(project_members.c.project_id == project["id"]))
-            connection.execute(delete(projects).where(projects.c.id == project["id"]))
+            session.execute(delete(MemberRow).where(MemberRow.project_id == project.id))
+            session.execute(delete(ProjectRow).where(ProjectRow.id == project.id))
 
     def ended(self, memberships: Sequence[str]) -> list[str]:
         """Those of some ``membership`` that have ended."""
-        table = project_members.c
-        query = select(table.project_id, table.member)
         asked = [one for one in memberships if "/" in one]
-        query = query.where(table.project_id.in_({one.partition("/")[0] for one in asked}))
-        with self._database.read() as connection:
-            left = {membership(row.project_id, row.member) for row in connection.execute(query)}
+        ids = {one.partition("/")[0] for one in asked}
+        query = select(MemberRow).where(MemberRow.project_id.in_(ids))
+        with self._database.read() as session:
+            left = {membership(row.project_id, row.member) for row in session.scalars(query)}
         return [one for one in asked if one not in left]
 
     def _read(self, tenant: Tenant, member: str | None, name: str | None = None) -> list[ProjectRow]:
-        query = select(projects).where(projects.c.tenant == tenant)
+        query = select(ProjectRow).where(ProjectRow.tenant == tenant)
         if name is not None:
-            query = query.where(projects.c.id == name)
+            query = query.where(ProjectRow.id == name)
+        role: SQLColumnExpression[str] = literal(OWNER)
         if member is not None:
-            joined = project_members.c.project_id == projects.c.id, project_members.c.member == member
-            query = query.join(project_members, joined[0] & joined[1]).add_columns(project_members.c.role)
-        rows = self._database.rows(query.order_by(projects.c.name))
-        return [cast(ProjectRow, {"role": OWNER, **row}) for row in rows]
+            query = query.join(MemberRow, MemberRow.project_id == ProjectRow.id)
+            query, role = query.where(MemberRow.member == member), MemberRow.role
+        query = query.options(with_expression(ProjectRow.role, role))
+        return self._database.rows(query.order_by(ProjectRow.name))
 
 
 def membership(project_id: str, member: str) -> str:
@@ -173,30 +174,25 @@ def membership(project_id: str, member: str) -> str:
     return f"{project_id}/{member}"
 
 
-def _put(connection: Connection, project_id: str, member: str, role: str) -> None:
-    table = project_members.c
-    mine = table.project_id == project_id, table.member == member
-    if connection.execute(update(project_members).where(*mine).values(role=role)).rowcount:
+def _put(session: Session, project_id: str, member: str, role: str) -> None:
+    mine = update(MemberRow).filter_by(project_id=project_id, member=member)
+    if rows_changed(session, mine.values(role=role)):
         return
-    count = connection.execute(select(func.count()).where(table.project_id == project_id)).scalar_one()
+    count = session.scalars(select(func.count()).where(MemberRow.project_id == project_id)).one()
     if count >= MOST_MEMBERS:
         raise InvalidInput("members", f"{count} of this project", f"at most {MOST_MEMBERS}")
-    row: Plain = {"project_id": project_id, "member": member, "role": role, "created": time.time()}
-    connection.execute(insert(project_members).values(**row))
+    session.add(MemberRow(project_id=project_id, member=member, role=role, created=time.time()))
 
 
-def _is_owner(connection: Connection, project_id: str, member: str) -> bool:
-    table = project_members.c
-    mine = select(table.role).where(table.project_id == project_id, table.member == member)
-    return connection.execute(mine).scalar_one_or_none() == OWNER
+def _is_owner(session: Session, project_id: str, member: str) -> bool:
+    query = select(MemberRow.role).filter_by(project_id=project_id, member=member)
+    return session.scalar(query) == OWNER
 
 
-def _check_owner(connection: Connection, project_id: str) -> None:
+def _check_owner(session: Session, project_id: str) -> None:
     """Raise InvalidInput if nobody could change the project any more; the transaction is rolled back."""
-    owners = select(project_members.c.member).where(
-        project_members.c.project_id == project_id, project_members.c.role == OWNER
-    )
-    if connection.execute(owners.limit(1)).first() is None:
+    owners = select(MemberRow.member).filter_by(project_id=project_id, role=OWNER)
+    if session.scalar(owners.limit(1)) is None:
         raise InvalidInput(
             "role", "no owner left", "a project with an owner; make another member owner first"
         )

@@ -8,14 +8,12 @@ import secrets
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
-from sqlalchemy import delete, func, insert, select
+from sqlalchemy import delete, select
 
-from .database import Database
-from .schema import pending_sign_ins, sessions
+from .database import Database, rows_changed
+from .tables import PendingSignInRow, SessionRow
 from .tenants import Tenant
-from .typed_rows import PendingSignInRow, Plain, SessionRow
 
 # Time for the user to sign in at the provider, s.
 PENDING_S = 600.0
@@ -61,58 +59,57 @@ class Sessions:
             address: part of the page to return to.
         """
         now = time.time()
-        row = {"state_sha256": digest(pending.state), "browser_sha256": digest(pending.browser)}
-        row |= {"nonce": pending.nonce, "verifier": pending.verifier, "address": address}
-        table = pending_sign_ins.c
-        with self._database.write() as connection:
-            connection.execute(delete(pending_sign_ins).where(table.expires <= now))
-            connection.execute(insert(pending_sign_ins).values(**row, expires=now + PENDING_S))
-            newest = connection.execute(select(func.max(table.number))).scalar_one()
-            connection.execute(delete(pending_sign_ins).where(table.number <= newest - MAX_PENDING))
+        row = PendingSignInRow(state_sha256=digest(pending.state), browser_sha256=digest(pending.browser))
+        row.nonce, row.verifier, row.address = pending.nonce, pending.verifier, address
+        row.expires = now + PENDING_S
+        with self._database.write() as session:
+            session.execute(delete(PendingSignInRow).where(PendingSignInRow.expires <= now))
+            session.add(row)
+            session.flush()
+            dropped = PendingSignInRow.number <= row.number - MAX_PENDING
+            session.execute(delete(PendingSignInRow).where(dropped))
 
     def take(self, state: str, browser: str) -> PendingSignInRow | None:
         """Remove and return a sign-in; None if it is unknown, used, expired or of another browser."""
-        mine = pending_sign_ins.c.state_sha256 == digest(state)
-        with self._database.write() as connection:
-            row = connection.execute(select(pending_sign_ins).where(mine)).mappings().one_or_none()
+        mine = PendingSignInRow.state_sha256 == digest(state)
+        with self._database.write() as session:
+            row = session.scalar(select(PendingSignInRow).where(mine))
             # Of two requests at the same time, one deletes the row.
-            taken = connection.execute(delete(pending_sign_ins).where(mine)).rowcount
-        if row is None or not taken or row["expires"] <= time.time():
+            taken = rows_changed(session, delete(PendingSignInRow).where(mine))
+        if row is None or not taken or row.expires <= time.time():
             return None
-        if not hmac.compare_digest(row["browser_sha256"], digest(browser)):
+        if not hmac.compare_digest(row.browser_sha256, digest(browser)):
             return None
-        return cast(PendingSignInRow, dict(row))
+        return row
 
     def start(
         self, tenant: Tenant, who: str, scopes: Sequence[str], seconds: float
     ) -> tuple[str, SessionRow]:
         """Start a session of a user; returns its secret and its row."""
         secret, now = secrets.token_urlsafe(32), time.time()
-        row: Plain = {"id": f"{ID_PREFIX}{secrets.token_hex(10)}", "tenant": tenant, "who": who[:200]}
-        row |= {"sha256": digest(secret), "scopes": list(scopes)}
-        with self._database.write() as connection:
-            connection.execute(delete(sessions).where(sessions.c.expires <= now))
-            connection.execute(insert(sessions).values(**row, created=now, expires=now + seconds))
-        found = self.owner(secret)
-        assert found is not None
-        return secret, found
+        row = SessionRow(id=f"{ID_PREFIX}{secrets.token_hex(10)}", tenant=tenant, who=who[:200])
+        row.sha256, row.scopes, row.created, row.expires = digest(secret), list(scopes), now, now + seconds
+        with self._database.write() as session:
+            session.execute(delete(SessionRow).where(SessionRow.expires <= now))
+            session.add(row)
+        return secret, row
 
     def owner(self, secret: str) -> SessionRow | None:
         """The row of a valid session; None if it is unknown, ended or expired."""
-        query = select(sessions).where(sessions.c.sha256 == digest(secret), sessions.c.expires > time.time())
-        rows = self._database.rows(query)
-        return cast(SessionRow, rows[0]) if rows else None
+        valid = SessionRow.sha256 == digest(secret), SessionRow.expires > time.time()
+        with self._database.read() as session:
+            return session.scalar(select(SessionRow).where(*valid))
 
     def end(self, secret: str) -> None:
         """End a session."""
-        with self._database.write() as connection:
-            connection.execute(delete(sessions).where(sessions.c.sha256 == digest(secret)))
+        with self._database.write() as session:
+            session.execute(delete(SessionRow).where(SessionRow.sha256 == digest(secret)))
 
     def ended(self, ids: Sequence[str]) -> list[str]:
         """The sessions among ``ids`` that have ended or expired."""
-        valid = select(sessions.c.id).where(sessions.c.id.in_(ids), sessions.c.expires > time.time())
-        with self._database.read() as connection:
-            left = set(connection.execute(valid).scalars())
+        valid = select(SessionRow.id).where(SessionRow.id.in_(ids), SessionRow.expires > time.time())
+        with self._database.read() as session:
+            left = set(session.scalars(valid))
         return [one for one in ids if one.startswith(ID_PREFIX) and one not in left]
 
 

@@ -11,8 +11,8 @@ from sqlalchemy.engine import make_url
 
 from bentray_kernels.errors import InvalidInput
 
-from . import schema
 from .database import engine_of, version_of
+from .tables import VERSION, About, Base
 
 # Rows in memory at once.
 BATCH = 500
@@ -37,11 +37,11 @@ def snapshot(address: str) -> Iterator[Connection]:
             reading = reading.execution_options(isolation_level="REPEATABLE READ")
         try:
             with reading.begin() as connection:
-                if not inspect(connection).has_table(schema.about.name):
+                if not inspect(connection).has_table(About.__tablename__):
                     raise InvalidInput("database_url", f"{shown}, without tables", ACCEPTED)
                 version = version_of(connection)
-                if version != schema.VERSION:
-                    accepted = f"schema version {schema.VERSION}; use the Bentray version of the service"
+                if version != str(VERSION):
+                    accepted = f"schema version {VERSION}; use the Bentray version of the service"
                     raise InvalidInput("database_url", f"{shown} with schema version {version}", accepted)
                 yield connection
         finally:
@@ -67,14 +67,14 @@ def copy_to(source: Connection, address: str) -> None:
     engine = engine_of(address, ("foreign_keys=ON",), patient=False)
     try:
         with engine.begin() as target:
-            schema.metadata.create_all(target)
+            Base.metadata.create_all(target)
             _copy_rows(source, target)
     finally:
         engine.dispose()
 
 
 def _copy_rows(source: Connection, target: Connection) -> None:
-    for table in schema.metadata.sorted_tables:
+    for table in Base.metadata.sorted_tables:
         rows = source.execute(select(table).execution_options(yield_per=BATCH)).mappings()
         for part in rows.partitions():
             target.execute(insert(table), [dict(row) for row in part])
@@ -103,9 +103,9 @@ def has_tables(address: str, besides: str = "") -> bool:
     engine = engine_of(address, ())
     try:
         with engine.begin() as connection:
-            if not inspect(connection).has_table(schema.about.name):
+            if not inspect(connection).has_table(About.__tablename__):
                 return False
-            return connection.execute(select(schema.bucket_mark.c.database)).scalar_one_or_none() != besides
+            return connection.execute(select(About.database)).scalar_one_or_none() != besides
     except exc.SQLAlchemyError as error:
         reason = str(getattr(error, "orig", None) or error).splitlines()[0]
         raise InvalidInput("database_url", f"{shown} ({reason})", "a database that answers") from error

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sqlalchemy import Connection, case, func, literal, or_, select, union
+from sqlalchemy import case, func, literal, or_, select, union
+from sqlalchemy.orm import Session, aliased
 
 from .accounts import Account, account_in
 from .job_states import RUNNING
-from .schema import jobs, projects
+from .tables import JobRow, ProjectRow
 from .tenants import Tenant
 
 
@@ -31,32 +32,32 @@ class Turn(NamedTuple):
     tenants: tuple[Tenant, ...] = ()
 
 
-def turns_of(connection: Connection, further: Account | None = None) -> dict[Account, Turn]:
+def turns_of(session: Session, further: Account | None = None) -> dict[Account, Turn]:
     """Turns of all accounts with queued jobs, and of a ``further`` one."""
-    there = jobs.alias()
-    waiting = select(account_in(there.c.tenant)).where(there.c.state == "queued")
+    there = aliased(JobRow)
+    waiting = select(account_in(there.tenant)).where(there.state == "queued")
     accounts = waiting if further is None else union(waiting, select(literal(further)))
     of_them = or_(
-        jobs.c.tenant.in_(accounts),
-        jobs.c.tenant.in_(select(projects.c.id).where(projects.c.tenant.in_(accounts))),
+        JobRow.tenant.in_(accounts),
+        JobRow.tenant.in_(select(ProjectRow.id).where(ProjectRow.tenant.in_(accounts))),
     )
     queued, running = (
-        func.coalesce(func.sum(case((jobs.c.state.in_(states), 1), else_=0)), 0)
+        func.coalesce(func.sum(case((JobRow.state.in_(states), 1), else_=0)), 0)
         for states in (("queued",), RUNNING)
     )
-    served = func.coalesce(func.max(jobs.c.started), 0.0)
-    oldest = func.min(case((jobs.c.state == "queued", jobs.c.number)))
-    each = select(account_in(jobs.c.tenant), jobs.c.tenant, queued, running, served, oldest)
-    found: dict[Account, Turn] = {} if further is None else {further: Turn()}
-    for account, tenant, waits, busy, last, first in connection.execute(
-        each.where(of_them).group_by(jobs.c.tenant)
+    served = func.coalesce(func.max(JobRow.started), 0.0)
+    oldest = func.min(case((JobRow.state == "queued", JobRow.number)))
+    each = select(account_in(JobRow.tenant), JobRow.tenant, queued, running, served, oldest)
+    turns: dict[Account, Turn] = {} if further is None else {further: Turn()}
+    for account, tenant, waits, busy, last, first in session.execute(
+        each.where(of_them).group_by(JobRow.tenant)
     ):
-        before = found.get(Account(account), Turn())
-        found[Account(account)] = Turn(
+        before = turns.get(Account(account), Turn())
+        turns[Account(account)] = Turn(
             before.running + int(busy),
             max(before.served, float(last)),
             min(before.oldest, math.inf if first is None else first),
             before.queued + int(waits),
             (*before.tenants, Tenant(tenant)) if waits else before.tenants,
         )
-    return found
+    return turns

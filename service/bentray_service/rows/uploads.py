@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import time
-from typing import Any, cast
+from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, func, insert, select, update
+from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy import delete as delete_from
+from sqlalchemy.orm import Session
 
 from ..errors import RateLimited
 from . import usage
 from .accounts import family_of
 from .ids import new_id
-from .schema import uploads
 from .stored_tables import TenantTable
+from .tables import Plain, UploadRow
 from .tenants import Tenant
-from .typed_rows import Plain, UploadRow
 
 # Incomplete uploads of one tenant; they are deleted by the client or expire.
 MAX_INCOMPLETE = 100
@@ -31,7 +31,7 @@ class Uploads(TenantTable[UploadRow]):
     A row expires some time after its last change.
     """
 
-    table, what = uploads, "upload"
+    table, what = UploadRow, "upload"
 
     def add(
         self,
@@ -61,19 +61,19 @@ class Uploads(TenantTable[UploadRow]):
         upload_id, now = new_id("upload"), time.time()
         # The id of the result is fixed here, so that repeated ingestion writes the same file.
         result_id = new_id(what)
-        with self._database.write() as connection:
+        with self._database.write() as session:
             # First, since it serialises the transactions of one tenant.
-            usage.reserve(connection, tenant, result_id, length, most_bytes)
-            _check_begun(connection, tenant)
-            connection.execute(
-                insert(uploads).values(
+            usage.reserve(session, tenant, result_id, length, most_bytes)
+            _check_begun(session, tenant)
+            session.add(
+                UploadRow(
                     id=upload_id,
                     tenant=tenant,
                     what=what,
                     result_id=result_id,
                     length=length,
                     given=given,
-                    metadata=metadata,
+                    sent_metadata=metadata,
                     state="receiving",
                     created=now,
                     expires=now + keep_s,
@@ -83,21 +83,22 @@ class Uploads(TenantTable[UploadRow]):
 
     def set_direct(self, row: UploadRow) -> UploadRow:
         """Note that the parts of an upload go to the bucket."""
-        self._change(row["id"], multipart_id=DIRECT)
-        return {**row, "multipart_id": DIRECT}
+        self._change(row.id, multipart_id=DIRECT)
+        row.multipart_id = DIRECT
+        return row
 
     def unread(self) -> list[UploadRow]:
         """Complete uploads of all tenants that wait for ingestion, oldest first."""
-        return self._where(uploads.c.state == "reading")
+        return self._where(UploadRow.state == "reading")
 
     def ids(self) -> set[str]:
         """The ids of the uploads of all tenants."""
-        with self._database.read() as connection:
-            return set(connection.execute(select(uploads.c.id)).scalars())
+        with self._database.read() as session:
+            return set(session.scalars(select(UploadRow.id)))
 
     def receiving(self) -> list[UploadRow]:
         """Incomplete uploads of all tenants."""
-        return self._where(uploads.c.state == "receiving")
+        return self._where(UploadRow.state == "receiving")
 
     def expired(self, now: float) -> list[UploadRow]:
         """Expired uploads of all tenants, except those being read.
@@ -105,7 +106,7 @@ class Uploads(TenantTable[UploadRow]):
         Args:
             now: s since 1970.
         """
-        return self._where(uploads.c.state != "reading", uploads.c.expires < now)
+        return self._where(UploadRow.state != "reading", UploadRow.expires < now)
 
     def keep(self, upload_id: str, keep_s: float) -> float:
         """Extend the expiry after data was received; returns the new expiry, s since 1970."""
@@ -127,31 +128,30 @@ class Uploads(TenantTable[UploadRow]):
 
     def remove(self, upload_id: str) -> None:
         """Delete an upload."""
-        with self._database.write() as connection:
-            _release(connection, upload_id)
-            connection.execute(delete_from(uploads).where(uploads.c.id == upload_id))
+        with self._database.write() as session:
+            _release(session, upload_id)
+            session.execute(delete_from(UploadRow).where(UploadRow.id == upload_id))
 
     def _where(self, *conditions: ColumnElement[bool]) -> list[UploadRow]:
-        query = select(uploads).where(*conditions).order_by(uploads.c.number)
-        return cast(list[UploadRow], self._database.rows(query))
+        return self._database.rows(select(UploadRow).where(*conditions).order_by(UploadRow.number))
 
     def _change(self, upload_id: str, *, released: bool = False, **values: Any) -> None:
-        with self._database.write() as connection:
+        with self._database.write() as session:
             if released:
-                _release(connection, upload_id)
-            connection.execute(update(uploads).where(uploads.c.id == upload_id).values(**values))
+                _release(session, upload_id)
+            session.execute(update(UploadRow).where(UploadRow.id == upload_id).values(**values))
 
 
-def _check_begun(connection: Connection, tenant: Tenant) -> None:
-    begun = uploads.c.tenant.in_(family_of(connection, tenant)), uploads.c.state == "receiving"
-    count = connection.execute(select(func.count()).where(*begun)).scalar_one()
+def _check_begun(session: Session, tenant: Tenant) -> None:
+    begun = UploadRow.tenant.in_(family_of(session, tenant)), UploadRow.state == "receiving"
+    count = session.scalars(select(func.count()).where(*begun)).one()
     if count >= MAX_INCOMPLETE:
         accepted = f"fewer than {MAX_INCOMPLETE} incomplete uploads per tenant; delete those no longer needed"
         raise RateLimited("uploads", f"{count} incomplete uploads", accepted, AGAIN_S)
 
 
-def _release(connection: Connection, upload_id: str) -> None:
+def _release(session: Session, upload_id: str) -> None:
     """Release the reservation of an upload; a stored result is kept."""
-    query = select(uploads.c.tenant, uploads.c.result_id).where(uploads.c.id == upload_id)
-    for row in connection.execute(query):
-        usage.release(connection, Tenant(row.tenant), row.result_id)
+    query = select(UploadRow.tenant, UploadRow.result_id).where(UploadRow.id == upload_id)
+    for row in session.execute(query):
+        usage.release(session, row.tenant, row.result_id)

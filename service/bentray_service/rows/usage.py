@@ -6,12 +6,16 @@ import hashlib
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import Literal, get_args
 
-from sqlalchemy import ColumnElement, Connection, delete, func, insert, not_, or_, select, update
+from sqlalchemy import ColumnElement, delete, func, not_, or_, select, update
+from sqlalchemy.orm import Session
 
 from ..errors import QuotaExceeded
 from .accounts import Account, account_in, account_of, family_of
-from .schema import storage
+from .database import Database, rows_changed
+from .ids import PREFIXES
+from .tables import ResultVolumeRow, StorageRow
 from .tenants import Tenant
 
 
@@ -31,38 +35,40 @@ class Lease:
     until: float
 
 
-def usage_of(connection: Connection, tenant: Tenant, besides: str = "") -> Usage:
+def usage_of(session: Session, tenant: Tenant, besides: str = "") -> Usage:
     """The usage of a tenant and its projects, or of all of those of a project; without dead processes.
 
     Args:
-        connection: in a transaction.
+        session: in a transaction.
         tenant: owner.
         besides: name of an item to leave out.
     """
-    family = storage.c.tenant.in_(family_of(connection, tenant))
+    family = StorageRow.tenant.in_(family_of(session, tenant))
     # The name alone would leave out an equal one of another project, as of a geometry field.
-    other = or_(storage.c.tenant != tenant, storage.c.name != besides)
+    other = or_(StorageRow.tenant != tenant, StorageRow.name != besides)
     mine = family, other, _counted()
-    query = select(storage.c.reserved, func.sum(storage.c.bytes)).where(*mine).group_by(storage.c.reserved)
-    sizes = {bool(reserved): int(size) for reserved, size in connection.execute(query)}
+    query = select(StorageRow.reserved, func.sum(StorageRow.bytes)).where(*mine).group_by(StorageRow.reserved)
+    sizes = {bool(reserved): int(size) for reserved, size in session.execute(query)}
     return Usage(sizes.get(False, 0), sizes.get(True, 0))
 
 
-def largest(connection: Connection, most: int) -> dict[Account, int]:
+def largest(session: Session, most: int) -> dict[Account, int]:
     """Bytes stored and reserved by the accounts that use most."""
-    each = select(account_in(storage.c.tenant).label("account"), storage.c.bytes).where(_counted()).subquery()
+    each = (
+        select(account_in(StorageRow.tenant).label("account"), StorageRow.bytes).where(_counted()).subquery()
+    )
     size = func.sum(each.c.bytes)
     query = select(each.c.account, size).group_by(each.c.account).order_by(size.desc(), each.c.account)
-    return {Account(account): int(total) for account, total in connection.execute(query.limit(most))}
+    return {Account(account): int(total) for account, total in session.execute(query.limit(most))}
 
 
 def reserve(
-    connection: Connection, tenant: Tenant, name: str, size: int, most: int, lease: Lease | None = None
+    session: Session, tenant: Tenant, name: str, size: int, most: int, lease: Lease | None = None
 ) -> None:
     """Reserve storage for an item, or change its reservation.
 
     Args:
-        connection: in a write transaction; it serialises reservations of one tenant.
+        session: in a write transaction; it serialises reservations of one tenant.
         tenant: owner.
         name: id of the item, or another unique name.
         size: its maximum size, bytes.
@@ -72,97 +78,150 @@ def reserve(
     Raises:
         QuotaExceeded: when less is available; nothing is changed.
     """
-    _take_turn(connection, tenant)
-    used = usage_of(connection, tenant, name)
+    _take_turn(session, tenant)
+    used = usage_of(session, tenant, name)
     if used.stored + used.reserved + size > most:
         raise QuotaExceeded(
             "storage",
             f"{used.stored} bytes stored, {used.reserved} reserved, {size} more requested",
             f"at most {most} bytes per tenant (BENTRAY_MAX_TENANT_BYTES); delete stored data",
         )
-    if connection.execute(update(storage).where(*_one(tenant, name)).values(bytes=size)).rowcount:
+    if rows_changed(session, update(StorageRow).where(*_one(tenant, name)).values(bytes=size)):
         return
     held = {} if lease is None else {"lease_owner": lease.owner, "lease_until": lease.until}
-    row = {"tenant": tenant, "name": name, "bytes": size, "reserved": True, **held}
-    connection.execute(insert(storage).values(**row))
+    session.add(StorageRow(tenant=tenant, name=name, bytes=size, reserved=True, **held))
 
 
-def grow(connection: Connection, tenant: Tenant, name: str, size: int) -> None:
+def grow(session: Session, tenant: Tenant, name: str, size: int) -> None:
     """Increase a reservation to ``size`` bytes, if it is smaller."""
-    mine = *_one(tenant, name), storage.c.reserved, storage.c.bytes < size
-    connection.execute(update(storage).where(*mine).values(bytes=size))
+    mine = *_one(tenant, name), StorageRow.reserved, StorageRow.bytes < size
+    session.execute(update(StorageRow).where(*mine).values(bytes=size))
 
 
-def keep(connection: Connection, tenant: Tenant, name: str, otherwise: int) -> None:
+def keep(session: Session, tenant: Tenant, name: str, otherwise: int) -> None:
     """Turn a reservation into a stored item of the same size, or of ``otherwise`` bytes without one."""
-    if not _settle(connection, tenant, name):
-        store(connection, tenant, name, otherwise)
+    if not _settle(session, tenant, name):
+        store(session, tenant, name, otherwise)
 
 
-def store(connection: Connection, tenant: Tenant, name: str, size: int) -> None:
+def store(session: Session, tenant: Tenant, name: str, size: int) -> None:
     """Store the size of an item, bytes."""
-    _take_turn(connection, tenant)
-    if not _settle(connection, tenant, name, bytes=size):
-        connection.execute(insert(storage).values(tenant=tenant, name=name, bytes=size, reserved=False))
+    _take_turn(session, tenant)
+    if not _settle(session, tenant, name, bytes=size):
+        session.add(StorageRow(tenant=tenant, name=name, bytes=size, reserved=False))
 
 
-def release(connection: Connection, tenant: Tenant, name: str) -> None:
+def release(session: Session, tenant: Tenant, name: str) -> None:
     """Release a reservation; a stored item is kept."""
-    connection.execute(delete(storage).where(*_one(tenant, name), storage.c.reserved))
+    session.execute(delete(StorageRow).where(*_one(tenant, name), StorageRow.reserved))
 
 
-def forget(connection: Connection, tenant: Tenant, names: Collection[str]) -> None:
+def forget(session: Session, tenant: Tenant, names: Collection[str]) -> None:
     """Remove items and their exports ``ID.EXTENSION``."""
-    parts = [storage.c.name.like(f"{name}.%") for name in names]
-    gone = or_(storage.c.name.in_(names), *parts)
-    connection.execute(delete(storage).where(storage.c.tenant == tenant, gone))
+    parts = [StorageRow.name.like(f"{name}.%") for name in names]
+    gone = or_(StorageRow.name.in_(names), *parts)
+    session.execute(delete(StorageRow).where(StorageRow.tenant == tenant, gone))
 
 
-def correct(connection: Connection, tenant: Tenant, sizes: Mapping[str, int]) -> None:
+def correct(session: Session, tenant: Tenant, sizes: Mapping[str, int]) -> None:
     """Correct the sizes of stored items; missing items are added."""
-    mine = select(storage.c.name, storage.c.bytes, storage.c.reserved).where(storage.c.tenant == tenant)
-    known = {row.name: row for row in connection.execute(mine)}
+    mine = select(StorageRow.name, StorageRow.bytes, StorageRow.reserved).where(StorageRow.tenant == tenant)
+    known = {row.name: row for row in session.execute(mine)}
     for name, size in sizes.items():
         if name not in known:
-            store(connection, tenant, name, size)
+            store(session, tenant, name, size)
         elif not known[name].reserved and known[name].bytes != size:
-            connection.execute(update(storage).where(*_one(tenant, name)).values(bytes=size))
+            session.execute(update(StorageRow).where(*_one(tenant, name)).values(bytes=size))
 
 
-def renew(connection: Connection, lease: Lease) -> None:
+def renew(session: Session, lease: Lease) -> None:
     """Extend all leases of a process."""
-    mine = storage.c.lease_owner == lease.owner
-    connection.execute(update(storage).where(mine).values(lease_until=lease.until))
+    mine = StorageRow.lease_owner == lease.owner
+    session.execute(update(StorageRow).where(mine).values(lease_until=lease.until))
 
 
-def drop_expired(connection: Connection) -> None:
+def drop_expired(session: Session) -> None:
     """Remove reservations of dead processes."""
-    connection.execute(delete(storage).where(not_(_counted())))
+    session.execute(delete(StorageRow).where(not_(_counted())))
 
 
-def drop_leased(connection: Connection) -> None:
+def drop_leased(session: Session) -> None:
     """Remove all reservations of processes, if no other service uses the database."""
-    connection.execute(delete(storage).where(storage.c.lease_owner.is_not(None)))
+    session.execute(delete(StorageRow).where(StorageRow.lease_owner.is_not(None)))
 
 
-def _settle(connection: Connection, tenant: Tenant, name: str, **values: int) -> bool:
+def _settle(session: Session, tenant: Tenant, name: str, **values: int) -> bool:
     """Turn a reservation into a stored item; returns whether it or the item existed."""
     now = {"reserved": False, "lease_owner": None, "lease_until": None}
-    return bool(
-        connection.execute(update(storage).where(*_one(tenant, name)).values(**now, **values)).rowcount
-    )
+    return bool(rows_changed(session, update(StorageRow).where(*_one(tenant, name)).values(**now, **values)))
 
 
 def _one(tenant: Tenant, name: str) -> tuple[ColumnElement[bool], ColumnElement[bool]]:
-    return storage.c.tenant == tenant, storage.c.name == name
+    return StorageRow.tenant == tenant, StorageRow.name == name
 
 
 def _counted() -> ColumnElement[bool]:
-    return or_(storage.c.lease_until.is_(None), storage.c.lease_until >= time.time())
+    return or_(StorageRow.lease_until.is_(None), StorageRow.lease_until >= time.time())
 
 
-def _take_turn(connection: Connection, tenant: Tenant) -> None:
+def _take_turn(session: Session, tenant: Tenant) -> None:
     """Serialise write transactions of one tenant; those of SQLite are serialised anyway."""
-    if connection.dialect.name != "sqlite":
-        digest = hashlib.sha256(f"storage/{account_of(connection, tenant)}".encode()).digest()
-        connection.execute(select(func.pg_advisory_xact_lock(int.from_bytes(digest[:8], signed=True))))
+    if session.get_bind().dialect.name != "sqlite":
+        digest = hashlib.sha256(f"storage/{account_of(session, tenant)}".encode()).digest()
+        session.execute(select(func.pg_advisory_xact_lock(int.from_bytes(digest[:8], signed=True))))
+
+
+StoredKind = Literal["scans", "results", "volumes", "meshes", "geometry-fields", "exports", "jobs", "uploads"]
+
+_BY_PREFIX: dict[str, StoredKind] = {
+    PREFIXES["dataset"]: "scans",
+    PREFIXES["volume"]: "volumes",
+    PREFIXES["mesh"]: "meshes",
+    PREFIXES["field"]: "geometry-fields",
+    PREFIXES["job"]: "jobs",
+    PREFIXES["upload"]: "uploads",
+}
+
+
+@dataclass(frozen=True)
+class KindUsage:
+    """Stored items of one kind.
+
+    Attributes:
+        kind: ``results`` are volumes of reconstructions, ``volumes`` uploaded ones, ``jobs`` space for
+            unfinished jobs and finished turntables.
+        items: number of stored items.
+        stored, reserved: bytes.
+    """
+
+    kind: StoredKind
+    items: int
+    stored: int
+    reserved: int
+
+
+def usage_by_kind(database: Database, tenant: Tenant) -> list[KindUsage]:
+    """Storage of a tenant by kind, without reservations of dead processes; kinds without any are left out."""
+    alive = or_(StorageRow.lease_until.is_(None), StorageRow.lease_until >= time.time())
+    mine = select(StorageRow.name, StorageRow.bytes, StorageRow.reserved).where(
+        StorageRow.tenant == tenant, alive
+    )
+    made = select(ResultVolumeRow.id).where(ResultVolumeRow.tenant == tenant)
+    with database.read() as session:
+        results = set(session.execute(made).scalars())
+        rows = list(session.execute(mine))
+    counted: dict[StoredKind, list[int]] = {kind: [0, 0, 0] for kind in get_args(StoredKind)}
+    for name, size, reserved in rows:
+        entry = counted[_kind_of(str(name), results)]
+        entry[0] += not reserved
+        entry[2 if reserved else 1] += int(size)
+    return [KindUsage(kind, *entry) for kind, entry in counted.items() if any(entry)]
+
+
+def _kind_of(name: str, results: set[str]) -> StoredKind:
+    # An exported volume is named ID.EXTENSION.
+    if "." in name:
+        return "exports"
+    if name in results:
+        return "results"
+    return _BY_PREFIX.get(name.partition("-")[0], "jobs")

@@ -16,8 +16,8 @@ from .. import __version__
 from ..errors import DatabaseUnavailable
 from ..rows.database import Database
 from ..rows.deliveries import Deliveries, WebhookSecrets
+from ..rows.tables import DeliveryRow
 from ..rows.tenants import Tenant
-from ..rows.typed_rows import DeliveryRow
 from ..settings import ServiceSettings
 from ..web.addresses import networks
 from .receiver import Outcome, check_url, post
@@ -128,22 +128,22 @@ class Webhooks:
             self._send_once(delivery)
         except SQLAlchemyError as error:
             # Sent again with the same id when its lease ends.
-            log.warning("the outcome of %s could not be stored: %s", delivery["id"], error)
+            log.warning("the outcome of %s could not be stored: %s", delivery.id, error)
         except Exception:
-            log.exception("%s could not be sent", delivery["id"])
+            log.exception("%s could not be sent", delivery.id)
         finally:
             self._free.release()
 
     def _send_once(self, delivery: DeliveryRow) -> None:
-        now, body = time.time(), delivery["body"].encode()
-        secrets = self._secrets.of(delivery["tenant"])
+        now, body = time.time(), delivery.body.encode()
+        secrets = self._secrets.of(delivery.tenant)
         if secrets:
-            headers = signed_headers(secrets, delivery["id"], int(now), body)
+            headers = signed_headers(secrets, delivery.id, int(now), body)
             headers |= {"Content-Type": "application/json", "User-Agent": f"Bentray/{__version__}"}
-            outcome = post(delivery["url"], headers, body, self._permitted)
+            outcome = post(delivery.url, headers, body, self._permitted)
         else:
             outcome = Outcome(None, "the tenant has no secret to sign with", 0.0)
-        attempt = delivery["attempts"]
+        attempt = delivery.attempts
         last = attempt > len(PAUSES_S) or outcome.status == GONE
         state = "delivered" if not outcome.error else "failed" if last else "waiting"
         pause = 0.0 if last else PAUSES_S[attempt - 1] * random.uniform(1 - JITTER, 1 + JITTER)  # noqa: S311
@@ -152,4 +152,4 @@ class Webhooks:
         # The address is not logged, since it may contain a secret of the receiver.
         words = "%s of %s, attempt %d: %s"
         level = logging.WARNING if state == "failed" else logging.INFO
-        log.log(level, words, delivery["id"], delivery["job_id"], attempt, outcome.error or "delivered")
+        log.log(level, words, delivery.id, delivery.job_id, attempt, outcome.error or "delivered")

@@ -27,11 +27,11 @@ from bentray_kernels.tomography.result import Reconstruction
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
 from bentray_service.routes.models.surface_records import FieldErrors, FieldSeconds, FieldSizes, Repairs
-from bentray_service.rows import schema
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.ids import new_id, volume_of
 from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.keys import Keys
+from bentray_service.rows.tables import Base, FieldRow, ResultVolumeRow
 from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
 from bentray_service.web import errors
@@ -108,9 +108,9 @@ def one_of_each(app: FastAPI, http: TestClient, owner: Tenant, auth: dict[str, s
     figures |= {f"{name}_seconds": 1.0 for name in FieldSeconds.model_fields}
     with parts.database.write() as connection:
         made = {"tenant": owner, "job_id": job, "created": 1.0}
-        connection.execute(insert(schema.volumes).values(id=volume_of(job), **made, **cube))
+        connection.execute(insert(ResultVolumeRow).values(id=volume_of(job), **made, **cube))
         made |= {"mesh_id": mesh, "bytes": 1, "settings": {}, "figures": figures}
-        connection.execute(insert(schema.geometry_fields).values(id=field, **made))
+        connection.execute(insert(FieldRow).values(id=field, **made))
     for path in (files.dataset(dataset), files.mesh(mesh)):
         path.write_bytes(b"of acme")
     ones = np.ones((4, 4, 4))
@@ -201,7 +201,7 @@ def stored(place: Place, beside: str = "") -> dict[str, Any]:
         if path.is_file() and path.parent.name != "audit" and not path.name.startswith("bentray.sqlite")
     }
     with closing(sqlite3.connect(place.folder / "data" / "bentray.sqlite")) as rows:
-        for table in schema.metadata.tables:
+        for table in Base.metadata.tables:
             if table not in ("keys", "about"):
                 found[table] = rows.execute(f"SELECT * FROM {table} ORDER BY 1").fetchall()
     return {name: value for name, value in found.items() if not beside or not name.startswith(beside)}

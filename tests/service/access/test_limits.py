@@ -24,6 +24,7 @@ from bentray_service.picture_queue import MAX_PER_ACCOUNT
 from bentray_service.pictures import Pictures
 from bentray_service.rows import deliveries as messages
 from bentray_service.rows.accounts import Accounts
+from bentray_service.rows.claims import ClaimedTenants
 from bentray_service.rows.database import Database, open_database
 from bentray_service.rows.deliveries import Deliveries
 from bentray_service.rows.job_queue import Queue
@@ -31,7 +32,7 @@ from bentray_service.rows.jobs import Jobs
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.sessions import Sessions
-from bentray_service.rows.tenants import ClaimedTenants, Tenant
+from bentray_service.rows.tenants import Tenant
 from bentray_service.rows.uploads import MAX_INCOMPLETE, Uploads
 from bentray_service.rows.usage import reserve
 from bentray_service.settings import ServiceSettings

@@ -24,8 +24,8 @@ from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.keys import Keys
-from bentray_service.rows.schema import datasets
 from bentray_service.rows.stored_tables import Datasets
+from bentray_service.rows.tables import DatasetRow
 from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
 
@@ -115,7 +115,7 @@ def open_stored(settings):
 def rows(settings):
     """The rows of all scans; floating-point numbers keep every bit."""
     with closing(open_database(settings.database)) as database:
-        return database.rows(select(datasets))
+        return database.rows(select(DatasetRow))
 
 
 def keys_of(members):

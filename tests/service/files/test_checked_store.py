@@ -13,7 +13,7 @@ from bentray_service.files.store import Store
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id
-from bentray_service.rows.schema import uploaded_volumes
+from bentray_service.rows.tables import UploadedVolumeRow
 from bentray_service.rows.tenants import LOCAL
 
 from .store_suite import StoreSuite
@@ -158,7 +158,7 @@ def test_a_file_of_an_older_version_is_taken_as_it_is_and_kept_so(opened, rows, 
     own = {"tenant": LOCAL, "id": path.stem, "created": 0.0, "bytes": len(CONTENT), "sha256": ""}
     database = open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")
     with database.write() as connection:
-        connection.execute(insert(uploaded_volumes).values(**own, **told))
+        connection.execute(insert(UploadedVolumeRow).values(**own, **told))
     database.close()
     assert opened().store.fetch(path) == path
     row = rows.get(LOCAL, path.stem)

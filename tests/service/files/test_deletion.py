@@ -14,12 +14,20 @@ from bentray_service.files.deletion import Deletion, StoredItem
 from bentray_service.files.orphans import Orphans
 from bentray_service.housekeeping import DAY_S, Housekeeper
 from bentray_service.ingest.append import UploadLocks
-from bentray_service.rows import schema
 from bentray_service.rows.ages import ExpiryMarks, ObservedTime
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import new_id, volume_of
 from bentray_service.rows.jobs import Jobs
 from bentray_service.rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
+from bentray_service.rows.tables import (
+    Base,
+    DatasetRow,
+    FieldRow,
+    JobRow,
+    MeshRow,
+    ResultVolumeRow,
+    UploadedVolumeRow,
+)
 from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
 
@@ -53,7 +61,7 @@ class Shelf:
 
     def ended(self, job, tenant=LOCAL, state="succeeded"):
         with self.database.write() as connection:
-            change = update(schema.jobs).where(schema.jobs.c.id == job["id"])
+            change = update(JobRow).where(JobRow.id == job["id"])
             connection.execute(change.values(state=state))
         return job["id"]
 
@@ -70,7 +78,7 @@ class Shelf:
         }
         with self.database.write() as connection:
             values = {"id": name, "job_id": job, "created": time.time(), "bytes": 1, "tenant": tenant}
-            connection.execute(insert(schema.volumes).values(**values, **row))
+            connection.execute(insert(ResultVolumeRow).values(**values, **row))
         for path in (files.volume(name), files.export(name, "npy"), files.export(name, "nii")):
             path.write_bytes(b"x")
         return job, name
@@ -80,7 +88,7 @@ class Shelf:
         job = self.ended(self.jobs.add(LOCAL, "simulation", {}), state=state)
         if days is not None:
             with self.database.write() as connection:
-                mine = update(schema.jobs).where(schema.jobs.c.id == job)
+                mine = update(JobRow).where(JobRow.id == job)
                 connection.execute(mine.values(finished=time.time() - days * DAY_S))
         return job
 
@@ -110,7 +118,7 @@ class Shelf:
             (folder / "outer.npy").write_bytes(b"x")
             row = {"mesh_id": mesh, "job_id": job, "created": 1.0, "bytes": 1, "settings": {}, "figures": {}}
             with self.database.write() as connection:
-                connection.execute(insert(schema.geometry_fields).values(id=field, tenant=LOCAL, **row))
+                connection.execute(insert(FieldRow).values(id=field, tenant=LOCAL, **row))
         return job
 
     def delete(self, what, name, tenant=LOCAL):
@@ -122,7 +130,7 @@ class Shelf:
 
     def rows(self):
         with self.database.read() as connection:
-            tables = [table for table in schema.metadata.sorted_tables if table.name not in BESIDE]
+            tables = [table for table in Base.metadata.sorted_tables if table.name not in BESIDE]
             counts = {
                 table.name: connection.execute(select(func.count()).select_from(table)).scalar_one()
                 for table in tables
@@ -227,7 +235,7 @@ def test_old_data_go_and_young_data_stay(shelf):
     volume, mesh = shelf.upload(), shelf.mesh()
     shelf.jobs.add(OTHER, "reconstruction", {}, needed)
     with shelf.database.write() as connection:
-        for table in (schema.datasets, schema.uploaded_volumes, schema.meshes):
+        for table in (DatasetRow, UploadedVolumeRow, MeshRow):
             aged = update(table).where(table.c.id != young)
             connection.execute(aged.values(created=time.time() - 31 * DAY_S))
     clocks = Clocks()
@@ -253,7 +261,7 @@ def test_old_jobs_without_anything_go_too(shelf):
     dataset = shelf.dataset()
     made = shelf.simulation("succeeded")
     with shelf.database.write() as connection:
-        rows = schema.datasets
+        rows = DatasetRow
         connection.execute(update(rows).where(rows.c.id == dataset).values(job_id=made))
     shelf.reconstruction(dataset)
     young, at_work = shelf.simulation("failed", days=28), shelf.simulation("running", days=None)

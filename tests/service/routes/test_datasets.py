@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sqlalchemy import insert
 
-from bentray_service.rows.schema import datasets
+from bentray_service.rows.tables import DatasetRow
 from bentray_service.rows.tenants import LOCAL
 from bentray_workers.files.dataset import read_dataset
 
@@ -197,7 +197,7 @@ def test_a_thousand_scans_are_searched_and_read_in_pages(start, uploaded):
     ]
     other = {**row, "id": "ds-" + "f" * 20, "name": "Visit 999 of another", "tenant": "other"}
     with stored._database.write() as connection:
-        connection.execute(insert(datasets), [*copies, other])
+        connection.execute(insert(DatasetRow), [*copies, other])
 
     def pages(address):
         while address:

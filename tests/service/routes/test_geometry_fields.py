@@ -13,7 +13,7 @@ from sqlalchemy import insert
 from bentray_kernels.meshes.example_surfaces import torus
 from bentray_service.app import create_app
 from bentray_service.rows.ids import field_of, new_id
-from bentray_service.rows.schema import geometry_fields
+from bentray_service.rows.tables import FieldRow
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
@@ -55,7 +55,7 @@ def here(http, made):
     job = parts.jobs.add(LOCAL, "reconstruction", {})["id"]
     row = {"mesh_id": mesh, "bytes": bytes_of(target), "settings": COARSE, "figures": figures}
     with parts.database.write() as connection:
-        connection.execute(insert(geometry_fields).values(id=field, job_id=job, created=1.0, **row))
+        connection.execute(insert(FieldRow).values(id=field, job_id=job, created=1.0, **row))
     return f"/v1/geometry-fields/{field}"
 
 

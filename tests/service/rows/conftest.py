@@ -71,4 +71,4 @@ def queue(database: Database) -> Queue:
 def dataset(database: Database) -> str:
     """The id of a dataset of the local tenant."""
     row = Datasets(database).add(LOCAL, new_id("dataset"), size=1, sha256="0" * 64, summary=SUMMARY)
-    return str(row["id"])
+    return str(row.id)

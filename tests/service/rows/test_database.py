@@ -10,8 +10,8 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.schema import CreateTable
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.rows import schema
 from bentray_service.rows.database import open_database
+from bentray_service.rows.tables import About, Base, EventRow
 
 
 def test_pragmas(tmp_path):
@@ -29,19 +29,19 @@ def test_pragmas(tmp_path):
 def test_foreign_keys_hold(database):
     row = {"job_id": "job-none", "time": 0.0, "state": "queued"}
     with pytest.raises(IntegrityError), database.write() as connection:
-        connection.execute(insert(schema.events).values(**row))
+        connection.execute(insert(EventRow).values(**row))
 
 
 def test_a_write_that_fails_leaves_nothing(database):
     def spoil():
         with database.write() as connection:
-            connection.execute(update(schema.about).values(probed=-1.0))
+            connection.execute(update(About).values(probed=-1.0))
             raise RuntimeError("stop")
 
     with pytest.raises(RuntimeError):
         spoil()
     with database.read() as connection:
-        assert connection.execute(select(schema.about.c.probed)).scalar_one() > 0
+        assert connection.execute(select(About.probed)).scalar_one() > 0
 
 
 def test_a_reader_does_not_wait_for_a_writer(database):
@@ -49,11 +49,11 @@ def test_a_reader_does_not_wait_for_a_writer(database):
 
     def reader():
         with database.read() as connection:
-            connection.execute(select(schema.about)).all()
+            connection.execute(select(About)).all()
         read.set()
 
     with database.write() as connection:
-        connection.execute(update(schema.about).values(probed=1.0))
+        connection.execute(update(About).values(probed=1.0))
         thread = threading.Thread(target=reader)
         thread.start()
         assert read.wait(60.0)
@@ -63,7 +63,7 @@ def test_a_reader_does_not_wait_for_a_writer(database):
 def test_another_version_is_rejected(address):
     database = open_database(address)
     with database.write() as connection:
-        connection.execute(update(schema.about).values(version=99))
+        connection.execute(update(About).values(version=99))
     database.close()
     with pytest.raises(InvalidInput, match="schema version 99"):
         open_database(address)
@@ -83,6 +83,6 @@ def test_a_wrong_address_is_rejected_without_its_password(address):
     assert "secret" not in str(caught.value)
 
 
-@pytest.mark.parametrize("table", schema.metadata.sorted_tables, ids=lambda table: table.name)
+@pytest.mark.parametrize("table", Base.metadata.sorted_tables, ids=lambda table: table.name)
 def test_postgres_takes_the_schema(table):
     assert table.name in str(CreateTable(table).compile(dialect=postgresql.dialect()))

@@ -12,9 +12,10 @@ import pytest
 from sqlalchemy import select
 
 from bentray_service.errors import DatabaseFull, DatabaseUnavailable
-from bentray_service.rows import admission, database, postgresql_timeouts, schema
+from bentray_service.rows import admission, database, postgresql_timeouts
 from bentray_service.rows.database import open_database
 from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.tables import VERSION, About
 from bentray_service.rows.tenants import LOCAL
 
 from ..held_database import held
@@ -25,7 +26,7 @@ BOUNDED_S = 25.0
 
 def ask(opened):
     with opened.read() as connection:
-        return connection.execute(select(schema.about.c.version)).scalar_one()
+        return connection.execute(select(About.version)).scalar_one()
 
 
 @contextmanager
@@ -51,7 +52,7 @@ def test_held_by_another_program(tmp_path, monkeypatch, caplog):
                 with pytest.raises(DatabaseUnavailable, match="locked by another program"):
                     jobs.add(LOCAL, "simulation", {})
             assert jobs.newest(LOCAL, 9) == [], "reading goes on"
-        assert jobs.add(LOCAL, "simulation", {})["state"] == "queued"
+        assert jobs.add(LOCAL, "simulation", {}).state == "queued"
     assert [record.message for record in caplog.records] == [
         "the database is unavailable: database is locked"
     ], "once a minute, not once a request"
@@ -88,7 +89,7 @@ def test_a_full_disk(tmp_path):
 def test_postgresql_that_is_killed(postgresql_server):
     address = postgresql_server.new_database()
     with closing(open_database(address)) as opened:
-        assert ask(opened) == schema.VERSION
+        assert ask(opened) == VERSION
         postgresql_server.kill()
         try:
             begun = time.monotonic()
@@ -101,7 +102,7 @@ def test_postgresql_that_is_killed(postgresql_server):
             assert time.monotonic() - begun < BOUNDED_S
         finally:
             postgresql_server.start()
-        assert ask(opened) == schema.VERSION
+        assert ask(opened) == VERSION
     postgresql_server.drop(address)
 
 
@@ -110,7 +111,7 @@ def test_unresponsive_postgresql(postgresql_server, monkeypatch):
     monkeypatch.setattr(postgresql_timeouts, "ANSWER_SECONDS", 0.5)
     address = postgresql_server.new_database()
     with closing(open_database(address)) as opened:
-        assert ask(opened) == schema.VERSION
+        assert ask(opened) == VERSION
         threads = threading.active_count()
         with stopped(postgresql_server), ThreadPoolExecutor(30) as pool:
             begun = time.monotonic()
@@ -118,7 +119,7 @@ def test_unresponsive_postgresql(postgresql_server, monkeypatch):
             ends = [one.exception(timeout=60.0) for one in asked]
             assert time.monotonic() - begun < BOUNDED_S
         assert {type(end) for end in ends} == {DatabaseUnavailable}
-        assert ask(opened) == schema.VERSION
+        assert ask(opened) == VERSION
         assert threading.active_count() <= threads, "nobody still waits"
     postgresql_server.drop(address)
 
@@ -128,7 +129,7 @@ def test_a_row_that_another_holds_on_postgresql(postgresql_server, monkeypatch):
     address = postgresql_server.new_database()
     with closing(open_database(address)) as opened, closing(open_database(address)) as other:
         with other.write() as connection:
-            connection.execute(schema.about.update().values(probed=1.0))
+            connection.execute(About.update().values(probed=1.0))
             with pytest.raises(DatabaseUnavailable, match="locked by another program"):
                 opened.probe()
         opened.probe()

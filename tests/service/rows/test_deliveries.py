@@ -7,7 +7,7 @@ from sqlalchemy import update
 
 from bentray_service.rows import deliveries as module
 from bentray_service.rows.deliveries import Deliveries, WebhookSecrets
-from bentray_service.rows.schema import deliveries
+from bentray_service.rows.tables import DeliveryRow
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 LAB = Tenant("lab")
@@ -19,7 +19,7 @@ def ended(jobs):
     """Insert a job with a webhook and end it; returns its id."""
 
     def add(tenant=LOCAL, webhook=URL):
-        job = jobs.add(tenant, "simulation", {}, webhook=webhook)["id"]
+        job = jobs.add(tenant, "simulation", {}, webhook=webhook).id
         jobs.request_cancel(tenant, job)
         return job
 
@@ -29,9 +29,9 @@ def ended(jobs):
 def test_one_message_for_each_job_with_a_webhook(database, jobs, ended):
     found = Deliveries(database)
     assert found.claim() is None
-    waiting = jobs.add(LOCAL, "simulation", {}, webhook=URL)["id"]
+    waiting = jobs.add(LOCAL, "simulation", {}, webhook=URL).id
     job, silent = ended(), ended(webhook=None)
-    assert found.of_job(LOCAL, job)["state"] == "waiting"
+    assert found.of_job(LOCAL, job).state == "waiting"
     assert found.of_job(LAB, job) is None
     assert found.of_job(LOCAL, waiting) is None
     assert found.of_job(LOCAL, silent) is None
@@ -41,14 +41,14 @@ def test_one_message_for_each_job_with_a_webhook(database, jobs, ended):
 def test_claimed_once_and_again_when_its_sender_died(database, ended, monkeypatch):
     found, job = Deliveries(database), ended()
     first = found.claim()
-    assert (first["job_id"], first["attempts"]) == (job, 1)
+    assert (first.job_id, first.attempts) == (job, 1)
     assert found.claim() is None
     found.take_over()
     second = found.claim()
-    assert (second["id"], second["attempts"]) == (first["id"], 2)
+    assert (second.id, second.attempts) == (first.id, 2)
     later = time.time() + module.LEASE_S + 1
     monkeypatch.setattr(time, "time", lambda: later)
-    assert found.claim()["attempts"] == 3
+    assert found.claim().attempts == 3
 
 
 def test_settled_messages_wait_or_rest(database, ended):
@@ -58,21 +58,21 @@ def test_settled_messages_wait_or_rest(database, ended):
     found.settle(one, "waiting", {"status": 500}, time.time() + 60.0)
     assert found.claim() is None
     with database.write() as connection:
-        connection.execute(update(deliveries).values(due=0.0))
+        connection.execute(update(DeliveryRow).values(due=0.0))
     again = found.claim()
-    assert (again["log"], again["body"]) == ([{"status": 500}], one["body"])
+    assert (again.log, again.body) == ([{"status": 500}], one.body)
     found.settle(again, "failed", {"status": 501}, 0.0)
     assert found.claim() is None
-    assert [one["state"] for one in found.newest(LOCAL, "failed", 9)] == ["failed"]
-    assert found.retry([again["id"], "msg-unknown"]) == 1
-    assert found.claim()["attempts"] == 1
+    assert [one.state for one in found.newest(LOCAL, "failed", 9)] == ["failed"]
+    assert found.retry([again.id, "msg-unknown"]) == 1
+    assert found.claim().attempts == 1
 
 
 def test_tenants_take_turns(database, ended):
     found = Deliveries(database)
     first = [ended() for _ in range(4)]
     other = ended(LAB)
-    claimed = [found.claim()["job_id"] for _ in range(3)]
+    claimed = [found.claim().job_id for _ in range(3)]
     assert claimed == [first[0], other, first[1]]
     # Two of one tenant are under way.
     assert found.claim() is None

@@ -24,10 +24,10 @@ def finished(database, mesh, content, size, tenant=LOCAL):
     jobs, queue = Jobs(database), Queue(database)
     jobs.add(tenant, "geometry-field", {"samples": 8}, mesh_id=mesh, field_id=field)
     job = queue.claim()
-    assert (job["mesh_id"], job["field_id"]) == (mesh, field)
+    assert (job.mesh_id, job.field_id) == (mesh, field)
     row = {"id": field, "mesh_id": mesh, "bytes": size, "settings": {"samples": 8}, "figures": {"faces": 1}}
-    assert queue.succeed(job["id"], row, "geometry_fields")
-    return job["id"]
+    assert queue.succeed(job.id, row, "geometry_fields")
+    return job.id
 
 
 def test_the_same_content_is_one_field(database):
@@ -36,8 +36,8 @@ def test_the_same_content_is_one_field(database):
     finished(database, mesh, "a" * 64, 8)
     finished(database, mesh, "b" * 64, 9)
     row = fields.get(LOCAL, field_of("a" * 64))
-    assert (row["job_id"], row["bytes"], row["figures"]) == (first, 7, {"faces": 1})
-    assert [one["id"] for one in fields.newest(LOCAL, 9)] == [field_of("b" * 64), field_of("a" * 64)]
+    assert (row.job_id, row.bytes, row.figures) == (first, 7, {"faces": 1})
+    assert [one.id for one in fields.newest(LOCAL, 9)] == [field_of("b" * 64), field_of("a" * 64)]
 
 
 def test_missing_objects_are_not_found(database):
@@ -51,5 +51,5 @@ def test_tenants_have_fields_of_the_same_content_and_do_not_see_each_others(data
     with pytest.raises(UnknownId):
         fields.get(other, name)
     theirs = finished(database, new_id("mesh"), "a" * 64, 7, other)
-    assert (fields.get(LOCAL, name)["job_id"], fields.get(other, name)["job_id"]) == (mine, theirs)
+    assert (fields.get(LOCAL, name).job_id, fields.get(other, name).job_id) == (mine, theirs)
     assert len(fields.newest(other, 9)) == 1

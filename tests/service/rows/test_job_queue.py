@@ -32,18 +32,18 @@ def volume(job_id):
 
 
 def test_claimed_in_order(jobs, queue, dataset):
-    made = [jobs.add(LOCAL, "reconstruction", {}, dataset)["id"] for _ in range(3)]
-    assert [queue.claim()["id"] for _ in range(3)] == made
+    made = [jobs.add(LOCAL, "reconstruction", {}, dataset).id for _ in range(3)]
+    assert [queue.claim().id for _ in range(3)] == made
     assert queue.claim() is None
 
 
 def test_no_job_is_claimed_twice(jobs, queue, dataset):
-    made = {jobs.add(LOCAL, "reconstruction", {}, dataset)["id"] for _ in range(12)}
+    made = {jobs.add(LOCAL, "reconstruction", {}, dataset).id for _ in range(12)}
     claimed = []
 
     def take():
         while (job := queue.claim()) is not None:
-            claimed.append(job["id"])
+            claimed.append(job.id)
 
     threads = [threading.Thread(target=take) for _ in range(4)]
     for thread in threads:
@@ -57,43 +57,43 @@ def test_no_job_is_claimed_twice(jobs, queue, dataset):
 def test_success_comes_with_its_volume(database, jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset)
     queue.claim()
-    queue.progress(job["id"], 4, 4, [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 4}])
-    assert queue.succeed(job["id"], volume(job["id"]))
-    row = jobs.get(LOCAL, job["id"])
-    assert (row["state"], row["done"], row["history"][0]["emitters"]) == ("succeeded", 4, 4)
-    assert row["finished"] >= row["started"]
-    assert Volumes(database).get(LOCAL, volume_of(job["id"]))["dataset_id"] == dataset
-    assert [event["state"] for event in jobs.events(LOCAL, job["id"])] == ["queued", "running", "succeeded"]
+    queue.progress(job.id, 4, 4, [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 4}])
+    assert queue.succeed(job.id, volume(job.id))
+    row = jobs.get(LOCAL, job.id)
+    assert (row.state, row.done, row.history[0]["emitters"]) == ("succeeded", 4, 4)
+    assert row.finished >= row.started
+    assert Volumes(database).get(LOCAL, volume_of(job.id)).dataset_id == dataset
+    assert [event.state for event in jobs.events(LOCAL, job.id)] == ["queued", "running", "succeeded"]
 
 
 def test_a_cancelled_job_cannot_succeed(database, jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     queue.claim()
-    assert jobs.request_cancel(LOCAL, job["id"])["state"] == "cancelling"
-    assert not queue.succeed(job["id"], volume(job["id"]))
+    assert jobs.request_cancel(LOCAL, job.id).state == "cancelling"
+    assert not queue.succeed(job.id, volume(job.id))
     with pytest.raises(UnknownId):
-        Volumes(database).get(LOCAL, volume_of(job["id"]))
-    queue.mark_cancelled(job["id"])
-    assert queue.state(job["id"]) == "cancelled"
+        Volumes(database).get(LOCAL, volume_of(job.id))
+    queue.mark_cancelled(job.id)
+    assert queue.state(job.id) == "cancelled"
 
 
 def test_failure_keeps_the_reason(jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     queue.claim()
-    queue.fail(job["id"], PROBLEM)
-    assert jobs.get(LOCAL, job["id"])["error"] == PROBLEM
-    assert jobs.events(LOCAL, job["id"])[-1]["note"] == "why"
+    queue.fail(job.id, PROBLEM)
+    assert jobs.get(LOCAL, job.id).error == PROBLEM
+    assert jobs.events(LOCAL, job.id)[-1]["note"] == "why"
 
 
 def test_release_is_no_attempt(jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     queue.claim()
-    queue.progress(job["id"], 3, 9, [])
-    queue.release(job["id"], "a reason")
-    row = jobs.get(LOCAL, job["id"])
-    assert (row["state"], row["attempts"], row["started"]) == ("queued", 0, None)
+    queue.progress(job.id, 3, 9, [])
+    queue.release(job.id, "a reason")
+    row = jobs.get(LOCAL, job.id)
+    assert (row.state, row.attempts, row.started) == ("queued", 0, None)
     again = queue.claim()
-    assert (again["done"], again["total"]) == (3, 9), "it resumes from its checkpoint"
+    assert (again.done, again.total) == (3, 9), "it resumes from its checkpoint"
 
 
 def test_a_job_that_kills_the_service_is_given_up(database, jobs, queue, dataset):
@@ -102,7 +102,7 @@ def test_a_job_that_kills_the_service_is_given_up(database, jobs, queue, dataset
     for _ in range(3):
         Queue(database, "folder").claim()
         Queue(database, "folder").recover(PROBLEM)
-        ends.append(queue.state(job["id"]))
+        ends.append(queue.state(job.id))
     assert ends == ["queued", "queued", "failed"]
 
 
@@ -110,29 +110,29 @@ def test_job_with_progress_is_retried(database, jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
     for _ in range(8):
         dying = Queue(database, "folder")
-        assert dying.claim()["id"] == job["id"]
-        dying.reset_attempts(job["id"])
+        assert dying.claim().id == job.id
+        dying.reset_attempts(job.id)
         assert Queue(database, "folder").recover(PROBLEM) == 1
-    assert jobs.get(LOCAL, job["id"])["attempts"] == 1
-    assert [event["state"] for event in jobs.events(LOCAL, job["id"])] == [
+    assert jobs.get(LOCAL, job.id).attempts == 1
+    assert [event.state for event in jobs.events(LOCAL, job.id)] == [
         "queued",
         *8 * ["running", "queued"],
     ]
 
 
 def test_a_service_takes_over_the_jobs_of_its_data_folder_at_once_and_no_others(database, jobs, dataset):
-    made = {name: jobs.add(LOCAL, "reconstruction", {}, dataset)["id"] for name in ("one", "one_", "other")}
+    made = {name: jobs.add(LOCAL, "reconstruction", {}, dataset).id for name in ("one", "one_", "other")}
     for name in made:
         Queue(database, name).claim()
     again = Queue(database, "one")
     assert again.recover(PROBLEM) == 1
     assert [again.state(job) for job in made.values()] == ["queued", "running", "running"]
-    assert again.claim()["id"] == made["one"]
+    assert again.claim().id == made.one
     assert again.recover(PROBLEM) == 0, "its own job is at work"
 
 
 def test_the_longest_queues_are_those_of_accounts_with_their_projects(database, jobs, queue, dataset):
-    project = Projects(database).add(LOCAL, "Trial", None)["id"]
+    project = Projects(database).add(LOCAL, "Trial", None).id
     for tenant, number in ((LOCAL, 2), (project, 2), ("b", 3), ("c", 1)):
         for _ in range(number):
             jobs.add(tenant, "reconstruction", {}, dataset)
@@ -153,21 +153,21 @@ def test_second_service_claims_only_expired_jobs(database, jobs, queue, dataset,
     assert queue.recover(PROBLEM) == 0
     later = time.time() + LEASE_S + 1.0
     monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later)
-    other.renew([job["id"]])
+    other.renew([job.id])
     assert queue.recover(PROBLEM) == 0
     monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later + LEASE_S + 1.0)
-    assert other.recover(PROBLEM, held=[job["id"]]) == 0, "its own job is at work"
+    assert other.recover(PROBLEM, held=[job.id]) == 0, "its own job is at work"
     assert queue.recover(PROBLEM) == 1
-    assert queue.claim()["id"] == job["id"]
+    assert queue.claim().id == job.id
     # The first one wakes up and has lost its job.
-    assert other.held_state(job["id"]) is None
-    other.progress(job["id"], 7, 9, [])
-    other.fail(job["id"], PROBLEM)
-    other.release(job["id"], "late")
-    assert not other.succeed(job["id"], volume(job["id"]))
-    row = jobs.get(LOCAL, job["id"])
-    assert (row["state"], row["done"], queue.held_state(job["id"])) == ("running", 0, "running")
-    assert queue.succeed(job["id"], volume(job["id"]))
+    assert other.held_state(job.id) is None
+    other.progress(job.id, 7, 9, [])
+    other.fail(job.id, PROBLEM)
+    other.release(job.id, "late")
+    assert not other.succeed(job.id, volume(job.id))
+    row = jobs.get(LOCAL, job.id)
+    assert (row.state, row.done, queue.held_state(job.id)) == ("running", 0, "running")
+    assert queue.succeed(job.id, volume(job.id))
 
 
 def test_lost_claim_is_reclaimed(jobs, queue, dataset, monkeypatch):
@@ -178,7 +178,7 @@ def test_lost_claim_is_reclaimed(jobs, queue, dataset, monkeypatch):
     later = time.time() + LEASE_S + 1.0
     monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later)
     assert queue.recover(PROBLEM) == 1
-    assert queue.claim()["id"] == job["id"]
+    assert queue.claim().id == job.id
 
 
 def test_tenants_take_turns(jobs, queue, dataset):
@@ -188,51 +188,51 @@ def test_tenants_take_turns(jobs, queue, dataset):
     order = []
     for _ in range(8):
         job = queue.claim()
-        order.append(job["tenant"])
-        queue.fail(job["id"], PROBLEM)
+        order.append(job.tenant)
+        queue.fail(job.id, PROBLEM)
         # A clock too coarse to tell two starts apart would leave the order to the numbers.
         time.sleep(0.002)
     assert order == ["a", "b", "c", "a", "b", "a", "a", "a"]
     for _ in range(3):
         jobs.add(Tenant("a"), "reconstruction", {}, dataset)
     jobs.add(Tenant("b"), "reconstruction", {}, dataset)
-    assert [queue.claim()["tenant"] for _ in range(3)] == ["b", "a", "a"]
+    assert [queue.claim().tenant for _ in range(3)] == ["b", "a", "a"]
 
 
 def test_claim_can_be_limited_to_idle_tenants(jobs, queue, dataset):
     for tenant in ("a", "a", "b"):
         jobs.add(Tenant(tenant), "reconstruction", {}, dataset)
-    assert queue.claim(idle_only=True)["tenant"] == "a"
+    assert queue.claim(idle_only=True).tenant == "a"
     job = queue.claim(idle_only=True)
-    assert job["tenant"] == "b"
+    assert job.tenant == "b"
     assert queue.claim(idle_only=True) is None
-    queue.fail(job["id"], PROBLEM)
+    queue.fail(job.id, PROBLEM)
     assert queue.claim(idle_only=True) is None
-    assert queue.claim()["tenant"] == "a"
+    assert queue.claim().tenant == "a"
 
 
 def test_a_job_on_a_volume_ends_without_one(jobs, queue, database):
     job = jobs.add(LOCAL, "refraction", {"frames": 3}, volume_id="vol-" + "0" * 20)
-    assert (job["dataset_id"], job["volume_id"]) == (None, "vol-" + "0" * 20)
+    assert (job.dataset_id, job.volume_id) == (None, "vol-" + "0" * 20)
     queue.claim()
-    assert queue.succeed(job["id"], None)
-    assert queue.state(job["id"]) == "succeeded"
+    assert queue.succeed(job.id, None)
+    assert queue.state(job.id) == "succeeded"
     with pytest.raises(UnknownId):
-        Volumes(database).get(LOCAL, volume_of(job["id"]))
+        Volumes(database).get(LOCAL, volume_of(job.id))
 
 
 def test_a_result_with_numbers_that_json_has_not_is_null_there(jobs, queue, dataset, database):
     job = jobs.add(LOCAL, "reconstruction", {"weight": math.inf}, dataset)
     queue.claim()
-    result = volume(job["id"])
+    result = volume(job.id)
     result |= {"speed_range_mps": [math.nan, 1500.0], "provenance": {"fit": {"rms": -math.inf, "n": 3}}}
-    queue.progress(job["id"], 1, 2, [{"residual_rms_s": math.nan}])
-    assert queue.succeed(job["id"], result)
-    row = jobs.get(LOCAL, job["id"])
-    assert (row["state"], row["settings"], row["history"]) == (
+    queue.progress(job.id, 1, 2, [{"residual_rms_s": math.nan}])
+    assert queue.succeed(job.id, result)
+    row = jobs.get(LOCAL, job.id)
+    assert (row.state, row.settings, row.history) == (
         "succeeded",
         {"weight": None},
         [{"residual_rms_s": None}],
     )
-    kept = Volumes(database).get(LOCAL, volume_of(job["id"]))
+    kept = Volumes(database).get(LOCAL, volume_of(job.id))
     assert (kept["speed_range_mps"], kept["provenance"]) == ([None, 1500.0], {"fit": {"rms": None, "n": 3}})

@@ -18,15 +18,15 @@ def titled(database, jobs):
     def make(tenant, title, name="", started_by=""):
         summary = {**SUMMARY, "title": title}
         row = Datasets(database).add(tenant, new_id("dataset"), size=1, sha256="0" * 64, summary=summary)
-        job = jobs.add(tenant, "reconstruction", {}, row["id"], started_by=started_by)
-        jobs.describe(tenant, job["id"], name=name)
-        return job["id"]
+        job = jobs.add(tenant, "reconstruction", {}, row.id, started_by=started_by)
+        jobs.describe(tenant, job.id, name=name)
+        return job.id
 
     return make
 
 
 def found(jobs, tenant, text):
-    return [job["id"] for job in jobs.newest(tenant, 10, text=text)]
+    return [job.id for job in jobs.newest(tenant, 10, text=text)]
 
 
 def test_names_titles_and_owners_of_one_tenant(jobs, titled):
@@ -56,6 +56,6 @@ def test_a_simulation_by_the_title_of_the_scan_that_it_made(database, jobs, queu
         "bytes": 1,
         "sha256": "0" * 64,
     }
-    assert queue.succeed(job["id"], result, into="datasets")
-    assert found(jobs, LOCAL, "table 7") == [job["id"]]
+    assert queue.succeed(job.id, result, into="datasets")
+    assert found(jobs, LOCAL, "table 7") == [job.id]
     assert found(jobs, LOCAL, "table 8") == []

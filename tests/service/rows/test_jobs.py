@@ -10,17 +10,17 @@ from bentray_service.rows.tenants import LOCAL, Tenant
 
 
 def test_newest_first_and_of_one_tenant(jobs, dataset):
-    made = [jobs.add(LOCAL, "reconstruction", {}, dataset)["id"] for _ in range(3)]
+    made = [jobs.add(LOCAL, "reconstruction", {}, dataset).id for _ in range(3)]
     other = Tenant("other")
-    theirs = jobs.add(other, "reconstruction", {}, dataset)["id"]
-    assert [row["id"] for row in jobs.newest(LOCAL, 10)] == made[::-1]
-    assert [row["id"] for row in jobs.newest(LOCAL, 2)] == made[:0:-1]
-    assert [row["id"] for row in jobs.newest(LOCAL, 9, before=made[1])] == made[:1]
-    assert [row["id"] for row in jobs.newest(other, 9)] == [theirs]
+    theirs = jobs.add(other, "reconstruction", {}, dataset).id
+    assert [row.id for row in jobs.newest(LOCAL, 10)] == made[::-1]
+    assert [row.id for row in jobs.newest(LOCAL, 2)] == made[:0:-1]
+    assert [row.id for row in jobs.newest(LOCAL, 9, before=made[1])] == made[:1]
+    assert [row.id for row in jobs.newest(other, 9)] == [theirs]
 
 
 def test_another_tenants_job_is_as_none(jobs, dataset):
-    job, other = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"], Tenant("other")
+    job, other = jobs.add(LOCAL, "reconstruction", {}, dataset).id, Tenant("other")
     assert jobs.events(other, job) == []
     for ask in (jobs.get, jobs.request_cancel, lambda tenant, job: jobs.newest(tenant, 9, before=job)):
         with pytest.raises(UnknownId) as refusal:
@@ -28,15 +28,15 @@ def test_another_tenants_job_is_as_none(jobs, dataset):
         with pytest.raises(UnknownId) as unknown:
             ask(other, "job-" + "0" * 20)
         assert str(refusal.value).replace(job, "") == str(unknown.value).replace("job-" + "0" * 20, "")
-    assert jobs.get(LOCAL, job)["state"] == "queued"
+    assert jobs.get(LOCAL, job).state == "queued"
 
 
 def test_a_queued_job_is_cancelled_at_once(jobs, queue, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset)
-    assert jobs.request_cancel(LOCAL, job["id"])["state"] == "cancelled"
+    assert jobs.request_cancel(LOCAL, job.id).state == "cancelled"
     assert queue.claim() is None
     with pytest.raises(JobFinished, match="cancelled"):
-        jobs.request_cancel(LOCAL, job["id"])
+        jobs.request_cancel(LOCAL, job.id)
 
 
 def test_a_full_queue_refuses_of_this_tenant_alone(jobs, queue, dataset):
@@ -60,7 +60,7 @@ def test_a_key_names_one_job_of_its_tenant(database, jobs, queue, dataset):
     made = []
 
     def add():
-        made.append(jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset, key="k")["id"])
+        made.append(jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset, key="k").id)
 
     threads = [threading.Thread(target=add) for _ in range(6)]
     for thread in threads:
@@ -70,7 +70,7 @@ def test_a_key_names_one_job_of_its_tenant(database, jobs, queue, dataset):
     assert (len(made), len(set(made))) == (6, 1)
     with pytest.raises(KeyReused):
         jobs.add(LOCAL, "reconstruction", {"nodes": 17}, dataset, key="k")
-    assert jobs.add(Tenant("b"), "reconstruction", {"nodes": 17}, dataset, key="k")["id"] not in made
+    assert jobs.add(Tenant("b"), "reconstruction", {"nodes": 17}, dataset, key="k").id not in made
     assert [len(jobs.newest(LOCAL, 9, state=state)) for state in ("queued", "running")] == [1, 0]
     assert queue.load()[0] == {"queued": 2}
 
@@ -90,9 +90,9 @@ def test_durations_are_those_of_one_tenant_and_kind(jobs, queue, dataset):
     other = Tenant("other")
     for tenant, kind in ((LOCAL, "reconstruction"), (LOCAL, "refraction"), (other, "reconstruction")):
         jobs.add(tenant, kind, {}, dataset, plan={"work_s": 2.0})
-        queue.succeed(queue.claim()["id"], None)
+        queue.succeed(queue.claim().id, None)
     jobs.add(LOCAL, "reconstruction", {}, dataset)
-    queue.fail(queue.claim()["id"], {"detail": "no image"})
+    queue.fail(queue.claim().id, {"detail": "no image"})
     ((plan, seconds),) = jobs.durations(LOCAL, "reconstruction", 10)
     assert plan == {"work_s": 2.0}
     assert seconds >= 0.0

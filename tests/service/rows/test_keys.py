@@ -5,9 +5,9 @@ import time
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.rows import schema
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.keys import USED_S, Keys
+from bentray_service.rows.tables import KeyRow
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 ACME = Tenant("acme")
@@ -24,9 +24,9 @@ def test_the_secret_is_nowhere(database, keys):
     keys.add(token, ACME, "one", ("read",))
     assert keys.any()
     with database.read() as connection:
-        stored = str(connection.execute(schema.keys.select()).all())
+        stored = str(connection.execute(KeyRow.select()).all())
     assert token.shown().rpartition("_")[2] not in stored
-    assert keys.owner(token)["tenant"] == ACME
+    assert keys.owner(token).tenant == ACME
 
 
 def test_another_secret_under_the_same_id_is_none(keys):
@@ -43,14 +43,14 @@ def test_it_ends_when_it_expires_or_is_revoked(keys, monkeypatch):
     now = time.time()
     keys.add(soon, ACME, "soon", ("read",), now + 100.0)
     keys.add(never, LOCAL, "never", ("read",))
-    assert [row["name"] for row in keys.all()] == ["soon", "never"]
-    assert [row["name"] for row in keys.all(LOCAL)] == ["never"]
+    assert [row.name for row in keys.all()] == ["soon", "never"]
+    assert [row.name for row in keys.all(LOCAL)] == ["never"]
     monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda: now + 101.0)
     assert keys.owner(soon) is None
     assert keys.owner(never) is not None
-    first = keys.revoke(never.id)["revoked"]
+    first = keys.revoke(never.id).revoked
     monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda: now + 200.0)
-    assert keys.revoke(never.id)["revoked"] == first
+    assert keys.revoke(never.id).revoked == first
     assert keys.owner(never) is None
     with pytest.raises(InvalidInput, match="bentray keys list"):
         keys.revoke("0" * 12)

@@ -32,13 +32,13 @@ def test_a_row_is_kept_as_given(meshes):
     mesh = new_id("mesh")
     row = meshes.add(LOCAL, mesh, size=9, sha256="f" * 64, summary=SUMMARY)
     assert SUMMARY.items() <= row.items()
-    assert (row["id"], row["bytes"], row["volume_id"], row["iso"]) == (mesh, 9, None, None)
+    assert (row.id, row.bytes, row.volume_id, row.iso) == (mesh, 9, None, None)
     assert meshes.get(LOCAL, mesh) == row
 
 
 def test_newest_first(meshes):
-    made = [meshes.add(LOCAL, new_id("mesh"), size=1, sha256="f", summary=SUMMARY)["id"] for _ in range(3)]
-    assert [row["id"] for row in meshes.newest(LOCAL, 2)] == made[:0:-1]
+    made = [meshes.add(LOCAL, new_id("mesh"), size=1, sha256="f", summary=SUMMARY).id for _ in range(3)]
+    assert [row.id for row in meshes.newest(LOCAL, 2)] == made[:0:-1]
 
 
 def test_missing_objects_are_not_found(meshes):

@@ -11,11 +11,11 @@ OTHER = Tenant("other")
 
 def test_what_is_not_given_stays(database, jobs, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset, started_by="key-7")
-    assert (job["name"], job["notes"], job["started_by"]) == ("", "", "key-7")
-    jobs.describe(LOCAL, job["id"], name="First", notes="Cold water")
-    assert jobs.describe(LOCAL, job["id"]) == jobs.get(LOCAL, job["id"])
-    jobs.describe(LOCAL, job["id"], name="")
-    assert jobs.get(LOCAL, job["id"]) == {**job, "notes": "Cold water"}
+    assert (job.name, job.notes, job.started_by) == ("", "", "key-7")
+    jobs.describe(LOCAL, job.id, name="First", notes="Cold water")
+    assert jobs.describe(LOCAL, job.id) == jobs.get(LOCAL, job.id)
+    jobs.describe(LOCAL, job.id, name="")
+    assert jobs.get(LOCAL, job.id) == {**job, "notes": "Cold water"}
     scans = Datasets(database)
     before = scans.get(LOCAL, dataset)
     assert scans.describe(LOCAL, dataset, name="Left") == {**before, "name": "Left"}
@@ -26,9 +26,9 @@ def test_only_the_item_of_the_tenant_is_changed(database, jobs, dataset):
     for table, item in ((jobs, mine["id"]), (Datasets(database), dataset)):
         with pytest.raises(UnknownId):
             table.describe(OTHER, item, name="theirs")
-        assert table.get(LOCAL, item)["name"] == ""
+        assert table.get(LOCAL, item).name == ""
     jobs.describe(LOCAL, mine["id"], name="First")
-    assert jobs.get(LOCAL, second["id"]) == second
+    assert jobs.get(LOCAL, second.id) == second
 
 
 def test_the_place_in_the_queue_is_the_order_of_claims(jobs, queue, dataset):
@@ -38,12 +38,12 @@ def test_the_place_in_the_queue_is_the_order_of_claims(jobs, queue, dataset):
     # So that the tenants differ in when their last job started.
     for _ in range(2):
         claimed = queue.claim()
-        queue.fail(claimed["id"], {"detail": "ended"})
-        waiting = [job for job in waiting if job["id"] != claimed["id"]]
-        assert jobs.place(jobs.get(claimed["tenant"], claimed["id"])) is None
-    told = {job["id"]: jobs.place(job) for job in waiting}
+        queue.fail(claimed.id, {"detail": "ended"})
+        waiting = [job for job in waiting if job.id != claimed.id]
+        assert jobs.place(jobs.get(claimed.tenant, claimed.id)) is None
+    told = {job.id: jobs.place(job) for job in waiting}
     order = []
     while (claimed := queue.claim()) is not None:
-        order.append(claimed["id"])
-        queue.fail(claimed["id"], {"detail": "ended"})
+        order.append(claimed.id)
+        queue.fail(claimed.id, {"detail": "ended"})
     assert [told[job] for job in order] == list(range(5))

@@ -38,12 +38,12 @@ def at_once(ask):
 
 
 def states(jobs, job_id):
-    return [event["state"] for event in jobs.events(LOCAL, job_id)]
+    return [event.state for event in jobs.events(LOCAL, job_id)]
 
 
 def test_one_key_makes_one_job(jobs, dataset):
     made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset, key="once"))
-    assert len({job["id"] for job in made}) == 1
+    assert len({job.id for job in made}) == 1
     assert len(jobs.newest(LOCAL, 2 * AT_ONCE)) == 1
     assert states(jobs, made[0]["id"]) == ["queued"]
 
@@ -57,7 +57,7 @@ def test_a_key_for_several_requests_is_the_firsts(jobs, dataset):
 
 def test_without_keys_each_makes_its_own(jobs, dataset):
     made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {}, dataset))
-    assert len({job["id"] for job in made}) == AT_ONCE
+    assert len({job.id for job in made}) == AT_ONCE
 
 
 def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
@@ -77,23 +77,23 @@ def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
 
 
 def test_a_queued_job_is_cancelled_once(jobs, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset).id
     told = Counter(type(one) for one in at_once(lambda _: jobs.request_cancel(LOCAL, job)))
     assert told == {dict: 1, JobFinished: AT_ONCE - 1}
     assert states(jobs, job) == ["queued", "cancelled"]
 
 
 def test_running_job_is_cancelled_once(jobs, queue, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
-    assert queue.claim()["id"] == job
-    told = at_once(lambda _: jobs.request_cancel(LOCAL, job)["state"])
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset).id
+    assert queue.claim().id == job
+    told = at_once(lambda _: jobs.request_cancel(LOCAL, job).state)
     assert told == ["cancelling"] * AT_ONCE
     assert states(jobs, job) == ["queued", "running", "cancelling"]
 
 
 @pytest.mark.parametrize("end", ["succeed", "cancelled"])
 def test_a_job_that_ends_while_it_is_cancelled_has_one_end(jobs, queue, dataset, end):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)["id"]
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset).id
     queue.claim()
 
     def ask(number):
@@ -102,7 +102,7 @@ def test_a_job_that_ends_while_it_is_cancelled_has_one_end(jobs, queue, dataset,
         return queue.succeed(job, None) if end == "succeed" else queue.mark_cancelled(job)
 
     at_once(ask)
-    if jobs.get(LOCAL, job)["state"] == "cancelling":
+    if jobs.get(LOCAL, job).state == "cancelling":
         queue.mark_cancelled(job)
     told = states(jobs, job)
     assert len([state for state in told if state in ("succeeded", "cancelled")]) == 1

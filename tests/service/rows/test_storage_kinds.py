@@ -5,9 +5,9 @@ from sqlalchemy import insert
 from bentray_service.access.quota import Quota
 from bentray_service.rows import usage
 from bentray_service.rows.ids import new_id, volume_of
-from bentray_service.rows.schema import storage, volumes
-from bentray_service.rows.storage_kinds import usage_by_kind
+from bentray_service.rows.tables import ResultVolumeRow, StorageRow
 from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.usage import usage_by_kind
 
 OTHER = Tenant("other")
 
@@ -18,14 +18,14 @@ def kinds(database, tenant=LOCAL):
 
 def test_every_kind_is_counted_once(database, jobs):
     scan = new_id("dataset")
-    job = jobs.add(LOCAL, "refraction", {})["id"]
+    job = jobs.add(LOCAL, "refraction", {}).id
     result = volume_of(job)
     cube = {"axes": "x", "shape": [1], "spacing_m": [1.0], "origin_m": [0.0], "speed_range_mps": [1.0, 1.0]}
     row = {"id": result, "job_id": job, "created": 1.0, "bytes": 20, "water_speed_mps": 1.0, "provenance": {}}
     sizes = {scan: 10, result: 20, f"{result}.nii": 30, new_id("volume"): 40, new_id("mesh"): 50}
     sizes |= {new_id("field"): 60, job: 70}
     with database.write() as connection:
-        connection.execute(insert(volumes).values(tenant=LOCAL, **row, **cube))
+        connection.execute(insert(ResultVolumeRow).values(tenant=LOCAL, **row, **cube))
         for name, size in sizes.items():
             usage.store(connection, LOCAL, name, size)
         usage.store(connection, OTHER, new_id("dataset"), 1000)
@@ -52,5 +52,5 @@ def test_reservations_of_dead_processes_do_not_count(database):
     with database.write() as connection:
         late = {"lease_owner": "dead", "lease_until": 1.0}
         row = {"tenant": LOCAL, "name": new_id("job"), "bytes": 7, "reserved": True}
-        connection.execute(insert(storage).values(**row, **late))
+        connection.execute(insert(StorageRow).values(**row, **late))
     assert kinds(database) == {}

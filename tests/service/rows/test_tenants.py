@@ -7,10 +7,11 @@ from sqlalchemy import insert
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.claims import ClaimedTenants, former_tenant
 from bentray_service.rows.database import open_database
 from bentray_service.rows.keys import Keys
-from bentray_service.rows.schema import claimed_tenants
-from bentray_service.rows.tenants import LOCAL, PATTERN, ClaimedTenants, Tenant, checked_tenant, former_tenant
+from bentray_service.rows.tables import ClaimedTenantRow
+from bentray_service.rows.tenants import LOCAL, PATTERN, Tenant, checked_tenant
 
 HERE, THERE = "https://id.example", "https://id.example.org"
 # Names that look like another, that a key may have as tenant, and that are no names of folders.
@@ -42,7 +43,7 @@ def key_of(database, tenant):
 def of_before(database, *tenants):
     with database.write() as connection:
         rows = [{"tenant": one, "issuer": "", "claim": "", "value": one} for one in tenants]
-        connection.execute(insert(claimed_tenants), rows)
+        connection.execute(insert(ClaimedTenantRow), rows)
 
 
 def test_no_two_names_share_a_tenant_and_none_has_that_of_a_key(database):

@@ -142,7 +142,7 @@ def test_an_upload_has_its_room_until_it_is_forgotten_refused_or_stored(database
     uploads.mark_done(stored["id"], 60.0)
     # Its row goes, and what it has become stays.
     for one in (refused, stored):
-        uploads.remove(one["id"])
+        uploads.remove(one.id)
     assert quota.of(LOCAL) == Usage(70, 0)
 
 
@@ -150,8 +150,8 @@ def test_an_upload_has_its_room_until_it_is_forgotten_refused_or_stored(database
 def test_a_job_has_its_room_until_its_end(database, jobs, queue, dataset, end):
     quota = Quota(database, 100)
     before = quota.of(LOCAL).stored
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset, reserve=(60, 100))["id"]
-    assert queue.claim()["id"] == job
+    job = jobs.add(LOCAL, "reconstruction", {}, dataset, reserve=(60, 100)).id
+    assert queue.claim().id == job
     queue.record_size(job, 50)
     assert quota.of(LOCAL) == Usage(before, 60)
     queue.record_size(job, 80)
@@ -183,7 +183,7 @@ def test_deletion_releases_quota_of_derived_objects(database, jobs, queue, tmp_p
     quota, files, dataset = Quota(database, 1000), Files(tmp_path / "data"), new_id("dataset")
     files.prepare()
     Datasets(database).add(LOCAL, dataset, size=60, sha256="0" * 64, summary=SUMMARY)
-    job = jobs.add(LOCAL, "simulation", {}, dataset, reserve=(60, 1000))["id"]
+    job = jobs.add(LOCAL, "simulation", {}, dataset, reserve=(60, 1000)).id
     queue.claim()
     queue.succeed(job, None, size=9)
     quota.stored(LOCAL, f"{dataset}.nii", 5)

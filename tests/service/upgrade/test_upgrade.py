@@ -20,7 +20,7 @@ from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import Deliveries
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.projects import Projects
-from bentray_service.rows.schema import VERSION
+from bentray_service.rows.tables import VERSION
 from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster

@@ -12,8 +12,8 @@ from bentray_kernels.errors import InvalidInput
 
 from ...errors import NoBucket, TooLarge, WrongOffset
 from ...files.direct_uploads import DirectUploads, part_sizes
+from ...rows.tables import UploadRow
 from ...rows.tenants import Tenant
-from ...rows.typed_rows import UploadRow
 from ...web.errors import problems
 from ...wiring import CallerTenant, Parts, Service
 from ..bodies import SmallBody, accept_media_types
@@ -82,12 +82,12 @@ def show_parts(
     A part may be sent again. Those with the size in `received` are in the bucket.
     """
     row, direct = _receiving(service, tenant, upload_id)
-    sizes = part_sizes(row["length"])
+    sizes = part_sizes(row.length)
     for number in parts.numbers:
         if number > len(sizes):
             raise InvalidInput("numbers", number, f"1 to {len(sizes)}")
     received = direct.received(row)
-    service.uploads.keep(row["id"], service.settings.upload_keep_s)
+    service.uploads.keep(row.id, service.settings.upload_keep_s)
     return PartAddresses(
         parts=[
             PartRecord(number=one, bytes=sizes[one - 1], url=direct.part_url(row, one))
@@ -107,12 +107,12 @@ def complete_direct_upload(upload_id: str, service: Service, tenant: CallerTenan
     service.uploads.get(tenant, upload_id)
     with service.hold(upload_id):
         row = service.uploads.get(tenant, upload_id)
-        if row["multipart_id"] is None or row["state"] == "receiving":
+        if row.multipart_id is None or row.state == "receiving":
             row, direct = _receiving(service, tenant, upload_id)
             # In the order of the numbers, and nothing beside them.
             found = [size for _, size in sorted(direct.received(row).items())]
-            if found != part_sizes(row["length"]):
-                accepted = f"{len(part_sizes(row['length']))} parts, {row['length']} bytes in total"
+            if found != part_sizes(row.length):
+                accepted = f"{len(part_sizes(row.length))} parts, {row.length} bytes in total"
                 raise WrongOffset("parts", f"{len(found)} parts, {sum(found)} bytes", accepted)
             # The mark of this service, which ingests it.
             service.files.of(tenant).upload(upload_id).touch()
@@ -129,16 +129,16 @@ def _direct(service: Parts) -> DirectUploads:
 
 def _receiving(service: Parts, tenant: Tenant, upload_id: str) -> tuple[UploadRow, DirectUploads]:
     row = service.uploads.get(tenant, upload_id)
-    if row["multipart_id"] is None:
-        raise WrongOffset("upload", f"{row['id']}, sent to the service", "a direct upload")
-    if row["state"] != "receiving":
-        raise WrongOffset("state", row["state"], "receiving")
+    if row.multipart_id is None:
+        raise WrongOffset("upload", f"{row.id}, sent to the service", "a direct upload")
+    if row.state != "receiving":
+        raise WrongOffset("state", row.state, "receiving")
     return row, _direct(service)
 
 
 def _record(row: UploadRow) -> DirectUploadRecord:
-    here, record = f"/v1/direct-uploads/{row['id']}", upload_record(row, 0)
-    sizes = part_sizes(row["length"])
+    here, record = f"/v1/direct-uploads/{row.id}", upload_record(row, 0)
+    sizes = part_sizes(row.length)
     links = {**record.links, "parts": f"{here}/parts", "complete": f"{here}/complete"}
     more = {"parts": len(sizes), "part_bytes": sizes[0], "links": links}
     return DirectUploadRecord.model_validate({**record.model_dump(exclude={"offset"}), **more})

@@ -18,13 +18,14 @@ from ...ingest.ingest_process import ACCEPTED
 from ...ingest.receive import Received, check_announced, receive
 from ...rows.ids import new_id
 from ...rows.stored_tables import UploadedTable
+from ...rows.tables import DatasetRow, MeshRow, UploadedVolumeRow
 from ...rows.tenants import Tenant
 from ...wiring import Parts
 
 # Longest wait of a request in the ingest queue, s; proxies rarely wait longer.
 LONGEST_WAIT_S = 300.0
 
-Record = TypeVar("Record")
+Record = TypeVar("Record", bound=DatasetRow | MeshRow | UploadedVolumeRow)
 Made = TypeVar("Made")
 
 

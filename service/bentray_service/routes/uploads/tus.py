@@ -16,8 +16,8 @@ from starlette.concurrency import run_in_threadpool
 
 from ...errors import StorageFull, TooLarge, WrongOffset, WrongProtocol
 from ...ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, received_bytes
+from ...rows.tables import UploadRow
 from ...rows.tenants import Tenant
-from ...rows.typed_rows import UploadRow
 from ...web.errors import problems
 from ...web.tus_headers import PLACE, VERSION
 from ...wiring import CallerTenant, Parts, Service
@@ -101,7 +101,7 @@ def create_upload(
     row = service.uploads.add(tenant, what, upload_length, given, upload_metadata, keep_s, most_bytes)
     record = upload_record(row, 0)
     response.headers["Location"] = record.links["self"]
-    response.headers["Upload-Expires"] = http_date(row["expires"])
+    response.headers["Upload-Expires"] = http_date(row.expires)
     return record
 
 
@@ -111,14 +111,14 @@ def show_upload_offset(upload_id: str, service: Service, tenant: CallerTenant) -
     row = service.uploads.get(tenant, upload_id)
     headers = {
         "Upload-Offset": str(offset_of(service, tenant, row)),
-        "Upload-Length": str(row["length"]),
-        "Upload-Expires": http_date(row["expires"]),
+        "Upload-Length": str(row.length),
+        "Upload-Expires": http_date(row.expires),
         "Cache-Control": "no-store",
-        "Bentray-State": row["state"],
+        "Bentray-State": row.state,
     }
-    if row["metadata"]:
-        headers["Upload-Metadata"] = row["metadata"]
-    if row["state"] == "done":
+    if row.sent_metadata:
+        headers["Upload-Metadata"] = row.sent_metadata
+    if row.state == "done":
         headers["Bentray-Result"] = result_link(row)
     return Response(headers=headers)
 
@@ -161,13 +161,13 @@ async def append_upload(
     await run_in_threadpool(service.uploads.get, tenant, upload_id)
     with service.hold(upload_id):
         row = await run_in_threadpool(service.uploads.get, tenant, upload_id)
-        offset, expires = await run_in_threadpool(offset_of, service, tenant, row), row["expires"]
+        offset, expires = await run_in_threadpool(offset_of, service, tenant, row), row.expires
         if upload_offset != offset:
-            raise WrongOffset("Upload-Offset", upload_offset, f"{offset}, of {row['length']} bytes")
-        if row["multipart_id"] is not None:
-            raise WrongOffset("upload", f"{row['id']}, sent to the bucket", "an upload to the service")
-        if row["state"] == "receiving":
-            length, path = row["length"], service.files.of(tenant).upload(upload_id)
+            raise WrongOffset("Upload-Offset", upload_offset, f"{offset}, of {row.length} bytes")
+        if row.multipart_id is not None:
+            raise WrongOffset("upload", f"{row.id}, sent to the bucket", "an upload to the service")
+        if row.state == "receiving":
+            length, path = row.length, service.files.of(tenant).upload(upload_id)
             announced = int(request.headers.get("content-length", 0))
             if announced > length - offset:
                 raise TooLarge("body", f"{announced} bytes", f"at most {length - offset} bytes")
@@ -201,9 +201,9 @@ def offset_of(service: Parts, tenant: Tenant, row: UploadRow) -> int:
 
     Data with a checksum counts after it has been verified.
     """
-    if row["state"] != "receiving":
-        return int(row["length"])
-    return received_bytes(service.files.of(tenant).upload(row["id"]))
+    if row.state != "receiving":
+        return int(row.length)
+    return received_bytes(service.files.of(tenant).upload(row.id))
 
 
 def http_date(seconds: float) -> str:

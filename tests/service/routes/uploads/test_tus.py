@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from sqlalchemy import update
 
 from bentray_service.ingest.upload_limits import UploadLimits
-from bentray_service.rows import schema
+from bentray_service.rows.tables import ExpiredRow, UploadRow
 
 from ...conftest import NoProjects
 from ...tus_records import settled
@@ -263,14 +263,14 @@ def test_expired_uploads_are_swept(start):
         assert 900 < left <= 1001
     with parts.database.write() as connection:
         connection.execute(
-            update(schema.uploads)
-            .where(schema.uploads.c.id.in_([old.rpartition("/")[2], held.rpartition("/")[2]]))
+            update(UploadRow)
+            .where(UploadRow.id.in_([old.rpartition("/")[2], held.rpartition("/")[2]]))
             .values(expires=time.time() - 1)
         )
     parts.housekeeper.sweep()
     assert http.get(old).status_code == 200, "it is marked first: the clock may be wrong"
     with parts.database.write() as connection:
-        connection.execute(update(schema.too_old).values(noticed_s=-1001.0))
+        connection.execute(update(ExpiredRow).values(noticed_s=-1001.0))
     with parts.hold(held.rpartition("/")[2]):
         parts.housekeeper.sweep()
     assert [http.get(place).status_code for place in (old, young, held)] == [404, 200, 200]
