@@ -11,7 +11,7 @@ from sqlalchemy.schema import CreateTable
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.rows.database import open_database
-from bentray_service.rows.tables import About, Base, EventRow
+from bentray_service.rows.tables import About, Base, EventRow, SchemaVersion
 
 
 def test_pragmas(tmp_path):
@@ -63,7 +63,7 @@ def test_a_reader_does_not_wait_for_a_writer(database):
 def test_another_version_is_rejected(address):
     database = open_database(address)
     with database.write() as connection:
-        connection.execute(update(About).values(version=99))
+        connection.execute(update(SchemaVersion).values(version_num="99"))
     database.close()
     with pytest.raises(InvalidInput, match="schema version 99"):
         open_database(address)

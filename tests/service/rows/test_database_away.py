@@ -9,13 +9,13 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import select, text, update
 
 from bentray_service.errors import DatabaseFull, DatabaseUnavailable
 from bentray_service.rows import admission, database, postgresql_timeouts
 from bentray_service.rows.database import open_database
 from bentray_service.rows.jobs import Jobs
-from bentray_service.rows.tables import VERSION, About
+from bentray_service.rows.tables import VERSION, About, SchemaVersion
 from bentray_service.rows.tenants import LOCAL
 
 from ..held_database import held
@@ -26,7 +26,7 @@ BOUNDED_S = 25.0
 
 def ask(opened):
     with opened.read() as connection:
-        return connection.execute(select(About.version)).scalar_one()
+        return connection.execute(select(SchemaVersion.version_num)).scalar_one()
 
 
 @contextmanager
@@ -81,7 +81,7 @@ def test_few_threads_wait_while_it_is_held(tmp_path, monkeypatch):
 def test_a_full_disk(tmp_path):
     with closing(open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")) as opened:
         with opened.read() as connection:
-            connection.exec_driver_sql("PRAGMA max_page_count = 1")
+            connection.execute(text("PRAGMA max_page_count = 1"))
         with pytest.raises(DatabaseFull):
             Jobs(opened).add(LOCAL, "simulation", {"much": "x" * 100_000})
 
@@ -89,7 +89,7 @@ def test_a_full_disk(tmp_path):
 def test_postgresql_that_is_killed(postgresql_server):
     address = postgresql_server.new_database()
     with closing(open_database(address)) as opened:
-        assert ask(opened) == VERSION
+        assert ask(opened) == str(VERSION)
         postgresql_server.kill()
         try:
             begun = time.monotonic()
@@ -102,7 +102,7 @@ def test_postgresql_that_is_killed(postgresql_server):
             assert time.monotonic() - begun < BOUNDED_S
         finally:
             postgresql_server.start()
-        assert ask(opened) == VERSION
+        assert ask(opened) == str(VERSION)
     postgresql_server.drop(address)
 
 
@@ -111,7 +111,7 @@ def test_unresponsive_postgresql(postgresql_server, monkeypatch):
     monkeypatch.setattr(postgresql_timeouts, "ANSWER_SECONDS", 0.5)
     address = postgresql_server.new_database()
     with closing(open_database(address)) as opened:
-        assert ask(opened) == VERSION
+        assert ask(opened) == str(VERSION)
         threads = threading.active_count()
         with stopped(postgresql_server), ThreadPoolExecutor(30) as pool:
             begun = time.monotonic()
@@ -119,7 +119,7 @@ def test_unresponsive_postgresql(postgresql_server, monkeypatch):
             ends = [one.exception(timeout=60.0) for one in asked]
             assert time.monotonic() - begun < BOUNDED_S
         assert {type(end) for end in ends} == {DatabaseUnavailable}
-        assert ask(opened) == VERSION
+        assert ask(opened) == str(VERSION)
         assert threading.active_count() <= threads, "nobody still waits"
     postgresql_server.drop(address)
 
@@ -129,7 +129,7 @@ def test_a_row_that_another_holds_on_postgresql(postgresql_server, monkeypatch):
     address = postgresql_server.new_database()
     with closing(open_database(address)) as opened, closing(open_database(address)) as other:
         with other.write() as connection:
-            connection.execute(About.update().values(probed=1.0))
+            connection.execute(update(About).values(probed=1.0))
             with pytest.raises(DatabaseUnavailable, match="locked by another program"):
                 opened.probe()
         opened.probe()

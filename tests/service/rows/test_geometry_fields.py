@@ -8,6 +8,7 @@ from bentray_service.rows.ids import field_of, new_id
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs
 from bentray_service.rows.stored_tables import GeometryFields
+from bentray_service.rows.tables import FieldRow
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 
@@ -26,7 +27,7 @@ def finished(database, mesh, content, size, tenant=LOCAL):
     job = queue.claim()
     assert (job.mesh_id, job.field_id) == (mesh, field)
     row = {"id": field, "mesh_id": mesh, "bytes": size, "settings": {"samples": 8}, "figures": {"faces": 1}}
-    assert queue.succeed(job.id, row, "geometry_fields")
+    assert queue.succeed(job.id, row, FieldRow)
     return job.id
 
 

@@ -60,7 +60,7 @@ def test_success_comes_with_its_volume(database, jobs, queue, dataset):
     queue.progress(job.id, 4, 4, [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 4}])
     assert queue.succeed(job.id, volume(job.id))
     row = jobs.get(LOCAL, job.id)
-    assert (row.state, row.done, row.history[0]["emitters"]) == ("succeeded", 4, 4)
+    assert (row.state, row.done, row.history[0].emitters) == ("succeeded", 4, 4)
     assert row.finished >= row.started
     assert Volumes(database).get(LOCAL, volume_of(job.id)).dataset_id == dataset
     assert [event.state for event in jobs.events(LOCAL, job.id)] == ["queued", "running", "succeeded"]
@@ -82,7 +82,7 @@ def test_failure_keeps_the_reason(jobs, queue, dataset):
     queue.claim()
     queue.fail(job.id, PROBLEM)
     assert jobs.get(LOCAL, job.id).error == PROBLEM
-    assert jobs.events(LOCAL, job.id)[-1]["note"] == "why"
+    assert jobs.events(LOCAL, job.id)[-1].note == "why"
 
 
 def test_release_is_no_attempt(jobs, queue, dataset):
@@ -127,7 +127,7 @@ def test_a_service_takes_over_the_jobs_of_its_data_folder_at_once_and_no_others(
     again = Queue(database, "one")
     assert again.recover(PROBLEM) == 1
     assert [again.state(job) for job in made.values()] == ["queued", "running", "running"]
-    assert again.claim().id == made.one
+    assert again.claim().id == made["one"]
     assert again.recover(PROBLEM) == 0, "its own job is at work"
 
 
@@ -235,4 +235,4 @@ def test_a_result_with_numbers_that_json_has_not_is_null_there(jobs, queue, data
         [{"residual_rms_s": None}],
     )
     kept = Volumes(database).get(LOCAL, volume_of(job.id))
-    assert (kept["speed_range_mps"], kept["provenance"]) == ([None, 1500.0], {"fit": {"rms": None, "n": 3}})
+    assert (kept.speed_range_mps, kept.provenance) == ([None, 1500.0], {"fit": {"rms": None, "n": 3}})

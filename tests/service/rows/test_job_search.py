@@ -4,6 +4,7 @@ import pytest
 
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.stored_tables import Datasets
+from bentray_service.rows.tables import DatasetRow
 from bentray_service.rows.tenants import LOCAL, Tenant
 
 from .conftest import SUMMARY
@@ -56,6 +57,6 @@ def test_a_simulation_by_the_title_of_the_scan_that_it_made(database, jobs, queu
         "bytes": 1,
         "sha256": "0" * 64,
     }
-    assert queue.succeed(job.id, result, into="datasets")
+    assert queue.succeed(job.id, result, into=DatasetRow)
     assert found(jobs, LOCAL, "table 7") == [job.id]
     assert found(jobs, LOCAL, "table 8") == []

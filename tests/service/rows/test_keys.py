@@ -3,6 +3,7 @@
 import time
 
 import pytest
+from sqlalchemy import select
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.rows.api_key import ApiKey
@@ -24,7 +25,7 @@ def test_the_secret_is_nowhere(database, keys):
     keys.add(token, ACME, "one", ("read",))
     assert keys.any()
     with database.read() as connection:
-        stored = str(connection.execute(KeyRow.select()).all())
+        stored = str(connection.execute(select(KeyRow.__table__)).all())
     assert token.shown().rpartition("_")[2] not in stored
     assert keys.owner(token).tenant == ACME
 
@@ -62,4 +63,4 @@ def test_its_last_use_is_known_to_the_minute(keys, monkeypatch):
     for later, expected in ((0.0, 0.0), (USED_S - 1.0, 0.0), (USED_S + 1.0, USED_S + 1.0)):
         monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda at=now + later: at)
         keys.owner(token)
-        assert keys.all()[0]["used"] == pytest.approx(now + expected, abs=1e-3)
+        assert keys.all()[0].used == pytest.approx(now + expected, abs=1e-3)

@@ -31,9 +31,9 @@ def meshes(tmp_path):
 def test_a_row_is_kept_as_given(meshes):
     mesh = new_id("mesh")
     row = meshes.add(LOCAL, mesh, size=9, sha256="f" * 64, summary=SUMMARY)
-    assert SUMMARY.items() <= row.items()
+    assert SUMMARY.items() <= row.values().items()
     assert (row.id, row.bytes, row.volume_id, row.iso) == (mesh, 9, None, None)
-    assert meshes.get(LOCAL, mesh) == row
+    assert meshes.get(LOCAL, mesh).values() == row.values()
 
 
 def test_newest_first(meshes):

@@ -13,22 +13,22 @@ def test_what_is_not_given_stays(database, jobs, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset, started_by="key-7")
     assert (job.name, job.notes, job.started_by) == ("", "", "key-7")
     jobs.describe(LOCAL, job.id, name="First", notes="Cold water")
-    assert jobs.describe(LOCAL, job.id) == jobs.get(LOCAL, job.id)
+    assert jobs.describe(LOCAL, job.id).values() == jobs.get(LOCAL, job.id).values()
     jobs.describe(LOCAL, job.id, name="")
-    assert jobs.get(LOCAL, job.id) == {**job, "notes": "Cold water"}
+    assert jobs.get(LOCAL, job.id).values() == {**job.values(), "notes": "Cold water"}
     scans = Datasets(database)
     before = scans.get(LOCAL, dataset)
-    assert scans.describe(LOCAL, dataset, name="Left") == {**before, "name": "Left"}
+    assert scans.describe(LOCAL, dataset, name="Left").values() == {**before.values(), "name": "Left"}
 
 
 def test_only_the_item_of_the_tenant_is_changed(database, jobs, dataset):
     mine, second = (jobs.add(LOCAL, "reconstruction", {}, dataset) for _ in range(2))
-    for table, item in ((jobs, mine["id"]), (Datasets(database), dataset)):
+    for table, item in ((jobs, mine.id), (Datasets(database), dataset)):
         with pytest.raises(UnknownId):
             table.describe(OTHER, item, name="theirs")
         assert table.get(LOCAL, item).name == ""
-    jobs.describe(LOCAL, mine["id"], name="First")
-    assert jobs.get(LOCAL, second.id) == second
+    jobs.describe(LOCAL, mine.id, name="First")
+    assert jobs.get(LOCAL, second.id).values() == second.values()
 
 
 def test_the_place_in_the_queue_is_the_order_of_claims(jobs, queue, dataset):

@@ -32,14 +32,14 @@ def test_only_members_see_a_project(projects):
         projects.all(OTHER, ALICE) == projects.all(LAB, "user:ALICE") == projects.all(LAB, "key:alice") == []
     )
     for tenant, name, member in (
-        (LAB, two["id"], ALICE),
+        (LAB, two.id, ALICE),
         (OTHER, one.id, ALICE),
         (LAB, "project-x", ALICE),
     ):
         with pytest.raises(UnknownId):
             projects.get(tenant, name, member)
     # Without authentication everything is allowed.
-    assert projects.get(LAB, two["id"], None).role == "owner"
+    assert projects.get(LAB, two.id, None).role == "owner"
     assert [row.member for row in projects.members(one)] == [ALICE, BOB]
 
 
@@ -53,7 +53,7 @@ def test_someone_owns_it_at_all_times(projects):
             change()
     projects.put_member(project, BOB, "owner")
     projects.remove_member(project, ALICE)
-    assert projects.members(project)[0]["member"] == BOB
+    assert projects.members(project)[0].member == BOB
     with pytest.raises(InvalidInput, match="a member of the project"):
         projects.remove_member(project, ALICE)
 

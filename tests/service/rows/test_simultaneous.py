@@ -10,6 +10,7 @@ from bentray_service.errors import InUse, JobFinished, KeyReused, UnknownId
 from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion, StoredItem
 from bentray_service.rows import admission
+from bentray_service.rows.tables import JobRow
 from bentray_service.rows.tenants import LOCAL
 
 AT_ONCE = 50
@@ -45,7 +46,7 @@ def test_one_key_makes_one_job(jobs, dataset):
     made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset, key="once"))
     assert len({job.id for job in made}) == 1
     assert len(jobs.newest(LOCAL, 2 * AT_ONCE)) == 1
-    assert states(jobs, made[0]["id"]) == ["queued"]
+    assert states(jobs, made[0].id) == ["queued"]
 
 
 def test_a_key_for_several_requests_is_the_firsts(jobs, dataset):
@@ -72,14 +73,14 @@ def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
 
     told = at_once(ask)
     deleted = told.pop(AT_ONCE // 2) is None
-    assert {type(one) for one in told} == ({UnknownId} if deleted else {dict})
+    assert {type(one) for one in told} == ({UnknownId} if deleted else {JobRow})
     assert len(jobs.newest(LOCAL, AT_ONCE)) == (0 if deleted else AT_ONCE - 1)
 
 
 def test_a_queued_job_is_cancelled_once(jobs, dataset):
     job = jobs.add(LOCAL, "reconstruction", {}, dataset).id
     told = Counter(type(one) for one in at_once(lambda _: jobs.request_cancel(LOCAL, job)))
-    assert told == {dict: 1, JobFinished: AT_ONCE - 1}
+    assert told == {JobRow: 1, JobFinished: AT_ONCE - 1}
     assert states(jobs, job) == ["queued", "cancelled"]
 
 
