@@ -18,5 +18,5 @@ def store_volume(http, values=None, spacing=(1e-3,) * 3):
         "origin_m": [0.0] * 3,
         "value_range": list(volume.range()),
     }
-    parts.volumes.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
+    parts.volumes.uploaded.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
     return volume_id

@@ -74,7 +74,7 @@ def test_clean_stop_puts_a_running_job_back(tmp_path, cluster, uploaded, submitt
     app = create_app(settings, cluster)
     with TestClient(app, base_url="http://localhost") as http:
         assert until(http, job["id"])["state"] == "succeeded"
-        states = [event["state"] for event in app.state.parts.jobs.events(LOCAL, job["id"])]
+        states = [event.state for event in app.state.parts.jobs.events(LOCAL, job["id"])]
     assert states == ["queued", "running", "queued", "running", "succeeded"]
     assert len(work.calls) == 2
 

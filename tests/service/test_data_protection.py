@@ -11,7 +11,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "data-protec
 # The row of the page for each table; None: nothing about persons.
 STATED = {
     "about": None,
-    "bucket_mark": None,
+    "alembic_version": None,
     "checksums": None,
     "events": "jobs",
     "geometry_fields": "scans, volumes, meshes, fields",

@@ -81,7 +81,7 @@ def put(parts, tenant, values, shape=None):
         "origin_m": [0.0] * 3,
         "value_range": list(volume.range()),
     }
-    parts.volumes.add(tenant, volume_id, size=4 * nodes, sha256="0" * 64, summary=summary)
+    parts.volumes.uploaded.add(tenant, volume_id, size=4 * nodes, sha256="0" * 64, summary=summary)
     return f"/v1/volumes/{volume_id}"
 
 

@@ -301,7 +301,7 @@ def version_of(connection: Connection) -> str:
     """The version of the tables of a database, which those of before Alembic have in another table."""
     if inspect(connection).has_table(SchemaVersion.__tablename__):
         return connection.execute(select(SchemaVersion.version_num)).scalar_one()
-    return str(connection.execute(text("SELECT version FROM about")).scalar_one())
+    return str(connection.execute(text("SELECT about.version FROM about")).scalar_one())
 
 
 def rows_changed(session: Session, statement: UpdateBase) -> int:

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from urllib.parse import parse_qs, urlencode, urlsplit
 
 import pytest
+from sqlalchemy import text
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.access import openid_provider
@@ -201,7 +202,7 @@ def test_sessions_expire_and_end_their_streams(http, provider):
         assert stream.status_code == 200
         begun = time.monotonic()
         with database.write() as connection:
-            connection.exec_driver_sql("UPDATE sessions SET expires = 1.0")
+            connection.execute(text("UPDATE sessions SET expires = 1.0"))
         list(stream.iter_bytes())
         assert time.monotonic() - begun < 10.0
     assert http.get("/v1/access").status_code == 401
@@ -233,7 +234,7 @@ def test_a_response_counts_once_and_in_its_browser(http, provider):
 def test_a_pending_sign_in_expires(http, provider):
     address = back(http, provider)
     with http.app.state.parts.database.write() as connection:
-        connection.exec_driver_sql("UPDATE pending_sign_ins SET expires = 1.0")
+        connection.execute(text("UPDATE pending_sign_ins SET expires = 1.0"))
     refused(http.get(address), 401, "expired")
 
 

@@ -97,12 +97,12 @@ def one_of_each(app: FastAPI, http: TestClient, owner: Tenant, auth: dict[str, s
     surface["repairs"] = dict.fromkeys(Repairs.model_fields, 0)
     surface |= {"title": "", "format": "ply", "content": "0" * 64}
     parts.meshes.add(owner, mesh, size=1, sha256="0" * 64, summary=surface)
-    job = parts.jobs.add(owner, "reconstruction", {}, dataset)["id"]
+    job = parts.jobs.add(owner, "reconstruction", {}, dataset).id
     cube = {"axes": "x,y,z", "shape": [4, 4, 4], "spacing_m": [1.0] * 3, "origin_m": [0.0] * 3}
     cube |= {"speed_range_mps": [1.0, 2.0], "water_speed_mps": 1.0, "provenance": {}, "bytes": 1}
     # At its end, so that its events have one too.
     parts.jobs.request_cancel(owner, job)
-    batch = parts.batches.add(owner, "", {}, [NewJob("reconstruction", {}, dataset)], Submission())["id"]
+    batch = parts.batches.add(owner, "", {}, [NewJob("reconstruction", {}, dataset)], Submission()).id
     parts.batches.request_cancel(owner, batch)
     figures = dict.fromkeys((*FieldSizes.model_fields, *FieldErrors.model_fields), 1)
     figures |= {f"{name}_seconds": 1.0 for name in FieldSeconds.model_fields}

@@ -54,7 +54,7 @@ class World:
     def __init__(self, database: Database, stack: ExitStack) -> None:
         self.database, self.stack, self.accounts = database, stack, Accounts(database)
         made = Projects(database)
-        self.owners = [LAB, *(Tenant(made.add(LAB, name, MEMBER)["id"]) for name in ("One", "Two"))]
+        self.owners = [LAB, *(Tenant(made.add(LAB, name, MEMBER).id) for name in ("One", "Two"))]
 
     def sign_in(self) -> SignIn:
         settings = ServiceSettings(requests_per_minute=7, renders_per_minute=5)
@@ -146,9 +146,9 @@ def running_jobs(world: World, at_once: int = 2) -> tuple[int, Use]:
         job = rows.add(tenant, "simulation", {})
         count = len(running)
         if count >= runner._most or runner._queue.claim(idle_only=count >= runner._at_once) is None:
-            rows.request_cancel(tenant, job["id"])
+            rows.request_cancel(tenant, job.id)
             raise RateLimited("jobs", "waits", "later", 1.0)
-        running.append(job["id"])
+        running.append(job.id)
 
     return runner._at_once, run
 
@@ -210,7 +210,7 @@ def messages_under_way(world: World) -> tuple[int, Use]:
     def send(tenant: Tenant) -> None:
         job = rows.add(tenant, "simulation", {}, webhook="https://example.org/")
         queue.claim()
-        queue.fail(job["id"], {"detail": "why"})
+        queue.fail(job.id, {"detail": "why"})
         if sent.claim() is None:
             raise RateLimited("messages", "waits", "later", 1.0)
 

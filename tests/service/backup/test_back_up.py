@@ -8,7 +8,7 @@ import sys
 from contextlib import closing
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import select, text
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.backup import archive
@@ -115,7 +115,7 @@ def open_stored(settings):
 def rows(settings):
     """The rows of all scans; floating-point numbers keep every bit."""
     with closing(open_database(settings.database)) as database:
-        return database.rows(select(DatasetRow))
+        return [row.values() for row in database.rows(select(DatasetRow))]
 
 
 def keys_of(members):
@@ -409,7 +409,7 @@ def test_what_is_no_place_for_a_backup(stored, tmp_path):
 
 def test_a_database_of_another_version_is_not_touched(stored, tmp_path):
     with closing(open_database(stored.database)) as database, database.write() as connection:
-        connection.exec_driver_sql("UPDATE about SET version = 5")
+        connection.execute(text("UPDATE alembic_version SET version_num = 5"))
     with pytest.raises(InvalidInput, match="schema version 5"):
         back_up(stored, tmp_path / "backup")
     assert not (tmp_path / "backup").exists()

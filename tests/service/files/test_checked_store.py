@@ -74,7 +74,7 @@ def test_a_flipped_bit_is_found_by_the_next_process(opened, rows, caplog):
     for _ in range(2):
         with pytest.raises(Damaged, match=f"{path.stem}, different content"):
             store.fetch(path)
-    assert rows.get(LOCAL, path.stem)["damaged"] is not None
+    assert rows.get(LOCAL, path.stem).damaged is not None
     assert len(caplog.records) == 1, "said once"
 
 
@@ -138,7 +138,7 @@ def test_a_restored_file_is_taken_again(opened, rows):
         opened().store.fetch(path)
     path.write_bytes(CONTENT)
     assert files.store.fetch(path).read_bytes() == CONTENT
-    assert rows.get(LOCAL, path.stem)["damaged"] is None
+    assert rows.get(LOCAL, path.stem).damaged is None
 
 
 def test_damage_found_by_a_scrub_is_not_served(opened, rows):
@@ -162,7 +162,7 @@ def test_a_file_of_an_older_version_is_taken_as_it_is_and_kept_so(opened, rows, 
     database.close()
     assert opened().store.fetch(path) == path
     row = rows.get(LOCAL, path.stem)
-    assert (row["as_written"], row["bytes"], row["path"]) == (False, len(CONTENT), f"volumes/{path.name}")
+    assert (row.as_written, row.bytes, row.path) == (False, len(CONTENT), f"volumes/{path.name}")
     flip(path)
     with pytest.raises(Damaged):
         opened().store.fetch(path)
@@ -195,5 +195,5 @@ def test_a_bucket_has_another_copy(tmp_path, rows, bucket_url):
     path = stored(files)
     flip(path)
     assert store.fetch(path).read_bytes() == CONTENT
-    assert rows.get(LOCAL, path.stem)["damaged"] is None
+    assert rows.get(LOCAL, path.stem).damaged is None
     database.close()

@@ -41,7 +41,7 @@ SENT = {"size": 1, "sha256": "0" * 64}
 
 
 # Every one of them has a row in storage; test_usage tells what becomes of it.
-BESIDE = ("about", "storage")
+BESIDE = ("alembic_version", "about", "storage")
 
 
 class Shelf:
@@ -61,9 +61,9 @@ class Shelf:
 
     def ended(self, job, tenant=LOCAL, state="succeeded"):
         with self.database.write() as connection:
-            change = update(JobRow).where(JobRow.id == job["id"])
+            change = update(JobRow).where(JobRow.id == job.id)
             connection.execute(change.values(state=state))
-        return job["id"]
+        return job.id
 
     def reconstruction(self, dataset, tenant=LOCAL):
         """A job that has succeeded, its volume, and the exports of that."""
@@ -99,7 +99,9 @@ class Shelf:
 
     def upload(self, tenant=LOCAL):
         name = new_id("volume")
-        self.volumes.add(tenant, name, summary={"title": "", **GRID, "value_range": [0.0, 1.0]}, **SENT)
+        self.volumes.uploaded.add(
+            tenant, name, summary={"title": "", **GRID, "value_range": [0.0, 1.0]}, **SENT
+        )
         self.files.of(tenant).volume(name).write_bytes(b"x")
         return name
 
@@ -171,8 +173,8 @@ def test_deletion_affects_nothing_else(shelf):
         with pytest.raises(UnknownId):
             shelf.delete({"ds": "dataset", "vol": "volume"}[stored.partition("-")[0]], stored, OTHER)
     assert (shelf.left(), shelf.rows()) == before
-    assert {shelf.jobs.get(LOCAL, each)["id"] for each in (job, animation)} == {job, animation}
-    assert Datasets(shelf.database).get(OTHER, other)["id"] == other
+    assert {shelf.jobs.get(LOCAL, each).id for each in (job, animation)} == {job, animation}
+    assert Datasets(shelf.database).get(OTHER, other).id == other
 
 
 @pytest.mark.parametrize("state", ["queued", "running", "cancelling"])
@@ -185,7 +187,7 @@ def test_inputs_of_a_running_job_are_kept(shelf, state):
         with pytest.raises(InUse, match=busy):
             shelf.delete(what, name)
     assert (shelf.left(), shelf.rows()) == before
-    shelf.ended({"id": busy}, state="cancelled")
+    shelf.ended(shelf.jobs.get(LOCAL, busy), state="cancelled")
     shelf.delete("dataset", dataset)
     assert (shelf.left(), shelf.rows()) == ([], {})
 
@@ -206,7 +208,7 @@ def test_an_uploaded_volume_leaves_its_mesh(shelf):
     mesh = shelf.mesh(volume_id=volume, iso=0.5)
     shelf.delete("volume", volume)
     assert (shelf.left(), shelf.rows()) == ([f"{mesh}.h5"], {"meshes": 1})
-    assert Meshes(shelf.database).get(LOCAL, mesh)["volume_id"] is None
+    assert Meshes(shelf.database).get(LOCAL, mesh).volume_id is None
 
 
 def test_deleting_a_mesh_deletes_unshared_fields(shelf):
@@ -216,7 +218,7 @@ def test_deleting_a_mesh_deletes_unshared_fields(shelf):
     heir = shelf.field(second, field)
     shelf.delete("mesh", first)
     row = GeometryFields(shelf.database).get(LOCAL, field)
-    assert (row["mesh_id"], row["job_id"]) == (second, heir)
+    assert (row.mesh_id, row.job_id) == (second, heir)
     assert shelf.left() == [f"{second}.h5", "outer.npy"]
     shelf.delete("mesh", second)
     assert (shelf.left(), shelf.rows()) == ([], {})
@@ -236,7 +238,7 @@ def test_old_data_go_and_young_data_stay(shelf):
     shelf.jobs.add(OTHER, "reconstruction", {}, needed)
     with shelf.database.write() as connection:
         for table in (DatasetRow, UploadedVolumeRow, MeshRow):
-            aged = update(table).where(table.c.id != young)
+            aged = update(table).where(table.id != young)
             connection.execute(aged.values(created=time.time() - 31 * DAY_S))
     clocks = Clocks()
     keeper = housekeeper(shelf, clocks, None)
@@ -262,10 +264,10 @@ def test_old_jobs_without_anything_go_too(shelf):
     made = shelf.simulation("succeeded")
     with shelf.database.write() as connection:
         rows = DatasetRow
-        connection.execute(update(rows).where(rows.c.id == dataset).values(job_id=made))
+        connection.execute(update(rows).where(rows.id == dataset).values(job_id=made))
     shelf.reconstruction(dataset)
     young, at_work = shelf.simulation("failed", days=28), shelf.simulation("running", days=None)
-    kept = [row["id"] for row in shelf.jobs.newest(LOCAL, 9)]
+    kept = [row.id for row in shelf.jobs.newest(LOCAL, 9)]
     for state in ("cancelled", "failed"):
         shelf.simulation(state)
     clocks = Clocks()
@@ -276,7 +278,7 @@ def test_old_jobs_without_anything_go_too(shelf):
     keeper.sweep()
     clocks.pass_by(3600.0)
     keeper.sweep()
-    assert [row["id"] for row in shelf.jobs.newest(LOCAL, 9)] == kept
+    assert [row.id for row in shelf.jobs.newest(LOCAL, 9)] == kept
     assert {young, at_work, made} < set(kept)
     assert shelf.rows()["events"] == len(kept)
 
@@ -328,11 +330,11 @@ def test_an_upload_that_ends_by_a_wrong_clock_stays(shelf):
     clocks.wall += 31 * DAY_S
     clocks.pass_by(60.0)
     keeper.sweep()
-    assert uploads.get(LOCAL, row["id"])["state"] == "receiving"
+    assert uploads.get(LOCAL, row.id).state == "receiving"
     clocks.pass_by(DAY_S)
     keeper.sweep()
     with pytest.raises(UnknownId):
-        uploads.get(LOCAL, row["id"])
+        uploads.get(LOCAL, row.id)
 
 
 class Clocks:

@@ -169,7 +169,7 @@ def test_a_bucket_that_is_away_is_waited_for(service, scan, s3_server, monkeypat
     fetch, calls = direct.fetch, []
 
     def away_once(row, path):
-        calls.append(row["id"])
+        calls.append(row.id)
         if len(calls) == 1:
             raise StorageUnavailable("away")
         fetch(row, path)

@@ -50,7 +50,7 @@ def remove(path):
 def of_version(version):
     def change(path):
         with closing(sqlite3.connect(path)) as database, database:
-            database.execute(f"UPDATE about SET version = {version}")
+            database.execute(f"UPDATE alembic_version SET version_num = {version}")
 
     return change
 
@@ -186,7 +186,7 @@ def test_a_database_of_before_its_keys_does_not_open_a_service(status, tmp_path)
         key = Keys(database).add(ApiKey.new(), LOCAL, "one", ("read",))
     assert status() == 401
     with closing(opened(files)) as database:
-        Keys(database).revoke(key["id"])
+        Keys(database).revoke(key.id)
     # The operator may revoke all keys: nobody comes in then.
     assert status() == 401
     remove(files.root / FILE)

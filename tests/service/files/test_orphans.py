@@ -41,8 +41,8 @@ def other(tmp_path):
 def fill(files, database):
     """What a killed service leaves: things with rows, and of every kind one without."""
     mine = files.of(LOCAL)
-    dataset = Datasets(database).add(LOCAL, new_id("dataset"), size=1, sha256="0", summary=SUMMARY)["id"]
-    upload = Uploads(database).add(LOCAL, "mesh", 9, {}, "", 60.0, 10**9)["id"]
+    dataset = Datasets(database).add(LOCAL, new_id("dataset"), size=1, sha256="0", summary=SUMMARY).id
+    upload = Uploads(database).add(LOCAL, "mesh", 9, {}, "", 60.0, 10**9).id
     kept = [mine.dataset(dataset), mine.upload(upload), mine.volume(new_id("volume")).with_suffix(".partial")]
     job = new_id("job")
     orphans = [mine.dataset(new_id("dataset")), mine.volume(new_id("volume")), mine.animation(job, "zip")]

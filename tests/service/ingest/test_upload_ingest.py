@@ -70,15 +70,15 @@ class Bench:
 
     def whole(self, tenant=LOCAL):
         row = self.uploads.add(tenant, "dataset", 3, {}, "", 60.0, 10**6)
-        self.files.of(tenant).upload(row["id"]).write_bytes(b"abc")
-        self.uploads.mark_complete(row["id"])
+        self.files.of(tenant).upload(row.id).write_bytes(b"abc")
+        self.uploads.mark_complete(row.id)
         return row
 
     def settled(self, row):
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline:
-            now = self.uploads.get(Tenant(row["tenant"]), row["id"])
-            if now["state"] in ("done", "refused"):
+            now = self.uploads.get(Tenant(row.tenant), row.id)
+            if now.state in ("done", "refused"):
                 return now
             time.sleep(0.01)
         raise AssertionError(now)
@@ -87,9 +87,9 @@ class Bench:
 def test_the_oldest_is_read_first(bench):
     rows = [bench.whole() for _ in range(3)]
     bench.reader.start()
-    assert [bench.settled(row)["state"] for row in rows] == ["done"] * 3
-    assert bench.read == [row["result_id"] for row in rows]
-    assert bench.store[rows[0]["result_id"]][0] == 3
+    assert [bench.settled(row).state for row in rows] == ["done"] * 3
+    assert bench.read == [row.result_id for row in rows]
+    assert bench.store[rows[0].result_id][0] == 3
     assert not list(bench.files.root.glob("tenants/*/uploads/*"))
 
 
@@ -97,29 +97,29 @@ def test_a_full_disk_is_waited_for(bench):
     row = bench.whole()
     bench.answers = [StorageFull("body", "no space", "some")] * 3
     bench.reader.start()
-    assert bench.settled(row)["state"] == "done"
-    assert bench.read == [row["result_id"]] * 4
+    assert bench.settled(row).state == "done"
+    assert bench.read == [row.result_id] * 4
 
 
 def test_rejections_and_errors_do_not_stop_the_queue(bench):
     bad, odd, good = (bench.whole() for _ in range(3))
     bench.answers = [InvalidInput("file", "nothing", "a scan"), RuntimeError("odd")]
     bench.reader.start()
-    assert bench.settled(good)["state"] == "done"
+    assert bench.settled(good).state == "done"
     bad, odd = bench.settled(bad), bench.settled(odd)
-    assert (bad["state"], bad["problem"]["field"]) == ("refused", "file")
-    assert (odd["state"], odd["problem"]["status"]) == ("refused", 500)
-    assert odd["problem"]["correlation_id"] in odd["problem"]["detail"]
+    assert (bad.state, bad.problem["field"]) == ("refused", "file")
+    assert (odd.state, odd.problem["status"]) == ("refused", 500)
+    assert odd.problem["correlation_id"] in odd.problem["detail"]
     assert not list(bench.files.root.glob("tenants/*/uploads/*"))
     assert bench.reader.alive()
 
 
 def test_uploads_of_other_services_are_ignored(bench):
     row, here = bench.whole(), bench.whole()
-    bench.files.of(LOCAL).upload(row["id"]).unlink()
+    bench.files.of(LOCAL).upload(row.id).unlink()
     bench.reader.start()
     bench.settled(here)
-    assert bench.uploads.get(LOCAL, row["id"])["state"] == "reading"
+    assert bench.uploads.get(LOCAL, row.id).state == "reading"
 
 
 def test_terminated_reader_rejects_no_upload(bench, monkeypatch):
@@ -134,5 +134,5 @@ def test_terminated_reader_rejects_no_upload(bench, monkeypatch):
     bench.reader.start()
     assert begun.wait(PATIENCE_S)
     bench.reader.stop()
-    assert bench.uploads.get(LOCAL, row["id"])["state"] == "reading"
-    assert bench.files.of(LOCAL).upload(row["id"]).exists()
+    assert bench.uploads.get(LOCAL, row.id).state == "reading"
+    assert bench.files.of(LOCAL).upload(row.id).exists()

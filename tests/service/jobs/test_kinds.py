@@ -133,7 +133,7 @@ def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch)
     monkeypatch.undo()
     with serving() as http:
         assert until(http, job["id"])["state"] == "succeeded"
-        states = [event["state"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
+        states = [event.state for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
     # On a loaded machine the workers of the second service may connect late; the job then waits again.
     assert states[:4] == ["queued", "running", "queued", "running"]
     assert states[-1] == "succeeded"
@@ -242,7 +242,7 @@ def test_interrupted_field_resumes_at_the_next_start(serving, until, monkeypatch
         done = until(http, job["id"])
         assert done["state"] == "succeeded", done["error"]
         total = http.get(done["links"]["field"]).json()
-        states = [event["state"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
+        states = [event.state for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
         assert (states[:4], states[-1]) == (["queued", "running", "queued", "running"], "succeeded")
         wait_until_empty(files.root / "work")
         assert [one.name for one in (files.root / "fields").iterdir()] == [total["id"]]

@@ -55,7 +55,7 @@ def test_job_of_another_tenant_starts_during_long_jobs(start, uploaded, work):
         parts.files.store.publish(its)
 
     def add(tenant):
-        job = parts.jobs.add(Tenant(tenant), "reconstruction", settings, dataset)["id"]
+        job = parts.jobs.add(Tenant(tenant), "reconstruction", settings, dataset).id
         parts.runner.notify()
         return job
 
@@ -192,7 +192,7 @@ def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monk
     work.error, room[0] = None, True
     runner.notify()
     assert until(http, job["id"])["state"] == "succeeded"
-    notes = [event["note"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
+    notes = [event.note for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
     assert notes[2] == "the disk is full; the job continues once there is space"
 
 
@@ -207,7 +207,7 @@ def test_lost_scheduler_fails_no_job(start, uploaded, submitted, until, work, er
     until(http, job["id"], "queued")
     work.error = None
     assert until(http, job["id"])["state"] == "succeeded"
-    notes = {event["note"] for event in http.app.state.parts.jobs.events(LOCAL, job["id"])}
+    notes = {event.note for event in http.app.state.parts.jobs.events(LOCAL, job["id"])}
     assert "no answer from the workers; the job continues when available" in notes
 
 

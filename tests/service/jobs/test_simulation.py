@@ -163,7 +163,7 @@ def test_stopped_service_resumes(serving, until, held):
         done = until(http, job)
         assert done["state"] == "succeeded", done["error"]
         assert done["progress"] == {"done": 5, "total": 5, "phase": ""}
-        events = [event["state"] for event in http.app.state.parts.jobs.events(LOCAL, job)]
+        events = [event.state for event in http.app.state.parts.jobs.events(LOCAL, job)]
         assert events == ["queued", "running", "queued", "running", "succeeded"]
         fresh = until(http, ask(http, **WAVES).json()["id"])
         both = [http.get(one["links"]["dataset"]).json()["sha256"] for one in (done, fresh)]

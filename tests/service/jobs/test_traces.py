@@ -6,6 +6,7 @@ from opentelemetry import trace
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.task_graph import Task
 from bentray_service.jobs import traces
+from bentray_service.rows.tables import JobRow
 from bentray_workers.cluster import task_retries
 from bentray_workers.cluster.task_retries import Attempts
 
@@ -51,7 +52,7 @@ def test_request_job_and_tasks_are_one_trace(monkeypatch, tmp_path, cluster):
     with tracer.start_as_current_span("POST /v1/jobs"):
         jobs.remember("job-1")
     assert not trace.get_current_span().get_span_context().is_valid
-    job = {"id": "job-1", "batch_id": None, "kind": "reconstruction", "attempts": 1}
+    job = JobRow(id="job-1", batch_id=None, kind="reconstruction", attempts=1)
     with jobs.attempt(job):
         attempts = Attempts(cluster, tmp_path, lambda: {"resources": {}, "workers": None})
         attempts.result(attempts.submit(Task(abs, (-1,), keep_on_worker=True)))

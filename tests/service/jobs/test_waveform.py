@@ -84,9 +84,7 @@ def test_interrupted_job_gives_the_bits_of_one_process(http, torn, tmp_path):
     gone, restored = torn
     assert set(gone) < set(restored), "rays and waves were gone on from"
     events = http.app.state.parts.jobs.events(LOCAL, job["id"])
-    assert "no answer from the workers; the job continues when available" in {
-        event["note"] for event in events
-    }
+    assert "no answer from the workers; the job continues when available" in {event.note for event in events}
 
     expected = reconstruct(
         replace(pick(scan()), waveform=scan().waveform), Settings.of(**{"method": "sart", **ASKED})

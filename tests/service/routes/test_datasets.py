@@ -190,7 +190,7 @@ def test_a_thousand_scans_are_searched_and_read_in_pages(start, uploaded):
     http = start()
     stored = http.app.state.parts.datasets
     first = uploaded(http)
-    row = {name: value for name, value in stored.get(LOCAL, first).items() if name != "number"}
+    row = {name: value for name, value in stored.get(LOCAL, first).values().items() if name != "number"}
     copies = [
         {**row, "id": f"ds-{k:020x}", "name": f"Visit {k}", "notes": "100 %" if k == 700 else "left_side"}
         for k in range(1000)

@@ -257,7 +257,7 @@ def test_jobs_of_another_tenant_are_not_in_the_stream(start, uploaded, submitted
     work.hold.clear()
     job = submitted(http, uploaded(http))["id"]
     parts = http.app.state.parts
-    assert [row["id"] for row in parts.jobs.changes(LOCAL, None, [])[1]] == [job]
+    assert [row.id for row in parts.jobs.changes(LOCAL, None, [])[1]] == [job]
     assert parts.jobs.changes(Tenant("other"), None, [job]) == (0, [])
     work.hold.set()
 

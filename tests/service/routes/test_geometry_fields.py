@@ -52,7 +52,7 @@ def here(http, made):
     target.mkdir()
     for file in source.iterdir():
         (target / file.name).write_bytes(file.read_bytes())
-    job = parts.jobs.add(LOCAL, "reconstruction", {})["id"]
+    job = parts.jobs.add(LOCAL, "reconstruction", {}).id
     row = {"mesh_id": mesh, "bytes": bytes_of(target), "settings": COARSE, "figures": figures}
     with parts.database.write() as connection:
         connection.execute(insert(FieldRow).values(id=field, job_id=job, created=1.0, **row))

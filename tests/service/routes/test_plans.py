@@ -4,6 +4,7 @@ import io
 
 import numpy as np
 import pytest
+from sqlalchemy import text
 
 from bentray_service.jobs import kinds
 from bentray_service.rows.api_key import ApiKey
@@ -28,7 +29,7 @@ def submit(http, dataset, **more):
 def done_in(http, job, seconds):
     """Let a job have taken this long."""
     with http.app.state.parts.database.write() as connection:
-        connection.exec_driver_sql(f"UPDATE jobs SET finished = started + {seconds} WHERE id = '{job}'")
+        connection.execute(text(f"UPDATE jobs SET finished = started + {seconds} WHERE id = '{job}'"))
 
 
 def test_nothing_is_started(start, uploaded, work):

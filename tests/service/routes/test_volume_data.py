@@ -150,7 +150,7 @@ def test_files_are_not_made_in_the_memory_of_the_service(start):
             "origin_m": [0.0] * 3,
             "value_range": [0.0, 0.0],
         }
-        parts.volumes.add(LOCAL, volume_id, size=values.nbytes, sha256="0" * 64, summary=summary)
+        parts.volumes.uploaded.add(LOCAL, volume_id, size=values.nbytes, sha256="0" * 64, summary=summary)
         del values
         for asked in ("npy", "nifti", "metaimage", "mat"):
             here = f"/v1/volumes/{volume_id}/data?format={asked}"

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
-ARCHIVES = sorted(Path(__file__).parent.glob("version-*.tar.xz"))
+FOLDER = Path(__file__).parent
+VERSIONS = sorted(path.name.removesuffix(".tar.xz") for path in FOLDER.glob("version-*.tar.xz"))
 
 
-@pytest.fixture(params=ARCHIVES, ids=lambda path: path.name.removesuffix(".tar.xz"))
+@pytest.fixture(params=VERSIONS)
 def left(request, tmp_path):
     """What an earlier version answered; its data folder is ``tmp_path / "data"``."""
-    with tarfile.open(request.param) as archive:
+    with tarfile.open(FOLDER / f"{request.param}.tar.xz") as archive:
         archive.extractall(tmp_path, filter="data")
     return json.loads((tmp_path / "expected.json").read_text())

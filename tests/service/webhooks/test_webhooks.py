@@ -8,10 +8,12 @@ import time
 from contextlib import closing
 
 import pytest
+from sqlalchemy import update
 
 import bentray
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import Deliveries, WebhookSecrets
+from bentray_service.rows.tables import DeliveryRow
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_service.webhooks import sender
@@ -259,10 +261,9 @@ def test_slow_receivers_of_one_tenant_delay_no_other(called, receiver):
     assert len(slow.messages) == 2
     with database.write() as connection:
         # One of the waiting messages is of another tenant.
-        left = [one for one in Deliveries(database).newest(None, "waiting", 9) if not one["attempts"]]
-        connection.exec_driver_sql(
-            "UPDATE deliveries SET tenant = 'lab', url = ? WHERE id = ?", (receiver.url, left[0]["id"])
-        )
+        left = [one for one in Deliveries(database).newest(None, "waiting", 9) if not one.attempts]
+        other = update(DeliveryRow).where(DeliveryRow.id == left[0].id)
+        connection.execute(other.values(tenant="lab", url=receiver.url))
     WebhookSecrets(database).create("lab")
     receiver.wait(1)
     slow.close()

@@ -6,6 +6,7 @@ import tracemalloc
 import h5py
 import numpy as np
 import pytest
+from sqlalchemy import text
 
 from bentray_kernels.limits import ELEMENTS, EMISSIONS, SAMPLES, SLICES
 from bentray_service.ingest.ingest_process import convert_upload
@@ -83,7 +84,7 @@ def test_a_job_is_planned_without_its_file(start, uploaded, submitted, work, mon
     monkeypatch.undo()
     # Of one from before counts were kept the file is read.
     with http.app.state.parts.datasets._database.write() as connection:
-        connection.exec_driver_sql("UPDATE datasets SET counts = NULL")
+        connection.execute(text("UPDATE datasets SET counts = NULL"))
     assert submitted(http, dataset)["plan"] == plan
 
 

@@ -316,14 +316,14 @@ def test_complete_uploads_are_ingested_at_the_next_start(start, scan, state):
     row = http.app.state.parts.uploads.receiving()[0]
     files = http.app.state.parts.files.of("local")
     http.app.state.parts.upload_ingest.stop()
-    files.upload(row["id"]).write_bytes(content)
-    files.candidate(row["result_id"]).write_bytes(content[:500])
+    files.upload(row.id).write_bytes(content)
+    files.candidate(row.result_id).write_bytes(content[:500])
     if state == "reading":
-        http.app.state.parts.uploads.mark_complete(row["id"])
+        http.app.state.parts.uploads.mark_complete(row.id)
     http.__exit__()
     http = start()
-    assert settled(http, place)["result"] == row["result_id"]
-    assert http.get(f"/v1/datasets/{row['result_id']}").json()["elements"] == 16
+    assert settled(http, place)["result"] == row.result_id
+    assert http.get(f"/v1/datasets/{row.result_id}").json()["elements"] == 16
     assert left_in(http) == []
 
 
