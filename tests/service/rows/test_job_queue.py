@@ -60,7 +60,7 @@ def test_success_comes_with_its_volume(database, jobs, queue, dataset):
     queue.progress(job.id, 4, 4, [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 4}])
     assert queue.succeed(job.id, volume(job.id))
     row = jobs.get(LOCAL, job.id)
-    assert (row.state, row.done, row.history[0].emitters) == ("succeeded", 4, 4)
+    assert (row.state, row.done, row.history[0]["emitters"]) == ("succeeded", 4, 4)
     assert row.finished >= row.started
     assert Volumes(database).get(LOCAL, volume_of(job.id)).dataset_id == dataset
     assert [event.state for event in jobs.events(LOCAL, job.id)] == ["queued", "running", "succeeded"]
