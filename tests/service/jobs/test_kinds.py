@@ -20,6 +20,7 @@ from bentray_service.app import create_app
 from bentray_service.jobs import kinds
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.ids import new_id
+from bentray_service.rows.tables import JobRow
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
@@ -289,7 +290,7 @@ def test_a_field_that_is_cancelled_at_its_end_stays_for_others(start):
 def test_cancelled_fields_leave_no_files(start, kind):
     parts = start().app.state.parts
     files = parts.files.of(LOCAL)
-    written = kinds.KINDS[kind].target(files, {"id": new_id("job")})
+    written = kinds.KINDS[kind].target(files, JobRow(id=new_id("job")))
     written.write_bytes(b"x")
     parts.files.store.publish(written)
     kinds.KINDS[kind].discard(files, written)
