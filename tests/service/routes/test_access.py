@@ -43,7 +43,7 @@ def test_storage_by_kind_is_that_of_the_tenant(http, tenants, scan):
 def test_keys_are_listed_without_secrets(http, tenants):
     headers, token = tenants["acme"]
     store = Keys(http.app.state.parts.database)
-    store.revoke(store.add(ApiKey.new(), Tenant("acme"), "old", ("read",))["id"])
+    store.revoke(store.add(ApiKey.new(), Tenant("acme"), "old", ("read",)).id)
     answer = http.get("/v1/access/keys", headers=headers)
     scanner, old = answer.json()["keys"]
     assert set(scanner) == {"id", "name", "scopes", "created", "expires", "revoked", "used"}

@@ -130,7 +130,7 @@ def test_export_of_a_volume_deleted_meanwhile(http, upload, monkeypatch):
 
     async def delete_then(tenant, volume, *given):
         await export(tenant, volume, *given)
-        parts.deletion.delete(StoredItem(tenant, "volume", volume["id"]))
+        parts.deletion.delete(StoredItem(tenant, "volume", volume.id))
 
     monkeypatch.setattr(parts.pictures, "export", delete_then)
     answer = http.get(f"{upload}?format=npy")
