@@ -169,6 +169,14 @@ def test_lock_files_cover_pyproject(lock: str, extras: tuple[str, ...]) -> None:
     assert {normal(one) for one in asked} - set(requirements(lock)) == set()
 
 
+def test_the_reference_gives_the_reason_of_every_dependency() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    table = re.findall(
+        r"^\| `([\w-]+)` \| (.+) \|$", (ROOT / "docs/reference/dependencies.md").read_text(), re.M
+    )
+    assert [name for name, _ in table] == sorted(normal(asked) for asked in project["dependencies"])
+
+
 def test_all_lock_files_pin_the_same_versions() -> None:
     # Behind the version stands for which platforms it is, which may be more of them for the tests.
     plain, *others = (
