@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-import signal
-import subprocess
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 from benchmarks.dissertation import dissertation
 from benchmarks.dissertation._outline import CHAPTERS, benchmarks_of
-from benchmarks.dissertation._parts import Parts
 from benchmarks.dissertation._report import PARTLY
 from typer.testing import CliRunner
 
@@ -22,8 +18,6 @@ from bentray_service.cli import bench as command
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 
 from ._fake_benchmarks import NAMES, Fakes, by_name, in_this_process, of, state_of
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
@@ -48,31 +42,6 @@ def test_a_second_run_continues_after_the_parts_that_are_complete(fakes: Fakes, 
     fakes.ran.clear()
     assert fakes.report(tmp_path) == made
     assert fakes.ran == []
-
-
-def test_a_killed_run_loses_only_the_part_in_progress(tmp_path: Path):
-    code = f"""
-import os, signal, sys
-from pathlib import Path
-sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests" / "benchmarks")!r}]
-from _fake_benchmarks import NAMES, BenchmarkContext, Fakes
-BenchmarkContext.cluster = lambda self: None
-class Killed(Fakes):
-    def load(self, name):
-        rows = super().load(name)
-        def killed(context):
-            for row in rows(context):
-                yield row
-                if name == NAMES[2]:
-                    os.kill(os.getpid(), signal.SIGKILL)
-        return killed
-Killed().report(Path({str(tmp_path)!r}))
-"""
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True)
-    assert done.returncode == -signal.SIGKILL, done.stderr.decode()
-    parts = Parts(tmp_path)
-    assert [name for name in NAMES if parts.read(name)] == NAMES[:2]
-    assert json.loads((tmp_path / "report.json").read_text())["chapters"]
 
 
 def test_a_part_of_other_settings_is_measured_again(
@@ -113,12 +82,6 @@ def test_only_measures_the_items_that_are_named_and_keeps_earlier_parts(fakes: F
     assert not made["complete"]
 
 
-def test_an_unknown_item_is_refused_before_anything_runs(fakes: Fakes, tmp_path: Path):
-    with pytest.raises(InvalidInput, match=r"'figure99'; accepted: one of chapter3, .*figure34, table8$"):
-        fakes.report(tmp_path, "figure99")
-    assert fakes.ran == []
-
-
 def test_a_benchmark_that_stops_is_stated_and_tried_again(fakes: Fakes, tmp_path: Path):
     fakes.stops["table5"] = ImportError("no such peer")
     made = fakes.report(tmp_path, "table5")
@@ -129,13 +92,6 @@ def test_a_benchmark_that_stops_is_stated_and_tried_again(fakes: Fakes, tmp_path
     fakes.ran.clear()
     assert of(fakes.report(tmp_path, "table5"), "Table 5")["errors"] == []
     assert fakes.ran == ["table5"]
-
-
-def test_which_parts_used_workers_is_stated(fakes: Fakes, tmp_path: Path):
-    made = fakes.report(tmp_path, "figure34", "table5", scheduler="tcp://head:8786")
-    on_workers = {part["benchmark"]: part["on_workers"] for part in made["parts"] if part["measured"]}
-    assert (on_workers["reconstruction_volume"], on_workers["table5"]) == (True, False)
-    assert made["cluster"] == "workers of tcp://head:8786"
 
 
 def test_an_address_without_a_scheduler_is_refused_before_anything_runs(

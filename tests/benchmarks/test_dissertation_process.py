@@ -48,6 +48,7 @@ def table(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.nightly
 def test_a_benchmark_in_its_own_process_may_end_it(table: Path, tmp_path: Path):
     shown: list[tuple[int, int, str]] = []
     context = BenchmarkContext(True, lambda done, total, note="": shown.append((done, total, note)))
@@ -63,6 +64,7 @@ def test_a_benchmark_in_its_own_process_may_end_it(table: Path, tmp_path: Path):
     assert store.complete("own", part.settings) is None
 
 
+@pytest.mark.nightly
 def test_the_process_of_a_part_ends_with_a_command_that_is_killed(table: Path, tmp_path: Path):
     (table / "wait").touch()
     code = f"""

@@ -12,6 +12,9 @@ from schemathesis.openapi.checks import RejectedPositiveData
 from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 
 from bentray_kernels.request_fields import effective_when
+from bentray_kernels.tomography.settings import Settings
+from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.refraction_view import RefractionView
 from bentray_workers.simulation.request import PhantomScan
 
 # Pieces of uploads are bytes as they are.
@@ -26,8 +29,8 @@ VIEW = {
     "surroundings",
     # Only of B-splines.
     "smoothing",
-    # Not with real supersampling.
-    "ray_spacing",
+    # What only some views have, as a degree of supersampling.
+    *effective_when(RefractionView),
     # Rays of the whole picture.
     "width, height, degree",
     # The tests forbid OpenCL devices.
@@ -41,7 +44,8 @@ SETTINGS = {
     *VIEW,
     # Pixels of all pictures together.
     "frames",
-    # Settings of a reconstruction that need or exclude another; the lower speed comes first.
+    # Settings of a reconstruction that only some have, or that exclude another; the lower speed comes first.
+    *effective_when(Settings),
     *(
         "attenuation.focusing",
         "decomposition",
@@ -103,7 +107,9 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
     # Of a reconstruction with attenuation, and of a format with one image.
     "GET /v1/volumes/{volume_id}/data": {422: {"quantity", "attenuation", "volume"}},
     "GET /v1/volumes/{volume_id}/refraction.png": {422: VIEW},
-    "GET /v1/geometry-fields/{field_id}/image.png": {422: {"width, height, rays", "positions_m"}},
+    "GET /v1/geometry-fields/{field_id}/image.png": {
+        422: {*effective_when(FieldView), "width, height, rays", "positions_m"}
+    },
     # Within the volume's range; one that leaves two nodes.
     "POST /v1/volumes/{volume_id}/mesh": {422: {"iso", "step"}},
 }

@@ -100,6 +100,7 @@ def test_colours_over_all_numbers_are_rejected(http, volume):
         refused_by_name(http.get(volume["links"]["image"], params={"low": low, "high": high}), "low")
 
 
+@pytest.mark.nightly
 def test_every_number_of_a_query_or_header_has_bounds(http, volume):
     """Each is drawn from the description, so that a new one is held against the extremes too."""
     rendered = 0

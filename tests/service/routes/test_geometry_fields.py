@@ -175,17 +175,7 @@ def test_large_picture_is_drawn_in_tiles(http, here, cluster):
 @pytest.mark.parametrize(
     ("query", "field", "accepted"),
     [
-        ("scene=moon", "scene", "mirror-ball"),
-        ("mode=paint", "mode", "refract"),
-        ("lookup=guess", "lookup", "accurate"),
-        ("camera=fisheye", "camera", "perspective"),
-        ("azimuth_deg=nan", "azimuth_deg", "36000"),
-        ("elevation_deg=90", "elevation_deg", "89"),
-        ("index=0", "index", "10"),
-        ("share=2", "share", "1"),
-        ("width=5000", "width", "4096"),
         ("width=4096&height=4096&rays=2", "width, height, rays", "16777216"),
-        ("depth=99", "depth", "64"),
         ("iso=1", "iso", "scene, mode"),
     ],
 )

@@ -56,11 +56,7 @@ def test_of_a_reconstruction(http, uploaded, submitted, until, work):
 @pytest.mark.parametrize(
     ("query", "field", "accepted"),
     [
-        ("bins=1", "bins", "2"),
-        ("bins=1025", "bins", "1024"),
-        ("bins=many", "bins", "integer"),
         ("quantity=speed", "quantity", "value"),
-        ("quantity=colour", "quantity", "'speed', 'coverage'"),
     ],
 )
 def test_rejects_invalid_input(http, cluster, query, field, accepted):

@@ -86,8 +86,6 @@ def test_traces_and_picks(start, cluster, traced):
     [
         ("emission=12", "emission", "0 to 11"),
         ("slice=1", "slice", "0 to 0"),
-        ("emission=-1", "emission", "greater than or equal to 0"),
-        ("quantity=air", "quantity", "'object' or 'water'"),
     ],
 )
 def test_names_the_wrong_parameter_and_what_is_accepted(start, traced, query, field, accepted):

@@ -52,13 +52,7 @@ def test_every_parameter_changes_picture_and_etag(http, here):
 @pytest.mark.parametrize(
     ("query", "field"),
     [
-        ("axis=w", "axis"),
-        ("size=10", "size"),
         ("size=100", "size"),
-        ("size=5000", "size"),
-        ("interpolation=none", "interpolation"),
-        ("colormap=jet", "colormap"),
-        ("frame=perhaps", "frame"),
     ],
 )
 def test_refusals_need_no_worker(http, here, cluster, query, field):
