@@ -54,11 +54,6 @@ def test_nothing_outside_the_region_counts() -> None:
     assert error.of_constant(1490.0) == 10.0
 
 
-def test_an_image_without_attenuation_has_no_error() -> None:
-    image = Spy()(dataset(), Settings(method="sart"))
-    assert np.isnan(ImageError(TRUE, REGION, quantity="attenuation").of(image))
-
-
 def test_straight_rays_have_the_method_penalty_and_width_of_the_image() -> None:
     spy = Spy()
     images = Images(dataset(), spy)
@@ -69,26 +64,6 @@ def test_straight_rays_have_the_method_penalty_and_width_of_the_image() -> None:
     straight = spy.asked[-1]
     assert (straight.rays, straight.method, straight.eikonal) == ("straight", "gauss-newton", "deviation")
     assert (straight.gauss_newton.penalty_strength, straight.numerics.ray_width_m) == (0.7, 0.002)
-
-
-def test_straight_rays_do_not_keep_a_speed_range() -> None:
-    spy = Spy()
-    images = Images(dataset(), spy)
-    bent = images.made(Settings.of(method="sart", speed_range_mps=(1400.0, 1600.0)))
-    images.straight(bent.result)
-    assert spy.asked[-1].sart.speed_range_mps is None
-
-
-def test_full_waveforms_are_compared_with_the_straight_rays_of_the_default() -> None:
-    spy = Spy()
-    images = Images(dataset(), spy)
-    images.straight(images.made(Settings(method="waveform")).result)
-    straight = spy.asked[-1]
-    assert (straight.rays, straight.method, straight.numerics.ray_width_m) == (
-        "straight",
-        "gauss-newton",
-        0.003,
-    )
 
 
 def test_all_four_baselines_stand_beside_an_image_and_each_is_made_once() -> None:
@@ -103,13 +78,3 @@ def test_all_four_baselines_stand_beside_an_image_and_each_is_made_once() -> Non
     assert compared.baselines["water alone"] == pytest.approx(np.sqrt(((TRUE - WATER_MPS) ** 2).mean()))
     assert compared.baselines["straight rays"] == pytest.approx(np.sqrt(((TRUE - 1495.0) ** 2).mean()))
     assert [one.method for one in spy.asked] == ["sart", "sart", "auto"]
-
-
-def test_a_straight_image_that_exists_is_not_made_again() -> None:
-    spy = Spy()
-    images = Images(dataset(), spy)
-    made = images.made(Settings(method="sart", rays="straight"))
-    bent = images.made(Settings(method="sart"))
-    assert images.straight(bent.result) is made.result
-    assert images.straight(made.result) is made.result
-    assert len(spy.asked) == 2

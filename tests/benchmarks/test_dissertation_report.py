@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import json
 import re
-from contextlib import nullcontext
-from html.parser import HTMLParser
 from importlib import import_module
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from benchmarks.dissertation._outline import CHAPTERS, items
-from benchmarks.dissertation._page import fragment, page
 from benchmarks.dissertation._recorded import RECORDED, recorded_parts
-from benchmarks.dissertation._report import MISSED, PARTLY, REPRODUCED, SKETCH, report_of
+from benchmarks.dissertation._report import report_of
 from benchmarks.dissertation._summary import CASES
 
-from bentray_service.cli.output.benchmark_context import BenchmarkContext
-from bentray_service.cli.output.benchmark_row import Row
-
-from ._fake_benchmarks import IMAGE, Fakes, of, state_of
+from ._fake_benchmarks import of
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -57,102 +50,6 @@ def test_labels_of_the_outline_and_of_the_summary_are_labels_of_recorded_rows():
                 # Some recorded files hold one water only.
                 stem = re.split(", (?:coupling|water) ", name)[0]
                 assert any(label.startswith(stem) for label in labels), case.name
-
-
-def test_states_counts_and_sentences():
-    def part(*rows: Row) -> SimpleNamespace:
-        listed = [row.to_dict() for row in rows]
-        return SimpleNamespace(
-            benchmark="table5",
-            rows=listed,
-            pictures=[],
-            error="",
-            measured="2026-01-01",
-            seconds=1.0,
-            load=0.5,
-            uses_cluster=False,
-        )
-
-    met, missed = (Row(f"Table 5 {value}", value, 2.0, "<=", "s", "") for value in (1.0, 3.0))
-    absent = Row("Table 5 none", None, 2.0, "<=", "s", "no peer")
-    for rows, state in (((met, absent), REPRODUCED), ((met, missed), PARTLY), ((missed,), MISSED)):
-        made = report_of({"table5": part(*rows)}, quick=False, cluster="own workers")
-        assert state_of(made, "Table 5") == state
-        assert bool(of(made, "Table 5")["sentence"]) is (state != REPRODUCED)
-    assert made["rows"] == {"met": 0, "missed": 1, "without a value": 0}
-    for one in made["chapters"]:
-        for item in one["items"]:
-            assert item["sentence"].count(". ") == 0, item["sentence"]
-    assert of(made, "Figure 24")["state"] == SKETCH
-    # A published value that no row has as its goal.
-    frames = part(Row("Figure 26, 27: ball refracting", 0.5, 1.0, "<=", "%", ""))
-    frames.benchmark = "chapter5"
-    made_of_frames = report_of({"chapter5": frames}, quick=True, cluster="own workers")
-    assert state_of(made_of_frames, "Figure 27") == PARTLY
-    assert of(made_of_frames, "Figure 27")["sentence"].startswith("The published rates")
-    quick = report_of({"table5": part(missed)}, quick=True, cluster="own workers")
-    assert of(quick, "Table 5")["sentence"].startswith("1 of 1 rows miss their goal on the small problems")
-
-
-def test_the_summary_names_the_best_peer_and_the_baselines():
-    peers = {"pyGIMLi": 1.2, "ttcrpy": 1.1}
-    water = "water 1500"
-    rows = [Row(f"R6 unseen slice rmse, default, {water}", 25.0, 28.0, "<=", "m/s", "", baselines=IMAGE)]
-    rows += [Row(f"R6 rmse below {name}, {water}", ratio, 1.0, ">", "", "") for name, ratio in peers.items()]
-    part = SimpleNamespace(
-        benchmark="reconstruction_peers",
-        rows=[row.to_dict() for row in rows],
-        pictures=[],
-        error="",
-        measured="2026-01-01",
-        seconds=1.0,
-        load=0.5,
-        uses_cluster=False,
-    )
-    (line,) = report_of({"reconstruction_peers": part}, quick=False, cluster="")["summary"]
-    assert line["best_peer"] == {"name": "ttcrpy", "error": pytest.approx(27.5)}
-    assert (line["default"], line["best_constant"], line["straight"]) == (25.0, 0.3, 0.2)
-    assert line["published"] is None
-
-
-class Outside(HTMLParser):
-    """Collects every address that a page would load or link to."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.found: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        for name, value in attrs:
-            if name in ("src", "href", "srcset", "action", "poster", "data") and value is not None:
-                self.found.append(value)
-
-
-def test_the_page_is_self_contained_and_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(BenchmarkContext, "cluster", lambda self: nullcontext())
-    made = Fakes().report(tmp_path)
-    html = (tmp_path / "report.html").read_text()
-    parser = Outside()
-    parser.feed(html)
-    assert parser.found
-    assert all(address.startswith(("data:image/png;base64,", "#")) for address in parser.found)
-    assert not re.search(r"https?://|url\(|@import|<script|<link", html)
-    assert "&lt;first&gt;" in html
-    assert "a &amp; b" in html
-    assert html.count("<img") == len({file for item in items() for file in item.pictures})
-    targets = re.findall(r' id="([^"]+)"', html)
-    assert len(targets) == len(set(targets))
-    assert {address[1:] for address in parser.found if address.startswith("#")} <= set(targets)
-    assert "prefers-color-scheme: dark" in html
-    assert "@media print" in html
-    assert "width=device-width" in html
-    for item in items():
-        assert f">{item.name}<" in html
-    inner = fragment(made, lambda benchmark, name: None)
-    assert "<html" not in inner
-    assert "<img" not in inner
-    assert "Quick run." in inner
-    assert "Quick run." not in page(made | {"quick": False}, lambda benchmark, name: None)
 
 
 def test_the_page_of_the_documentation_shows_every_item_by_its_recorded_rows(

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.waves import _kwave_peer
 from benchmarks.waves._kwave_peer import installed, mass
 from benchmarks.waves._wave_shots import Shot, delays, misfit, pulse
 
@@ -70,13 +69,3 @@ def test_kwave_gives_our_traces_but_for_the_stated_dispersion(
     assert misfit(shot.ours(), theirs) == pytest.approx(stated, rel=0.1)
     assert misfit(*shot.as_a_refinement(theirs)) < 0.01
     assert programs() == before
-
-
-def test_a_missing_kwave_is_left_out_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    def absent() -> None:
-        raise ImportError("No module named 'kwave'")
-
-    monkeypatch.setattr(_kwave_peer, "python_solver", absent)
-    found, missing = installed()
-    assert not found
-    assert missing == {"k-Wave": "k-Wave is not installed (No module named 'kwave')"}

@@ -24,8 +24,6 @@ from benchmarks.scoreboard._benchlab_cases import (
 from benchmarks.shared._ring_scan import OWN_NODES_A_WAVE, RingScan
 from docs.from_code import scoreboard
 
-from bentray_kernels.errors import InvalidInput
-
 from ..kernels.tomography.comparison.squares import image
 
 
@@ -82,38 +80,6 @@ def test_slices_of_nbp_are_centred_in_water_in_metres_per_second(tmp_path: Path)
     places = np.argwhere(inside)
     assert np.abs(places.min(0) + places.max(0) + 1 - inside.shape).max() <= 2
     assert (fatty.at(101, SIDE_M)[0] == WATER_MPS).all()
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"label": None}, "arrays"),
-        ({"sos": np.full((38, 30), 1500.0)}, "1.5e"),
-        ({"sos": np.ones((38, 30))}, "1000 m/s"),
-    ],
-)
-def test_slices_of_another_layout_are_named(
-    tmp_path: Path, changes: dict[str, np.ndarray], said: str
-) -> None:
-    write_nbp(tmp_path / NBP, **changes)
-    with pytest.raises(InvalidInput, match=said) as refused:
-        list(read_cases(tmp_path))
-    assert "A540024479" in refused.value.field
-
-
-def test_files_that_are_none_are_named(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match=NBP):
-        list(read_cases(tmp_path))
-    for name in (OPENBREASTUS, NBP):
-        (tmp_path / name).write_bytes(b"not found")
-        with pytest.raises(InvalidInput) as refused:
-            list(read_cases(tmp_path))
-        assert refused.value.field == name
-        (tmp_path / name).unlink()
-    with h5py.File(tmp_path / OPENBREASTUS, "w") as file:
-        file["odd"] = np.zeros((3, 4, 5))
-    with pytest.raises(InvalidInput, match="shape"):
-        list(read_cases(tmp_path))
 
 
 def test_the_tissue_holds_enclosed_water_and_no_other() -> None:

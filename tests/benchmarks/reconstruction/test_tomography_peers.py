@@ -6,7 +6,6 @@ import warnings
 
 import numpy as np
 import pytest
-from benchmarks.reconstruction import _tomography_peers
 from benchmarks.reconstruction._tomography_peers import PEERS, installed
 
 from .._small_ring import DISC_MPS, WATER_MPS, disc, ring
@@ -25,11 +24,3 @@ def test_a_peer_finds_a_disc(name: str) -> None:
     assert np.isfinite(speed).all()
     assert speed[disc(times, 0.5)].mean() == pytest.approx(DISC_MPS, abs=12.0)
     assert speed[0, 0] == pytest.approx(WATER_MPS)
-
-
-def test_a_missing_peer_is_left_out_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(_tomography_peers.PEERS, "absent", ("no_such_module", lambda module: module))
-    found, missing = installed()
-    assert "absent" not in found
-    assert "no_such_module" in missing["absent"]
-    assert set(found) | set(missing) == set(PEERS)
