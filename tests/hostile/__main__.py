@@ -1,4 +1,4 @@
-"""Run the hostile list and print its table: ``python -m tests.hostile [service | edge | parts]``."""
+"""Run the hostile list and print its table: ``python -m tests.hostile [service | edge]``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The parts of the hostile list, each with the deployment that it is tried on."""
+"""The hostile list against a service, itself and behind nginx."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeSca
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_workers.files.dataset import write_dataset
 
-from ..faults.machine import Machine
 from .attack_table import Outcome, run
-from .parts_attacks import parts_attacks
 from .service_attacks import Victim, service_attacks
 
 ELEMENTS = 32
@@ -37,19 +35,7 @@ def _on_service(folder: Path, say: Callable[[str], None], *, fronted: bool = Fal
         victim.close()
 
 
-def _on_parts(folder: Path, say: Callable[[str], None]) -> list[Outcome]:
-    scan = _scan()
-    write_dataset(folder / "scan.h5", scan)
-    (folder / "machine").mkdir()
-    machine = Machine(folder / "machine")
-    try:
-        machine.wait_ready()
-        return run(parts_attacks(machine, scan, folder / "scan.h5", folder), say)
-    finally:
-        machine.close()
-
-
-LISTS = {"service": _on_service, "edge": partial(_on_service, fronted=True), "parts": _on_parts}
+LISTS = {"service": _on_service, "edge": partial(_on_service, fronted=True)}
 
 
 def run_list(name: str, folder: Path, say: Callable[[str], None]) -> list[Outcome]:

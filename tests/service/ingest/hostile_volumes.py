@@ -82,6 +82,7 @@ OBJECTS = npy(np.array([{"a": 1}, print], dtype=object))
 
 # Name: the content, what the user says of it, and the field that its refusal names.
 REFUSED: dict[str, tuple[bytes, Given, str]] = {
+    "nothing": (b"", {}, "file"),
     "nothing known": (b"no volume at all", {}, "file"),
     "a pickle": (b"\x80\x04\x8c\x05posix\x94\x8c\x06system\x94\x93\x94.", {}, "file"),
     # NumPy.
@@ -114,6 +115,9 @@ REFUSED: dict[str, tuple[bytes, Given, str]] = {
     # Raw bytes.
     "too few bytes": (bytes(59), RAW, "file"),
     "too many bytes": (bytes(61), RAW, "file"),
+    "raw without a type": (bytes(60), {"shape": [3, 4, 5]}, "dtype"),
+    "raw without a shape": (bytes(60), {"dtype": "uint8"}, "shape"),
+    "raw of one axis": (bytes(60), RAW | {"shape": [60]}, "shape"),
     "raw terabytes": (bytes(60), RAW | {"shape": [10**6, 10**6, 4]}, "shape"),
     "a raw negative size": (bytes(60), RAW | {"shape": [-3, -4, 5]}, "shape"),
     "raw objects": (bytes(480), RAW | {"dtype": "O"}, "dtype"),
@@ -139,6 +143,7 @@ REFUSED: dict[str, tuple[bytes, Given, str]] = {
     "a packed NRRD that is too short": (nrrd(encoding="gzip", values=gzip.compress(bytes(3))), {}, "file"),
     "a declared NRRD bomb": (nrrd(encoding="gzip", sizes="3 4 4000000000", values=b""), {}, "sizes"),
     "a header of NRRD without an end": (b"NRRD0004\n" + b"# nothing\n" * 200_000, {}, "file"),
+    "one unit of inches": (nrrd("spacings: 1 1 1", 'units: "mm" "mm" "inch"'), {}, "units"),
     "an unknown unit": (nrrd("spacings: 1 1 1", 'units: "ell" "ell" "ell"'), {}, "units"),
     "spacings that are none": (nrrd("spacings: nan nan nan"), {}, "spacings"),
     "endless directions": (
@@ -161,6 +166,8 @@ REFUSED: dict[str, tuple[bytes, Given, str]] = {
     "a scale without end": (nifti({"scl_slope": np.float32(3e38), "scl_inter": 3e38}), {}, "values"),
     "a grid of nothing": (nifti({"sform_code": 1, "srow_x": [0, 0, 0, 0]}), {}, "spacing_m"),
     "a sheared grid": (nifti({"sform_code": 1, "srow_x": [1, 0.9, 0, 0]}), {}, "affine"),
+    "a grid without end": (nifti({"sform_code": 1, "srow_x": [1, 0, 0, np.inf]}), {}, "origin_m"),
+    "a value of NIfTI that is none": (nifti({"datatype": 16, "bitpix": 32}, b"\xff" * 240), {}, "values"),
     "spacing without end": (nifti(UNPLACED | {"pixdim": [1, np.inf, 1, 1, 0, 0, 0, 0]}), {}, "spacing_m"),
     "a packed NIfTI cut short": (gzip.compress(nifti())[:-40], {}, "file"),
     "a packed file of another kind": (gzip.compress(b"x" * 1000), {}, "file"),

@@ -3,7 +3,6 @@
 import base64
 import io
 import json
-import struct
 
 import numpy as np
 import pytest
@@ -149,20 +148,14 @@ def lone(place, accepted="three"):
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", "file: found an empty file"),
         (b"\x00\x01\x02 something else", "a file of another kind .it begins with"),
-        (b"PK\x03\x04" + b"v 0 0 0" * 9, "a file of another kind"),
         (lone("0 1 0", "9"), "file: found OBJ data that are truncated, damaged"),
         (lone("0 1 0", "0"), "faces: found 'f 1 2 0' in line 4; accepted: vertices from 1, or from -1 to -3"),
         (lone("0 1 0", "-4"), "faces: found 'f 1 2 -4' in line 4"),
-        (lone("nan 1 0", "3"), "not finite"),
-        (lone("inf 1 0", "3"), "not finite"),
         (lone("2 0 0", "3"), "1 without area"),
         (b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "vertices: found 'v 0 0' in line 1"),
         (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "an STL of words without its end"),
         (exported("stl")[:-1], r"or a binary STL of \d+ bytes, where its header means \d+"),
-        (b"OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n", "faces: found none|damaged"),
-        (b"ply\nformat ascii 1.0\nelement vertex 2000000000\nproperty float x\nend_header\n", "damaged"),
     ],
 )
 def test_rejects_invalid_meshes(data, words):
@@ -172,16 +165,6 @@ def test_rejects_invalid_meshes(data, words):
 
 def scene(buffers, **more):
     return json.dumps({"asset": {"version": "2.0"}, "buffers": buffers, "meshes": [], **more}).encode()
-
-
-@pytest.mark.parametrize("uri", ["outside.bin", "file:///etc/passwd", "http://127.0.0.1/a.bin", "../a.bin"])
-def test_gltf_does_not_open_external_files(uri):
-    with pytest.raises(InvalidInput, match=r"buffers/uri: found .*; accepted: data within the file"):
-        read_mesh(scene([{"uri": uri, "byteLength": 4}]))
-    text = scene([{"uri": uri, "byteLength": 4}]).ljust(400)
-    glb = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text), len(text), b"JSON") + text
-    with pytest.raises(InvalidInput, match="buffers/uri"):
-        read_mesh(glb)
 
 
 def test_images_of_gltf_are_not_looked_at(monkeypatch):
