@@ -59,13 +59,13 @@ class AngularCoverage(NamedTuple):
         """A sentence in plain words."""
         if not self.limited:
             return "Paths cross the object in every direction."
-        part = f"paths run in {100.0 * self.visible:.0f} % of the directions on average"
+        coverage = f"paths run in {100.0 * self.visible:.0f} % of the directions on average"
         if self.turn_deg is not None:
-            part = f"elements cover {self.turn_deg:.0f}° of 360°, {part}"
+            coverage = f"elements cover {self.turn_deg:.0f}° of 360°, {coverage}"
         edges = "edges parallel to the missing directions"
         if self.missing_deg is not None:
             edges += f", mostly {self.missing_deg[0]:.0f}° to {self.missing_deg[1]:.0f}° from the x axis,"
-        return f"Limited angle: {part}; {edges} are blurred."
+        return f"Limited angle: {coverage}; {edges} are blurred."
 
 
 def angular_coverage(position_m: Floats, start_m: Floats, end_m: Floats) -> AngularCoverage | None:
@@ -123,8 +123,8 @@ def _crossed(start: Floats, end: Floats, edges: Floats, grid: tuple[Floats, floa
     direction = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
     limit = math.sin(0.5 * math.pi / DIRECTIONS) if len(low) == 2 else math.sin(math.radians(ALONG_DEG))
     # Twice in each cell.
-    part = np.linspace(0.0, 1.0, 2 * max(shape) + 1)
-    points = start[:, None] + part[:, None] * along[:, None]
+    fraction = np.linspace(0.0, 1.0, 2 * max(shape) + 1)
+    points = start[:, None] + fraction[:, None] * along[:, None]
     node = np.clip(((points - low) / width).astype(np.int64), 0, np.array(shape) - 1)
     cell = np.ravel_multi_index(tuple(np.moveaxis(node, -1, 0)), shape)
     crossed = np.zeros((math.prod(shape), len(edges)), dtype=np.bool_)
@@ -133,9 +133,9 @@ def _crossed(start: Floats, end: Floats, edges: Floats, grid: tuple[Floats, floa
     return crossed
 
 
-def _missing(part: Floats) -> tuple[float, float] | None:
+def _missing(visible: Floats) -> tuple[float, float] | None:
     """The widest run of directions that fewer than half of the cells have, degrees; None without one."""
-    rare = part < 0.5
+    rare = visible < 0.5
     if not rare.any() or rare.all():
         return None
     first = int(np.argmin(rare))
@@ -143,7 +143,7 @@ def _missing(part: Floats) -> tuple[float, float] | None:
     edges = np.flatnonzero(np.diff(np.concatenate(([False], turned, [False])).astype(np.int8)))
     runs = edges.reshape(-1, 2)
     begin, end = max(runs.tolist(), key=lambda run: run[1] - run[0])
-    step = 180.0 / len(part)
+    step = 180.0 / len(visible)
     low = (begin + first) * step % 180.0
     return low, low + (end - begin) * step
 

@@ -113,10 +113,10 @@ def rearranged(dataset: Dataset, name: str) -> Dataset:
     Raises:
         InvalidInput: for a name that is none, or does not apply to the array.
     """
-    for one in arrangements(dataset):
-        if one.name == name:
-            counts = _without_own(dataset, one)
-            changes = {"tx": one.tx, "rx": one.rx, "element_position_m": one.position_m}
+    for order in arrangements(dataset):
+        if order.name == name:
+            counts = _without_own(dataset, order)
+            changes = {"tx": order.tx, "rx": order.rx, "element_position_m": order.position_m}
             return replace(dataset, **changes, impossible_times=counts)  # type: ignore[arg-type]
     accepted = (
         "emitters-, receivers- or elements- with reversed, shifted-by-N, reversed-shifted-by-N, grid-…, "
@@ -126,11 +126,11 @@ def rearranged(dataset: Dataset, name: str) -> Dataset:
     raise InvalidInput("arrangement", repr(name)[:60], accepted)
 
 
-def _without_own(dataset: Dataset, one: Arrangement) -> dict[str, int]:
+def _without_own(dataset: Dataset, arrangement: Arrangement) -> dict[str, int]:
     """Numbers of impossible times without those of an element to itself, which are rightly 0."""
     counts = dict(dataset.impossible_times)
     if dataset.tof_s is not None and AT_ZERO in counts:
-        own = one.tx[:, None] == one.rx[None, :]
+        own = arrangement.tx[:, None] == arrangement.rx[None, :]
         counts[AT_ZERO] -= int((own & np.isnan(dataset.tof_s)).sum())
     return {kind: count for kind, count in counts.items() if count > 0}
 
@@ -165,7 +165,9 @@ def _turns(position: Floats) -> bool:
     """Whether the array turns into itself from each element to the next."""
     first, last = position[0], position[-1]
     step, near = np.roll(position, 1, axis=0), 1e-6 * float(np.ptp(position, axis=0).max())
-    offsets = [np.linalg.norm(places - place, axis=1) for places, place in ((position, first), (step, last))]
+    offsets = [
+        np.linalg.norm(points - origin, axis=1) for points, origin in ((position, first), (step, last))
+    ]
     return bool(np.abs(np.subtract(*offsets)).max() < near) and bool(
         np.ptp(np.linalg.norm(position - step, axis=1)) < near
     )
@@ -299,46 +301,47 @@ class _Times:
         assert times is not None
         self.times = times if dataset.valid is None else np.where(dataset.valid, times, np.nan)
         self.water_mps = dataset.water_speed_mps
-        known = self.times[np.isfinite(self.times)]
-        self.count = known.size
-        off = np.abs(known - np.median(known)) if known.size else np.zeros(1)
+        finite_times = self.times[np.isfinite(self.times)]
+        self.count = finite_times.size
+        off = np.abs(finite_times - np.median(finite_times)) if finite_times.size else np.zeros(1)
         # Wrong picks are cut off; an object that few chords cross is not.
         self.most = float(next((x for x in np.percentile(off, (90.0, 95.0, 98.0)) if x > 0.0), 0.0))
         self.spread = float(np.minimum(off, self.most).mean())
         self.least = LEAST * self.spread
 
-    def fits(self, some: Sequence[Arrangement], most: tuple[int, int]) -> _Measure:
+    def fits(self, tried: Sequence[Arrangement], most: tuple[int, int]) -> _Measure:
         """The fits of arrangements with the same positions.
 
         Args:
-            some: the arrangements.
+            tried: the arrangements.
             most: emissions and receivers that are compared, evenly spaced.
         """
-        position = some[0].position_m
+        position = tried[0].position_m
         e, r = (_evenly(n, m) for n, m in zip(self.times.shape, most, strict=True))
-        tx, rx = np.stack([one.tx for one in some]), np.stack([one.rx for one in some])
+        tx, rx = np.stack([order.tx for order in tried]), np.stack([order.rx for order in tried])
         sent, heard = tx[:, e], rx[:, r]
         times = self.times[np.ix_(e, r)]
         distance = _distance(position, sent, heard)
         width = float(np.ptp(position, axis=0).max())
-        known = np.isfinite(times) & (distance > NEAR * width)
-        late, slope = self._lateness(distance, known, times)
+        usable = np.isfinite(times) & (distance > NEAR * width)
+        late, slope = self._lateness(distance, usable, times)
         short = np.where(distance <= SHORT * width, late, np.nan)
         # The same pairs in the other direction, if they were measured.
         at_tx, at_rx = _places(tx, len(position)), _places(rx, len(position))
-        row = np.arange(len(some))[:, None]
+        row = np.arange(len(tried))[:, None]
         back_e, back_r = at_tx[row, heard][:, None, :], at_rx[row, sent][:, :, None]
         both = (back_e >= 0) & (back_r >= 0) & (sent[:, :, None] != heard[:, None, :])
         reverse = np.where(both, times - self.times[back_e, back_r], np.nan)
-        beside = _neighbours(position, some[0].rx)[heard]
-        at = at_rx[row, beside]
-        late_beside = self.times[e[None, :, None], at[:, None, :]] - slope * _distance(position, sent, beside)
+        nearest = _neighbours(position, tried[0].rx)[heard]
+        at = at_rx[row, nearest]
+        expected = slope * _distance(position, sent, nearest)
+        late_beside = self.times[e[None, :, None], at[:, None, :]] - expected
         residuals = (late, short, reverse, late - late_beside)
         measures = [_measure(values, self.most, median=self.absolute) for values in residuals]
         if not self.absolute:
             # Not about their own middle: those of another order may be large and alike.
             measures[1] = _measure(short, self.most, median=False, about=0.0)
-        fit = _Measure(*(np.stack(part, axis=1) for part in zip(*measures, strict=True)))
+        fit = _Measure(*(np.stack(column, axis=1) for column in zip(*measures, strict=True)))
         if not self.absolute:
             # A rearrangement does not change the residuals of differences as a whole.
             fit.typical[:, 0] = np.nan
@@ -353,20 +356,20 @@ class _Times:
         if not self.absolute:
             return [0.0]
         water = 1.0 / self.water_mps
-        parts = np.linspace(5.0, 95.0, 19)
-        x, y = (np.percentile(values, parts) for values in (distance, times))
+        percents = np.linspace(5.0, 95.0, 19)
+        x, y = (np.percentile(values, percents) for values in (distance, times))
         x, y = x - x.mean(), y - y.mean()
         slope = float(x @ y) / max(float(x @ x), 1e-30)
         return [water, min(max(slope, 1.0 / FASTEST_MPS), 1.0 / SLOWEST_MPS)]
 
-    def _lateness(self, distance: Floats, known: Flags, times: Floats) -> tuple[Floats, Floats]:
+    def _lateness(self, distance: Floats, usable: Flags, times: Floats) -> tuple[Floats, Floats]:
         """Times minus those along the better one of two slownesses, and the slowness of each arrangement."""
         late, best = np.full(distance.shape, np.nan), np.full(len(distance), np.inf)
         chosen = np.zeros(len(distance))
-        whole = known[0]
+        whole = usable[0]
         pairs = (distance[0][whole], times[whole]) if whole.any() else (np.ones(1), np.ones(1))
         for slowness in self._slownesses(*pairs):
-            off = np.where(known, times - slowness * distance, np.nan)
+            off = np.where(usable, times - slowness * distance, np.nan)
             size = np.nan_to_num(_measure(off, self.most, median=True).typical, nan=np.finfo(np.float64).max)
             better = size < best
             late[better], best[better], chosen[better] = off[better], size[better], slowness
@@ -375,9 +378,10 @@ class _Times:
     def step(self) -> float:
         """Usual difference of the times of neighbouring receivers by their distances, s."""
         e, r = (_evenly(n, m) for n, m in zip(self.times.shape, SEARCHED, strict=True))
-        one = self.given
-        beside = _neighbours(one.position_m, one.rx)[one.rx[r]]
-        near, far = (_distance(one.position_m, one.tx[None, e], heard[None]) for heard in (one.rx[r], beside))
+        given = self.given
+        nearest = _neighbours(given.position_m, given.rx)[given.rx[r]]
+        sent = given.tx[None, e]
+        near, far = (_distance(given.position_m, sent, heard[None]) for heard in (given.rx[r], nearest))
         return float(np.median(np.abs(near - far))) / self.water_mps
 
     def unrelated(self) -> float:
@@ -385,8 +389,8 @@ class _Times:
         e, r = (_evenly(n, m) for n, m in zip(self.times.shape, JUDGED, strict=True))
         distance = _distance(self.given.position_m, self.given.tx[None, e], self.given.rx[None, r])
         times = self.times[np.ix_(e, r)]
-        known = np.isfinite(times) & (distance > NEAR * distance.max(initial=0.0))
-        x, y = distance[known], times[known[0]]
+        usable = np.isfinite(times) & (distance > NEAR * distance.max(initial=0.0))
+        x, y = distance[usable], times[usable[0]]
         if not self.absolute or x.size < 2 * MIN_PAIRS:
             return math.nan
         low, middle, high = np.percentile(x, (10.0, 50.0, 90.0))
@@ -425,13 +429,13 @@ def find_mismatch(dataset: Dataset) -> Mismatch | None:
     if _surely_right(times, unrelated, before.typical[0]):
         return None
     ranked = sorted(_ranked(times, dataset), key=lambda row: row[:2])
-    finalists = [(number, one) for _, number, one in ranked[:FINALISTS]]
+    finalists = [(number, arrangement) for _, number, arrangement in ranked[:FINALISTS]]
     judged = []
-    for number, one in finalists:
-        after = times.fits([one], JUDGED)
+    for number, arrangement in finalists:
+        after = times.fits([arrangement], JUDGED)
         gain = _gains(before, after, times.least)
         if gain.accepted[0]:
-            judged.append((-float(gain.total[0]), number, one, after))
+            judged.append((-float(gain.total[0]), number, arrangement, after))
     if judged and (named := _named(times, before, judged)):
         return named
     if unrelated > UNRELATED:
@@ -450,10 +454,10 @@ def _surely_right(times: _Times, unrelated: float, typical: Floats) -> bool:
 def _ranked(times: _Times, dataset: Dataset) -> Iterator[tuple[float, int, Arrangement]]:
     """Arrangements that may be better than that of the scan, with minus their gain and their number."""
     before = times.fits([times.given], SEARCHED)
-    for numbers, some in _batches(arrangements(dataset)):
-        gain = _gains(before, times.fits(some, SEARCHED), times.least)
+    for numbers, batch in _batches(arrangements(dataset)):
+        gain = _gains(before, times.fits(batch, SEARCHED), times.least)
         yield from (
-            (-float(gain.total[k]), numbers[k], some[k]) for k in np.flatnonzero(gain.promising).tolist()
+            (-float(gain.total[k]), numbers[k], batch[k]) for k in np.flatnonzero(gain.promising).tolist()
         )
 
 
@@ -467,11 +471,11 @@ class _Gains(NamedTuple):
 
 def _gains(before: _Measure, after: _Measure, least: float) -> _Gains:
     """Compare the fit of one arrangement with those of others."""
-    known = np.isfinite(before.typical) & np.isfinite(after.typical)
+    finite = np.isfinite(before.typical) & np.isfinite(after.typical)
     logs = np.log(np.fmax(before.typical, least) / np.fmax(after.typical, least))
     sigma = np.hypot(before.sigma, after.sigma)
-    certain = known & (logs > np.fmax(-math.log(BETTER), CERTAIN * sigma))
-    logs = np.where(known, logs, 0.0)
+    certain = finite & (logs > np.fmax(-math.log(BETTER), CERTAIN * sigma))
+    logs = np.where(finite, logs, 0.0)
     total = logs.sum(axis=1)
     promising = certain.any(axis=1) & (total > 0.0)
     return _Gains(total, promising, promising & (logs > -math.log(WORSE)).all(axis=1))
@@ -484,21 +488,25 @@ def _named(
     best_loss = min(loss for loss, *_ in judged)
     # Medians do not see a few wrong places, which means do.
     near = [
-        (_mean(after), number, one, after) for loss, number, one, after in judged if loss < best_loss + NEARLY
+        (_mean(after), number, order, after)
+        for loss, number, order, after in judged
+        if loss < best_loss + NEARLY
     ]
     least, _, best, after = min(near, key=lambda row: row[:2])
-    rivals = [one for mean, _, one, _ in near if mean * CLEARLY <= least and not _alike(one, best)]
+    rivals = [order for mean, _, order, _ in near if mean * CLEARLY <= least and not _alike(order, best)]
     if times.absolute and after.mean[0, 0] > EXPLAINED * before.mean[0, 0]:
         return None
     if rivals:
-        found = _numbers(before, after, "in several other orders of the elements about")
-        return Mismatch(found, None)
+        message = _numbers(before, after, "in several other orders of the elements about")
+        return Mismatch(message, None)
     # The simplest of those that are the same.
     same = next(
-        one for _, _, one, _ in sorted(near, key=lambda row: row[1]) if one is best or _alike(one, best)
+        order
+        for _, _, order, _ in sorted(near, key=lambda row: row[1])
+        if order is best or _alike(order, best)
     )
-    found = _numbers(before, after, f"with {same.words} set right")
-    return Mismatch(found, same)
+    message = _numbers(before, after, f"with {same.words} set right")
+    return Mismatch(message, same)
 
 
 def _mean(fit: _Measure) -> float:
@@ -506,10 +514,10 @@ def _mean(fit: _Measure) -> float:
     return float(np.exp(np.nanmean(np.log(np.maximum(fit.mean, 1e-15)))))
 
 
-def _alike(one: Arrangement, other: Arrangement) -> bool:
+def _alike(first: Arrangement, other: Arrangement) -> bool:
     """Whether two arrangements have the same distances."""
-    pair = [_distance(a.position_m, a.tx[None], a.rx[None])[0] for a in (one, other)]
-    return bool(np.abs(np.subtract(*pair)).max() < 1e-6 * float(np.ptp(one.position_m, axis=0).max()))
+    pair = [_distance(a.position_m, a.tx[None], a.rx[None])[0] for a in (first, other)]
+    return bool(np.abs(np.subtract(*pair)).max() < 1e-6 * float(np.ptp(first.position_m, axis=0).max()))
 
 
 # What each residual is, in words.
@@ -534,16 +542,16 @@ def _numbers(before: _Measure, after: _Measure | None, what: str = "") -> str:
     return f"{RESIDUALS[kind]} {1e6 * sizes[kind]:.3g} µs, {what} {1e6 * max(right[kind], floor):.2g} µs"
 
 
-def _batches(some: Iterable[Arrangement]) -> Iterator[tuple[list[int], list[Arrangement]]]:
+def _batches(listed: Iterable[Arrangement]) -> Iterator[tuple[list[int], list[Arrangement]]]:
     """Arrangements with the same positions, together, with their numbers."""
     numbers: list[int] = []
     batch: list[Arrangement] = []
-    for number, one in enumerate(some):
-        if batch and (len(batch) == BATCH or one.position_m is not batch[0].position_m):
+    for number, arrangement in enumerate(listed):
+        if batch and (len(batch) == BATCH or arrangement.position_m is not batch[0].position_m):
             yield numbers, batch
             numbers, batch = [], []
         numbers.append(number)
-        batch.append(one)
+        batch.append(arrangement)
     if batch:
         yield numbers, batch
 
@@ -563,21 +571,21 @@ def _distance(position: Floats, sent: Ints, heard: Ints) -> Floats:
 
 def _places(listed: Ints, elements: int) -> Ints:
     """Index of each element in lists, (arrangements, elements); -1 where it is absent."""
-    places = np.full((len(listed), elements), -1, dtype=np.int64)
-    np.put_along_axis(places, listed, np.broadcast_to(np.arange(listed.shape[1]), listed.shape), axis=1)
-    return places
+    indices = np.full((len(listed), elements), -1, dtype=np.int64)
+    np.put_along_axis(indices, listed, np.broadcast_to(np.arange(listed.shape[1]), listed.shape), axis=1)
+    return indices
 
 
 def _neighbours(position: Floats, listed: Ints) -> Ints:
     """The nearest other receiver of each element, (elements,)."""
     there = np.unique(listed)
-    found = np.empty(len(position), dtype=np.int64)
+    nearest = np.empty(len(position), dtype=np.int64)
     for start in range(0, len(position), 512):
-        part = position[start : start + 512]
-        apart = np.linalg.norm(part[:, None] - position[there], axis=-1)
+        block = position[start : start + 512]
+        apart = np.linalg.norm(block[:, None] - position[there], axis=-1)
         apart[apart == 0.0] = np.inf
-        found[start : start + 512] = there[np.argmin(apart, axis=1)]
-    return found
+        nearest[start : start + 512] = there[np.argmin(apart, axis=1)]
+    return nearest
 
 
 class _Measure(NamedTuple):
@@ -606,10 +614,10 @@ def _measure(values: Floats, most: float, *, median: bool, about: float | None =
     cut = np.where(np.isfinite(size), np.minimum(size, most), 0.0)
     mean = cut.sum(axis=1) / number
     if median:
-        place = (PART * middle / 0.5).astype(np.int64)
-        typical = np.take_along_axis(np.sort(size, axis=1), place, axis=1)[:, 0]
+        rank = (PART * middle / 0.5).astype(np.int64)
+        typical = np.take_along_axis(np.sort(size, axis=1), rank, axis=1)[:, 0]
         sigma = MEDIAN_SIGMA / np.sqrt(number)
     else:
         typical = mean
         sigma = np.sqrt((cut**2).sum(axis=1)) / np.maximum(mean * number, 1e-30)
-    return _Measure(*(np.where(enough, part, np.nan) for part in (typical, sigma, mean)))
+    return _Measure(*(np.where(enough, sizes, np.nan) for sizes in (typical, sigma, mean)))

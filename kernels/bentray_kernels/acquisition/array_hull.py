@@ -66,12 +66,12 @@ def inside_array(
         InvalidInput: as ``check_extent``.
     """
     check_extent(position_m)
-    place = (position_m - np.asarray(origin)) / spacing
+    position = (position_m - np.asarray(origin)) / spacing
     lines = [np.arange(n, dtype=np.float64) for n in shape]
     columns = np.stack(np.meshgrid(*lines[:-1], indexing="ij"), axis=-1)
     # The hull is convex: of each column of nodes along the last axis it holds one interval.
     low, high = np.full(shape[:-1], -np.inf), np.full(shape[:-1], np.inf)
-    for *normal, offset in _faces(place, rim_nodes):
+    for *normal, offset in _faces(position, rim_nodes):
         excess = columns @ np.array(normal[:-1]) + (offset + rim_nodes - ROUNDING)
         if abs(normal[-1]) < FLAT:
             high[excess > 0.0] = -np.inf
@@ -80,7 +80,7 @@ def inside_array(
         else:
             np.maximum(low, -excess / normal[-1], out=low)
     region = (lines[-1] >= low[..., None]) & (lines[-1] <= high[..., None])
-    _clear_near(region, place, rim_nodes)
+    _clear_near(region, position, rim_nodes)
     return np.asarray(region)
 
 
@@ -101,26 +101,26 @@ def depth_inside(position_m: Floats, places_m: Floats) -> Floats:
     return np.asarray(-(places_m @ faces[:, :-1].T + faces[:, -1]).max(axis=1))
 
 
-def _faces(place: Floats, rim_nodes: float) -> Floats:
+def _faces(position: Floats, rim_nodes: float) -> Floats:
     """Outward unit normals and offsets of the faces of the hull, (faces, ndim + 1), without open ends."""
     # SciPy is not needed to check an upload, which imports this module.
     from scipy.spatial import ConvexHull
 
     # Flat faces are divided into triangles, each with the same equation.
-    faces = np.unique(np.round(ConvexHull(place).equations, 9), axis=0)
-    if place.shape[1] == 2:
+    faces = np.unique(np.round(ConvexHull(position).equations, 9), axis=0)
+    if position.shape[1] == 2:
         return np.asarray(faces)
     for end in (1.0, -1.0):
         lid = end * faces[:, 2] > LEVEL
-        if lid.any() and _open(place, end, rim_nodes):
+        if lid.any() and _open(position, end, rim_nodes):
             faces = faces[~lid]
     return np.asarray(faces)
 
 
-def _open(place: Floats, end: float, rim_nodes: float) -> bool:
+def _open(position: Floats, end: float, rim_nodes: float) -> bool:
     """Whether the upper (1) or lower (-1) face of an array has no elements but those of its edge."""
-    height = end * place[:, 2]
-    flat = place[height >= height.max() - 0.5][:, :2]
+    height = end * position[:, 2]
+    flat = position[height >= height.max() - 0.5][:, :2]
     centred = flat - flat.mean(axis=0)
     sizes = np.linalg.svd(centred, compute_uv=False)
     if len(flat) < 3 or sizes[-1] <= FLAT * sizes[0]:
@@ -130,12 +130,12 @@ def _open(place: Floats, end: float, rim_nodes: float) -> bool:
     return not (depth > rim_nodes).any()
 
 
-def _clear_near(region: Flags, place: Floats, rim_nodes: float) -> None:
-    """Remove the nodes nearer to an element than the rim; ``place`` in nodes."""
+def _clear_near(region: Flags, position: Floats, rim_nodes: float) -> None:
+    """Remove the nodes nearer to an element than the rim; ``position`` in nodes."""
     reach = int(np.ceil(rim_nodes))
-    first = np.floor(place).astype(np.int64)
-    for step in product(range(-reach, reach + 2), repeat=place.shape[1]):
+    first = np.floor(position).astype(np.int64)
+    for step in product(range(-reach, reach + 2), repeat=position.shape[1]):
         node = first + np.array(step)
-        near = np.linalg.norm(node - place, axis=1) < rim_nodes - ROUNDING
+        near = np.linalg.norm(node - position, axis=1) < rim_nodes - ROUNDING
         near &= ((node >= 0) & (node < region.shape)).all(axis=1)
         region[tuple(node[near].T)] = False

@@ -99,8 +99,8 @@ class Dataset:
 
     def __post_init__(self) -> None:
         self._fill_masks()
-        for place, shape in self.shapes().items():
-            check_size(place, shape)
+        for path, shape in self.shapes().items():
+            check_size(path, shape)
         position = self.element_position_m
         if position.ndim != 2 or position.shape[1] not in (2, 3) or len(position) < 3:
             raise InvalidInput(
@@ -142,7 +142,7 @@ class Dataset:
             array = getattr(self, name)
             if isinstance(array, np.ma.MaskedArray):
                 object.__setattr__(self, name, np.ma.filled(array, False))
-        for place, array in (
+        for path, array in (
             (POSITION, self.element_position_m),
             ("acquisition/tx", self.tx),
             ("acquisition/rx", self.rx),
@@ -151,7 +151,7 @@ class Dataset:
             ("geometry/element_normal", self.element_normal),
         ):
             if array is not None:
-                refuse_mask(place, array)
+                refuse_mask(path, array)
 
     def _leave_out_impossible(self) -> None:
         """Replace travel times that no sound can have by NaN, and count them."""
@@ -165,10 +165,10 @@ class Dataset:
             # Another shape is refused below.
             if times is None or times.shape != pairs:
                 continue
-            kept, found = without_impossible(times, geometry, absolute=name == "tof_s")
+            kept, impossible = without_impossible(times, geometry, absolute=name == "tof_s")
             if kept is not times:
                 object.__setattr__(self, name, kept)
-            for kind, count in found.items():
+            for kind, count in impossible.items():
                 counts[kind] = counts.get(kind, 0) + count
         object.__setattr__(self, "impossible_times", counts)
         if self.sigma_s is not None and self.picked and self.sigma_s.shape == pairs:
@@ -244,7 +244,7 @@ class Dataset:
             "waveform/object": None if traces is None else traces.object,
             "truth/sound_speed_mps": None if truth is None else truth.sound_speed_mps,
         }
-        return {place: array.shape for place, array in arrays.items() if array is not None}
+        return {path: array.shape for path, array in arrays.items() if array is not None}
 
     @property
     def slices(self) -> int:
@@ -263,25 +263,25 @@ class Dataset:
         if self.slice_z_m is None:
             return self
 
-        def one(array: NDArray | None) -> NDArray | None:  # type: ignore[type-arg]
+        def slice_of(array: NDArray | None) -> NDArray | None:  # type: ignore[type-arg]
             return None if array is None else array[index]
 
         traces = self.waveform
         if traces is not None:
             traces = Waveform(
                 traces.object[index],
-                one(traces.water),
+                slice_of(traces.water),
                 traces.scale,
-                one(traces.object_scale),
-                one(traces.water_scale),
+                slice_of(traces.object_scale),
+                slice_of(traces.water_scale),
             )
         return replace(
             self,
-            tof_s=one(self.tof_s),
-            delta_tof_s=one(self.delta_tof_s),
-            sigma_s=one(self.sigma_s),
-            log_ratio_np=one(self.log_ratio_np),
-            valid=one(self.valid),
+            tof_s=slice_of(self.tof_s),
+            delta_tof_s=slice_of(self.delta_tof_s),
+            sigma_s=slice_of(self.sigma_s),
+            log_ratio_np=slice_of(self.log_ratio_np),
+            valid=slice_of(self.valid),
             waveform=traces,
             truth=None,
             slice_z_m=None,

@@ -94,23 +94,23 @@ def without_impossible(
         to itself are left as they are. Where most times seem impossible, the unit is wrong, and they stay.
     """
     counts: dict[str, int] = {}
-    found = times
+    read = times
     if isinstance(times, np.ma.MaskedArray):
-        found = np.ma.filled(times.astype(np.float64), np.nan)
+        read = np.ma.filled(times.astype(np.float64), np.nan)
         counts[MASKED] = int(np.ma.getmaskarray(times).sum())
     elif times.dtype.kind in "iu":
-        found = times.astype(np.float64)
-    infinite = np.isinf(found)
+        read = times.astype(np.float64)
+    infinite = np.isinf(read)
     if infinite.any():
         counts[INFINITE] = int(infinite.sum())
-        found = np.where(infinite, np.nan, found)
-    stacked = found[None] if found.ndim == 2 else found
+        read = np.where(infinite, np.nan, read)
+    stacked = read[None] if read.ndim == 2 else read
     for kind, flags in _impossible(stacked, geometry, absolute=absolute):
         counts[kind] = counts.get(kind, 0) + int(flags.sum())
         stacked = np.where(flags, np.nan, stacked)
-    found = stacked[0] if found.ndim == 2 else stacked
+    read = stacked[0] if read.ndim == 2 else stacked
     kept = {kind: count for kind, count in counts.items() if count}
-    return (found if kept or found is not times else times), kept
+    return (read if kept or read is not times else times), kept
 
 
 def _impossible(times: Floats, geometry: Geometry, *, absolute: bool) -> Iterator[tuple[str, Flags]]:
@@ -130,7 +130,7 @@ def _impossible(times: Floats, geometry: Geometry, *, absolute: bool) -> Iterato
         # Differences of 0, beside a small object, are right in every unit.
         if flags.sum() <= MOST * (np.isfinite(times) & (times != 0.0)).sum():
             yield from (
-                (kind, part) for kind, part in ((TOO_LATE, late), (TOO_EARLY, flags & ~late)) if part.any()
+                (kind, pairs) for kind, pairs in ((TOO_LATE, late), (TOO_EARLY, flags & ~late)) if pairs.any()
             )
         else:
             return
@@ -140,8 +140,8 @@ def _impossible(times: Floats, geometry: Geometry, *, absolute: bool) -> Iterato
         early = _at_once(times, geometry, absolute=absolute)
         if early.any() and early.sum() <= MOST * np.isfinite(times).sum():
             half = [
-                flags.sum() >= HALF * np.isfinite(one).sum() and _is_half(flags, one, geometry)
-                for flags, one in zip(early, times, strict=True)
+                flags.sum() >= HALF * np.isfinite(plane).sum() and _is_half(flags, plane, geometry)
+                for flags, plane in zip(early, times, strict=True)
             ]
             once = early & np.array(half)[:, None, None]
             yield ONE_WAY, once
@@ -152,7 +152,7 @@ def _impossible(times: Floats, geometry: Geometry, *, absolute: bool) -> Iterato
         yield PLACEHOLDER, held
         times = np.where(held, np.nan, times)
     if not absolute and least <= 0.0 <= most:
-        zero = np.stack([_one_way(one, geometry) for one in times])
+        zero = np.stack([_one_way(plane, geometry) for plane in times])
         if zero.any():
             yield ONE_WAY, zero
 
@@ -186,18 +186,18 @@ def _at_once(times: Floats, geometry: Geometry, *, absolute: bool) -> Flags:
 def _placeholders(times: Floats) -> Flags:
     """Repeated numbers that programs write for a missing value, outside the range of the others."""
     flags = np.zeros(times.shape, dtype=bool)
-    known = times[np.isfinite(times)]
-    if not known.size:
+    finite = times[np.isfinite(times)]
+    if not finite.size:
         return flags
     for unit in UNITS:
         for number in PLACEHOLDERS:
             value = number * unit
             low, high = sorted((value * (1.0 - SAME), value * (1.0 + SAME)))
             # Without arrays of floating-point numbers, since scans are large and most have no placeholder.
-            if ((known >= low) & (known <= high)).sum() < REPEATED:
+            if ((finite >= low) & (finite <= high)).sum() < REPEATED:
                 continue
             same = (times >= low) & (times <= high)
-            if same.sum() == known.size:
+            if same.sum() == finite.size:
                 continue
             others = times[np.isfinite(times) & ~same & ~flags]
             low, high = np.percentile(others, OUTSIDE)
@@ -254,8 +254,8 @@ def _one_way(times: Floats, geometry: Geometry) -> Flags:
 def _step(times: Floats) -> float:
     """The step of which all times are multiples, s; 0 without one."""
     sizes = np.unique(np.abs(times))
-    parts = sizes / sizes[0]
-    return float(sizes[0]) if np.abs(parts - np.rint(parts)).max() < 0.01 else 0.0
+    ratios = sizes / sizes[0]
+    return float(sizes[0]) if np.abs(ratios - np.rint(ratios)).max() < 0.01 else 0.0
 
 
 def lost_pairs(counts: Mapping[str, int]) -> int:

@@ -76,21 +76,21 @@ def check_plausible(dataset: Dataset) -> None:
             ``WrongArrangement`` with the arrangement that explains the times.
     """
     _check_places(dataset)
-    for place, times in (
+    for path, times in (
         ("traveltime/tof_s", dataset.tof_s),
         ("traveltime/delta_tof_s", dataset.delta_tof_s),
     ):
         if times is not None:
-            _check_times(dataset, place, times)
-            rules.within_or_nan(place, times, TIME_S)
-    for place, values, within in (
+            _check_times(dataset, path, times)
+            rules.within_or_nan(path, times, TIME_S)
+    for path, values, within in (
         ("traveltime/sigma_s", dataset.sigma_s, DEVIATION_S),
         ("amplitude/log_ratio_np", dataset.log_ratio_np, LOG_RATIO_NP),
         ("geometry/element_normal", dataset.element_normal, PRESSURE),
         ("acquisition/wavelet", dataset.wavelet, PRESSURE),
     ):
         if values is not None:
-            rules.within_or_nan(place, values, within)
+            rules.within_or_nan(path, values, within)
     _check_missing(dataset)
     if dataset.picked:
         check_arrangement(dataset)
@@ -108,8 +108,8 @@ def check_arrangement(dataset: Dataset) -> None:
     absolute = dataset.tof_s is not None
     times = dataset.tof_s if absolute else dataset.delta_tof_s
     assert times is not None
-    known = [int(np.isfinite(one).sum()) for one in (times if times.ndim == 3 else times[None])]
-    mismatch = find_mismatch(dataset.slice(int(np.argmax(known))))
+    counts = [int(np.isfinite(plane).sum()) for plane in (times if times.ndim == 3 else times[None])]
+    mismatch = find_mismatch(dataset.slice(int(np.argmax(counts))))
     if mismatch is not None:
         raise WrongArrangement("traveltime/tof_s" if absolute else "traveltime/delta_tof_s", mismatch)
 
@@ -123,9 +123,9 @@ def _check_missing(dataset: Dataset) -> None:
     other = (dataset.tx[:, None] != dataset.rx[None, :]) & np.isfinite(times)
     left = int(other.sum())
     if left < lost:
-        place = "traveltime/tof_s" if dataset.tof_s is not None else "traveltime/delta_tof_s"
-        found = f"impossible times ({impossible_words(dataset.impossible_times)}) and only {left} others"
-        raise InvalidInput(place, found, "arrival times of most pairs, NaN for missing ones")
+        path = "traveltime/tof_s" if dataset.tof_s is not None else "traveltime/delta_tof_s"
+        shortage = f"impossible times ({impossible_words(dataset.impossible_times)}) and only {left} others"
+        raise InvalidInput(path, shortage, "arrival times of most pairs, NaN for missing ones")
 
 
 def _check_places(dataset: Dataset) -> None:
@@ -133,17 +133,17 @@ def _check_places(dataset: Dataset) -> None:
     # Halved, so that the difference of the largest numbers is finite.
     width = 2.0 * float(np.ptp(0.5 * position, axis=0).max())
     if not WIDTH_M.holds(width):
-        found = f"an array {width:.4g} m wide"
-        raise ImplausibleUnit(POSITION, found, WIDTH_M.words, *_length_hint(width, "positions"))
+        width_words = f"an array {width:.4g} m wide"
+        raise ImplausibleUnit(POSITION, width_words, WIDTH_M.words, *_length_hint(width, "positions"))
     rules.within_or_nan(POSITION, position, PLACE_M)
     if dataset.radius_m is not None and not RADIUS_M.holds(dataset.radius_m):
-        found, hint = f"{dataset.radius_m:.4g}", _length_hint(2.0 * dataset.radius_m, "radius")
-        raise ImplausibleUnit("geometry@radius_m", found, RADIUS_M.words, *hint)
+        width_words, hint = f"{dataset.radius_m:.4g}", _length_hint(2.0 * dataset.radius_m, "radius")
+        raise ImplausibleUnit("geometry@radius_m", width_words, RADIUS_M.words, *hint)
     if dataset.slice_z_m is not None:
         height = 2.0 * float(np.ptp(0.5 * dataset.slice_z_m))
         if height > WIDTH_M.most:
-            found, hint = f"slices over {height:.4g} m", _length_hint(height, "heights")
-            raise ImplausibleUnit("slice/z_m", found, f"at most {WIDTH_M.most:g} m", *hint)
+            width_words, hint = f"slices over {height:.4g} m", _length_hint(height, "heights")
+            raise ImplausibleUnit("slice/z_m", width_words, f"at most {WIDTH_M.most:g} m", *hint)
         rules.within_or_nan("slice/z_m", dataset.slice_z_m, PLACE_M)
 
 
@@ -158,13 +158,13 @@ def _length_hint(width: float, what: str) -> tuple[str, str]:
     return f"; {this} {what} {verb} like {unit}: write m", unit
 
 
-def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
+def _check_times(dataset: Dataset, path: str, times: Floats) -> None:
     """Compare times with the distances of their pairs."""
     distance, time = _sample_pairs(dataset, times)
     in_water = distance / dataset.water_speed_mps
     if not distance.size:
         return
-    offset = in_water if place == "traveltime/delta_tof_s" else np.zeros_like(in_water)
+    offset = in_water if path == "traveltime/delta_tof_s" else np.zeros_like(in_water)
 
     def plausible(factor: float) -> bool:
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
@@ -175,14 +175,14 @@ def _check_times(dataset: Dataset, place: str, times: Floats) -> None:
     value = f"{time[middle]:.4g} s between elements {distance[middle]:.3g} m apart, the median of all pairs"
     if offset is in_water and np.mean(np.abs(time - in_water) <= ARRIVALS * in_water) >= MIN_ARRIVALS:
         accepted = "arrival with the object minus arrival in water; these look like arrivals: write them to "
-        raise InvalidInput(place, value, f"{accepted}traveltime/tof_s")
+        raise InvalidInput(path, value, f"{accepted}traveltime/tof_s")
     if plausible(1.0):
         return
     low, high = BULK_MPS
     unit = next((unit for unit in TIMES if plausible(TIMES[unit])), "")
     hint = f"; these times look like {unit}: write s" if unit else ""
     plain = f"times in s of sound that runs at {low:g} to {high:g} m/s between them"
-    raise ImplausibleUnit(place, value, plain, hint, unit)
+    raise ImplausibleUnit(path, value, plain, hint, unit)
 
 
 def _sample_pairs(dataset: Dataset, times: Floats) -> tuple[Floats, Floats]:
@@ -193,17 +193,17 @@ def _sample_pairs(dataset: Dataset, times: Floats) -> tuple[Floats, Floats]:
         np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
         for count, most in zip(stacked.shape, SAMPLED, strict=True)
     )
-    place = dataset.element_position_m
-    offset = place[dataset.tx[e]][:, None, :] - place[dataset.rx[r]][None, :, :]
+    position = dataset.element_position_m
+    offset = position[dataset.tx[e]][:, None, :] - position[dataset.rx[r]][None, :, :]
     distance = np.broadcast_to(np.linalg.norm(offset, axis=-1), (len(z), len(e), len(r)))
-    some = stacked[np.ix_(z, e, r)]
+    sampled = stacked[np.ix_(z, e, r)]
     # A difference of 0, beside the object, is one in every unit.
-    known: Flags = (
-        np.isfinite(some)
-        & ((some != 0.0) | (times is dataset.tof_s))
+    usable: Flags = (
+        np.isfinite(sampled)
+        & ((sampled != 0.0) | (times is dataset.tof_s))
         & (distance > NEAR * distance.max(initial=0.0))
     )
     if dataset.valid is not None:
         valid = dataset.valid if dataset.valid.ndim == 3 else dataset.valid[None]
-        known &= valid[np.ix_(z, e, r)]
-    return distance[known], some[known]
+        usable &= valid[np.ix_(z, e, r)]
+    return distance[usable], sampled[usable]

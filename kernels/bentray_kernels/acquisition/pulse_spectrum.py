@@ -51,19 +51,19 @@ def estimate_spectrum(traces: Any, rate_hz: float) -> PulseSpectrum:
         InvalidInput: where no trace holds a pulse.
     """
     of_power = np.asarray(np.fft.rfftfreq(traces.shape[-1], 1.0 / rate_hz), dtype=np.float64)
-    found = []
+    estimates = []
     for e in range(0, len(traces), max(1, len(traces) // EMISSIONS)):
         power = without_noise(power_of(_with_pulse(np.asarray(traces[e], dtype=np.float64))))
         if power.any():
             band = of_power[power >= BAND_EDGE * power.max()]
-            found.append((mean_frequency(power, of_power), float(np.ptp(band))))
-    if not found:
+            estimates.append((mean_frequency(power, of_power), float(np.ptp(band))))
+    if not estimates:
         raise InvalidInput(
             "acquisition@center_frequency_hz",
             "nothing, and no pulse in the traces to estimate it from",
             "the centre frequency of the pulse, Hz",
         )
-    centre, width = np.median(found, axis=0).tolist()
+    centre, width = np.median(estimates, axis=0).tolist()
     FREQUENCY_HZ.check("acquisition@center_frequency_hz", centre)
     return PulseSpectrum(centre, width)
 

@@ -64,7 +64,7 @@ def fit_cautions(
         delta = np.where(within_opening(dataset, settings.opening_angle_deg), delta, np.nan)
     used = np.isfinite(delta)
     residual = residual_within(residuals, TYPICAL)
-    if not used.any() or max((one.sweep + one.stage for one in history), default=0) < FITTED:
+    if not used.any() or max((entry.sweep + entry.stage for entry in history), default=0) < FITTED:
         return
     time = float(np.broadcast_to(distance, delta.shape)[used].mean()) / dataset.water_speed_mps
     speed, constant = _best_constant(delta[used], np.broadcast_to(distance, delta.shape)[used], dataset)
@@ -143,15 +143,15 @@ def with_settings_caution(result: Reconstruction, requested: Settings, *, picks:
     idle = unused(result.settings, facts, requested)
     sentences = []
     if idle:
-        without = "; ".join(f"{place}, unless {lacking}" for place, (_, lacking) in idle.items())
+        without = "; ".join(f"{path}, unless {lacking}" for path, (_, lacking) in idle.items())
         chosen = result.settings.method
         by = "" if chosen == requested.method else f" by {chosen}, which {requested.method} chose"
         sentences.append(f"Settings without effect on this result{by}: {without}.")
     changes = []
-    for one in declared(Settings).values():
-        value, used = (value_at(settings, one.place) for settings in (requested, result.settings))
-        if value not in (used, one.default) and one.place not in (*idle, "method"):
-            changes.append(f"{one.place} {value} by {used}")
+    for setting in declared(Settings).values():
+        value, used = (value_at(settings, setting.place) for settings in (requested, result.settings))
+        if value not in (used, setting.default) and setting.place not in (*idle, "method"):
+            changes.append(f"{setting.place} {value} by {used}")
     if changes:
         sentences.append(f"Settings replaced by auto: {', '.join(changes)}.")
     if not sentences:
@@ -162,7 +162,7 @@ def with_settings_caution(result: Reconstruction, requested: Settings, *, picks:
 def _difference_both_ways(dataset: Dataset, delta: Floats) -> float:
     """Nine tenths of the times of pairs measured both ways differ by less, s; 0 without such pairs."""
     slices = delta.reshape(-1, *delta.shape[-2:])
-    differences = np.concatenate([reciprocal_differences(dataset.tx, dataset.rx, one) for one in slices])
+    differences = np.concatenate([reciprocal_differences(dataset.tx, dataset.rx, delta) for delta in slices])
     return float(np.quantile(np.abs(differences), TYPICAL)) / math.sqrt(2.0) if differences.size else 0.0
 
 

@@ -67,7 +67,7 @@ def _pack(value: Any, arrays: Arrays) -> Any:
         arrays.append(value)
         return {"array": len(arrays) - 1}
     if isinstance(value, tuple):
-        return [_pack(part, arrays) for part in value]
+        return [_pack(item, arrays) for item in value]
     if value is None or isinstance(value, bool | int | float | str):
         return value
     raise TypeError(f"{type(value).__name__} in a checkpoint")
@@ -75,10 +75,10 @@ def _pack(value: Any, arrays: Arrays) -> Any:
 
 def _unpack(tree: Any, arrays: Sequence[NDArray[Any]], types: Mapping[str, type]) -> Any:
     if isinstance(tree, list):
-        return tuple(_unpack(part, arrays, types) for part in tree)
+        return tuple(_unpack(item, arrays, types) for item in tree)
     if isinstance(tree, dict):
         if "array" in tree:
             return arrays[tree["array"]]
-        inner = {name: _unpack(part, arrays, types) for name, part in tree["fields"].items()}
+        inner = {name: _unpack(item, arrays, types) for name, item in tree["fields"].items()}
         return types[tree["of"]](**inner)
     return tree

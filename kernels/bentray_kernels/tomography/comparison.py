@@ -256,7 +256,7 @@ def rmse(image: ArrayLike, truth: ArrayLike, region: ArrayLike) -> float:
 def correlation(image: ArrayLike, truth: ArrayLike, region: ArrayLike) -> float:
     """Pearson's correlation coefficient (PCC) of two images over a region; NaN if one is constant there."""
     a, b, where = _checked(image, truth, region)
-    first, second = (one[where] - one[where].mean() for one in (a, b))
+    first, second = (image[where] - image[where].mean() for image in (a, b))
     norm = math.sqrt(float(first @ first) * float(second @ second))
     return float(first @ second) / norm if norm > 0.0 else math.nan
 
@@ -288,8 +288,8 @@ def structural_similarity(image: ArrayLike, truth: ArrayLike, region: ArrayLike,
         return math.nan
     # Differences from one value: squares of speeds would lose digits. Nodes outside are in no window.
     offset = float(b[where].mean())
-    x, y = (np.where(where, one - offset, 0.0) for one in (a, b))
-    mean_x, mean_y = (uniform_filter(one, window) for one in (x, y))
+    x, y = (np.where(where, image - offset, 0.0) for image in (a, b))
+    mean_x, mean_y = (uniform_filter(image, window) for image in (x, y))
     sample = WINDOW**2 / (WINDOW**2 - 1.0)
     variance_x = sample * (uniform_filter(x * x, window) - mean_x * mean_x)
     variance_y = sample * (uniform_filter(y * y, window) - mean_y * mean_y)

@@ -13,13 +13,13 @@ from ..errors import InvalidInput
 NORMAL = "geometry/element_normal"
 
 
-def check_normals(opening_angle_deg: float | None, *, known: bool) -> None:
+def check_normals(opening_angle_deg: float | None, *, normals: bool) -> None:
     """Check that a scan states the directions of its elements, if an opening angle is given.
 
     Raises:
         InvalidInput: without them.
     """
-    if opening_angle_deg is not None and not known:
+    if opening_angle_deg is not None and not normals:
         raise InvalidInput(
             "opening_angle_deg",
             f"{opening_angle_deg:g} for a scan without directions of its elements",
@@ -38,7 +38,7 @@ def within_opening(dataset: Dataset, opening_angle_deg: float) -> Flags:
         InvalidInput: without directions, for one of length 0, and where no pair is left.
     """
     normal = dataset.element_normal
-    check_normals(opening_angle_deg, known=normal is not None)
+    check_normals(opening_angle_deg, normals=normal is not None)
     assert normal is not None
     length = np.linalg.norm(normal, axis=1)
     if (length == 0.0).any():

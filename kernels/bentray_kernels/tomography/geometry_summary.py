@@ -79,7 +79,7 @@ def _leaving(problem: Problem, start: Floats, end: Floats) -> np.ndarray:
     """Whether some paths, drawn evenly, pass outside the region over more than the rim."""
     drawn = slice(None, None, -(-len(start) // MAX_PAIRS))
     far = distance_transform_edt(~problem.region) > BEYOND_NODES
-    part = np.linspace(0.0, 1.0, POINTS)[:, None]
-    points = start[drawn, None] + part * (end - start)[drawn, None]
+    fraction = np.linspace(0.0, 1.0, POINTS)[:, None]
+    points = start[drawn, None] + fraction * (end - start)[drawn, None]
     node = np.clip(np.rint(points / problem.spacing).astype(np.int64), 0, np.array(far.shape) - 1)
     return np.asarray(far[tuple(np.moveaxis(node, -1, 0))].any(axis=1))

@@ -43,9 +43,9 @@ def initial_slowness(problem: Problem, image: Floats | None = None, before: Prob
         return np.full(shape, water)
     if image.shape == shape:
         return image
-    places = [
+    lines = [
         (low + problem.spacing * np.arange(n) - lowest) / before.spacing
         for n, low, lowest in zip(shape, problem.origin, before.origin, strict=True)
     ]
-    interpolated = map_coordinates(image, np.meshgrid(*places, indexing="ij"), order=1, mode="nearest")
+    interpolated = map_coordinates(image, np.meshgrid(*lines, indexing="ij"), order=1, mode="nearest")
     return np.where(problem.region, interpolated, water)

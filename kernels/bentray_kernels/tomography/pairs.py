@@ -98,8 +98,8 @@ def of(dataset: Dataset, settings: Settings, index: int) -> Pairs:
 
 
 def _slice(dataset: Dataset, settings: Settings, index: int) -> Pairs:
-    one = dataset.slice(index)
-    return _between(one, settings, one.tx, one.rx, np.arange(len(one.element_position_m)))
+    scan = dataset.slice(index)
+    return _between(scan, settings, scan.tx, scan.rx, np.arange(len(scan.element_position_m)))
 
 
 def _ring(dataset: Dataset, settings: Settings, index: int) -> Pairs:
@@ -128,13 +128,13 @@ def _moved_ring(dataset: Dataset, settings: Settings) -> Pairs:
         return np.column_stack((points, np.full(len(points), height)))
 
     ratios = [ring.log_ratio for ring in rings]
-    known = [ratio for ratio in ratios if ratio is not None]
+    finite = [ratio for ratio in ratios if ratio is not None]
     return Pairs(
         np.concatenate([lifted(ring.emitters, h) for ring, h in zip(rings, z, strict=True)]),
         np.stack([lifted(ring.receivers[0], h) for ring, h in zip(rings, z, strict=True)]),
         np.repeat(np.arange(len(z)), [len(ring.emitters) for ring in rings]),
         np.concatenate([ring.delta_tof for ring in rings]),
-        np.concatenate(known) if len(known) == len(ratios) else None,
+        np.concatenate(finite) if len(finite) == len(ratios) else None,
         max(ring.noise_s for ring in rings),
     )
 
@@ -173,8 +173,8 @@ def reciprocal_noise(tx: Ints, rx: Ints, delta: Floats) -> float:
     Args:
         tx, rx: elements of the rows and columns; delta: (ntx, nrx), s, NaN where there is none.
     """
-    known = reciprocal_differences(tx, rx, delta)
-    return robust_deviation(known) / math.sqrt(2.0) if known.size else 0.0
+    differences = reciprocal_differences(tx, rx, delta)
+    return robust_deviation(differences) / math.sqrt(2.0) if differences.size else 0.0
 
 
 def reciprocal_differences(tx: Ints, rx: Ints, delta: Floats) -> Floats:

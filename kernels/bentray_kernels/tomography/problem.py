@@ -94,19 +94,19 @@ class Problem:
         # Coarse grids of a thin array have nodes inside it, but none so far inside.
         rims = (RIM_NODES, 0.5 * RIM_NODES, 0.0)
         regions = (inside_array(elements, shape, spacing, origin, rim) for rim in rims)
-        region = next((one for one in regions if one.any()), None)
+        region = next((mask for mask in regions if mask.any()), None)
         if region is None:
             raise InvalidInput(
                 POSITION,
                 f"no node inside the array: nodes {spacing:.3g} m apart, array {2.0 * reach:.3g} m wide",
                 "elements around the object, and nodes (settings nodes, side_m) between them",
             )
-        place = tuple(float(x) for x in origin)
+        corner = tuple(float(x) for x in origin)
         frequency = dataset.amplitude_frequency_hz or dataset.center_frequency_hz
         if settings.roi:
             heights = pairs.heights(dataset)
-            height = None if heights is None or len(place) == 3 else float(heights[index])
-            region &= inside(dataset, region.shape, spacing, place, height)
+            height = None if heights is None or len(corner) == 3 else float(heights[index])
+            region &= inside(dataset, region.shape, spacing, corner, height)
             # A slice above or below a 3-D region stays water; the other slices are reconstructed.
             if not region.any() and (height is None or dataset.roi is None or dataset.roi.ndim == 2):
                 raise InvalidInput(
@@ -119,7 +119,7 @@ class Problem:
             delta_tof=data.delta_tof,
             region=region,
             spacing=spacing,
-            origin=place,
+            origin=corner,
             water_speed=dataset.water_speed_mps,
             log_ratio=data.log_ratio,
             water_attenuation=dataset.water_attenuation_np_m or 0.0,

@@ -132,8 +132,8 @@ def on_this_machine(dataset: Dataset, settings: Settings, samples: int) -> Setti
 
 def device_request(dataset: Dataset, settings: Settings, samples: int) -> tuple[ScanSize, Settings]:
     """The arguments of ``device_choice.with_device`` for a dataset with so many samples in a trace."""
-    known = with_nodes(dataset, with_decomposition(dataset.element_position_m, settings))
-    return ScanSize(dataset.slices, len(dataset.tx), len(dataset.rx), samples), known
+    sized = with_nodes(dataset, with_decomposition(dataset.element_position_m, settings))
+    return ScanSize(dataset.slices, len(dataset.tx), len(dataset.rx), samples), sized
 
 
 def run_reconstruction(
@@ -291,18 +291,18 @@ def _assembled(
         spacing = (*spacing, float(steps[0]) if even else float("nan"))
         origin = (*origin, float(z[0]))
 
-    def image(parts: Sequence[Floats]) -> Floats:
-        return np.ascontiguousarray(np.stack(parts, axis=-1)) if stacked else parts[0]
+    def image(slices: Sequence[Floats]) -> Floats:
+        return np.ascontiguousarray(np.stack(slices, axis=-1)) if stacked else slices[0]
 
     def evaluated(evaluate: Callable[..., Floats]) -> Floats | None:
-        parts = [graph.value_of(evaluate) for graph in graphs]
-        return None if any(part is None for part in parts) else image(parts)
+        values = [graph.value_of(evaluate) for graph in graphs]
+        return None if any(value is None for value in values) else image(values)
 
     # Read once: images in blocks are in files.
     states = [graph.state for graph in graphs]
     losses = evaluated(solve_attenuation)
     spread = [graph.value_of(estimate_uncertainty) for graph in graphs]
-    known = all(one is not None for one in spread)
+    complete = all(item is not None for item in spread)
     experimental = {} if losses is None else {"attenuation": EXPERIMENTAL}
     speed = image([1.0 / state.slowness for state in states])
     coverage = image([state.coverage for state in states])
@@ -310,8 +310,8 @@ def _assembled(
     bounds, water = settings.speed_bounds_mps, dataset.water_speed_mps
     cautions = [*bound_cautions(speed, coverage, bounds, water)]
     cautions += fit_cautions(dataset, settings, residuals, history)
-    if known and any(one.caution for one in spread):
-        cautions.append(Caution("uncertainty", _of_slices([one.caution for one in spread])))
+    if complete and any(item.caution for item in spread):
+        cautions.append(Caution("uncertainty", _of_slices([item.caution for item in spread])))
     return Reconstruction(
         speed=speed,
         coverage=coverage,
@@ -322,8 +322,8 @@ def _assembled(
         history=history,
         attenuation=losses,
         recovery=evaluated(check_resolution),
-        uncertainty=image([one.deviation for one in spread]) if known else None,
-        resolution_width_m=tuple(one.width_m for one in spread) if known else (),
+        uncertainty=image([item.deviation for item in spread]) if complete else None,
+        resolution_width_m=tuple(item.width_m for item in spread) if complete else (),
         residuals=residuals,
         trials=trials,
         cautions=tuple(cautions),
@@ -333,8 +333,8 @@ def _assembled(
 
 def _of_slices(slices: Sequence[str]) -> str:
     """The first caution about the uncertainty, and of how many slices there is one."""
-    found = [one for one in slices if one]
-    return found[0] if len(slices) == 1 else f"{found[0]} (One of {len(found)} of {len(slices)} slices.)"
+    texts = [text for text in slices if text]
+    return texts[0] if len(slices) == 1 else f"{texts[0]} (One of {len(texts)} of {len(slices)} slices.)"
 
 
 def provenance() -> dict[str, str]:

@@ -92,13 +92,15 @@ class ReconstructionGraph:
     @property
     def total(self) -> int:
         """Emitter passes, at most; without those that an early stop has saved."""
-        later = sum(self._most[self._stage.number + 1 :]) + sum(sum(one.sizes) for one in self._evaluations)
+        later = sum(self._most[self._stage.number + 1 :])
+        later += sum(sum(evaluation.sizes) for evaluation in self._evaluations)
         return self._passes_before + self._stage.total + later
 
     @property
     def done(self) -> int:
         """Emitter passes made."""
-        return self._passes_before + self._stage.done + sum(one.done for one in self._evaluations)
+        evaluated = sum(evaluation.done for evaluation in self._evaluations)
+        return self._passes_before + self._stage.done + evaluated
 
     @property
     def state(self) -> State | Iterate:
@@ -107,7 +109,9 @@ class ReconstructionGraph:
 
     def value_of(self, evaluate: Callable[..., Any]) -> Any:
         """Result of a task after the last stage; None before it, and where it is not requested."""
-        return next((one.value for one in self._evaluations if one.evaluate is evaluate), None)
+        return next(
+            (evaluation.value for evaluation in self._evaluations if evaluation.evaluate is evaluate), None
+        )
 
     @property
     def history(self) -> tuple[Iteration, ...]:
@@ -117,7 +121,7 @@ class ReconstructionGraph:
     @property
     def checkpoint(self) -> ReconstructionCheckpoint:
         """The state; without rows of an iteration that is not finished."""
-        values = tuple(one.value for one in self._evaluations)
+        values = tuple(evaluation.value for evaluation in self._evaluations)
         number = self._stage.number
         problem = self._scan.problem(self._index, number)
         before = number, self._passes_before, self._history
@@ -128,8 +132,8 @@ class ReconstructionGraph:
         self._history, self._passes_before = checkpoint.history, checkpoint.passes_before
         self._stage = self._stage_of(checkpoint.stage, checkpoint.state.slowness)
         self._stage.state = checkpoint.state
-        for one, value in zip(self._evaluations, checkpoint.values, strict=True):
-            one.value = value
+        for evaluation, value in zip(self._evaluations, checkpoint.values, strict=True):
+            evaluation.value = value
 
     def first(self) -> list[Task]:
         """See ``task_graph.TaskGraph``."""
@@ -137,9 +141,9 @@ class ReconstructionGraph:
 
     def after(self, task: Task, result: Any) -> list[Task]:
         """See ``task_graph.TaskGraph``."""
-        for one in self._evaluations:
-            if task.function in (one.trace, one.evaluate):
-                return one.after(task, result)
+        for evaluation in self._evaluations:
+            if task.function in (evaluation.trace, evaluation.evaluate):
+                return evaluation.after(task, result)
         following = self._stage.after(task, result)
         return following if following or not self._stage.state.done else self._next()
 
@@ -147,8 +151,8 @@ class ReconstructionGraph:
         """Tasks that follow a finished stage."""
         image, number = self._stage.state.slowness, self._stage.number + 1
         if number == len(self._plans):
-            pending = [one for one in self._evaluations if one.value is None]
-            return [task for one in pending for task in one.first(image)]
+            pending = [evaluation for evaluation in self._evaluations if evaluation.value is None]
+            return [task for evaluation in pending for task in evaluation.first(image)]
         self._history = self.history
         self._passes_before += self._stage.total
         earlier, problem = (self._scan.problem(self._index, k) for k in (number - 1, number))

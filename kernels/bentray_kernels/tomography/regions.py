@@ -70,8 +70,8 @@ class RoundRegion:
         return inside, (away > INNER * self.radius_m) & (away <= OUTER * self.radius_m)
 
     def __str__(self) -> str:
-        place = ", ".join(f"{1e3 * one:g}" for one in self.centre_m)
-        return f"({place}) mm, radius {1e3 * self.radius_m:g} mm"
+        centre = ", ".join(f"{1e3 * x:g}" for x in self.centre_m)
+        return f"({centre}) mm, radius {1e3 * self.radius_m:g} mm"
 
 
 def round_nodes(
@@ -141,14 +141,14 @@ def region_statistics(
     """
     refuse_mask("values", values)
     image = np.asarray(values, np.float64)
-    known = np.isfinite(image)
-    inside = region & known
+    finite = np.isfinite(image)
+    inside = region & finite
     if not inside.any():
         raise InvalidInput("region", "no node with a value", "a region that overlaps the image")
     mean = float(image[inside].mean())
     contrast = ratio = None
-    if surroundings is not None and (beside := surroundings & known).any():
-        contrast, noise = mean - float(image[beside].mean()), float(image[beside].std())
+    if surroundings is not None and (outside := surroundings & finite).any():
+        contrast, noise = mean - float(image[outside].mean()), float(image[outside].std())
         ratio = abs(contrast) / noise if noise > 0.0 else None
     deviation = None if uncertainty is None else float(np.mean(np.asarray(uncertainty)[inside]))
     return RegionStatistics(

@@ -34,7 +34,7 @@ def check_scan(dataset: Dataset, settings: Settings, samples: int) -> None:
         raise InvalidInput("waveform/object", "no traces", "traces to read amplitudes from")
     if settings.method == "waveform":
         check_waveform(settings, samples, dataset.slices, in_space=dataset.element_position_m.shape[1] != 2)
-    check_normals(settings.opening_angle_deg, known=dataset.element_normal is not None)
+    check_normals(settings.opening_angle_deg, normals=dataset.element_normal is not None)
     pairs.count(dataset, settings)
     flat = with_decomposition(dataset.element_position_m, settings).decomposition == "slices"
     check_extent(dataset.element_position_m[:, :2] if flat else dataset.element_position_m)

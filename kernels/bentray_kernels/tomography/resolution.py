@@ -25,7 +25,7 @@ DAMPING = 0.03
 CONTRAST = 0.01
 
 
-def recovery(problem: Problem, parts: Sequence[Rows], width: float = 0.0) -> Floats:
+def recovery(problem: Problem, blocks: Sequence[Rows], width: float = 0.0) -> Floats:
     """Recovery of a checkerboard at each node: 1 in full, 0 not at all.
 
     A checkerboard with fields of ``FIELD_NODES`` nodes is projected along the rays and reconstructed from
@@ -34,7 +34,7 @@ def recovery(problem: Problem, parts: Sequence[Rows], width: float = 0.0) -> Flo
 
     Args:
         problem: the slice or volume.
-        parts: rows of all emitters, in their order.
+        blocks: rows of all emitters, in their order.
         width: of the rays, nodes; see ``finite_frequency``.
 
     Returns:
@@ -44,8 +44,8 @@ def recovery(problem: Problem, parts: Sequence[Rows], width: float = 0.0) -> Flo
     crossing = problem.spacing / problem.water_speed
     board = np.where(problem.region, _checkerboard(shape) * CONTRAST * crossing, 0.0)
     seen = blurred(board, width)
-    rows = [replace(part, residual=part.project(seen)) for part in parts]
-    density = problem.mean_in_region(ray_density(problem, parts))
+    rows = [replace(block, residual=block.project(seen)) for block in blocks]
+    density = problem.mean_in_region(ray_density(problem, blocks))
     bounds = -crossing, crossing
     empty = np.zeros(shape)
     image, _ = Linearised(

@@ -42,8 +42,8 @@ def residual_within(counts: NDArray[np.int64], share: float) -> float:
     edges = np.concatenate(([0.0], RESIDUAL_EDGES_S[middle + 1 :]))
     below = np.concatenate(([0.0], np.cumsum(sizes) / counts.sum()))
     k = int(np.searchsorted(below, share - 1e-12)) - 1
-    part = (share - below[k]) / (below[k + 1] - below[k])
-    return float(edges[k] + part * (edges[k + 1] - edges[k]))
+    fraction = (share - below[k]) / (below[k + 1] - below[k])
+    return float(edges[k] + fraction * (edges[k + 1] - edges[k]))
 
 
 @dataclass(frozen=True)
@@ -209,12 +209,12 @@ class Reconstruction:
 
     def caution(self, code: str) -> str:
         """The text of the caution with a code; empty without it."""
-        return next((one.text for one in self.cautions if one.code == code), "")
+        return next((caution.text for caution in self.cautions if caution.code == code), "")
 
     @property
     def doubt(self) -> str:
         """Why the image is doubtful, in sentences; empty without a reason."""
-        reasons = " ".join(one.text for one in self.cautions if one.doubtful)
+        reasons = " ".join(caution.text for caution in self.cautions if caution.doubtful)
         return f"{DOUBTFUL} {reasons} {CHECK}" if reasons else ""
 
     @property

@@ -31,8 +31,8 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
     """
     straight = settings.rays == "straight"
     differences = settings.numerics.ray_gradient == "differences"
-    known = straight or (settings.eikonal == DEVIATION and differences)
-    if settings.method == "sart" and dimensions == 2 and known:
+    supported = straight or (settings.eikonal == DEVIATION and differences)
+    if settings.method == "sart" and dimensions == 2 and supported:
         return Solver(True, None if straight else DEVIATION)
     return Solver(False, None if straight else settings.ray_eikonal)
 

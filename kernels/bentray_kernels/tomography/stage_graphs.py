@@ -153,7 +153,9 @@ def update_sart_slices(
         same = [k for k in left if calls[k][0] == scan and calls[k][2] == stage]
         left = [k for k in left if k not in same]
         problems = scan.problems(tuple(calls[k][1] for k in same), stage)
-        slices = [SliceCall(one, *calls[k][3:], calls[k][1]) for k, one in zip(same, problems, strict=True)]
+        slices = [
+            SliceCall(problem, *calls[k][3:], calls[k][1]) for k, problem in zip(same, problems, strict=True)
+        ]
         states |= zip(same, advance_slices(slices, scan.stages()[stage]), strict=True)
     seconds = time.perf_counter() - started
     return [(states[k], seconds) for k in range(len(calls))]

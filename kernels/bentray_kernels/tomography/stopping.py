@@ -42,7 +42,7 @@ def _of_means(dataset: Dataset) -> float:
         return 1.0
     delta = dataset.differential_tof().reshape(-1, len(dataset.tx), len(dataset.rx))
     times = int(np.isfinite(delta).sum())
-    both = sum(reciprocal_differences(dataset.tx, dataset.rx, one).size for one in delta)
+    both = sum(reciprocal_differences(dataset.tx, dataset.rx, times).size for times in delta)
     # Of times − both pairs, ``both`` have half the variance.
     return math.sqrt(1.0 - 0.5 * both / (times - both)) if both else 1.0
 
@@ -55,7 +55,7 @@ def travel_time_noise(dataset: Dataset, deviation: Callable[[Floats], float] = r
         deviation: see ``noise_level``.
     """
     if dataset.sigma_s is not None:
-        known = dataset.sigma_s[np.isfinite(dataset.differential_tof()) & np.isfinite(dataset.sigma_s)]
-        if known.size:
-            return math.sqrt(float((known**2).mean()))
+        sigma = dataset.sigma_s[np.isfinite(dataset.differential_tof()) & np.isfinite(dataset.sigma_s)]
+        if sigma.size:
+            return math.sqrt(float((sigma**2).mean()))
     return noise_level(dataset.differential_tof(), deviation)

@@ -57,8 +57,8 @@ def resource_of(settings: Settings) -> Lane:
 def without_device(settings: Settings) -> InvalidInput:
     """The error of settings that need a device that no connected worker has."""
     if tracks_on_device(settings):
-        found, accepted = f"{settings.eikonal!r}, which no connected worker has", "a method without a device"
-        return InvalidInput("eikonal", found, accepted)
+        given, accepted = f"{settings.eikonal!r}, which no connected worker has", "a method without a device"
+        return InvalidInput("eikonal", given, accepted)
     return InvalidInput("device", f"{settings.device!r}, which no connected worker has", "auto or cpu")
 
 

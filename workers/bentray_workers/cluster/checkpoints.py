@@ -90,9 +90,9 @@ class Checkpoints:
         number = 1 + (int(files[-1].stem.rpartition("-")[2]) if files else 0)
         tree, arrays = pack(checkpoint)
         text = json.dumps({"kernels": _kernels(), "state": tree}).encode()
-        parts = {str(k): array for k, array in enumerate(arrays)}
+        numbered = {str(k): array for k, array in enumerate(arrays)}
         with atomic_replace(self._folder / f"{name}-{number:06d}.npz") as partial, partial.open("wb") as file:
-            np.savez(file, allow_pickle=False, json=np.frombuffer(text, np.uint8), **parts)
+            np.savez(file, allow_pickle=False, json=np.frombuffer(text, np.uint8), **numbered)
         for old in files[: 1 - KEPT]:
             old.unlink(missing_ok=True)
 

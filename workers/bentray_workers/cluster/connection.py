@@ -129,9 +129,9 @@ def identity_of(address: str, security: Security, timeout_s: float, workers: int
     """
     encrypted = address.startswith("tls://")
     if (encrypted and security.tls_ca_file is None) or (security.require_encryption and not encrypted):
-        found = f"{address} with{'out' if encrypted else ''} certificates"
+        given = f"{address} with{'out' if encrypted else ''} certificates"
         raise InvalidInput(
-            "scheduler_address", found, "tls://host:port with certificates, else tcp://host:port"
+            "scheduler_address", given, "tls://host:port with certificates, else tcp://host:port"
         )
     try:
         return asyncio.run(identity(address, security, timeout_s, workers))

@@ -126,7 +126,7 @@ class Shares:
             self._remove(share)
 
     def _add(self, share: Share) -> None:
-        others = [self._had[one.lane, one.tenant] for one in self._jobs if one.lane == share.lane]
+        others = [self._had[job.lane, job.tenant] for job in self._jobs if job.lane == share.lane]
         # A new tenant starts with the least worker time of the others.
         self._had.setdefault((share.lane, share.tenant), min(others, default=0.0))
         self._jobs.append(share)
@@ -134,7 +134,7 @@ class Shares:
     def _remove(self, share: Share) -> None:
         whose = share.lane, share.tenant
         self._jobs.remove(share)
-        if all((one.lane, one.tenant) != whose for one in self._jobs):
+        if all((job.lane, job.tenant) != whose for job in self._jobs):
             del self._had[whose]
         self._changed.notify_all()
 
@@ -164,17 +164,17 @@ class Shares:
 
     def _is_next(self, share: Share, workers: int) -> bool:
         jobs: dict[str, list[Share]] = {}
-        for one in self._jobs:
-            if one.lane == share.lane:
-                jobs.setdefault(one.tenant, []).append(one)
-        held = {tenant: sum(one.in_flight for one in of_it) for tenant, of_it in jobs.items()}
+        for job in self._jobs:
+            if job.lane == share.lane:
+                jobs.setdefault(job.tenant, []).append(job)
+        held = {tenant: sum(job.in_flight for job in of_it) for tenant, of_it in jobs.items()}
         most = self._limit(share, jobs, held, workers)
         if held[share.tenant] >= most:
             return False
         if len(jobs) > workers and not self._has_turn(share, jobs, held, workers):
             return False
-        others = [one for one in jobs[share.tenant] if one is not share and self._has_demand(one)]
-        return all((share.in_flight, share.begun) <= (one.in_flight, one.begun) for one in others)
+        others = [job for job in jobs[share.tenant] if job is not share and self._has_demand(job)]
+        return all((share.in_flight, share.begun) <= (job.in_flight, job.begun) for job in others)
 
     def _limit(self, share: Share, jobs: dict[str, list[Share]], held: dict[str, int], workers: int) -> int:
         """Tasks that the tenant of a job may have in flight."""
@@ -185,8 +185,8 @@ class Shares:
         for tenant, of_it in jobs.items():
             if tenant != share.tenant:
                 # The remainder of the division goes to tenants that have used less.
-                part = equal + (self._had[share.lane, tenant] < had and workers % len(jobs) > 0)
-                reserved += min(part, held[tenant] + max(1, sum(one.ready for one in of_it)))
+                allowed = equal + (self._had[share.lane, tenant] < had and workers % len(jobs) > 0)
+                reserved += min(allowed, held[tenant] + max(1, sum(job.ready for job in of_it)))
         return max(1, equal, workers - reserved)
 
     def _has_turn(
@@ -196,7 +196,7 @@ class Shares:
 
         A new tenant waits for running tasks of others only, not for their ready ones.
         """
-        if not any(one.begun for one in jobs[share.tenant]):
+        if not any(job.begun for job in jobs[share.tenant]):
             return True
         if sum(min(1, count) for count in held.values()) >= workers:
             return False
@@ -204,7 +204,7 @@ class Shares:
         return not any(
             self._had[share.lane, tenant] < had
             for tenant, of_it in jobs.items()
-            if tenant != share.tenant and not held[tenant] and any(self._has_demand(one) for one in of_it)
+            if tenant != share.tenant and not held[tenant] and any(self._has_demand(job) for job in of_it)
         )
 
     def _has_demand(self, share: Share) -> bool:
@@ -212,10 +212,10 @@ class Shares:
 
     def _account(self) -> None:
         now = self.clock()
-        for one in self._jobs:
-            used_s = one.in_flight * (now - self._updated)
-            one.used_s += used_s
-            self._had[one.lane, one.tenant] += used_s
+        for job in self._jobs:
+            used_s = job.in_flight * (now - self._updated)
+            job.used_s += used_s
+            self._had[job.lane, job.tenant] += used_s
         self._updated = now
 
 

@@ -119,7 +119,7 @@ async def _work(request: JoinRequest, nannies: list[Any], say: Callable[[str], N
         for number in lost:
             nannies[number] = _nanny(request, number)
         begun = await asyncio.gather(*(nannies[number] for number in lost), return_exceptions=True)
-        if any(isinstance(one, Exception) for one in begun):
+        if any(isinstance(worker, Exception) for worker in begun):
             say(f"not all of them could be started; trying again in {pause:g} s.")
             await asyncio.sleep(pause)
             pause = min(2.0 * pause, LONGEST_PAUSE_S)

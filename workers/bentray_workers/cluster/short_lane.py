@@ -28,6 +28,6 @@ def is_short(plan: Mapping[str, Any], seconds: float | None, capacities: Sequenc
     """
     if seconds is None or seconds > SHORT_S or plan.get("lane") != LONG_LANE:
         return False
-    able = [one for one in capacities if SHORT_LANE in one.resources]
-    most = min((MEMORY_PART * one.memory_bytes for one in able if one.memory_bytes), default=float("inf"))
+    able = [worker for worker in capacities if SHORT_LANE in worker.resources]
+    most = min((MEMORY_PART * host.memory_bytes for host in able if host.memory_bytes), default=float("inf"))
     return bool(able) and plan["largest_bytes"] <= most

@@ -50,7 +50,7 @@ class ClusterPool:
         self._next_priority = 0.0
 
     def devices(self) -> int:
-        return max(1, sum("opencl" in one.resources for one in capacities_of(self._client)))
+        return max(1, sum("opencl" in worker.resources for worker in capacities_of(self._client)))
 
     def may_submit(self, running: int, ready: int) -> bool:
         self._next_priority = self._share.priority(running)

@@ -64,5 +64,5 @@ def at_end(file: Any, tail: int = 0) -> None:
         InvalidInput: for more data. The reader itself raises for a wrong check sum.
     """
     if len(file.read(tail + 1)) > tail:
-        found = "more data after the values than its header declares"
-        raise InvalidInput("file", found, "the values and nothing more")
+        excess = "more data after the values than its header declares"
+        raise InvalidInput("file", excess, "the values and nothing more")

@@ -35,16 +35,16 @@ class ScanFindings(NamedTuple):
 
     def of_traces(self, index: int) -> tuple[Finding, ...]:
         """Findings in the traces of a slice, without those in picked times."""
-        known = OF_TRACES + OF_WATER
-        return tuple(one for one in self.findings if one.slice == index and one.check in known)
+        kinds = OF_TRACES + OF_WATER
+        return tuple(item for item in self.findings if item.slice == index and item.check in kinds)
 
     def words(self, *, stacked: bool) -> str:
         """Summary in one line; see ``finding.words``."""
-        found = words(self.findings, stacked=stacked) if self.findings or self.examined else ""
-        if self.examined or any(one.check != IMPOSSIBLE for one in self.findings):
-            return found
+        sentence = words(self.findings, stacked=stacked) if self.findings or self.examined else ""
+        if self.examined or any(finding.check != IMPOSSIBLE for finding in self.findings):
+            return sentence
         unchecked = "travel times not examined, which needs a centre frequency; bentray quality checks them"
-        return "; ".join(part for part in (found, unchecked) if part)
+        return "; ".join(text for text in (sentence, unchecked) if text)
 
 
 def write_findings(path: Path, findings: ScanFindings, picked: Path | None = None) -> None:

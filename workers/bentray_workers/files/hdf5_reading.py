@@ -46,12 +46,12 @@ def opened(path: Path, limits: Limits) -> Iterator[Reader]:
         file = h5py.File(path, "r", locking=False)
     except DAMAGE:
         if not start:
-            found = "an empty file"
+            content = "an empty file"
         elif start == SIGNATURE:
-            found = f"an HDF5 file that is cut short or damaged ({size} bytes)"
+            content = f"an HDF5 file that is cut short or damaged ({size} bytes)"
         else:
-            found = f"a file that is not HDF5 ({first_bytes(start)})"
-        raise InvalidInput("file", found, accepted) from None
+            content = f"a file that is not HDF5 ({first_bytes(start)})"
+        raise InvalidInput("file", content, accepted) from None
     try:
         yield Reader(file, limits)
     finally:
@@ -84,8 +84,8 @@ class Reader:
             InvalidInput: naming the first that differs.
         """
         for attribute, accepted in (("format", name), ("format_version", version)):
-            if (found := self.text("", attribute)) != accepted:
-                raise InvalidInput(f"@{attribute}", repr(found), f'"{accepted}"')
+            if (stored := self.text("", attribute)) != accepted:
+                raise InvalidInput(f"@{attribute}", repr(stored), f'"{accepted}"')
 
     def names(self) -> tuple[str, ...]:
         """Names in the root group."""
@@ -119,18 +119,16 @@ class Reader:
 
     def checked(self, path: str, kinds: str, accepted: str) -> h5py.Dataset | None:
         """Like ``array``: checked, but not read."""
-        found = self._object(path)
-        if found is None:
+        item = self._object(path)
+        if item is None:
             return None
-        if not isinstance(found, h5py.Dataset):
+        if not isinstance(item, h5py.Dataset):
             raise InvalidInput(path, "a group", accepted)
         with rejecting_hdf5_damage(path, accepted):
-            check_storage(path, found, accepted, self._limits, self._read_bytes)
-            if found.dtype.kind not in kinds:
-                raise InvalidInput(
-                    path, f"{TYPES[found.id.get_type().get_class()]} ({found.dtype})", accepted
-                )
-        return found
+            check_storage(path, item, accepted, self._limits, self._read_bytes)
+            if item.dtype.kind not in kinds:
+                raise InvalidInput(path, f"{TYPES[item.id.get_type().get_class()]} ({item.dtype})", accepted)
+        return item
 
     def attribute(self, path: str, name: str) -> Any:
         """Value of an attribute: str, or an array of numbers; None if it or its owner is absent.
@@ -187,8 +185,8 @@ class Reader:
         if values is None:
             return None
         if len(values) != 1 or not math.isfinite(values[0]):
-            found = values[0] if len(values) == 1 else f"{len(values)} numbers"
-            raise InvalidInput(f"{path}@{name}", found, f"one finite number in {unit}")
+            given = values[0] if len(values) == 1 else f"{len(values)} numbers"
+            raise InvalidInput(f"{path}@{name}", given, f"one finite number in {unit}")
         return values[0]
 
     def _object(self, path: str) -> Any:

@@ -35,15 +35,15 @@ class StoredMesh:
     @property
     def nbytes(self) -> int:
         """Size of its arrays, uncompressed."""
-        parts = (self.mesh.vertices, self.mesh.faces, self.colours)
-        return sum(part.nbytes for part in parts if part is not None)
+        arrays = (self.mesh.vertices, self.mesh.faces, self.colours)
+        return sum(array.nbytes for array in arrays if array is not None)
 
     def content(self) -> str:
         """SHA-256 of vertices, faces and colours, in hexadecimal."""
         digest = hashlib.sha256()
-        parts = (self.mesh.vertices, self.mesh.faces, self.colours)
-        for part, kind in zip(parts, ("<f8", "<i4", "<f8"), strict=True):
-            values = np.zeros(0) if part is None else part
+        arrays = (self.mesh.vertices, self.mesh.faces, self.colours)
+        for array, kind in zip(arrays, ("<f8", "<i4", "<f8"), strict=True):
+            values = np.zeros(0) if array is None else array
             digest.update(repr(values.shape).encode())
             digest.update(np.ascontiguousarray(values, dtype=kind).tobytes())
         return digest.hexdigest()

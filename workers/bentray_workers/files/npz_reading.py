@@ -36,19 +36,19 @@ def read_npz(file: IO[bytes], check: ShapeCheck) -> NDArray[Any]:
             than ``LARGEST_BYTES``, and a damaged archive.
     """
     with rejecting_damage("file", WHOLE), zipfile.ZipFile(file) as archive:
-        members = [one for one in archive.infolist() if one.filename.endswith(SUFFIX)]
+        members = [member for member in archive.infolist() if member.filename.endswith(SUFFIX)]
         if len(members) > MAX_MEMBERS:
             raise InvalidInput("file", f"{len(members)} arrays", f"at most {MAX_MEMBERS}")
         for number, member in enumerate(members):
             if member.compress_type not in PACKINGS or member.flag_bits & SECRET:
                 raise InvalidInput("file", f"array {number} with a password or another packing", WHOLE)
         shapes = {member: _header(archive, member)[0] for member in members}
-        found = [member for member, shape in shapes.items() if len(shape) == 3]
-        if len(found) != 1:
+        volumes = [member for member, shape in shapes.items() if len(shape) == 3]
+        if len(volumes) != 1:
             listed = ", ".join(str(shape) for shape in shapes.values())[:200]
-            words = f"{len(found)} arrays with three dimensions (shapes {listed or 'none'})"
+            words = f"{len(volumes)} arrays with three dimensions (shapes {listed or 'none'})"
             raise InvalidInput("file", words, WHOLE)
-        return _values(archive, found[0], check)
+        return _values(archive, volumes[0], check)
 
 
 def _header(

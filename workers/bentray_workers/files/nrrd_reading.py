@@ -209,12 +209,12 @@ def _axis(header: Any, axis: int, nodes: int) -> tuple[float, float]:
     if math.isfinite(high - low):
         between = (high - low) / max(nodes - (centering == "node"), 1)
         if not math.isnan(step) and abs(abs(between) - step) > AGREE * step:
-            found = f"{step:g} along axis {axis}, where axis mins and maxs mean {between:g}"
-            raise InvalidInput("spacings", found, "one of them, or both alike")
+            given = f"{step:g} along axis {axis}, where axis mins and maxs mean {between:g}"
+            raise InvalidInput("spacings", given, "one of them, or both alike")
         step = between
     if not math.isfinite(step) or step == 0.0:
-        found = f"{low:g} to {high:g} along axis {axis}"
-        raise InvalidInput("axis mins", found, "mins and maxs, finite and different")
+        given = f"{low:g} to {high:g} along axis {axis}"
+        raise InvalidInput("axis mins", given, "mins and maxs, finite and different")
     inset = 0.5 * step if centering == "cell" else 0.0
     return step, (low + inset if math.isfinite(low) else high - inset - (nodes - 1) * step)
 

@@ -41,4 +41,4 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
 )
 REFLECTION = QUANTITIES["reflection"].array
 # The arrays on the nodes of the speed; the reflection has pixels of its own.
-IMAGES = {name: one.array for name, one in QUANTITIES.items() if one.array != REFLECTION}
+IMAGES = {name: quantity.array for name, quantity in QUANTITIES.items() if quantity.array != REFLECTION}

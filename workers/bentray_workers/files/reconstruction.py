@@ -57,11 +57,11 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
         file.attrs["water_speed_mps"] = reconstruction.water_speed_mps
         file.attrs["settings"] = json.dumps(reconstruction.settings.to_dict())
         file.attrs["trials"] = json.dumps([asdict(trial) for trial in reconstruction.trials])
-        file.attrs["cautions"] = json.dumps([asdict(one) for one in reconstruction.cautions])
+        file.attrs["cautions"] = json.dumps([asdict(caution) for caution in reconstruction.cautions])
         file.attrs["provenance"] = json.dumps(reconstruction.provenance)
-        for name, place in IMAGES.items():
+        for name, array_path in IMAGES.items():
             if getattr(reconstruction, name) is not None:
-                write_array(file, place, getattr(reconstruction, name))
+                write_array(file, array_path, getattr(reconstruction, name))
         if reconstruction.uncertainty is not None:
             file[IMAGES["uncertainty"]].attrs["resolution_width_m"] = reconstruction.resolution_width_m
         if reconstruction.reflection is not None:
@@ -134,17 +134,17 @@ def shape_of_quantity(path: Path, quantity: str, shape: tuple[int, ...]) -> tupl
     if quantity != "reflection":
         return shape
     with opened(Path(path), Limits()) as reader:
-        found = reader.checked(REFLECTION, "f", "(nx, ny) or (nx, ny, nz) numbers")
-        if found is None:
+        stored = reader.checked(REFLECTION, "f", "(nx, ny) or (nx, ny, nz) numbers")
+        if stored is None:
             raise InvalidInput("quantity", "reflection of a result without it", "a quantity of this result")
-        return tuple(int(n) for n in found.shape)
+        return tuple(int(n) for n in stored.shape)
 
 
-def _image(reader: Reader, place: str, shape: tuple[int, ...] | None) -> NDArray[np.float64]:
+def _image(reader: Reader, path: str, shape: tuple[int, ...] | None) -> NDArray[np.float64]:
     accepted = "(nx, ny) or (nx, ny, nz) numbers" if shape is None else f"numbers of shape {shape}"
-    image = reader.required(place, "f", accepted)
+    image = reader.required(path, "f", accepted)
     if image.ndim not in (2, 3) or 0 in image.shape or (shape is not None and image.shape != shape):
-        raise InvalidInput(place, f"shape {image.shape}", accepted)
+        raise InvalidInput(path, f"shape {image.shape}", accepted)
     return np.asarray(image, dtype=np.float64)
 
 
@@ -161,20 +161,20 @@ def _reflection(reader: Reader, heights: tuple[int, ...]) -> Reflection | None:
 
 def _widths(reader: Reader) -> tuple[float, ...]:
     """Resolution widths, m; none without uncertainty."""
-    place, name = IMAGES["uncertainty"], "resolution_width_m"
-    if not reader.has(place):
+    path, name = IMAGES["uncertainty"], "resolution_width_m"
+    if not reader.has(path):
         return ()
-    values = reader.numbers(place, name, "m")
+    values = reader.numbers(path, name, "m")
     if not values or not min(values) >= 0.0:
-        raise InvalidInput(f"{place}@{name}", values or "nothing", "a number >= 0 m for each slice")
+        raise InvalidInput(f"{path}@{name}", values or "nothing", "a number >= 0 m for each slice")
     return values
 
 
 def _per_axis(reader: Reader, name: str, ndim: int, path: str = "") -> tuple[float, ...]:
     values = reader.numbers(path, name, "m")
     if values is None or len(values) != ndim:
-        found = "nothing" if values is None else values
-        raise InvalidInput(f"{path}@{name}", found, f"{ndim} numbers in m")
+        given = "nothing" if values is None else values
+        raise InvalidInput(f"{path}@{name}", given, f"{ndim} numbers in m")
     return values
 
 
@@ -233,12 +233,12 @@ def _trials(reader: Reader) -> tuple[Trial, ...]:
         trials = json.loads(reader.text("", "trials") or "[]")
         return tuple(
             Trial(
-                dict(one["settings"]),
-                float(one["held_out_rms_s"]),
-                float(one["shown_rms_s"]),
-                None if one.get("held_out_mean_s") is None else float(one["held_out_mean_s"]),
+                dict(trial["settings"]),
+                float(trial["held_out_rms_s"]),
+                float(trial["shown_rms_s"]),
+                None if trial.get("held_out_mean_s") is None else float(trial["held_out_mean_s"]),
             )
-            for one in trials
+            for trial in trials
         )
     except (ValueError, TypeError, KeyError, RecursionError):
         accepted = "a JSON list of trials by this version"

@@ -37,7 +37,7 @@ def write_reference(path: Path, reference: ReferenceShot) -> None:
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    arrays = {one.name: np.asarray(getattr(reference, one.name)) for one in fields(reference)}
+    arrays = {field.name: np.asarray(getattr(reference, field.name)) for field in fields(reference)}
     with atomic_replace(path) as partial, partial.open("wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
 
@@ -50,7 +50,7 @@ def read_reference(path: Path) -> ReferenceShot:
     """
     try:
         with np.load(path, allow_pickle=False) as stored:
-            values = {one.name: stored[one.name] for one in fields(ReferenceShot)}
+            values = {field.name: stored[field.name] for field in fields(ReferenceShot)}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise InvalidInput("reference", f"{path.name}: {error}", "the estimated water shot") from error
     plain = {name: value.item() if value.ndim == 0 else value for name, value in values.items()}

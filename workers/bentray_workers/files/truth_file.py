@@ -64,9 +64,9 @@ def read_truth(path: Path, image: Reconstruction, spacing_m: Sequence[float] | N
     if spacing_m is not None:
         raise InvalidInput("spacing", list(spacing_m), "nothing: only NumPy files do not state positions")
     if start.startswith(SIGNATURE):
-        known = _hdf5(path)
-        if known is not None:
-            return known
+        truth = _hdf5(path)
+        if truth is not None:
+            return truth
     if stored is None:
         volume = import_volume(path)
         stored = PositionedImage(volume.values, volume.grid, volume.title)
@@ -100,8 +100,8 @@ def _array(path: Path) -> NDArray[Any]:
     with rejecting_damage("truth", "a whole NumPy file of real numbers"):
         values = np.load(path, allow_pickle=False)
     if values.dtype.kind not in "uif" or values.ndim not in (2, 3):
-        found = f"{values.dtype} of shape {values.shape}"
-        raise InvalidInput("truth", found, "real numbers, (nx, ny) or (nx, ny, nz)")
+        given = f"{values.dtype} of shape {values.shape}"
+        raise InvalidInput("truth", given, "real numbers, (nx, ny) or (nx, ny, nz)")
     return np.asarray(values)
 
 
@@ -109,9 +109,9 @@ def _on_nodes(values: NDArray[Any], image: Reconstruction, spacing_m: Sequence[f
     """Values of a file without positions; see ``read_truth``."""
     if spacing_m is None:
         if values.shape != image.speed.shape:
-            found = f"none, for {' x '.join(map(str, values.shape))} nodes"
+            given = f"none, for {' x '.join(map(str, values.shape))} nodes"
             size = " x ".join(map(str, image.speed.shape))
-            raise InvalidInput("spacing", found, f"the node spacing in m, or an array of {size} nodes")
+            raise InvalidInput("spacing", given, f"the node spacing in m, or an array of {size} nodes")
         return _truth(values, image.spacing_m, image.origin_m)
     steps = tuple(spacing_m) * (values.ndim if len(spacing_m) == 1 else 1)
     if len(steps) != values.ndim:

@@ -59,8 +59,8 @@ class Volume:
     def __post_init__(self) -> None:
         check_shape("values", self.values.shape)
         if not np.isfinite(self.values).all():
-            place = tuple(int(k) for k in np.argwhere(~np.isfinite(self.values))[0])
-            raise InvalidInput("values", f"{self.values[place]} at node {place}", "finite numbers")
+            node = tuple(int(k) for k in np.argwhere(~np.isfinite(self.values))[0])
+            raise InvalidInput("values", f"{self.values[node]} at node {node}", "finite numbers")
         for name, given, within in (
             ("spacing_m", self.spacing_m, SPACING_M),
             ("origin_m", self.origin_m, ORIGIN_M),
@@ -99,7 +99,7 @@ class Volume:
         return cls(
             stored,
             tuple(float(step) for step in spacing_m),  # type: ignore[arg-type]
-            tuple(float(place) for place in origin_m),  # type: ignore[arg-type]
+            tuple(float(coordinate) for coordinate in origin_m),  # type: ignore[arg-type]
             printable(title)[:200].strip(),
             np.eye(3) if direction is None else direction,
         )
@@ -120,8 +120,8 @@ def _as_float32(values: NDArray[Any]) -> NDArray[np.float32]:
     low, high = values.min().item(), values.max().item()
     biggest = max(abs(low), abs(high))
     if MAX_FLOAT32 < biggest < math.inf:
-        found = low if abs(low) == biggest else high
-        raise InvalidInput("values", f"{found:g}, beyond float32", f"numbers up to {MAX_FLOAT32:.2g} in size")
+        given = low if abs(low) == biggest else high
+        raise InvalidInput("values", f"{given:g}, beyond float32", f"numbers up to {MAX_FLOAT32:.2g} in size")
     # Infinite values are rejected with the volume.
     with np.errstate(over="ignore"):
         stored = np.ascontiguousarray(values, dtype=np.float32)
@@ -129,12 +129,12 @@ def _as_float32(values: NDArray[Any]) -> NDArray[np.float32]:
         return stored
     # The steps of float32 are coarse here; values that are exact in float32 are accepted.
     lost = max(
-        float(np.abs(np.subtract(mine, theirs, dtype=np.longdouble)).max())
-        for mine, theirs in zip(values, stored, strict=True)
+        float(np.abs(np.subtract(value, theirs, dtype=np.longdouble)).max())
+        for value, theirs in zip(values, stored, strict=True)
     )
     if lost > (high - low) / LEVELS:
-        found = f"{low} to {high}, values that float32 cannot distinguish"
-        raise InvalidInput("values", found, "numbers near 0 beside their range; subtract an offset first")
+        given = f"{low} to {high}, values that float32 cannot distinguish"
+        raise InvalidInput("values", given, "numbers near 0 beside their range; subtract an offset first")
     return stored
 
 
@@ -149,8 +149,8 @@ def check_type(field: str, dtype: np.dtype[Any]) -> None:
     check_real(field, dtype, "integers or floating-point numbers")
     if dtype.kind not in "buif":
         words = {"O": "Python objects", "V": "records, as RGB"}
-        found = words.get(dtype.kind, "no numbers")
-        raise InvalidInput(field, f"{found} ({dtype})", "integers or floating-point numbers")
+        given = words.get(dtype.kind, "no numbers")
+        raise InvalidInput(field, f"{given} ({dtype})", "integers or floating-point numbers")
 
 
 def write_volume(path: Path, volume: Volume) -> None:

@@ -32,9 +32,9 @@ from .volume import FORMAT, Volume, read_volume
 from .volume_axes import Grid
 
 ATTENUATION, ATTENUATION_DB = IMAGES["attenuation"], "attenuation_db_cm_mhz"
-UNITS = {**{one.array: one.unit for one in QUANTITIES.values()}, ATTENUATION_DB: "dB/(cm.MHz)"}
+UNITS = {**{quantity.array: quantity.unit for quantity in QUANTITIES.values()}, ATTENUATION_DB: "dB/(cm.MHz)"}
 TITLES = {
-    **{one.array: one.label[0].upper() + one.label[1:] for one in QUANTITIES.values()},
+    **{quantity.array: quantity.label[0].upper() + quantity.label[1:] for quantity in QUANTITIES.values()},
     ATTENUATION_DB: "Attenuation (dB/(cm MHz))",
 }
 # Formats with one image.
@@ -183,8 +183,8 @@ def export_image(
     chosen = selection or Selection()
     if isinstance(image, Volume):
         if chosen != Selection():
-            found = f"{chosen.quantity}, {chosen.attenuation}"
-            raise InvalidInput("quantity", found, "none: an uploaded volume has values only")
+            given = f"{chosen.quantity}, {chosen.attenuation}"
+            raise InvalidInput("quantity", given, "none: an uploaded volume has values only")
         images = {"values": image.values}
         content = Content(image.values, image.grid, image.title, images, seconds)
     else:
@@ -193,8 +193,8 @@ def export_image(
 
 
 def _reconstructed(own: Reconstruction, chosen: Selection, seconds: float) -> Content:
-    held = {place: getattr(own, name) for name, place in IMAGES.items()}
-    images = {place: image for place, image in held.items() if image is not None}
+    held = {path: getattr(own, name) for name, path in IMAGES.items()}
+    images = {path: image for path, image in held.items() if image is not None}
     if chosen.attenuation != "Np/m" and ATTENUATION in images:
         frequency = _frequency(own.provenance, chosen)
         factor = DB_CM_OF_NP_M / (frequency * 1e-6)

@@ -96,8 +96,8 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: VolumeMetadata, chec
     image = positioned_image(file, start, check)
     if image is not None:
         return Volume.from_image(image)
-    found = "an empty file" if not start else f"a file of another kind ({first_bytes(start)})"
-    raise InvalidInput("file", found, ACCEPTED)
+    content = "an empty file" if not start else f"a file of another kind ({first_bytes(start)})"
+    raise InvalidInput("file", content, ACCEPTED)
 
 
 def positioned_image(
@@ -162,8 +162,8 @@ def _hdf5(path: Path, check: ShapeCheck) -> Volume:
     limits = Limits(total_bytes=LARGEST_BYTES)
     with opened(path, limits) as reader:
         kind = reader.text("", "format")
-        place = "values" if kind == FORMAT else "speed_mps"
-        values = reader.checked(place, "buif", "(nx, ny, nz) numbers")
+        array_path = "values" if kind == FORMAT else "speed_mps"
+        values = reader.checked(array_path, "buif", "(nx, ny, nz) numbers")
         if values is not None:
             check(values.shape)
         if kind == FORMAT:

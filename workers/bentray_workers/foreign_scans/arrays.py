@@ -24,7 +24,7 @@ LARGEST_TOTAL = 32 * 2**30
 MAX_AXES = 4
 
 # Fields of the upload format by names without groups, and by foreign names.
-PLACES = {place.rpartition("/")[2]: place for place in (*COUNTED, *OVER_PAIRS)} | {
+PLACES = {path.rpartition("/")[2]: path for path in (*COUNTED, *OVER_PAIRS)} | {
     "element_positions": "geometry/element_position_m",
     "delta_tof": "traveltime/delta_tof_s",
 }

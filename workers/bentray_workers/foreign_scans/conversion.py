@@ -101,8 +101,8 @@ def _write(arrays: Arrays, layout: Layout, target: Path, on_size: Callable[[int]
     on_size(bytes_of(layout.dataset))
 
     def pieces(name: str, chunk: tuple[int, ...]) -> Iterator[Piece]:
-        place = layout.traces[name]
-        for e, emission in enumerate(arrays.rows(place)):
+        path = layout.traces[name]
+        for e, emission in enumerate(arrays.rows(path)):
             where = (slice(e, e + 1), slice(0, emission.shape[0]), slice(0, emission.shape[1]))
             yield where, kept_traces(emission[None])
 

@@ -47,10 +47,10 @@ def truth(arrays: Arrays) -> Truth | None:
     )
 
 
-def name_in_file(arrays: Arrays, place: str) -> str:
+def name_in_file(arrays: Arrays, path: str) -> str:
     """The name of an array of the upload format in this file: with or without its group."""
-    leaf = place.rpartition("/")[2]
-    return place if place in arrays.names() or leaf not in arrays.names() else leaf
+    leaf = path.rpartition("/")[2]
+    return path if path in arrays.names() or leaf not in arrays.names() else leaf
 
 
 def required(arrays: Arrays, name: str, accepted: str) -> NDArray[np.float64]:
@@ -80,9 +80,9 @@ def indices(arrays: Arrays, name: str) -> NDArray[np.int64]:
     return np.ascontiguousarray(array, dtype=np.int64)
 
 
-def number(arrays: Arrays, place: str) -> float | None:
+def number(arrays: Arrays, path: str) -> float | None:
     """A finite number, or None."""
-    name = name_in_file(arrays, place)
+    name = name_in_file(arrays, path)
     declaration = arrays.declared(name)
     # Checked before reading, since it may be large.
     if declaration is not None and math.prod(declaration[0]) != 1:

@@ -66,20 +66,20 @@ class Measurement:
     def __init__(self, files: MeasurementFolder, root: str) -> None:
         self._files, self._root = files, root
         self._info = files.description(f"{root}info.mat", INFO)
-        found = sorted(
+        listed = sorted(
             (int(match["place"]), int(match["tas"]), int(match["one"]), match[0])
             for match in map(EMISSION.fullmatch, files.names)
             if match is not None and (match["root"] or "") == root
         )
-        self.positions = len({place for place, *_ in found})
+        self.positions = len({index for index, *_ in listed})
         self._emissions = [
-            _Emission(name, tas, one) for place, tas, one, name in found if place == found[0][0]
+            _Emission(name, tas, emitter) for index, tas, emitter, name in listed if index == listed[0][0]
         ]
         receivers, emitters = self._geometry()
         apart = emitters is not receivers
         elements = np.concatenate((*receivers, *(emitters if apart else [])))
-        self.position = self._moved(elements, found[0][0])
-        first = np.cumsum([0, *(len(one) for one in receivers), *(len(one) for one in emitters if apart)])
+        self.position = self._moved(elements, listed[0][0])
+        first = np.cumsum([0, *map(len, receivers), *(map(len, emitters) if apart else ())])
         self._first = first
         offset = len(receivers) if apart else 0
         self.tx = np.array(
@@ -98,7 +98,7 @@ class Measurement:
         (recorded,) = self._recorded
         self._undersampled = _number(self._info, "Bandpassundersampling") == 1.0
         self.samples = UNDERSAMPLING * (recorded + recorded % 2) if self._undersampled else recorded
-        self.temperature_c = self._temperature(found[0][0])
+        self.temperature_c = self._temperature(listed[0][0])
         self._excitation = self._code()
 
     def traces(self) -> Iterator[NDArray[np.float32]]:
@@ -115,12 +115,12 @@ class Measurement:
             traces = np.zeros((len(self.rx), self.samples), dtype=np.float32)
             is_float = self._is_float16(emission.name)
             for begin in range(0, len(elements), AT_ONCE):
-                some = slice(begin, begin + AT_ONCE)
-                values = decode_float16(coded[some]) if is_float else coded[some]
-                values = np.asarray(values, dtype=np.float64) / gain[some, None]
+                block = slice(begin, begin + AT_ONCE)
+                values = decode_float16(coded[block]) if is_float else coded[block]
+                values = np.asarray(values, dtype=np.float64) / gain[block, None]
                 if self._undersampled:
                     values = reconstruct_undersampled(values)
-                traces[rows[some]] = compress(values, self._excitation)
+                traces[rows[block]] = compress(values, self._excitation)
             yield traces
 
     def _geometry(self) -> tuple[list[NDArray[Any]], list[NDArray[Any]]]:
@@ -129,15 +129,15 @@ class Measurement:
             folder, _, leaf = name.rpartition("/")
             if not leaf.endswith(".mat") or folder not in (self._root.rstrip("/"), ""):
                 continue
-            found = self._files.description(name, ("TASElements",)).get("TASElements")
-            if found is None:
+            stored = self._files.description(name, ("TASElements",)).get("TASElements")
+            if stored is None:
                 continue
-            fields = found.dtype.names or ()
+            fields = stored.dtype.names or ()
             if "transducerPositions" in fields:
-                both = _places(found, "transducerPositions", name)
+                both = _places(stored, "transducerPositions", name)
                 return both, both
             if {"receiverPositions", "emitterPositions"} <= {*fields}:
-                return _places(found, "receiverPositions", name), _places(found, "emitterPositions", name)
+                return _places(stored, "receiverPositions", name), _places(stored, "emitterPositions", name)
             accepted = "transducerPositions, or receiverPositions and emitterPositions"
             raise InvalidInput(f"{name}: TASElements", f"the fields {', '.join(fields)}"[:120], accepted)
         accepted = (
@@ -145,7 +145,7 @@ class Measurement:
         )
         raise InvalidInput("TASElements", "nothing", accepted)
 
-    def _moved(self, elements: NDArray[np.float64], place: int) -> NDArray[np.float64]:
+    def _moved(self, elements: NDArray[np.float64], position: int) -> NDArray[np.float64]:
         """Elements at an aperture position: lifted along z and turned about it."""
         name = f"{self._root}Movements.mat"
         if name not in self._files.names:
@@ -153,22 +153,22 @@ class Measurement:
         moves = self._files.description(name, ("MovementsListreal",)).get("MovementsListreal")
         if moves is None or moves.dtype.kind not in "iuf" or moves.ndim != 2 or moves.shape[1] < 2:
             raise InvalidInput(f"{name}: MovementsListreal", "no list", "(positions, 2) rotations and lifts")
-        if not 1 <= place <= len(moves) or not np.isfinite(moves[place - 1, :2]).all():
+        if not 1 <= position <= len(moves) or not np.isfinite(moves[position - 1, :2]).all():
             return elements
-        angle, lift = np.deg2rad(float(moves[place - 1, 0])), float(moves[place - 1, 1])
+        angle, lift = np.deg2rad(float(moves[position - 1, 0])), float(moves[position - 1, 1])
         cosine, sine = math.cos(angle), math.sin(angle)
         turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         return np.asarray((elements + np.array([0.0, 0.0, lift])) @ turn.T)
 
-    def _temperature(self, place: int) -> float | None:
+    def _temperature(self, position: int) -> float | None:
         for leaf in TEMPERATURES:
             name = f"{self._root}{leaf}"
-            found = self._files.description(name, ("TASTemperature",)) if name in self._files.names else {}
-            values = found.get("TASTemperature")
+            named = self._files.description(name, ("TASTemperature",)) if name in self._files.names else {}
+            values = named.get("TASTemperature")
             if values is not None and values.dtype.kind == "f" and values.size:
-                here = values[..., min(place, values.shape[-1]) - 1] if values.ndim == 3 else values
-                known = here[np.isfinite(here)]
-                return float(known.mean()) if known.size else None
+                here = values[..., min(position, values.shape[-1]) - 1] if values.ndim == 3 else values
+                finite = here[np.isfinite(here)]
+                return float(finite.mean()) if finite.size else None
         return None
 
     def _code(self) -> NDArray[np.float64] | None:
@@ -186,8 +186,8 @@ class Measurement:
         defined = f"{self._root}CE.mat"
         if defined not in self._files.names:
             return None
-        found = self._files.description(defined, ("CE", "CE_SF"))
-        code, rate = found.get("CE"), _number(found, "CE_SF")
+        variables = self._files.description(defined, ("CE", "CE_SF"))
+        code, rate = variables.get("CE"), _number(variables, "CE_SF")
         if code is None or code.dtype.kind not in "iuf" or not code.size or rate is None or rate <= 0.0:
             return None
         code = np.asarray(code, dtype=np.float64).ravel()[: MAX_SAMPLES * 16]
@@ -216,13 +216,13 @@ class Measurement:
         tas, receiver = listed
         if tas.shape != receiver.shape or not tas.size:
             raise InvalidInput(f"{name}: receiverIndices", f"shape {receiver.shape}", f"shape {tas.shape}")
-        counts = np.array([len(one) for one in self._receivers])
+        counts = np.array([len(receivers) for receivers in self._receivers])
         wrong = (tas < 1) | (tas > len(counts)) | (receiver < 1)
         wrong |= receiver > counts[np.clip(tas - 1, 0, len(counts) - 1)]
         if wrong.any():
             k = int(np.flatnonzero(wrong)[0])
-            found = f"receiver {receiver[k]} of TAS {tas[k]}"
-            raise InvalidInput(f"{name}: receiverIndices", found, "a receiver of the geometry, from 1")
+            given = f"receiver {receiver[k]} of TAS {tas[k]}"
+            raise InvalidInput(f"{name}: receiverIndices", given, "a receiver of the geometry, from 1")
         return np.asarray(self._first[tas - 1] + receiver - 1, dtype=np.int64)
 
     def _is_float16(self, name: str) -> bool:
@@ -239,36 +239,36 @@ def _matrix(arrays: Matlab5, name: str) -> NDArray[Any]:
 
 
 def _places(elements: NDArray[Any], name: str, file: str) -> list[NDArray[Any]]:
-    found = [np.asarray(one) for one in elements[name].ravel()]
-    if any(one.dtype.kind != "f" or one.ndim != 2 or one.shape[1] != 3 for one in found):
+    positions = [np.asarray(of_tas) for of_tas in elements[name].ravel()]
+    if any(of_tas.dtype.kind != "f" or of_tas.ndim != 2 or of_tas.shape[1] != 3 for of_tas in positions):
         raise InvalidInput(f"{file}: TASElements.{name}", "no positions", "(n, 3) numbers in m for every TAS")
-    return [one.astype(np.float64) for one in found]
+    return [of_tas.astype(np.float64) for of_tas in positions]
 
 
 def _element(
-    first: NDArray[Any], offset: int, tas: int, one: int, places: list[NDArray[Any]], name: str
+    first: NDArray[Any], offset: int, tas: int, emitter: int, positions: list[NDArray[Any]], name: str
 ) -> int:
-    if not 1 <= tas <= len(places) or not 1 <= one <= len(places[tas - 1]):
-        raise InvalidInput(name, f"emitter {one} of TAS {tas}", "an emitter of the geometry")
-    return int(first[offset + tas - 1]) + one - 1
+    if not 1 <= tas <= len(positions) or not 1 <= emitter <= len(positions[tas - 1]):
+        raise InvalidInput(name, f"emitter {emitter} of TAS {tas}", "an emitter of the geometry")
+    return int(first[offset + tas - 1]) + emitter - 1
 
 
-def _number(found: dict[str, Any], name: str) -> float | None:
-    value = found.get(name)
+def _number(variables: dict[str, Any], name: str) -> float | None:
+    value = variables.get(name)
     return (
         float(value.ravel()[0]) if value is not None and value.dtype.kind in "iufb" and value.size else None
     )
 
 
-def _text(found: dict[str, Any], name: str) -> str:
-    value = found.get(name)
+def _text(variables: dict[str, Any], name: str) -> str:
+    value = variables.get(name)
     return str(value.ravel()[0]) if value is not None and value.dtype.kind == "U" and value.size else ""
 
 
 def _roots(names: frozenset[str]) -> list[str]:
     """Folders with A-scans and ``info.mat``."""
-    found = {match["root"] or "" for match in map(EMISSION.fullmatch, names) if match is not None}
-    return sorted(root for root in found if f"{root}info.mat" in names)
+    roots = {match["root"] or "" for match in map(EMISSION.fullmatch, names) if match is not None}
+    return sorted(root for root in roots if f"{root}info.mat" in names)
 
 
 def _detect(scan: OpenScan) -> bool:
@@ -283,30 +283,30 @@ def _read(scan: OpenScan) -> StreamedScan:
     if len(others) != 1:
         accepted = "one measurement, and an empty one in a folder named water or empty"
         raise InvalidInput("file", f"{len(others)} measurements: {', '.join(others)}"[:160], accepted)
-    one = Measurement(files, others[0])
-    shape = (len(one.tx), len(one.rx), one.samples)
-    traces = {"waveform/object": Traces(shape, np.dtype(np.float32), one.traces)}
+    record = Measurement(files, others[0])
+    shape = (len(record.tx), len(record.rx), record.samples)
+    traces = {"waveform/object": Traces(shape, np.dtype(np.float32), record.traces)}
     if empty is not None:
         water = Measurement(files, empty)
-        same = np.array_equal(water.tx, one.tx) and np.array_equal(water.rx, one.rx)
-        if not same or water.samples != one.samples or not np.allclose(water.position, one.position):
-            found = f"{len(water.tx)} emissions, {len(water.rx)} receivers, {water.samples} samples"
+        same = np.array_equal(water.tx, record.tx) and np.array_equal(water.rx, record.rx)
+        if not same or water.samples != record.samples or not np.allclose(water.position, record.position):
+            given = f"{len(water.tx)} emissions, {len(water.rx)} receivers, {water.samples} samples"
             accepted = f"those of the object: {shape[0]}, {shape[1]} and {shape[2]}, at the same places"
-            raise InvalidInput(empty.rstrip("/"), found, accepted)
+            raise InvalidInput(empty.rstrip("/"), given, accepted)
         traces["waveform/water"] = Traces(shape, np.dtype(np.float32), water.traces)
-        one.valid &= water.valid
+        record.valid &= water.valid
     small = {
-        "geometry/element_position_m": one.position,
-        "acquisition/tx": one.tx,
-        "acquisition/rx": one.rx,
+        "geometry/element_position_m": record.position,
+        "acquisition/tx": record.tx,
+        "acquisition/rx": record.rx,
         "acquisition/sampling_rate_hz": np.array(RATE_HZ),
         "acquisition/center_frequency_hz": np.array(CENTER_HZ),
         "acquisition/t0_s": np.array(DELAY_S),
-        "mask/valid": one.valid,
+        "mask/valid": record.valid,
     }
-    if one.temperature_c is not None:
-        small["water/temperature_c"] = np.array(one.temperature_c)
-    several = f", aperture position 1 of {one.positions}" if one.positions > 1 else ""
+    if record.temperature_c is not None:
+        small["water/temperature_c"] = np.array(record.temperature_c)
+    several = f", aperture position 1 of {record.positions}" if record.positions > 1 else ""
     return StreamedScan(f"KIT 3D USCT{several}", small, traces)
 
 

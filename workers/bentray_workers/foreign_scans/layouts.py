@@ -47,9 +47,9 @@ def _full_dataset(arrays: Arrays) -> Layout:
         raise InvalidInput("transducerPositionsXY", f"shape {position.shape}", "(2, N) numbers in m")
     position, count = position.T, position.shape[1]
     samples, rate = _clock(arrays)
-    found = arrays.declared("full_dataset")
+    whole = arrays.declared("full_dataset")
     accepted = f"({samples}, {count}, {count}): Nt by Nrx by Ntx, of time and transducerPositionsXY"
-    if found is None:
+    if whole is None:
         raise InvalidInput("full_dataset", "nothing", accepted)
     traces = {"object": "full_dataset"}
     if arrays.declared("full_dataset_water") is not None:
@@ -84,10 +84,10 @@ def named_layout(arrays: Arrays) -> Layout:
     )
     tx, rx = (indices(arrays, name_in_file(arrays, f"acquisition/{name}")) for name in ("tx", "rx"))
     fields: dict[str, Any] = {}
-    for place, name in (*PAIR_ARRAYS.items(), *FURTHER.items()):
-        fields[name] = _floats(arrays, place)
-    for place, name in FLAGS.items():
-        array = read_small(arrays, name_in_file(arrays, place), "booleans")
+    for path, name in (*PAIR_ARRAYS.items(), *FURTHER.items()):
+        fields[name] = _floats(arrays, path)
+    for path, name in FLAGS.items():
+        array = read_small(arrays, name_in_file(arrays, path), "booleans")
         fields[name] = None if array is None else np.asarray(array != 0)
     traces = {
         name: name_in_file(arrays, f"waveform/{name}")
@@ -106,8 +106,8 @@ def named_layout(arrays: Arrays) -> Layout:
     return Layout(_dataset(arrays, position, tx, rx, fields, traces), traces)
 
 
-def _floats(arrays: Arrays, place: str) -> NDArray[np.float64] | None:
-    array = read_small(arrays, name_in_file(arrays, place), "numbers")
+def _floats(arrays: Arrays, path: str) -> NDArray[np.float64] | None:
+    array = read_small(arrays, name_in_file(arrays, path), "numbers")
     return None if array is None else np.asarray(array, dtype=np.float64)
 
 
@@ -131,10 +131,10 @@ def _dataset(
     position = np.ascontiguousarray(position, dtype=np.float64)
     speed, temperature, assumed = water(arrays)
     note = f"; water temperature not given, {temperature:g} °C assumed" if assumed else ""
-    numbers = {name: number(arrays, f"{place}/{leaf}") for place, leaf, _, name in NUMBERS}
+    numbers = {name: number(arrays, f"{path}/{leaf}") for path, leaf, _, name in NUMBERS}
     waveform = None
     if traces:
-        empty = {name: placeholder(arrays, place) for name, place in traces.items()}
+        empty = {name: placeholder(arrays, path) for name, path in traces.items()}
         scale = number(arrays, "waveform/scale")
         waveform = Waveform(
             empty["object"],
@@ -142,7 +142,7 @@ def _dataset(
             1.0 if scale is None else scale,
             *(_floats(arrays, f"waveform/{name}") for name in ("object_scale", "water_scale")),
         )
-    known = numbers | fields
+    stated = numbers | fields
     dataset = Dataset(
         element_position_m=position,
         tx=tx,
@@ -153,7 +153,7 @@ def _dataset(
         waveform=waveform,
         truth=truth(arrays),
         source=f"from {arrays.kind}{note}",
-        **{name: value for name, value in known.items() if value is not None},
+        **{name: value for name, value in stated.items() if value is not None},
     )
     check_plausible(dataset)
     return dataset

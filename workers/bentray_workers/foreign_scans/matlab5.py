@@ -119,7 +119,7 @@ def _plain_arrays(file: IO[bytes]) -> dict[str, bool]:
     Raises:
         InvalidInput: for numbers that are stored as another type, with which SciPy 1.17 ends the process.
     """
-    found = {}
+    complex_by_name = {}
     order = "<" if file.read(HEADER_BYTES)[-2:] == b"IM" else ">"
     while tag := file.read(8):
         kind, length = struct.unpack(order + "II", tag)
@@ -132,18 +132,18 @@ def _plain_arrays(file: IO[bytes]) -> dict[str, bool]:
         (flags,) = struct.unpack_from(order + "I", array, 8)
         if flags & 0xFF not in CLASSES:
             continue
-        at, parts = 16, []
+        at, elements = 16, []
         for _ in range(3):
             stored, count = struct.unpack_from(order + "II", array, at)
             # Short elements have their size in the upper half of the type, and are in the tag.
             short = stored >> 16
             begin, size = (at + 4, short) if short else (at + 8, count)
-            parts.append((stored & 0xFFFF, array[begin : begin + size]))
+            elements.append((stored & 0xFFFF, array[begin : begin + size]))
             at += 8 if short else 8 + count + -count % 8
-        if parts[-1][0] not in STORED:
-            raise InvalidInput("file", f"numbers stored as type {parts[-1][0]}", "a whole MATLAB file")
-        found[parts[1][1].decode("latin-1")] = bool(flags & COMPLEX)
-    return found
+        if elements[-1][0] not in STORED:
+            raise InvalidInput("file", f"numbers stored as type {elements[-1][0]}", "a whole MATLAB file")
+        complex_by_name[elements[1][1].decode("latin-1")] = bool(flags & COMPLEX)
+    return complex_by_name
 
 
 @contextmanager

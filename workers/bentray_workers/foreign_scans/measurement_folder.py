@@ -52,8 +52,8 @@ class MeasurementFolder:
         from scipy.io import loadmat
 
         with self._path(name, LARGEST_DESCRIPTION) as path, rejecting_damage(name, "a MATLAB 5 file"):
-            found = loadmat(path, variable_names=list(variables), appendmat=False, chars_as_strings=True)
-        return {variable: found[variable] for variable in variables if variable in found}
+            loaded = loadmat(path, variable_names=list(variables), appendmat=False, chars_as_strings=True)
+        return {variable: loaded[variable] for variable in variables if variable in loaded}
 
     @contextmanager
     def _path(self, name: str, most: int) -> Iterator[Path]:

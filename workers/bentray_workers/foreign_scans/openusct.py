@@ -44,12 +44,12 @@ def _read(scan: OpenScan) -> StreamedScan:
     emissions, samples, receivers = data.shape
     position = _small(reader, POSITION, "f", "(N, 2 or 3) numbers in m", 3 * receivers)
     if position is None or position.ndim != 2 or len(position) != receivers:
-        found = "nothing" if position is None else f"shape {position.shape}"
-        raise InvalidInput(POSITION, found, f"({receivers}, 2 or 3), as many as receivers in {DATA}")
+        given = "nothing" if position is None else f"shape {position.shape}"
+        raise InvalidInput(POSITION, given, f"({receivers}, 2 or 3), as many as receivers in {DATA}")
     count = reader.number("geometry", "n_elements", "elements")
     if count not in (None, receivers):
-        found = f"{count:g}, with {receivers} elements in {POSITION}"
-        raise InvalidInput("geometry@n_elements", found, f"{receivers}, or no attribute")
+        given = f"{count:g}, with {receivers} elements in {POSITION}"
+        raise InvalidInput("geometry@n_elements", given, f"{receivers}, or no attribute")
     emitters = _small(reader, EMITTERS, "iu", "(n_tx,) integers", emissions)
     if emitters is not None and emitters.shape != (emissions,):
         raise InvalidInput(EMITTERS, f"shape {emitters.shape}", f"({emissions},), as of {DATA}")
@@ -75,7 +75,7 @@ def _read(scan: OpenScan) -> StreamedScan:
             "geometry/element_position_m": position,
             "acquisition/tx": np.arange(emissions) if emitters is None else emitters,
             "acquisition/rx": np.arange(receivers),
-            **{place: np.array(number) for place, number in numbers.items() if number is not None},
+            **{path: np.array(number) for path, number in numbers.items() if number is not None},
         },
         {"waveform/object": Traces((emissions, receivers, samples), data.dtype, traces)},
     )

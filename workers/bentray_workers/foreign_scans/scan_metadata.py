@@ -39,14 +39,14 @@ FIELDS: Mapping[str, tuple[str, str]] = {
     "slice_z": ("slice/z_m", "length"),
 }
 # The same by their full names, such as ``element_position_m``.
-PLACES = {name: place for name, (place, _) in FIELDS.items()} | {
-    place.rpartition("/")[2]: place for place, _ in FIELDS.values()
+PLACES = {name: path for name, (path, _) in FIELDS.items()} | {
+    path.rpartition("/")[2]: path for path, _ in FIELDS.values()
 }
 # Kind of the unit by name of the array: of the upload format, and of the layouts of other programs.
 KINDS = dict(FIELDS.values()) | {
     "element_positions": "length",
     "transducerPositionsXY": "length",
-    **{place.rpartition("/")[2]: kind for place, kind in FIELDS.values()},
+    **{path.rpartition("/")[2]: kind for path, kind in FIELDS.values()},
 }
 UNITS: Mapping[str, tuple[str, float]] = {
     "m": ("length", 1.0),
@@ -105,17 +105,17 @@ class ScanMetadata:
             InvalidInput: naming the option, its value and the accepted values.
         """
         numbers = dict(zip(NUMBERS, (temperature_c, sound_speed_mps, frequency_hz), strict=True))
-        stated = {place: value for place, value in numbers.items() if value is not None}
-        for place, within in zip(NUMBERS, (TEMPERATURE_C, SPEED_MPS, FREQUENCY_HZ), strict=True):
-            if place in stated:
-                within.check(NUMBERS[place], stated[place])
-        stated = {place: float(value) for place, value in stated.items()}
+        stated = {path: value for path, value in numbers.items() if value is not None}
+        for path, within in zip(NUMBERS, (TEMPERATURE_C, SPEED_MPS, FREQUENCY_HZ), strict=True):
+            if path in stated:
+                within.check(NUMBERS[path], stated[path])
+        stated = {path: float(value) for path, value in stated.items()}
         return cls(_variables(map), _factors(unit), stated)
 
     def words(self) -> str:
         """The names of what is stated, for errors."""
         named = {"map": self.variables, "unit": self.factors}
-        numbers = (NUMBERS[place] for place in self.numbers)
+        numbers = (NUMBERS[path] for path in self.numbers)
         return ", ".join([*(name for name, values in named.items() if values), *numbers])
 
     def __bool__(self) -> bool:
@@ -123,29 +123,29 @@ class ScanMetadata:
 
 
 def _variables(pairs: Iterable[str]) -> dict[str, str]:
-    found: dict[str, str] = {}
+    variables: dict[str, str] = {}
     for pair in pairs:
         name, _, variable = pair.partition("=")
-        place = PLACES.get(name.strip())
-        if place is None or not VARIABLE.fullmatch(variable.strip()):
+        path = PLACES.get(name.strip())
+        if path is None or not VARIABLE.fullmatch(variable.strip()):
             raise InvalidInput("map", repr(pair[:80]), f"FIELD=VARIABLE with a field of {', '.join(FIELDS)}")
-        if place in found:
+        if path in variables:
             raise InvalidInput("map", repr(pair[:80]), f"one variable for {name}, which was named before")
-        found[place] = variable.strip().strip("/")
-    return found
+        variables[path] = variable.strip().strip("/")
+    return variables
 
 
 def _factors(units: Iterable[str]) -> dict[str, float]:
-    found: dict[str, float] = {}
+    factors: dict[str, float] = {}
     for unit in units:
         # Two characters look like a micro sign.
         kind, factor = UNITS.get(unit.strip().replace("\u03bc", "\u00b5"), ("", 0.0))
         if not kind:
             raise InvalidInput("unit", repr(unit[:20]), f"one of {', '.join(UNITS)}")
-        if kind in found:
+        if kind in factors:
             raise InvalidInput("unit", repr(unit[:20]), f"one unit of {kind}; another was given before")
-        found[kind] = factor
-    return found
+        factors[kind] = factor
+    return factors
 
 
 class ArraysWithMetadata:
@@ -165,15 +165,15 @@ class ArraysWithMetadata:
         self._present = frozenset(arrays.names())
         self.kind = arrays.kind
         self.reversed_axes = arrays.reversed_axes
-        for place, variable in given.variables.items():
+        for path, variable in given.variables.items():
             if arrays.declared(variable) is None:
                 shown = ", ".join(sorted(self._present)[:12])
                 raise InvalidInput(
-                    f"map {_field(place)}", f"no variable {variable!r}", f"one of {shown}"[:200]
+                    f"map {_field(path)}", f"no variable {variable!r}", f"one of {shown}"[:200]
                 )
         self._replaced = self._check_water()
         self._stated: dict[str, NDArray[Any]] = {
-            place: np.array(number) for place, number in given.numbers.items()
+            path: np.array(number) for path, number in given.numbers.items()
         }
         if POSITION in given.variables:
             self._stated |= self._all_elements()
@@ -187,8 +187,8 @@ class ArraysWithMetadata:
             return self._stated[name].shape, self._stated[name].dtype
         if name in self._replaced:
             return None
-        found = self._arrays.declared(self._variable(name))
-        return (found[0][::-1], found[1]) if found is not None and self._turned(name, found[0]) else found
+        array = self._arrays.declared(self._variable(name))
+        return (array[0][::-1], array[1]) if array is not None and self._turned(name, array[0]) else array
 
     def whole(self, name: str) -> NDArray[Any]:
         if name in self._stated:
@@ -216,12 +216,12 @@ class ArraysWithMetadata:
 
     def _all_elements(self) -> dict[str, NDArray[Any]]:
         """Emitters and receivers of a file without a list of them: all elements, in their order."""
-        found = self.declared(POSITION)
-        assert found is not None
-        count = found[0][-1 if self.reversed_axes else 0] if found[0] else 0
+        declared = self.declared(POSITION)
+        assert declared is not None
+        count = declared[0][-1 if self.reversed_axes else 0] if declared[0] else 0
         ELEMENTS.check(f"elements of {self._variable(POSITION)}", count)
-        known = {*self._given.variables, *(place for place in INDICES if {place, place[-2:]} & self._present)}
-        return {place: np.arange(count) for place in INDICES if place not in known}
+        stated = {*self._given.variables, *(path for path in INDICES if {path, path[-2:]} & self._present)}
+        return {path: np.arange(count) for path in INDICES if path not in stated}
 
     def _counted_from_0(self, name: str, array: NDArray[Any]) -> NDArray[Any]:
         """Indices of elements in variables that the user names; MATLAB counts from 1, and in doubles."""
@@ -238,7 +238,7 @@ class ArraysWithMetadata:
             return frozenset()
         stated = speed if speed is not None else speed_from_temperature(temperature or 0.0)
         replaced = frozenset(
-            found for name in WATER for found in (f"water/{name}", name) if found in self._present
+            stored for name in WATER for stored in (f"water/{name}", name) if stored in self._present
         ) - frozenset(self._given.variables.values())
         for name in replaced:
             declaration = self._arrays.declared(name)
@@ -258,5 +258,5 @@ class ArraysWithMetadata:
 WATER = ("temperature_c", "sound_speed_mps")
 
 
-def _field(place: str) -> str:
-    return next(name for name, (other, _) in FIELDS.items() if other == place)
+def _field(path: str) -> str:
+    return next(name for name, (other, _) in FIELDS.items() if other == path)

@@ -53,6 +53,6 @@ class StreamedScan:
         return self.small[name]
 
     def rows(self, name: str) -> Iterator[NDArray[Any]]:
-        found = self.traces[name]
-        check_row(name, found.shape, found.dtype)
-        return found.emissions()
+        traces = self.traces[name]
+        check_row(name, traces.shape, traces.dtype)
+        return traces.emissions()

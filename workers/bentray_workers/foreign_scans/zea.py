@@ -54,9 +54,9 @@ def _read(scan: OpenScan) -> StreamedScan:
         raise InvalidInput(track + RAW, f"shape {raw.shape}", RAW_SHAPE)
     frames, emissions, samples, elements, channels = raw.shape
     if frames != 1 or channels != 1:
-        found = f"{frames} frames and {channels} channels (shape {raw.shape})"
+        given = f"{frames} frames and {channels} channels (shape {raw.shape})"
         accepted = f"one frame of radio-frequency data (n_frames 1, n_ch 1); {ACCEPTED}"
-        raise InvalidInput(track + RAW, found, accepted)
+        raise InvalidInput(track + RAW, given, accepted)
     field = _Fields(reader, track)
     position = field.numbers("probe_geometry", (elements, 3), "m")
     rate = field.number("sampling_frequency", "Hz")
@@ -66,8 +66,8 @@ def _read(scan: OpenScan) -> StreamedScan:
     # The clock of the samples begins with the first firing element, here the only one.
     first = starts - delays[np.arange(emissions), emitters]
     if not np.isfinite(first).all() or np.ptp(first) * rate > SAME_TIME:
-        found = f"{first.min():g} to {first.max():g} s after the emission"
-        raise InvalidInput(f"{track}scan/initial_times", found, "the same time for every emission")
+        given = f"{first.min():g} to {first.max():g} s after the emission"
+        raise InvalidInput(f"{track}scan/initial_times", given, "the same time for every emission")
     speed = field.optional("sound_speed", "m/s")
     frequency = field.optional("center_frequency", "Hz", of_emissions=emissions)
     numbers = {
@@ -87,7 +87,7 @@ def _read(scan: OpenScan) -> StreamedScan:
             "geometry/element_position_m": _in_plane(position),
             "acquisition/tx": emitters,
             "acquisition/rx": np.arange(elements),
-            **{place: np.array(number) for place, number in numbers.items() if number is not None},
+            **{path: np.array(number) for path, number in numbers.items() if number is not None},
         },
         {"waveform/object": Traces((emissions, elements, samples), raw.dtype, traces)},
     )
@@ -102,38 +102,38 @@ class _Fields:
 
     def place(self, name: str) -> str:
         """The path of a field: positions are in the group ``probe`` of newer files."""
-        places = (f"{self._track}scan/{name}", f"probe/{name}", f"{self._track}probe/{name}")
-        return next((place for place in places if self._reader.has(place)), places[0])
+        paths = (f"{self._track}scan/{name}", f"probe/{name}", f"{self._track}probe/{name}")
+        return next((path for path in paths if self._reader.has(path)), paths[0])
 
     def numbers(self, name: str, shape: tuple[int, ...], unit: str) -> NDArray[np.float64]:
         """An array of numbers that must be present."""
-        place, accepted = self.place(name), f"{shape} numbers in {unit}"
+        path, accepted = self.place(name), f"{shape} numbers in {unit}"
         if name == "probe_geometry":
-            check_size("geometry/element_position_m", shape, place)
-        stored = self._reader.checked(place, "f", accepted)
+            check_size("geometry/element_position_m", shape, path)
+        stored = self._reader.checked(path, "f", accepted)
         if stored is None or stored.shape != shape:
-            found = "nothing" if stored is None else f"shape {stored.shape}"
-            raise InvalidInput(place, found, accepted)
-        return np.asarray(self._reader.required(place, "f", accepted), dtype=np.float64)
+            given = "nothing" if stored is None else f"shape {stored.shape}"
+            raise InvalidInput(path, given, accepted)
+        return np.asarray(self._reader.required(path, "f", accepted), dtype=np.float64)
 
     def number(self, name: str, unit: str) -> float:
         """A number that must be present."""
-        found = self.optional(name, unit)
-        if found is None:
+        value = self.optional(name, unit)
+        if value is None:
             raise InvalidInput(self.place(name), "nothing", f"a number in {unit}")
-        return found
+        return value
 
     def optional(self, name: str, unit: str, of_emissions: int = 1) -> float | None:
         """A number, or the mean of one per emission, or None."""
-        place, accepted = self.place(name), f"one finite number in {unit}"
-        stored = self._reader.checked(place, "iuf", accepted)
+        path, accepted = self.place(name), f"one finite number in {unit}"
+        stored = self._reader.checked(path, "iuf", accepted)
         if stored is None:
             return None
         if math.prod(stored.shape) not in (1, of_emissions):
-            raise InvalidInput(place, f"shape {stored.shape}", accepted)
-        values = np.asarray(self._reader.required(place, "iuf", accepted), dtype=np.float64)
+            raise InvalidInput(path, f"shape {stored.shape}", accepted)
+        values = np.asarray(self._reader.required(path, "iuf", accepted), dtype=np.float64)
         if not np.isfinite(values).all():
-            raise InvalidInput(place, values.ravel()[0], accepted)
+            raise InvalidInput(path, values.ravel()[0], accepted)
         return float(values.mean())
 
 
@@ -144,10 +144,10 @@ def _emitters(field: _Fields, shape: tuple[int, int]) -> NDArray[np.int64]:
     count = active.sum(axis=1)
     if (count != 1).any():
         k = int(np.flatnonzero(count != 1)[0])
-        found = f"{count[k]} elements that emit in emission {k}"
+        given = f"{count[k]} elements that emit in emission {k}"
         accepted = "one emitting element for each emission (synthetic aperture); plane waves, focused and "
         raise InvalidInput(
-            field.place("tx_apodizations"), found, f"{accepted}diverging beams are not tomography"
+            field.place("tx_apodizations"), given, f"{accepted}diverging beams are not tomography"
         )
     return np.asarray(np.argmax(apodization, axis=1), dtype=np.int64)
 

@@ -69,8 +69,8 @@ def _check_member(number: int, member: zipfile.ZipInfo) -> None:
     packed, size = member.compress_size, member.file_size
     stored = member.compress_type == zipfile.ZIP_STORED
     if (stored and packed != size) or size > PACKING * packed + 4096:
-        found = f"member {number} of {size} bytes, of which {packed} are stored"
-        raise InvalidInput("file", found, "data that are in the file")
+        given = f"member {number} of {size} bytes, of which {packed} are stored"
+        raise InvalidInput("file", given, "data that are in the file")
 
 
 def _check_places(archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> None:
@@ -78,7 +78,7 @@ def _check_places(archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> N
     raw = archive.fp
     assert raw is not None
     end = 0
-    for number, member in sorted(enumerate(members), key=lambda one: one[1].header_offset):
+    for number, member in sorted(enumerate(members), key=lambda numbered: numbered[1].header_offset):
         at = member.header_offset
         raw.seek(max(at, 0))
         head = raw.read(LOCAL.size)
@@ -88,7 +88,7 @@ def _check_places(archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> N
         same = mark == b"PK\x03\x04" and packing == member.compress_type and not flags & SECRET
         pairs = ((crc, member.CRC), (packed, member.compress_size), (size, member.file_size))
         if not flags & DESCRIPTOR:
-            same &= all(mine in (theirs, IN_64_BITS) for mine, theirs in pairs)
+            same &= all(own in (theirs, IN_64_BITS) for own, theirs in pairs)
         if not same:
             raise InvalidInput("file", f"member {number}, which differs from the directory", WHOLE)
         end = at + LOCAL.size + name_bytes + extra_bytes + member.compress_size

@@ -18,9 +18,9 @@ def backdrop_card() -> NDArray[np.uint8]:
     """(1024, 1024, 3) 8-bit RGB."""
     card = Image.new("RGB", (SIDE, SIDE), PAPER)
     draw = ImageDraw.Draw(card)
-    for place in range(0, SIDE, 32):
-        bold = place % 128 == 0
-        for line in ((place, 0, place, SIDE), (0, place, SIDE, place)):
+    for position in range(0, SIDE, 32):
+        bold = position % 128 == 0
+        for line in ((position, 0, position, SIDE), (0, position, SIDE, position)):
             draw.line(line, fill=INK if bold else FAINT, width=3 if bold else 1)
     middle = SIDE // 2
     for radius in range(64, middle, 64):

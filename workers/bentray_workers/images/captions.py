@@ -9,8 +9,8 @@ from bentray_kernels.tomography.solver_choice import solver_of
 
 from ..files.quantities import QUANTITIES
 
-LABELS = {name: one.label for name, one in QUANTITIES.items()}
-NAMES = {name: one.title for name, one in QUANTITIES.items()}
+LABELS = {name: quantity.label for name, quantity in QUANTITIES.items()}
+NAMES = {name: quantity.title for name, quantity in QUANTITIES.items()}
 
 
 def slice_caption(result: Reconstruction, index: int) -> str:
@@ -27,18 +27,18 @@ def facts(result: Reconstruction) -> str:
     """Rays, method, iterations, size, water and residual in one line."""
     settings = _of_rays(result)
     size = " by ".join(str(n) for n in result.speed.shape)
-    parts = [
+    sentences = [
         _rays(settings),
         {"sart": "SART", "gauss-newton": "Gauss-Newton"}[settings.method],
         f"{size} nodes of {1e3 * result.spacing_m[0]:.2g} mm",
         f"water {result.water_speed_mps:.1f} m/s",
     ]
     if result.settings.method == "waveform":
-        parts.insert(2, "then waveforms")
+        sentences.insert(2, "then waveforms")
     if result.residual_rms_s is not None:
-        parts.insert(-2, _iterations(result))
-        parts.append(f"residual {1e9 * result.residual_rms_s:.0f} ns")
-    return "  ·  ".join(parts)
+        sentences.insert(-2, _iterations(result))
+        sentences.append(f"residual {1e9 * result.residual_rms_s:.0f} ns")
+    return "  ·  ".join(sentences)
 
 
 def _of_rays(result: Reconstruction) -> Settings:
@@ -53,7 +53,7 @@ def stage_names(result: Reconstruction) -> tuple[str, ...]:
     settings = _of_rays(result)
     nodes = settings.nodes or result.speed.shape[0]
     grids = [-(-nodes // 2**k) for k in range(settings.numerics.coarser_grids, -1, -1)]
-    names = [f"{one} nodes" for one in grids]
+    names = [f"{nodes} nodes" for nodes in grids]
     if settings.numerics.straight_iterations and settings.rays != "straight":
         names.insert(0, "straight")
     bands = {

@@ -42,8 +42,8 @@ def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Boo
     if not results:
         raise InvalidInput("results", "none", "at least one reconstruction")
     comparisons = {name: _compare(name, result, truth, roi) for name, result in results.items()}
-    limits = robust_limits([one.other[one.region] for one in comparisons.values()])
-    spread = symmetric_limits([one.difference[one.region] for one in comparisons.values()])
+    limits = robust_limits([compared.other[compared.region] for compared in comparisons.values()])
+    spread = symmetric_limits([compared.difference[compared.region] for compared in comparisons.values()])
     first, compared = next(iter(results.values())), next(iter(comparisons.values()))
     with drawing():
         columns = 1 + len(results)
@@ -56,12 +56,12 @@ def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Boo
         speeds, differences = [phantom], []
         draw_history(bottom[0], {name: result.history for name, result in results.items()})
         for upper, lower, (name, result) in zip(top[1:], bottom[1:], results.items(), strict=True):
-            one, shown = comparisons[name], name.capitalize()
+            errors, shown = comparisons[name], name.capitalize()
             speeds.append(
-                _panel(upper, result, one, result.speed, limits, SPEED, f"{shown}: {one.caption()}")
+                _panel(upper, result, errors, result.speed, limits, SPEED, f"{shown}: {errors.caption()}")
             )
             differences.append(
-                _panel(lower, result, one, one.difference, spread, DIFFERENCE, f"{shown} minus phantom")
+                _panel(lower, result, errors, errors.difference, spread, DIFFERENCE, f"{shown} minus phantom")
             )
         draw_bar(speeds, LABELS["speed"])
         draw_bar(differences, "difference (m/s)")

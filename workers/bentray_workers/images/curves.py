@@ -35,10 +35,10 @@ def draw_history(
     for (name, history), colour in zip(histories.items(), cycle(LINES), strict=False):
         begun = 0
         for number, rms in enumerate(_segments(history)):
-            places = begun + np.arange(1, len(rms) + 1)
+            iterations = begun + np.arange(1, len(rms) + 1)
             # Matplotlib omits labels with an underscore from the legend.
             label = name if number == 0 else f"_{name}"
-            axes.plot(places, rms, "o-", color=colour, linewidth=1.6, markersize=4, label=label)
+            axes.plot(iterations, rms, "o-", color=colour, linewidth=1.6, markersize=4, label=label)
             if number:
                 axes.axvline(begun + 0.5, color="#888888", linewidth=0.9, linestyle=":")
             if number < len(stages):
@@ -58,8 +58,8 @@ def draw_history(
 
 def legend_below(axes: Axes, markerscale: float = 1.0) -> None:
     """A legend below the label of the x axis, outside the data."""
-    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncol": 2}
-    axes.legend(**place, handletextpad=0.4, markerscale=markerscale)
+    options = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncol": 2}
+    axes.legend(**options, handletextpad=0.4, markerscale=markerscale)
 
 
 def _segments(history: tuple[Iteration, ...]) -> list[list[float]]:
@@ -73,9 +73,9 @@ def _segments(history: tuple[Iteration, ...]) -> list[list[float]]:
     ]
 
 
-def _name_stage(axes: Axes, place: float, name: str) -> None:
+def _name_stage(axes: Axes, x: float, name: str) -> None:
     axes.text(
-        place,
+        x,
         0.985,
         name,
         transform=axes.get_xaxis_transform(),
@@ -92,7 +92,7 @@ def _scale(axes: Axes, every: list[float], *, margin: bool) -> None:
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_minor_locator(NullLocator())
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
         if margin:
             axes.set_ylim(top=max(every) * (max(every) / min(every)) ** 0.2)
     else:

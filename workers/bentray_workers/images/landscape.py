@@ -28,8 +28,8 @@ ZENITH, HORIZON, SUN, WOODS, NEAR, FAR = np.array(
 @cache
 def landscape() -> Colours:
     """(768, 1536, 3) float32 RGB, 0 to 1: rows from the zenith to the nadir, columns round."""
-    places = (np.arange(2 * ROWS, dtype=np.float32) + 0.5) / ROWS
-    v, u = places[:ROWS, np.newaxis], places[np.newaxis]
+    positions = (np.arange(2 * ROWS, dtype=np.float32) + 0.5) / ROWS
+    v, u = positions[:ROWS, np.newaxis], positions[np.newaxis]
     angle, height = np.pi * u, 0.5 - v
     ridge = 0.05 + 0.03 * np.sin(2 * angle + 0.5) + 0.018 * np.sin(7 * angle) + 0.006 * np.sin(19 * angle)
     pale = (v / 0.5)[..., np.newaxis] ** 3

@@ -71,16 +71,16 @@ def draw_map(
 
     ``up`` replaces y by another axis, with its spacing and origin.
     """
-    places = [1e3 * (o + h * np.arange(n)) for o, h, n in zip(origin_m, spacing_m, image.shape, strict=False)]
+    points = [1e3 * (o + h * np.arange(n)) for o, h, n in zip(origin_m, spacing_m, image.shape, strict=False)]
     half = [0.5e3 * h for h in spacing_m]
     shown = axes.imshow(
         np.ma.masked_invalid(image.T),
         origin="lower",
         extent=(
-            places[0][0] - half[0],
-            places[0][-1] + half[0],
-            places[1][0] - half[1],
-            places[1][-1] + half[1],
+            points[0][0] - half[0],
+            points[0][-1] + half[0],
+            points[1][0] - half[1],
+            points[1][-1] + half[1],
         ),
         vmin=limits[0],
         vmax=limits[1],
@@ -90,7 +90,7 @@ def draw_map(
     )
     if outline is not None and outline.any() and not outline.all() and min(outline.shape) > 1:
         colour = "#555555" if colormap == DIFFERENCE else "#ffffff"
-        axes.contour(*places, outline.T.astype(float), levels=[0.5], colors=colour, linewidths=0.5)
+        axes.contour(*points, outline.T.astype(float), levels=[0.5], colors=colour, linewidths=0.5)
     axes.set_title(title)
     axes.set_xlabel("x (mm)")
     axes.set_ylabel(f"{up} (mm)", labelpad=1)
@@ -99,10 +99,10 @@ def draw_map(
     return shown
 
 
-def draw_bar(maps: Sequence[AxesImage], label: str, place: Axes | None = None) -> None:
+def draw_bar(maps: Sequence[AxesImage], label: str, bar_axes: Axes | None = None) -> None:
     """One colour bar for maps of the same limits; pointed if values exceed it.
 
-    It is drawn at ``place``, by default beside the last map, which shrinks all maps.
+    It is drawn at ``bar_axes``, by default beside the last map, which shrinks all maps.
     """
     low, high = maps[0].get_clim()
     values: list[Floats] = [
@@ -115,7 +115,7 @@ def draw_bar(maps: Sequence[AxesImage], label: str, place: Axes | None = None) -
     )
     axes = [shown.axes for shown in maps]
     layout: dict[str, Any] = (
-        {"ax": axes, "fraction": 0.046, "pad": 0.015, "aspect": 26} if place is None else {"cax": place}
+        {"ax": axes, "fraction": 0.046, "pad": 0.015, "aspect": 26} if bar_axes is None else {"cax": bar_axes}
     )
     bar = axes[0].figure.colorbar(maps[0], extend=extend, **layout)
     bar.set_label(label)

@@ -43,8 +43,8 @@ class Plane:
         """``slice index 2 (0 to 4), z = 6 mm``; empty for a 2-D image."""
         if not self.across:
             return ""
-        place = "" if math.isnan(self.place_m) else f", {self.across} = {1e3 * self.place_m:.4g} mm"
-        return f"slice index {self.index} (0 to {self.count - 1}){place}"
+        position = "" if math.isnan(self.place_m) else f", {self.across} = {1e3 * self.place_m:.4g} mm"
+        return f"slice index {self.index} (0 to {self.count - 1}){position}"
 
 
 def plane_of(
@@ -90,8 +90,8 @@ def check_plane(
     """Reject a slice that does not exist, or cannot be drawn to scale; arguments as for ``plane_of``."""
     accepted = AXES if len(shape) == 3 else UPRIGHT
     if len(axis) != 1 or axis not in accepted:
-        found = repr(axis) if len(shape) == 3 or axis not in AXES else f"{axis!r} of a 2-D image"
-        raise InvalidInput("axis", found, " or ".join(accepted))
+        given = repr(axis) if len(shape) == 3 or axis not in AXES else f"{axis!r} of a 2-D image"
+        raise InvalidInput("axis", given, " or ".join(accepted))
     uneven = spacing_m[-1] is None or not math.isfinite(spacing_m[-1])
     if axis != UPRIGHT and uneven:
         raise InvalidInput("axis", f"{axis!r} of slices at uneven heights", UPRIGHT)

@@ -48,18 +48,18 @@ def _framed(plane: Plane, limits: Limits, style: SliceStyle, title: str, unit: s
     sheet = (width + 2.0, height + 2.0)
     figure = open_figure(*sheet)
 
-    def place(left: float, bottom: float, wide: float, high: float) -> Axes:
+    def add_axes(left: float, bottom: float, wide: float, high: float) -> Axes:
         return figure.add_axes((left / sheet[0], bottom / sheet[1], wide / sheet[0], high / sheet[1]))
 
-    axes = place(1.0, 1.0, width, height)
+    axes = add_axes(1.0, 1.0, width, height)
     shown = _draw_image(axes, plane, limits, style, title)
     axes.set_xlabel(f"{plane.names[0]} (mm)")
     for axis, side in ((axes.xaxis, width), (axes.yaxis, height)):
         axis.set_major_locator(MaxNLocator(min(5, int(side / NUMBER_IN) + 1)))
     if style.colour_bar:
         # Beside a flat image the bar is higher, to fit its numbers.
-        beside = place(1.0 + width + BAR_GAP_IN, 1.0, BAR_IN, max(height, MIN_BAR_IN))
-        draw_bar([shown], unit, beside)
+        bar_axes = add_axes(1.0 + width + BAR_GAP_IN, 1.0, BAR_IN, max(height, MIN_BAR_IN))
+        draw_bar([shown], unit, bar_axes)
     small: dict[str, Any] = {"fontsize": 8, "color": "#666666", "ha": "center", "va": "top"}
     axes.annotate(note, (0.5, 0.0), (0.0, NOTE_POINTS), "axes fraction", "offset points", **small)
     fit(figure)

@@ -59,7 +59,7 @@ def read_picture(path: Path) -> Colours:
         with Image.open(path) as image:
             return np.asarray(image.convert("RGB"))
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        found = "no such file" if isinstance(error, FileNotFoundError) else "no picture"
+        reason = "no such file" if isinstance(error, FileNotFoundError) else "no picture"
         raise InvalidInput(
-            "backdrop", f"{path} ({found})", "checkerboard, picture, or a picture file"
+            "backdrop", f"{path} ({reason})", "checkerboard, picture, or a picture file"
         ) from None

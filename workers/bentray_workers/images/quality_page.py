@@ -34,11 +34,11 @@ UNREAD = "#b8b8b8"
 NO_TIME = "no time"
 
 
-def quality_png(one: Dataset, examined: Examined, index: int | None = None) -> bytes:
+def quality_png(dataset: Dataset, examined: Examined, index: int | None = None) -> bytes:
     """One page about one slice.
 
     Args:
-        one: the slice as it was examined; its traces may be ``Emissions``.
+        dataset: the slice as it was examined; its traces may be ``Emissions``.
         examined: report of the scan, and the picked dataset.
         index: of the slice; None: a scan without slices.
     """
@@ -46,16 +46,16 @@ def quality_png(one: Dataset, examined: Examined, index: int | None = None) -> b
     findings = [f for f in examined.report.findings if f.slice == (index or 0)]
     with drawing():
         figure = new_figure(*PAGE_IN)
-        title = one.title or "Scan"
+        title = dataset.title or "Scan"
         which = "" if index is None else f", slice {index}"
         figure.suptitle(f"Quality of {textwrap.shorten(title, 80)}{which}: {examined.report.verdict}")
         panels = figure.subplots(2, 3)
-        emission = _best_emission(one, picked)
-        _gather(panels[0, 0], one, picked, emission, "object")
-        _gather(panels[0, 1], one, picked, emission, "water")
+        emission = _best_emission(dataset, picked)
+        _gather(panels[0, 0], dataset, picked, emission, "object")
+        _gather(panels[0, 1], dataset, picked, emission, "water")
         _matrix(panels[0, 2], picked)
         _histogram(panels[1, 0], picked)
-        _reasons(panels[1, 1], one, picked, findings)
+        _reasons(panels[1, 1], dataset, picked, findings)
         _list(panels[1, 2], examined, findings)
         return to_png(figure)
 
@@ -158,9 +158,9 @@ def _reasons(axes: Axes, dataset: Dataset, picked: Dataset | None, findings: lis
         aspect="auto",
         interpolation="nearest",
     )
-    for place, name in enumerate(names, start=1):
-        count = int((reason == place).sum())
-        axes.plot([], [], "s", color=colours[place], label=f"{name}: {count}")
+    for index, name in enumerate(names, start=1):
+        count = int((reason == index).sum())
+        axes.plot([], [], "s", color=colours[index], label=f"{name}: {count}")
     legend_below(axes)
     _pair_axes(axes)
 

@@ -42,7 +42,7 @@ def draw_residuals(axes: Axes, counts: Counts, rms_s: float | None) -> None:
     axes.set_ylabel("number of pairs (area)", labelpad=1)
     axes.xaxis.set_major_locator(FixedLocator(_ticks(1e9 * linear, reach)))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
     axes.yaxis.set_major_locator(NullLocator())
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.set_box_aspect(1.0)

@@ -45,19 +45,19 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
     errors: dict[str, Any] | None = None
     if dataset.truth is not None:
         try:
-            found = compare(own, dataset.truth, dataset.roi)
+            comparison = compare(own, dataset.truth, dataset.roi)
         except NotComparable as reason:
             errors = {"region": f"not compared: {reason}", "nodes": 0}
         else:
             quantities.append("truth")
-            here, true = found.statistics()
+            here, true = comparison.statistics()
             errors = {
-                "region": found.region_choice,
-                "nodes": int(found.region.sum()),
-                "rmse_mps": found.rms,
-                "mean_absolute_error_mps": found.mean_absolute,
-                "ssim": _number(found.ssim),
-                "correlation": _number(found.correlation),
+                "region": comparison.region_choice,
+                "nodes": int(comparison.region.sum()),
+                "rmse_mps": comparison.rms,
+                "mean_absolute_error_mps": comparison.mean_absolute,
+                "ssim": _number(comparison.ssim),
+                "correlation": _number(comparison.correlation),
                 "mean_mps": here.mean,
                 "spread_mps": here.spread,
                 "uncertainty_mps": here.uncertainty,
@@ -67,7 +67,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
     return {
         "quantities": quantities,
         "resolution_width_m": list(own.resolution_width_m),
-        "cautions": [asdict(one) for one in own.cautions],
+        "cautions": [asdict(caution) for caution in own.cautions],
         "grids": {
             name: {
                 "shape": list(image.values.shape),
@@ -100,4 +100,4 @@ def _number(value: float) -> float | None:
 
 def _or_none(lengths: tuple[float, ...]) -> list[float | None]:
     """Lengths for JSON; None for the uneven spacing of heights."""
-    return [_number(one) for one in lengths]
+    return [_number(length) for length in lengths]

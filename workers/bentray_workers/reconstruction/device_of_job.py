@@ -42,24 +42,24 @@ def settled(client: Client | None, folder: Path, scan: Path, settings: Settings)
     dataset = read_scan(scan)
     if dataset.delta_tof_s is None and dataset.center_frequency_hz is None:
         return settings
-    size, known = device_request(dataset, settings, trace_samples(scan))
-    if device_work(size, known) is None:
+    size, sized = device_request(dataset, settings, trace_samples(scan))
+    if device_work(size, sized) is None:
         return settings
     file = folder / DECISION
     if settings.device == "auto" and (before := _read(file)):
         chosen = settings.changed(device=before)
         if client is None or _offered(client, chosen):
             return chosen
-    found = with_device(size, known) if client is None else _on_workers(client, size, known)
-    write_bytes(file, found.device.encode())
-    return settings.changed(device=found.device)
+    decided = with_device(size, sized) if client is None else _on_workers(client, size, sized)
+    write_bytes(file, decided.device.encode())
+    return settings.changed(device=decided.device)
 
 
 def _may_decide(client: Client, settings: Settings) -> bool:
     """Whether a worker may have a device for ``auto``; embedded ones have those of this machine."""
     if isinstance(client.cluster, LocalCluster):
         return needs_decision(settings)
-    offered = any("opencl" in one.resources for one in capacities_of(client))
+    offered = any("opencl" in worker.resources for worker in capacities_of(client))
     return offered and (settings.method != "gauss-newton" or settings.reflection.enabled)
 
 
@@ -98,5 +98,5 @@ def _on_workers(client: Client, scan: ScanSize, settings: Settings) -> Settings:
 async def device_here(scan: ScanSize, settings: Settings) -> str:
     """On a worker: the device of ``with_device``; not in the event loop, which sends heartbeats."""
     loop = asyncio.get_running_loop()
-    found: Any = await loop.run_in_executor(None, with_device, scan, settings)
-    return str(found.device)
+    decided: Any = await loop.run_in_executor(None, with_device, scan, settings)
+    return str(decided.device)

@@ -123,7 +123,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
             for an array without width, stored by earlier versions.
     """
     _check_extent(scan)
-    check_normals(settings.opening_angle_deg, known=scan.normals)
+    check_normals(settings.opening_angle_deg, normals=scan.normals)
     if settings.decomposition is None:
         settings = settings.changed(decomposition=scan.decomposition)
     if settings.nodes is None:

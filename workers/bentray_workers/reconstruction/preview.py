@@ -62,13 +62,13 @@ def checkpoint_image(folder: Path) -> dict[str, Any] | None:
         along a side, each n-th is in it; ``spacing_m`` between these, and ``origin_m``, (x, y) of the first.
         None while there is no image.
     """
-    named = [(found, path) for path in folder.glob("*.npz") if (found := FILE.fullmatch(path.name))]
-    for group in sorted({int(found[1]) for found, _ in named}, reverse=True):
-        mine = [(int(found[2]), int(found[3]), path) for found, path in named if int(found[1]) == group]
-        graphs = sorted({graph for graph, _, _ in mine})
+    named = [(match, path) for path in folder.glob("*.npz") if (match := FILE.fullmatch(path.name))]
+    for group in sorted({int(match[1]) for match, _ in named}, reverse=True):
+        of_group = [(int(match[2]), int(match[3]), path) for match, path in named if int(match[1]) == group]
+        graphs = sorted({graph for graph, _, _ in of_group})
         # From the middle one outwards, and of each the newest file.
         middle = graphs[len(graphs) // 2]
-        for graph, _, path in sorted(mine, key=lambda one: (abs(one[0] - middle), one[0], -one[1])):
+        for graph, _, path in sorted(of_group, key=lambda row: (abs(row[0] - middle), row[0], -row[1])):
             try:
                 image = _read(path)
             except UNREADABLE:
@@ -88,26 +88,26 @@ def _read(path: Path) -> dict[str, Any] | None:
         # Numbers in the place of the arrays.
         numbers = cast("list[NDArray[Any]]", range(len(archive.namelist()) - 1))
         checkpoint = unpack(content["state"], numbers, TYPES)
-        place = _place(checkpoint)
-        if place is None:
+        slowness = _place(checkpoint)
+        if slowness is None:
             return None
         if not isinstance(checkpoint, BlockCheckpoint):
-            with archive.open(f"{place.array}.npy") as member:
+            with archive.open(f"{slowness.array}.npy") as member:
                 image, every = _middle_plane(member)
     if isinstance(checkpoint, BlockCheckpoint):
         # They are parsed by their own reader, one at a time too.
         files = BlockFiles(path.parent.parent / BLOCKS, (checkpoint.nodes,), checkpoint.blocks)
         image, every = files.middle_plane(files.state(checkpoint.updates), SLOWNESS, MAX_NODES)
-    speed = 1.0 / image if place.slowness else image
+    speed = 1.0 / image if slowness.slowness else image
     return {
         "shape": list(speed.shape),
         "every": every,
         "speed": base64.b64encode(speed.astype("<f4").tobytes()).decode(),
         "range_mps": [float(speed.min()), float(speed.max())],
-        "spacing_m": [every * place.spacing] * 2,
-        "origin_m": list(place.origin[:2]),
-        "stage": place.stage + 1,
-        "iteration": place.iteration,
+        "spacing_m": [every * slowness.spacing] * 2,
+        "origin_m": list(slowness.origin[:2]),
+        "stage": slowness.stage + 1,
+        "iteration": slowness.iteration,
     }
 
 

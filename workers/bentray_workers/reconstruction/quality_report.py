@@ -76,8 +76,8 @@ def calibrate_file(
     quality = _examined(path, whole, picker, progress, max_left_out=max_left_out)
     if quality.picked is None:
         return quality, None
-    with open_slice(path, whole, 0) as one:
-        right = apply(one, [finding for finding in quality.examined.findings if finding.slice == 0])
+    with open_slice(path, whole, 0) as dataset:
+        right = apply(dataset, [finding for finding in quality.examined.findings if finding.slice == 0])
         calibration = calibrate(right, water_times(right), fit_speed=fit_speed)
     return replace(quality, picked=calibration.applied(quality.picked)), calibration
 
@@ -135,8 +135,8 @@ def _drawn(path: Path, whole: Dataset, examined: Examined) -> bytes:
 
     of_slices = [f.slice for f in examined.report.findings]
     worst = max(set(of_slices), key=of_slices.count, default=0)
-    with open_slice(path, whole, worst) as one:
-        return quality_png(one, examined, worst if whole.slice_z_m is not None else None)
+    with open_slice(path, whole, worst) as dataset:
+        return quality_png(dataset, examined, worst if whole.slice_z_m is not None else None)
 
 
 def _estimated_frequency(path: Path) -> Finding | None:
@@ -151,8 +151,8 @@ def _estimated_frequency(path: Path) -> Finding | None:
 def _slices(path: Path, whole: Dataset) -> Iterator[Dataset]:
     """Each slice, with traces that are readable until the next one."""
     for index in range(whole.slices):
-        with open_slice(path, whole, index) as one:
-            yield one
+        with open_slice(path, whole, index) as dataset:
+            yield dataset
 
 
 def quality_report(path: Path, picker: str, water_temperature_c: float | None = None) -> dict[str, Any]:
@@ -176,7 +176,7 @@ def _cancellable(path: Path, picker: str, water_temperature_c: float | None, *, 
 def _check_size(path: Path, largest_bytes: int) -> None:
     with opened(path, Limits()) as reader:
         stored = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
-        size = sum(math.prod(one.shape) * one.dtype.itemsize for one in stored if one is not None)
+        size = sum(math.prod(array.shape) * array.dtype.itemsize for array in stored if array is not None)
     if size > largest_bytes:
         raise InvalidInput(
             "dataset", f"{size} bytes of traces", f"at most {largest_bytes}; bentray quality has no limit"

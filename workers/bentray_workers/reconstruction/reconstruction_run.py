@@ -122,7 +122,7 @@ def _estimated(
         estimated[FREQUENCY] = repr(float(frequency))
     used = scan.in_water_of(water_temperature_c)
     replaced = "" if used is scan else replaced_water(scan, used)
-    if water := " ".join(part for part in (replaced, _water(job, findings, used)) if part):
+    if water := " ".join(note for note in (replaced, _water(job, findings, used)) if note):
         estimated["water"] = water
     return estimated
 
@@ -133,7 +133,7 @@ def _water(job: _Job, findings: ScanFindings, scan: Dataset) -> str:
     if shot.exists():
         reference = read_reference(shot)
         return water_summary(scan, reference.speed_mps, reference.speed_sigma_mps)
-    of_water = next((one for one in findings.findings if one.check == WATER_SPEED), None)
+    of_water = next((finding for finding in findings.findings if finding.check == WATER_SPEED), None)
     if of_water is not None:
         return f"{of_water.found}, {of_water.action}"
     if scan.water_temperature_assumed and scan.water_temperature_c is not None:
@@ -198,7 +198,7 @@ def _pick_with_guides(
         again, findings_again = _pick(
             job, source, PickingFiles.in_folder(job.folder, number), guide, progress
         )
-        if same_picks(*(read_dataset(one, traces=False) for one in (path, again))):
+        if same_picks(*(read_dataset(scan, traces=False) for scan in (path, again))):
             break
         path, findings = again, findings_again
     progress.following = 0

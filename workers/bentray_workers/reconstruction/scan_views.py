@@ -67,7 +67,7 @@ def scan_geometry(path: Path, *, water_temperature_c: float | None = None) -> di
         "pairs": pairs,
         "timed_pairs": int(np.isfinite(scan.differential_tof()).sum()) if scan.picked else None,
         "impossible_times": dict(recorded.impossible_times),
-        "proposed_corrections": [asdict(one) for one in propose(recorded, measured)],
+        "proposed_corrections": [asdict(correction) for correction in propose(recorded, measured)],
     }
 
 
@@ -102,14 +102,14 @@ def emission_traces(
         if scan.picked or lacks_water(path)
         else scan.center_frequency_hz or _measured_frequency(path, scan)
     )
-    with open_slice(path, scan, index) as one:
-        traces = None if one.waveform is None else getattr(one.waveform, what)
-        if traces is None or one.sampling_rate_hz is None:
-            found = f"{what!r}, of which the scan has no traces"
-            raise InvalidInput("quantity", found, "object or water, whichever the scan has; see the geometry")
+    with open_slice(path, scan, index) as dataset:
+        traces = None if dataset.waveform is None else getattr(dataset.waveform, what)
+        if traces is None or dataset.sampling_rate_hz is None:
+            given = f"{what!r}, of which the scan has no traces"
+            raise InvalidInput("quantity", given, "object or water, whichever the scan has; see the geometry")
         shot = np.asarray(traces[emission], dtype=np.float32)
-        picks, picker = _picks(replace(one, center_frequency_hz=frequency), emission)
-        rate, first = one.sampling_rate_hz, one.t0_s
+        picks, picker = _picks(replace(dataset, center_frequency_hz=frequency), emission)
+        rate, first = dataset.sampling_rate_hz, dataset.t0_s
     straight = scan.distance_m()[emission] / scan.water_speed_mps
     every = max(1, math.ceil(shot.shape[0] / MAX_RECEIVERS))
     block = max(1, math.ceil(shot.shape[1] / MAX_SAMPLES))
@@ -142,19 +142,19 @@ def _measured_frequency(path: Path, scan: Dataset) -> float | None:
     return None
 
 
-def _picks(one: Dataset, emission: int) -> tuple[Floats | None, str]:
+def _picks(dataset: Dataset, emission: int) -> tuple[Floats | None, str]:
     """Object minus water of each receiver, s, NaN without; and the picker, empty for times of the file."""
-    if one.picked:
-        return one.differential_tof()[emission], one.picker
-    if one.waveform is None or one.waveform.water is None or one.center_frequency_hz is None:
+    if dataset.picked:
+        return dataset.differential_tof()[emission], dataset.picker
+    if dataset.waveform is None or dataset.waveform.water is None or dataset.center_frequency_hz is None:
         return None, ""
-    shape = len(one.tx), len(one.rx)
-    reach = reach_of(one, DEFAULT_PICKER)
-    delta, _ = read_times(one, [emission], DEFAULT_PICKER, np.full(shape, np.nan), reach)
+    shape = len(dataset.tx), len(dataset.rx)
+    reach = reach_of(dataset, DEFAULT_PICKER)
+    delta, _ = read_times(dataset, [emission], DEFAULT_PICKER, np.full(shape, np.nan), reach)
     whole = np.full(shape, np.nan)
     whole[emission] = delta[0]
     # Without the comparison with neighbouring emissions, which would read all traces.
-    return screen_times(one, whole, np.zeros(shape), screened=False)[0][emission], DEFAULT_PICKER
+    return screen_times(dataset, whole, np.zeros(shape), screened=False)[0][emission], DEFAULT_PICKER
 
 
 def _reduced(shot: Any, block: int) -> Any:

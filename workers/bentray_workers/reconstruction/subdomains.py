@@ -77,17 +77,17 @@ class BlockField:
     rounds: int
     swept: Mapping[Place, Future]
 
-    def block(self, place: Place) -> Floats:
+    def block(self, index: Place) -> Floats:
         """The times of one block, s, in its own shape."""
-        future = self.swept[place]
+        future = self.swept[index]
         times: Floats = future.client.submit(_times, future, resources=RECONSTRUCTION, pure=False).result()
         return times
 
     def whole(self) -> Floats:
         """(nx, ny[, nz]), s; fetched block by block."""
         time = np.empty(self.shape)
-        for place, box in self.boxes.items():
-            time[box] = self.block(place)
+        for index, box in self.boxes.items():
+            time[box] = self.block(index)
         return time
 
 
@@ -172,28 +172,28 @@ def solve_many_in_blocks(
     all_seeds = (_seeds(array, spacing, placed(source, array.shape, spacing)) for source in sources)
     homes = _homes(client, list(boxes))
 
-    def run(place: Place, function: object, *arguments: object) -> Future:
+    def run(index: Place, function: object, *arguments: object) -> Future:
         return client.submit(
             function,
             *arguments,
             resources=RECONSTRUCTION,
             pure=False,
-            workers=homes[place],
+            workers=homes[index],
             allow_other_workers=True,
         )
 
     slowness = {
-        place: run(place, slowness_of, given if isinstance(given, Path) else array[box], box)
-        for place, box in boxes.items()
+        index: run(index, slowness_of, given if isinstance(given, Path) else array[box], box)
+        for index, box in boxes.items()
     }
 
     def solved(seeds: Mapping[Node, float]) -> BlockField:
         swept = {
-            place: run(place, begin, slowness[place], spacing, _within(seeds, box))
-            for place, box in boxes.items()
+            index: run(index, begin, slowness[index], spacing, _within(seeds, box))
+            for index, box in boxes.items()
         }
         rounds = _exchange(
-            client, run, swept, {place for place, box in boxes.items() if _within(seeds, box)}, tolerance
+            client, run, swept, {index for index, box in boxes.items() if _within(seeds, box)}, tolerance
         )
         return BlockField(array.shape, boxes, rounds, swept)
 
@@ -217,20 +217,20 @@ def _exchange(
         The number of rounds; ``swept`` holds the results of the last sweeps.
     """
     axes = len(next(iter(swept)))
-    arrived: dict[Place, list[Future | None]] = {place: [None] * (2 * axes) for place in swept}
+    arrived: dict[Place, list[Future | None]] = {index: [None] * (2 * axes) for index in swept}
     for rounds in itertools.count():
         if not waiting:
             return rounds
         changed = {}
-        for place in sorted(waiting):
-            swept[place] = run(place, sweep, swept[place], arrived[place], tolerance)
-            arrived[place] = [None] * (2 * axes)
-            changed[place] = run(place, _changed, swept[place])
+        for index in sorted(waiting):
+            swept[index] = run(index, sweep, swept[index], arrived[index], tolerance)
+            arrived[index] = [None] * (2 * axes)
+            changed[index] = run(index, _changed, swept[index])
         waiting = set()
-        for place, sides in client.gather(changed).items():
-            for side, beyond in neighbours(place, swept):
+        for index, sides in client.gather(changed).items():
+            for side, beyond in neighbours(index, swept):
                 if sides[side]:
-                    arrived[beyond][opposite(side)] = run(place, _face, swept[place], side)
+                    arrived[beyond][opposite(side)] = run(index, _face, swept[index], side)
                     waiting.add(beyond)
     raise AssertionError
 
@@ -257,13 +257,13 @@ def slowness_of(speed: Speed, box: Box) -> Floats:
     Raises:
         InvalidInput: for speeds that are not finite and positive, with the node in the whole grid.
     """
-    part = np.asarray(opened(speed)[box] if isinstance(speed, Path) else speed, dtype=np.float64)
+    values = np.asarray(opened(speed)[box] if isinstance(speed, Path) else speed, dtype=np.float64)
     # NaN fails the first comparison.
-    if not (part.min() > 0.0 and part.max() < math.inf):
-        inside = tuple(int(i) for i in np.argwhere(~(np.isfinite(part) & (part > 0.0)))[0])
+    if not (values.min() > 0.0 and values.max() < math.inf):
+        inside = tuple(int(i) for i in np.argwhere(~(np.isfinite(values) & (values > 0.0)))[0])
         node = tuple(b.start + i for b, i in zip(box, inside, strict=True))
-        raise InvalidInput("speed", f"{part[inside]:g} at node {node}", "finite speeds > 0 m/s")
-    return np.ascontiguousarray(1.0 / part)
+        raise InvalidInput("speed", f"{values[inside]:g} at node {node}", "finite speeds > 0 m/s")
+    return np.ascontiguousarray(1.0 / values)
 
 
 def begin(slowness: Floats, spacing: float, seeds: Mapping[Node, float]) -> Swept:
@@ -312,7 +312,7 @@ def _within(seeds: Mapping[Node, float], box: Box) -> dict[Node, float]:
     return inside
 
 
-def _homes(client: Client, places: Sequence[Place]) -> dict[Place, str]:
+def _homes(client: Client, indices: Sequence[Place]) -> dict[Place, str]:
     """A worker for each block, in turn; its data stay there as long as the worker lives.
 
     Raises:
@@ -321,4 +321,4 @@ def _homes(client: Client, places: Sequence[Place]) -> dict[Place, str]:
     workers = sorted(connected_workers(client))
     if not workers:
         raise ConnectionError("the cluster has no workers")
-    return {place: workers[k % len(workers)] for k, place in enumerate(places)}
+    return {index: workers[k % len(workers)] for k, index in enumerate(indices)}

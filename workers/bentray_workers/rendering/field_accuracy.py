@@ -49,8 +49,8 @@ def accuracy(surface: Surface, field: OuterField) -> dict[str, float]:
 def _ends() -> tuple[np.ndarray, np.ndarray]:
     """(rays, 3) float32 places on one face of the unit cube and on another one."""
     random = np.random.default_rng(0)
-    places = random.random((2, RAYS, 3), dtype=np.float32)
+    points = random.random((2, RAYS, 3), dtype=np.float32)
     first = random.integers(6, size=RAYS)
-    for place, face in zip(places, (first, (first + random.integers(1, 6, size=RAYS)) % 6), strict=True):
-        place[np.arange(RAYS), face // 2] = face % 2
-    return places[0], places[1]
+    for point, face in zip(points, (first, (first + random.integers(1, 6, size=RAYS)) % 6), strict=True):
+        point[np.arange(RAYS), face // 2] = face % 2
+    return points[0], points[1]

@@ -63,17 +63,17 @@ def scene_of(shape: Shape, texture: Floats | None, view: FieldView) -> Scene:
         return Scene(instances, DARK if view.mode == "self-only" else landscape())
     # The mesh is the first shape, so its tables are not copied.
     left, right = _material(view, CLAY, texture), _material(view, BLUE, texture)
-    places = places_of(view)
+    positions = places_of(view)
     if view.scene == "two-mirrors":
         pair = (
-            _upright(shape, view, places[0], 1.1, 0.0, left),
-            _upright(shape, view, places[1], 1.1, 180.0, right),
+            _upright(shape, view, positions[0], 1.1, 0.0, left),
+            _upright(shape, view, positions[1], 1.1, 180.0, right),
         )
         return Scene(pair, landscape(), GROUND)
-    ball = Instance(_ball(), placed((*places[2], 0.75), 1.5), Material(colour=SILVER, mirror=0.9))
+    ball = Instance(_ball(), placed((*positions[2], 0.75), 1.5), Material(colour=SILVER, mirror=0.9))
     both = (
-        _upright(shape, view, places[0], 0.85, 0.0, left),
-        _upright(shape, view, places[1], 0.85, 90.0, _material(view, RED, texture)),
+        _upright(shape, view, positions[0], 0.85, 0.0, left),
+        _upright(shape, view, positions[1], 0.85, 90.0, _material(view, RED, texture)),
     )
     return Scene((*both, ball), landscape(), GROUND)
 

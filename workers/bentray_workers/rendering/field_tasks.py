@@ -140,10 +140,10 @@ def finish(folder: Path, settings: FieldSettings, done: Path) -> dict[str, Any]:
     marked = time.perf_counter()
     field = OuterField(settings.samples, faces, fractions)
     figures = read_json(files.layout) | accuracy(_surface(files), field)
-    for part in ("outer", "inner"):
-        spent = [read_json(path)["seconds"] for path in done.glob(f"{part}-*.json")]
-        figures[f"{part}_seconds"] = float(sum(spent))
-        figures[f"{part}_tasks"] = len(spent)
+    for kind in ("outer", "inner"):
+        spent = [read_json(path)["seconds"] for path in done.glob(f"{kind}-*.json")]
+        figures[f"{kind}_seconds"] = float(sum(spent))
+        figures[f"{kind}_tasks"] = len(spent)
     figures["border_seconds"] = marked - started
     figures["outer_bytes"] = sum(path.stat().st_size for path in files.outer)
     figures["inner_bytes"] = files.inner.stat().st_size

@@ -94,15 +94,15 @@ class FieldView:
         check(self)
         numbers = 2 * OBJECTS[self.scene]
         if len(self.positions_m) not in (0, numbers):
-            found = f"{len(self.positions_m)} numbers"
+            given = f"{len(self.positions_m)} numbers"
             accepted = (
                 f"none, or {numbers}: x and y of each object"
                 if numbers
                 else "none: this scene has one object"
             )
-            raise InvalidInput("positions_m", found, accepted)
-        for place in self.positions_m:
-            POSITION_M.check("positions_m", place)
+            raise InvalidInput("positions_m", given, accepted)
+        for position in self.positions_m:
+            POSITION_M.check("positions_m", position)
         count = self.width * self.height * self.rays**2
         if count > MAX_RAYS:
             raise InvalidInput("width, height, rays", f"{count} rays", f"at most {MAX_RAYS}")

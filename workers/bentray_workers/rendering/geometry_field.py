@@ -70,12 +70,12 @@ class GeometryFieldGraph:
     def _batches(self) -> list[Task]:
         """Rows of both tables; the last argument of each is the file that marks it as finished."""
         outer, inner = self._settings.samples, self._settings.inner_samples
-        parts: tuple[tuple[Callable[..., None], str, int, int], ...] = (
+        fields: tuple[tuple[Callable[..., None], str, int, int], ...] = (
             (outer_rows, "outer", outer, 6 * outer**2),
             (inner_rows, "inner", inner, read_json(self._files.layout)["points"]),
         )
         tasks = []
-        for function, name, n, rows in parts:
+        for function, name, n, rows in fields:
             step = max(1, TASK_RAYS // (6 * n * n))
             for first in range(0, rows, step):
                 mark = self._finished_batches / f"{name}-{first:05d}.json"

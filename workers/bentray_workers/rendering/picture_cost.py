@@ -250,8 +250,8 @@ def placed(size: int, workers: Mapping[str, WorkerCapacity]) -> dict[str, Any]:
     Returns:
         Resources, and the addresses of able workers unless all are.
     """
-    able = {address: one for address, one in workers.items() if one.task_bytes >= size}
-    alone = any(size > spare_bytes(one) and "recon" in one.resources for one in able.values())
+    able = {address: capacity for address, capacity in workers.items() if capacity.task_bytes >= size}
+    alone = any(size > spare_bytes(capacity) and "recon" in capacity.resources for capacity in able.values())
     placement: dict[str, Any] = {"resources": {**RENDER, **RECONSTRUCTION} if alone else RENDER}
     return placement if len(able) in (0, len(workers)) else {**placement, "workers": list(able)}
 
@@ -262,11 +262,11 @@ def check_memory(field: str, what: str, cost: Cost, capacities: Sequence[WorkerC
     Raises:
         InvalidInput: naming ``field``, with the bytes found and accepted.
     """
-    limit = max((one.task_bytes for one in capacities), default=math.inf)
+    limit = max((capacity.task_bytes for capacity in capacities), default=math.inf)
     if cost.bytes > limit:
-        found = f"{what}, which takes {cost.bytes} bytes of a worker"
+        given = f"{what}, which takes {cost.bytes} bytes of a worker"
         accepted = f"at most {limit:.0f} bytes, or a worker with more memory"
-        raise InvalidInput(field, found, accepted)
+        raise InvalidInput(field, given, accepted)
 
 
 def _rays(view: RefractionView | FieldView) -> int:
@@ -280,12 +280,12 @@ def _tile_bytes(view: RefractionView | FieldView) -> int:
     return FLOOR_BYTES + max(RAY_BYTES * rays, PIXEL_BYTES * view.width * view.height)
 
 
-def _check_seconds(field: str, found: str, seconds: float, width: int, height: int, alternative: str) -> None:
+def _check_seconds(field: str, given: str, seconds: float, width: int, height: int, alternative: str) -> None:
     if seconds > MAX_SECONDS:
         shrink = math.sqrt(MAX_SECONDS / seconds)
         largest = f"{max(1, int(width * shrink))} x {max(1, int(height * shrink))} pixels of these"
         raise InvalidInput(
             field,
-            f"{found}: about {seconds:.0f} s of a core",
+            f"{given}: about {seconds:.0f} s of a core",
             f"at most {MAX_SECONDS:g} s, as {largest}{alternative}",
         )

@@ -204,7 +204,7 @@ class RefractionView:
 
     def plain(self) -> dict[str, Any]:
         """The fields as JSON values."""
-        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
 

@@ -130,8 +130,8 @@ def _filtered(path: Path, shape: tuple[int, ...], view: RefractionView) -> tuple
 def stored_shape(path: Path) -> tuple[int, ...]:
     """The shape in a volume or reconstruction file, without reading its values."""
     with opened(path, Limits(total_bytes=LARGEST_BYTES)) as reader:
-        for place in ("values", "speed_mps"):
-            stored = reader.checked(place, "buif", "(nx, ny, nz) numbers")
+        for array_path in ("values", "speed_mps"):
+            stored = reader.checked(array_path, "buif", "(nx, ny, nz) numbers")
             if stored is not None:
                 return tuple(int(n) for n in stored.shape)
     raise InvalidInput("values", "nothing", "(nx, ny, nz) numbers")

@@ -73,7 +73,7 @@ class Turntable(RefractionView):
 
     def frame(self, number: int) -> RefractionView:
         """The view of one frame, from 0."""
-        view: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(RefractionView)}
+        view: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(RefractionView)}
         view["azimuth_deg"] = (self.azimuth_deg + self.turn_deg * number / self.frames) % 360.0
         return RefractionView(**view)
 

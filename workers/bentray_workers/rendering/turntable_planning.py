@@ -53,7 +53,7 @@ def plan_turntable(
     """
     size = refraction_bytes(shape, turntable)
     check_memory("volume", f"shape {tuple(shape)}", Cost(0.0, size), capacities)
-    able = sum(one.task_bytes >= size for one in capacities)
+    able = sum(capacity.task_bytes >= size for capacity in capacities)
     scene, frame = refraction_seconds(shape, turntable)
     # Every worker filters the volume once.
     work = scene + turntable.frames * frame / max(1, able)

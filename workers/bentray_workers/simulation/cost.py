@@ -54,18 +54,18 @@ def task_bytes(settings: Timed | WaveSimulationSettings) -> dict[str, int]:
     """
     if isinstance(settings, WaveSimulationSettings):
         traces = settings.elements * settings.samples
-        part = _grid_bytes(settings) + _trace_bytes(settings)
+        arrays = _grid_bytes(settings) + _trace_bytes(settings)
         written = 6 * REAL * traces + 8 * settings.emissions * settings.elements
         truth = PLANE_BYTES * settings.nodes**2
     else:
         in_space = isinstance(settings, VolumeSimulationSettings)
         marched = isinstance(settings, VolumeSimulationSettings) and settings.three_d
-        part = (SPACE_BYTES if marched else PLANE_BYTES) * fine_nodes(settings)
+        arrays = (SPACE_BYTES if marched else PLANE_BYTES) * fine_nodes(settings)
         each = PAIR_BYTES + LOSS_BYTES * settings.attenuation + NOISE_BYTES * _noisy(settings)
         written = each * pairs(settings)
         heights = settings.slices if isinstance(settings, VolumeSimulationSettings) else 1
         truth = (SPACE_BYTES if in_space else PLANE_BYTES) * settings.nodes**2 * heights
-    return {"make_part": FLOOR_BYTES + part, "write_scan": FLOOR_BYTES + written + truth}
+    return {"make_part": FLOOR_BYTES + arrays, "write_scan": FLOOR_BYTES + written + truth}
 
 
 def costly_setting(settings: Timed | WaveSimulationSettings, task: str) -> str:

@@ -30,12 +30,12 @@ CHOICES = {"phantom": ("table6", "table6-vertical", "detailed", "table7")}
 
 def range_of(name: str) -> Range:
     """The range of a number over all kinds of scan; each checks its own range."""
-    ranges = [known[name] for known in map(ranges_of, KINDS) if name in known]
+    ranges = [ranges_of_kind[name] for ranges_of_kind in map(ranges_of, KINDS) if name in ranges_of_kind]
     return Range(
-        min(one.least for one in ranges),
-        max(one.most for one in ranges),
-        all(one.above for one in ranges),
-        all(one.below for one in ranges),
+        min(within.least for within in ranges),
+        max(within.most for within in ranges),
+        all(within.above for within in ranges),
+        all(within.below for within in ranges),
         ranges[0].unit,
     )
 
@@ -133,13 +133,13 @@ class PhantomScan:
             kind = WAVES[self.phantom]
         elif self.phantom == "table7":
             kind = VolumeSimulationSettings
-        known = {one.name for one in fields(kind)}
+        accepted = {field.name for field in fields(kind)}
         values = {
-            one.name: getattr(self, one.name)
-            for one in fields(self)
-            if one.name in known and getattr(self, one.name) is not None
+            field.name: getattr(self, field.name)
+            for field in fields(self)
+            if field.name in accepted and getattr(self, field.name) is not None
         }
-        if "emissions" in known and self.elements is not None:
+        if "emissions" in accepted and self.elements is not None:
             values.setdefault("emissions", min(EMISSIONS, self.elements))
         return kind(**values)
 

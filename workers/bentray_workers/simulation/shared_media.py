@@ -28,11 +28,11 @@ def made_once(most: int) -> Callable[[Callable[Given, Made]], Callable[Given, Ma
         @wraps(make)
         def get(*given: Given.args, **named: Given.kwargs) -> Made:
             with finding:
-                found = slot(*given)
-            with found.making:
-                if not found.value:
-                    found.value = (make(*given, **named),)
-                return found.value[0]
+                medium = slot(*given)
+            with medium.making:
+                if not medium.value:
+                    medium.value = (make(*given, **named),)
+                return medium.value[0]
 
         return get
 

@@ -61,21 +61,21 @@ def plan_simulation(request: PhantomScan, capacities: Sequence[WorkerCapacity]) 
     calls, size = task_bytes(settings), result_bytes(settings)
     most = Limits().total_bytes
     if size > most:
-        found = f"{settings.elements}, a file of {size} bytes"
-        raise InvalidInput("elements", found, f"so few that the file has at most {most} bytes")
-    able = [one for one in capacities if "recon" in one.resources]
-    limit = max((one.task_bytes for one in able), default=math.inf)
+        given = f"{settings.elements}, a file of {size} bytes"
+        raise InvalidInput("elements", given, f"so few that the file has at most {most} bytes")
+    able = [capacity for capacity in capacities if "recon" in capacity.resources]
+    limit = max((capacity.task_bytes for capacity in able), default=math.inf)
     name, largest = max(calls.items(), key=lambda item: item[1])
     if largest > limit:
         field = costly_setting(settings, name)
-        found = (
+        given = (
             f"{getattr(settings, field):g}, for which a task ({task_in_words(name)}) takes {largest} bytes"
         )
-        raise InvalidInput(field, found, f"settings whose tasks take at most {limit:.0f} bytes")
+        raise InvalidInput(field, given, f"settings whose tasks take at most {limit:.0f} bytes")
     tasks = count_of(settings) + 1
     if tasks > MAX_TASKS:
         raise InvalidInput("elements", f"{settings.elements}, {tasks} tasks", f"at most {MAX_TASKS} tasks")
-    able = [one for one in able if one.task_bytes >= largest]
+    able = [capacity for capacity in able if capacity.task_bytes >= largest]
     shared, each = cpu_seconds(settings)
     minutes = (shared / max(1, len(able)) + each) / 60.0
     where = "on one worker; none is connected yet"

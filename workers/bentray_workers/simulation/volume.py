@@ -90,8 +90,8 @@ class VolumeSimulationSettings:
     def medium(self, number: int) -> FineMedium:
         """A medium by its number, sampled on the fine grid."""
         scan = self.scan()
-        part = scan if self.three_d else scan.slice(number)
-        return part.medium(attenuation=self.attenuation)
+        dataset = scan if self.three_d else scan.slice(number)
+        return dataset.medium(attenuation=self.attenuation)
 
     def elements_in_medium(self, scan: int) -> Floats:
         """(n, ndim), m, in the coordinates of the medium."""

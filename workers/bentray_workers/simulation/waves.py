@@ -237,13 +237,13 @@ def simulate_emission(
     settings: WaveSimulationSettings, emission: int, poll: Poll = no_poll
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Object and water traces of an emission, (elements, samples); on ``poll`` see ``time_blocks``."""
-    places = settings.places_m()
-    at = places[settings.senders()[emission]]
+    positions = settings.places_m()
+    at = positions[settings.senders()[emission]]
     time = settings.step_s * np.arange(settings.samples * settings.skip) - BEFORE / settings.frequency_hz
     late = time * settings.frequency_hz
     pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
     received, water = (
-        simulate(medium, at, places, pulse, poll)[:, :: settings.skip] for medium in _media(settings)
+        simulate(medium, at, positions, pulse, poll)[:, :: settings.skip] for medium in _media(settings)
     )
     return received.astype(np.float32), water.astype(np.float32)
 

@@ -143,19 +143,19 @@ def _linear(
     along = position[a] - position[b]
     distance = np.linalg.norm(along, axis=1)
     toward = slowness * along / np.maximum(distance, 1e-12)[:, None]
-    one = np.ones(len(time))
+    ones_column = np.ones(len(time))
     entries = (
         (2 * a, toward[:, 0]),
         (2 * a + 1, toward[:, 1]),
         (2 * b, -toward[:, 0]),
         (2 * b + 1, -toward[:, 1]),
-        (at.emission + emitter, one),
-        (at.reception + receiver, one),
-        (np.full(len(time), at.common), one),
+        (at.emission + emitter, ones_column),
+        (at.reception + receiver, ones_column),
+        (np.full(len(time), at.common), ones_column),
         (np.full(len(time), at.count - 1), distance),
     )
     row = np.tile(np.arange(len(time)), len(entries))
-    columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
+    columns, values = (np.concatenate(arrays) for arrays in zip(*entries, strict=True))
     rows = sparse.csr_array((values, (row, columns)), shape=(len(time), at.count))
     delay = value[at.emission + emitter] + value[at.reception + receiver] + value[at.common]
     return rows, np.asarray(time - delay - slowness * distance)
@@ -187,8 +187,8 @@ def _step(
         InvalidInput: where the times do not determine the unknowns.
     """
     fixed = _conventions(dataset, at, fit_speed)[:, free]
-    part = rows[:, np.flatnonzero(free)]
-    normal = (part.T @ part).toarray()
+    free_columns = rows[:, np.flatnonzero(free)]
+    normal = (free_columns.T @ free_columns).toarray()
     # Unknowns are in m, s and s/m: scaled to similar size.
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-30))
     normal *= scale[:, None] * scale[None, :]
@@ -204,7 +204,7 @@ def _step(
             "times_s", "times that leave positions or delays open", "more pairs, around the whole array"
         ) from None
     change = np.zeros(at.count)
-    change[free] = scale * cho_solve(factor, scale * (part.T @ residual))
+    change[free] = scale * cho_solve(factor, scale * (free_columns.T @ residual))
     inverse = cho_solve(factor, np.eye(len(scale)))
     # The contribution of the conventions is not an uncertainty of the data.
     weight = np.linalg.solve(conventions @ inverse @ conventions.T, conventions @ inverse)
@@ -214,15 +214,15 @@ def _step(
 
 def _conventions(dataset: Dataset, at: _Unknowns, fit_speed: bool) -> Floats:
     """Rows whose product with a change must be 0: translation, rotation, mean delays, and scale."""
-    place = dataset.element_position_m - dataset.element_position_m.mean(axis=0)
+    centred = dataset.element_position_m - dataset.element_position_m.mean(axis=0)
     rows = np.zeros((_gauges(fit_speed), at.count))
     rows[0, 0 : at.emission : 2] = 1.0
     rows[1, 1 : at.emission : 2] = 1.0
-    rows[2, 0 : at.emission : 2], rows[2, 1 : at.emission : 2] = -place[:, 1], place[:, 0]
+    rows[2, 0 : at.emission : 2], rows[2, 1 : at.emission : 2] = -centred[:, 1], centred[:, 0]
     rows[3, at.emission : at.reception] = 1.0
     rows[4, at.reception : at.common] = 1.0
     if fit_speed:
-        rows[5, : at.emission] = place.ravel()
+        rows[5, : at.emission] = centred.ravel()
     return rows
 
 

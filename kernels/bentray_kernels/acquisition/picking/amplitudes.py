@@ -96,8 +96,8 @@ def with_log_ratios(dataset: Dataset, way: str) -> Dataset:
         InvalidInput: as ``read_log_ratios``; without travel times.
     """
     every = range(len(dataset.tx))
-    parts = [dataset.slice(k) for k in range(dataset.slices)]
-    ratios = [read_log_ratios(one, every, one.differential_tof(), way) for one in parts]
+    slices = [dataset.slice(k) for k in range(dataset.slices)]
+    ratios = [read_log_ratios(slice_data, every, slice_data.differential_tof(), way) for slice_data in slices]
     ratio = ratios[0] if dataset.slice_z_m is None else np.stack(ratios)
     return replace(dataset, log_ratio_np=ratio, amplitude_frequency_hz=dataset.center_frequency_hz)
 

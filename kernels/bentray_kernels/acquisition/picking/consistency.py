@@ -49,8 +49,8 @@ def outliers(dataset: Dataset, delta: Floats, skip_s: float) -> tuple[Flags, Flo
         (ntx, nrx) flags, and departures, s; NaN where a pick or its neighbours are missing.
     """
     around = _neighbours(dataset, delta)
-    known = np.isfinite(around)
-    count = known.sum(axis=0)
+    finite = np.isfinite(around)
+    count = finite.sum(axis=0)
     # Zeros avoid warnings of medians over columns without neighbours.
     around = np.where(count > 0, around, 0.0)
     middle = np.nanmedian(around, axis=0)

@@ -65,17 +65,17 @@ def pick(
     reach = reach_of(dataset, picker, reach_s)
     nz, every = dataset.slices, range(len(dataset.tx))
     predicted = _predictions(dataset, predicted_s)
-    parts = []
+    readings = []
     for k in range(nz):
-        one = dataset.slice(k)
+        slice_data = dataset.slice(k)
 
         def done(e: int, k: int = k) -> None:
             if progress is not None:
                 progress(k * len(every) + e + 1, nz * len(every))
 
-        times = read_times(one, every, picker, predicted[k], reach, done)
-        parts.append(screen_times(one, *times, screened=screened))
-    delta, sigma = (np.stack(both) for both in zip(*parts, strict=True))
+        times = read_times(slice_data, every, picker, predicted[k], reach, done)
+        readings.append(screen_times(slice_data, *times, screened=screened))
+    delta, sigma = (np.stack(both) for both in zip(*readings, strict=True))
     if dataset.slice_z_m is None:
         delta, sigma = delta[0], sigma[0]
     return replace(dataset, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=picker, waveform=None)

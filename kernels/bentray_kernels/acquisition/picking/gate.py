@@ -71,11 +71,11 @@ class Gate:
         strong = np.flatnonzero(power >= BAND_FLOOR * power.max()) * rate / (16 * pulse.size)
         frequency = np.linspace(strong[0], strong[-1], FREQUENCIES)
         turn = 2.0 * np.pi * frequency / rate
-        place = np.arange(math.ceil(2.0 * half) + 1.0)
-        weight = _flat(place - half, half) ** 2
-        apart = (turn[:, None] - turn)[..., None] * (place - half)
+        sample = np.arange(math.ceil(2.0 * half) + 1.0)
+        weight = _flat(sample - half, half) ** 2
+        apart = (turn[:, None] - turn)[..., None] * (sample - half)
         noise_correlation = (np.cos(apart) * weight).sum(axis=-1) / weight.sum()
-        return cls(late, half, frequency, np.exp(-1j * np.outer(place, turn)), noise_correlation)
+        return cls(late, half, frequency, np.exp(-1j * np.outer(sample, turn)), noise_correlation)
 
     def powers(self, traces: NDArray[Any], arrival: Floats, rounding: float) -> tuple[Floats, Floats]:
         """Power spectra of the pulses of one emission, and noise power, which is assumed to be white.

@@ -50,9 +50,9 @@ def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
         arrival_s = distance / dataset.water_speed_mps
     pieces: list[Floats] = []
     for e in range(0, len(dataset.tx), max(1, len(dataset.tx) // EMISSIONS)):
-        place = (arrival_s[e] - dataset.t0_s) * dataset.sampling_rate_hz
-        detected = (distance[e] >= least) & np.isfinite(place)
-        pieces += _pieces(dataset.waveform.water[e], place, detected, before, length)
+        sample = (arrival_s[e] - dataset.t0_s) * dataset.sampling_rate_hz
+        detected = (distance[e] >= least) & np.isfinite(sample)
+        pieces += _pieces(dataset.waveform.water[e], sample, detected, before, length)
     if not pieces:
         raise InvalidInput(
             "waveform/water", "no pulse whole in any trace", "traces that hold it about its arrival"
@@ -61,13 +61,13 @@ def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
 
 
 def _pieces(
-    traces: NDArray[Any], place: Floats, detected: NDArray[np.bool_], before: int, length: int
+    traces: NDArray[Any], sample: Floats, detected: NDArray[np.bool_], before: int, length: int
 ) -> list[Floats]:
     """The pulses of one emission, aligned to a fraction of a sample, peak 1."""
     turn = -2j * np.pi * np.fft.rfftfreq(length)
     pieces = []
     for r in np.flatnonzero(detected):
-        begin = math.floor(place[r]) - before
+        begin = math.floor(sample[r]) - before
         if begin < 0 or begin + length > traces.shape[1]:
             continue
         piece = traces[r, begin : begin + length].astype(np.float64)
@@ -78,8 +78,8 @@ def _pieces(
         peak = np.abs(piece).max()
         if peak == 0.0:
             continue
-        part = place[r] - math.floor(place[r])
-        pieces.append(np.fft.irfft(np.fft.rfft(piece / peak) * np.exp(-turn * part), length))
+        fraction = sample[r] - math.floor(sample[r])
+        pieces.append(np.fft.irfft(np.fft.rfft(piece / peak) * np.exp(-turn * fraction), length))
     return pieces
 
 

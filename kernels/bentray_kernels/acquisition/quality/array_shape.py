@@ -46,8 +46,8 @@ def find_limited_angle(dataset: Dataset) -> list[Finding]:
         return [Finding(COVERAGE, str(error.value), accepted, "reported", value=math.nan)]
     if coverage is None or not coverage.limited:
         return []
-    found, unit = str(coverage).removesuffix("."), "of the directions"
-    return [Finding(COVERAGE, found, accepted, "reported", value=coverage.visible, unit=unit)]
+    message, unit = str(coverage).removesuffix("."), "of the directions"
+    return [Finding(COVERAGE, message, accepted, "reported", value=coverage.visible, unit=unit)]
 
 
 def inapplicable(dataset: Dataset, checked: Iterable[str]) -> dict[str, str]:

@@ -13,17 +13,17 @@ from .measures import Measures
 MAX_CLIPPED = 0.25
 
 
-def find_broken(dataset: Dataset, measures: Measures, which: str, known: Flags) -> list[Finding]:
+def find_broken(dataset: Dataset, measures: Measures, which: str, reported: Flags) -> list[Finding]:
     """Find traces with samples that are not finite, and constant ones.
 
     Args:
         dataset: of one slice.
         measures: of its traces.
         which: ``object`` or ``water``.
-        known: (ntx, nrx), pairs already left out by another finding.
+        reported: (ntx, nrx), pairs already left out by another finding.
     """
     findings = []
-    other = (dataset.tx[:, None] != dataset.rx[None, :]) & ~known
+    other = (dataset.tx[:, None] != dataset.rx[None, :]) & ~reported
     for check, flags, fault, accepted in (
         ("values", measures.broken, "samples that are not finite", "finite samples"),
         ("constant traces", measures.constant, "a constant value", "a recording"),
@@ -43,9 +43,9 @@ def find_clipped(dataset: Dataset, measures: Measures, which: str) -> list[Findi
     pairs = measures.clipped & (dataset.tx[:, None] != dataset.rx[None, :])
     if not pairs.any():
         return []
-    part = float(pairs.sum()) / max(int(measures.detected.sum()), 1)
+    fraction = float(pairs.sum()) / max(int(measures.detected.sum()), 1)
     message = f"{which}: {int(pairs.sum())} traces clipped at their highest or lowest value"
-    message += ", the gain is too high" if part > MAX_CLIPPED else ""
+    message += ", the gain is too high" if fraction > MAX_CLIPPED else ""
     # Saturated channels, unless all of them are.
     often = pairs.sum(axis=0) > 0.5 * np.maximum(measures.detected.sum(axis=0), 1)
     saturated = dataset.rx[often] if often.sum() < 0.5 * often.size else dataset.rx[:0]
@@ -58,7 +58,7 @@ def find_clipped(dataset: Dataset, measures: Measures, which: str) -> list[Findi
             tuple(int(k) for k in saturated),
             "reception" if saturated.size else "",
             pairs=np.asarray(pairs),
-            value=part,
+            value=fraction,
             unit="of all traces",
         )
     ]

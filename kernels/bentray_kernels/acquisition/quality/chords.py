@@ -47,10 +47,10 @@ def examine_chords(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
         dataset = apply(dataset, findings)
         chords = find_water_chords(dataset, strongest, period)
     late = strongest - _expected(dataset, chords)
-    found = find_element_errors(dataset, late)
-    findings += found
+    errors = find_element_errors(dataset, late)
+    findings += errors
     emission, reception = np.zeros(len(dataset.tx)), np.zeros(len(dataset.rx))
-    for finding in found:
+    for finding in errors:
         if finding.check == CLOCK:
             sent = finding.role == "emission"
             of_role = np.isin(dataset.tx if sent else dataset.rx, finding.elements)
@@ -76,14 +76,14 @@ def _expected(dataset: Dataset, chords: WaterChords) -> Floats:
 def _log_ratio(dataset: Dataset, measures: Measures) -> Floats:
     """Logarithm of the amplitude over what emitter, receiver and distance explain; NaN without a trace."""
     distance = dataset.distance_m()
-    known = np.isfinite(measures.peak) & (measures.peak > 0.0) & (distance > 0.0)
+    usable = np.isfinite(measures.peak) & (measures.peak > 0.0) & (distance > 0.0)
     if dataset.valid is not None:
-        known &= dataset.valid
-    ratio = np.where(known, np.log(np.where(known, measures.peak * np.sqrt(distance), 1.0)), np.nan)
+        usable &= dataset.valid
+    ratio = np.where(usable, np.log(np.where(usable, measures.peak * np.sqrt(distance), 1.0)), np.nan)
     for _ in range(POLISHED):
         for axis in (0, 1):
-            some = known.any(axis=axis)
-            middle = np.zeros(some.size)
-            middle[some] = np.nanmedian(ratio[:, some] if axis == 0 else ratio[some], axis=axis)
+            measured = usable.any(axis=axis)
+            middle = np.zeros(measured.size)
+            middle[measured] = np.nanmedian(ratio[:, measured] if axis == 0 else ratio[measured], axis=axis)
             ratio = ratio - (middle if axis == 0 else middle[:, None])
     return ratio

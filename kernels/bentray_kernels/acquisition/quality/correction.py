@@ -35,10 +35,10 @@ def corrected(dataset: Dataset, report: Report) -> Dataset:
         return dataset
     if dataset.slice_z_m is None:
         return apply(dataset, report.findings)
-    parts = [
+    slices = [
         apply(dataset.slice(k), [f for f in report.findings if f.slice == k]) for k in range(dataset.slices)
     ]
-    return stacked(dataset, parts)
+    return stacked(dataset, slices)
 
 
 def apply(dataset: Dataset, findings: Iterable[Finding]) -> Dataset:
@@ -52,11 +52,11 @@ def apply(dataset: Dataset, findings: Iterable[Finding]) -> Dataset:
     return dataset
 
 
-def stacked(dataset: Dataset, parts: list[Dataset]) -> Dataset:
+def stacked(dataset: Dataset, slices: list[Dataset]) -> Dataset:
     """Combine the slices of a dataset."""
 
     def several(name: str) -> np.ndarray | None:
-        arrays = [getattr(part, name) for part in parts]
+        arrays = [getattr(slice_data, name) for slice_data in slices]
         if all(array is None for array in arrays):
             return None
         # Slices without findings have no mask.
@@ -65,14 +65,14 @@ def stacked(dataset: Dataset, parts: list[Dataset]) -> Dataset:
 
     names = ("tof_s", "delta_tof_s", "sigma_s", "log_ratio_np", "valid")
     waveform = None
-    if dataset.waveform is not None and all(part.waveform is not None for part in parts):
-        held = [part.waveform for part in parts]
+    if dataset.waveform is not None and all(slice_data.waveform is not None for slice_data in slices):
+        held = [slice_data.waveform for slice_data in slices]
         pieces = {
             name: None if getattr(held[0], name) is None else np.stack([getattr(w, name) for w in held])
             for name in ("object", "water", "object_scale", "water_scale")
         }
         waveform = replace(dataset.waveform, **pieces)  # type: ignore[arg-type]
-    first = parts[0]
+    first = slices[0]
     return replace(
         dataset,
         waveform=waveform,

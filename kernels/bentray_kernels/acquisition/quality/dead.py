@@ -31,9 +31,9 @@ def find_dead(dataset: Dataset, detected: Flags) -> list[Finding]:
         # Pairs with dead elements of the other role are not counted.
         alive = np.asarray(detected.any(axis=1 - axis))
         pairs_counted = other & (alive[None, :] if axis == 1 else alive[:, None])
-        part = (detected & pairs_counted).sum(axis=axis) / np.maximum(pairs_counted.sum(axis=axis), 1)
-        dead = np.flatnonzero(part < MIN_DETECTED)
-        if dead.size and np.median(part) >= USUALLY_DETECTED:
+        fraction = (detected & pairs_counted).sum(axis=axis) / np.maximum(pairs_counted.sum(axis=axis), 1)
+        dead = np.flatnonzero(fraction < MIN_DETECTED)
+        if dead.size and np.median(fraction) >= USUALLY_DETECTED:
             pairs = np.zeros_like(detected)
             pairs[(dead, slice(None)) if axis == 1 else (slice(None), dead)] = True
             findings.append(
@@ -45,7 +45,7 @@ def find_dead(dataset: Dataset, detected: Flags) -> list[Finding]:
                     tuple(int(k) for k in element[dead]),
                     role,
                     pairs,
-                    float(part[dead].max()),
+                    float(fraction[dead].max()),
                     "of its pairs",
                 )
             )

@@ -32,11 +32,11 @@ def find_drift(dataset: Dataset, residual_s: Floats) -> list[Finding]:
     distance = dataset.distance_m()
     emissions, slopes = [], []
     for e, row in enumerate(residual_s):
-        known = np.isfinite(row)
-        if known.sum() < MIN_CHORDS or np.std(distance[e][known]) < MIN_SPREAD * distance.max():
+        finite = np.isfinite(row)
+        if finite.sum() < MIN_CHORDS or np.std(distance[e][finite]) < MIN_SPREAD * distance.max():
             continue
         emissions.append(float(e))
-        slopes.append(robust_line(distance[e][known], row[known])[0])
+        slopes.append(robust_line(distance[e][finite], row[finite])[0])
     if len(emissions) < MIN_EMISSIONS:
         return []
     order, slope = np.array(emissions), np.array(slopes)

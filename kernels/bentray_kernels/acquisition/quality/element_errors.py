@@ -46,8 +46,8 @@ def fit_element_errors(dataset: Dataset, residual_s: Floats) -> ElementErrors:
         dataset: of one slice.
         residual_s: (ntx, nrx), s: times in water minus those of the stated positions; NaN where unknown.
     """
-    place, elements = dataset.element_position_m[:, :2], len(dataset.element_position_m)
-    away = place[dataset.tx][:, None] - place[dataset.rx][None]
+    position, elements = dataset.element_position_m[:, :2], len(dataset.element_position_m)
+    away = position[dataset.tx][:, None] - position[dataset.rx][None]
     # Direction of growing times for the emitter; that of the receiver is the opposite.
     away /= np.maximum(np.linalg.norm(away, axis=-1), 1e-12)[..., None]
     middle = float(np.nanmedian(residual_s)) if np.isfinite(residual_s).any() else 0.0

@@ -75,20 +75,20 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
 
 def _unusual(values: Floats, sigma: Floats, least: float) -> Ints:
     """Indices of values far from the usual ones, and certain; none where most are."""
-    known = values[np.isfinite(values)]
-    if not known.size:
+    finite = values[np.isfinite(values)]
+    if not finite.size:
         return np.array([], dtype=np.int64)
-    beyond = np.abs(values) > max(least, float(np.median(known)) + UNUSUAL * robust_deviation(known))
+    beyond = np.abs(values) > max(least, float(np.median(finite)) + UNUSUAL * robust_deviation(finite))
     beyond &= np.abs(values) > UNUSUAL * sigma
-    return np.flatnonzero(beyond) if beyond.sum() <= MAX_PART * known.size else np.array([], dtype=np.int64)
+    return np.flatnonzero(beyond) if beyond.sum() <= MAX_PART * finite.size else np.array([], dtype=np.int64)
 
 
-def _runs(places: Ints, values: Floats) -> list[Ints]:
+def _runs(indices: Ints, values: Floats) -> list[Ints]:
     """Neighbouring elements with deviations of the same sign, together."""
-    if not places.size:
+    if not indices.size:
         return []
-    breaks = (np.diff(places) > 1) | (np.diff(np.sign(values[places])) != 0.0)
-    return list(np.split(places, np.flatnonzero(breaks) + 1))
+    breaks = (np.diff(indices) > 1) | (np.diff(np.sign(values[indices])) != 0.0)
+    return list(np.split(indices, np.flatnonzero(breaks) + 1))
 
 
 def _named(elements: Ints) -> str:

@@ -36,8 +36,8 @@ def estimate_water(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
     findings, chords = examine_chords(dataset, measures)
     period_s = 1.0 / dataset.center_frequency_hz
     pulses = read_pulses(apply(dataset, findings), range(len(dataset.tx)), chords, period_s)
-    found, reference = estimate_from_pulses(apply(dataset, findings), chords, pulses)
-    return [*findings, *found], reference
+    estimated, reference = estimate_from_pulses(apply(dataset, findings), chords, pulses)
+    return [*findings, *estimated], reference
 
 
 def estimate_from_pulses(
@@ -72,11 +72,11 @@ def estimate_from_pulses(
 
 def find_estimated_water(dataset: Dataset, reference: ReferenceShot) -> Finding:
     """Water properties estimated from the chords that miss the object, beside what the file states."""
-    found = (
+    message = (
         f"none; from {reference.chords} chords that miss the object: water of {reference.speed_mps:.1f} m/s "
         f"({'assumed' if dataset.water_temperature_assumed else 'stated'}: {dataset.water_speed_mps:.1f}), "
         f"arrivals {1e6 * reference.delay_s:.3g} µs late"
     )
     return Finding(
-        WATER_SHOT, found, "a scan without the object", "reported", value=reference.speed_mps, unit="m/s"
+        WATER_SHOT, message, "a scan without the object", "reported", value=reference.speed_mps, unit="m/s"
     )

@@ -91,28 +91,26 @@ def examine_slices(
     """
     SHARE.check("max_left_out", max_left_out)
     findings = find_impossible(dataset.impossible_times)
-    parts: list[Dataset | None] = []
+    kept: list[Dataset | None] = []
     counted: list[Pairs] = []
     checked: tuple[str, ...] = ()
     numbers = count(1)
-    for k, one in enumerate(slices):
-        total = dataset.slices * len(dataset.tx) * _times_read(one)
+    for k, slice_data in enumerate(slices):
+        total = dataset.slices * len(dataset.tx) * _times_read(slice_data)
 
         def step(total: int = total) -> None:
             if progress is not None:
                 progress(next(numbers), total)
 
-        of_slice, part, checked = _slice(one, picker, step)
-        counted.append(count_left_out(one, of_slice))
+        of_slice, kept_slice, checked = _slice(slice_data, picker, step)
+        counted.append(count_left_out(slice_data, of_slice))
         findings += [replace(finding, slice=k) for finding in of_slice]
-        parts.append(part)
-    whole = [part for part in parts if part is not None]
+        kept.append(kept_slice)
+    whole = [slice_data for slice_data in kept if slice_data is not None]
     picked = None
-    too_few = (
-        find_too_few(counted, dataset.impossible_times, max_left_out) if len(whole) == len(parts) else []
-    )
+    too_few = find_too_few(counted, dataset.impossible_times, max_left_out) if len(whole) == len(kept) else []
     findings += too_few
-    if len(whole) == len(parts) and not too_few:
+    if len(whole) == len(kept) and not too_few:
         # A single slice keeps its truth and position; several lose them when sliced.
         combined = whole[0] if dataset.slice_z_m is None else stacked(dataset, whole)
         picked = replace(combined, truth=dataset.truth, waveform=None)
@@ -183,8 +181,8 @@ def check_times(dataset: Dataset) -> list[Finding]:
 
 def _detected(dataset: Dataset, delta: Floats) -> Flags:
     """(ntx, nrx): pairs with a time in at least one direction."""
-    known = np.isfinite(delta)
+    finite = np.isfinite(delta)
     elements = len(dataset.element_position_m)
     full = np.zeros((elements, elements), dtype=bool)
-    full[np.ix_(dataset.tx, dataset.rx)] = known
+    full[np.ix_(dataset.tx, dataset.rx)] = finite
     return np.asarray((full | full.T)[np.ix_(dataset.tx, dataset.rx)])

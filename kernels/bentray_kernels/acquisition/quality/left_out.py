@@ -29,15 +29,15 @@ def count_left_out(dataset: Dataset, findings: Iterable[Finding]) -> Pairs:
         findings: of this slice.
     """
     if dataset.picked:
-        known = np.isfinite(dataset.differential_tof())
+        usable = np.isfinite(dataset.differential_tof())
     else:
-        known = np.asarray(dataset.tx[:, None] != dataset.rx)
-        known = known if dataset.valid is None else known & dataset.valid
-    out = np.zeros_like(known)
+        usable = np.asarray(dataset.tx[:, None] != dataset.rx)
+        usable = usable if dataset.valid is None else usable & dataset.valid
+    out = np.zeros_like(usable)
     for finding in findings:
         if finding.action == "left out" and finding.pairs is not None:
             out |= finding.pairs
-    return Pairs(int(known.sum()), int((known & out).sum()))
+    return Pairs(int(usable.sum()), int((usable & out).sum()))
 
 
 def find_impossible(counts: Mapping[str, int]) -> list[Finding]:
@@ -70,17 +70,17 @@ def find_too_few(slices: Iterable[Pairs], impossible: Mapping[str, int], most: f
     """
     counted = list(slices)
     lost = lost_pairs(impossible)
-    known = sum(pairs.known for pairs in counted) + lost
+    total = sum(pairs.known for pairs in counted) + lost
     out = sum(pairs.left_out for pairs in counted) + lost
-    if known == 0 or out <= most * known:
+    if total == 0 or out <= most * total:
         return []
     return [
         Finding(
             LEFT_OUT,
-            f"{out} of {known} pairs, {100.0 * out / known:.0f} %",
+            f"{out} of {total} pairs, {100.0 * out / total:.0f} %",
             f"at most {100.0 * most:.0f} %; the setting max_left_out (--max-left-out) allows more",
             "refused",
-            value=out / known,
+            value=out / total,
             unit="of the pairs",
         )
     ]

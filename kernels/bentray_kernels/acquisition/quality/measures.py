@@ -48,7 +48,7 @@ class Measures:
         assert dataset.sampling_rate_hz is not None
         rows = [_emission(np.asarray(emission)) for emission in traces]
         broken, constant, detected, clipped, strongest, peak = (
-            np.stack(part) for part in zip(*rows, strict=True)
+            np.stack(rows_of_field) for rows_of_field in zip(*rows, strict=True)
         )
         time = np.where(detected, dataset.t0_s + strongest / dataset.sampling_rate_hz, np.nan)
         return cls(broken, constant, detected, clipped, time, peak)
@@ -65,10 +65,10 @@ class Measures:
         return unclipped if most else self.strongest_s
 
     @classmethod
-    def joined(cls, parts: Sequence[Measures]) -> Measures:
+    def joined(cls, measures: Sequence[Measures]) -> Measures:
         """Concatenate the measures of parts of the emissions, in order."""
         names = [field.name for field in fields(cls)]
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        return cls(*(np.concatenate([getattr(measure, name) for measure in measures]) for name in names))
 
 
 def _emission(traces: NDArray[Any]) -> tuple[Flags, Flags, Flags, Flags, Floats, Floats]:
@@ -79,8 +79,8 @@ def _emission(traces: NDArray[Any]) -> tuple[Flags, Flags, Flags, Flags, Floats,
     offset = np.median(x, axis=1, keepdims=True)
     centred = np.abs(x - offset)
     peak = centred.max(axis=1)
-    parts = np.array_split(centred, min(PARTS, x.shape[1]), axis=1)
-    quiet = np.min([np.sqrt((part**2).mean(axis=1)) for part in parts], axis=0)
+    blocks = np.array_split(centred, min(PARTS, x.shape[1]), axis=1)
+    quiet = np.min([np.sqrt((block**2).mean(axis=1)) for block in blocks], axis=0)
     detected = (peak > STANDS_OUT * quiet) & ~broken & ~constant
     # Small integers repeat by chance: clipping is detected only at amplitudes of many steps.
     steps = 20.0 if traces.dtype.kind == "i" else 0.0
@@ -122,5 +122,5 @@ def _vertex(size: Floats, at: NDArray[np.intp]) -> Floats:
         return at.astype(np.float64)
     left, middle, right = size[row, inner - 1], size[row, inner], size[row, inner + 1]
     bend = left - 2.0 * middle + right
-    part = np.where(bend < 0.0, 0.5 * (left - right) / np.where(bend < 0.0, bend, 1.0), 0.0)
-    return np.asarray(at + np.where(inner == at, part, 0.0))
+    fraction = np.where(bend < 0.0, 0.5 * (left - right) / np.where(bend < 0.0, bend, 1.0), 0.0)
+    return np.asarray(at + np.where(inner == at, fraction, 0.0))

@@ -72,13 +72,13 @@ def water_signs(dataset: Dataset, strongest_s: Floats) -> Floats:
     period = dataset.sampling_rate_hz / dataset.center_frequency_hz
     reach = math.ceil(REACH * period)
     # Traces without a maximum are not compared; any position will do.
-    place = np.where(np.isfinite(strongest_s), strongest_s, dataset.t0_s) - dataset.t0_s
-    place *= dataset.sampling_rate_hz
+    sample = np.where(np.isfinite(strongest_s), strongest_s, dataset.t0_s) - dataset.t0_s
+    sample *= dataset.sampling_rate_hz
     nt = dataset.waveform.water.shape[-1]
-    pieces = np.full((*place.shape, 2 * reach + 1), np.nan)
+    pieces = np.full((*sample.shape, 2 * reach + 1), np.nan)
     steps = np.arange(-reach, reach + 1)
-    for e in range(len(place)):
-        at = place[e][:, None] + steps
+    for e in range(len(sample)):
+        at = sample[e][:, None] + steps
         inside = (at[:, 0] >= 0.0) & (at[:, -1] <= nt - 2) & np.isfinite(strongest_s[e])
         low = np.clip(np.floor(at).astype(np.int64), 0, nt - 2)
         trace = np.array(dataset.waveform.water[e], dtype=np.float64)
@@ -89,16 +89,16 @@ def water_signs(dataset: Dataset, strongest_s: Floats) -> Floats:
         size = np.linalg.norm(piece, axis=1)
         good = inside & (size > 0.0) & np.isfinite(size)
         pieces[e][good] = piece[good] / size[good][:, None]
-    known = np.isfinite(pieces[..., 0])
-    if not known.any():
-        return np.full(place.shape, np.nan)
-    common = np.median(pieces[known], axis=0)
+    finite = np.isfinite(pieces[..., 0])
+    if not finite.any():
+        return np.full(sample.shape, np.nan)
+    common = np.median(pieces[finite], axis=0)
     size = float(np.linalg.norm(common))
-    return np.asarray(pieces @ (common / size)) if size > 0.0 else np.full(place.shape, np.nan)
+    return np.asarray(pieces @ (common / size)) if size > 0.0 else np.full(sample.shape, np.nan)
 
 
 def _majority(sign: Floats, axis: int) -> Floats:
     """-1 for rows (axis 1) or columns (axis 0) of which most are inverted, else 1."""
-    known = np.isfinite(sign)
-    down = ((sign < -0.3) & known).sum(axis=axis) / np.maximum(known.sum(axis=axis), 1)
-    return np.where((down > MIN_FRACTION) & (known.sum(axis=axis) >= MIN_PAIRS), -1.0, 1.0)
+    finite = np.isfinite(sign)
+    down = ((sign < -0.3) & finite).sum(axis=axis) / np.maximum(finite.sum(axis=axis), 1)
+    return np.where((down > MIN_FRACTION) & (finite.sum(axis=axis) >= MIN_PAIRS), -1.0, 1.0)

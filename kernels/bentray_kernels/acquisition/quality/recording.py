@@ -73,10 +73,10 @@ class Measured(NamedTuple):
         return cls(water, received)
 
     @classmethod
-    def joined(cls, parts: Sequence[Measured]) -> Measured:
+    def joined(cls, measured: Sequence[Measured]) -> Measured:
         """Concatenate the measures of parts of the emissions."""
-        water = [part.water for part in parts if part.water is not None]
-        return cls(Measures.joined(water) if water else None, Measures.joined([p.object for p in parts]))
+        water = [slice_measured.water for slice_measured in measured if slice_measured.water is not None]
+        return cls(Measures.joined(water) if water else None, Measures.joined([p.object for p in measured]))
 
 
 def check_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], tuple[str, ...]]:
@@ -159,9 +159,9 @@ def _of_water(dataset: Dataset, strongest: Floats) -> list[Finding]:
 def _log_ratio(received: Measures, water: Measures) -> Floats:
     """Logarithm of the object's amplitude over that of the water, (ntx, nrx); NaN where one has no pulse."""
     # A pulse that the object has removed is as weak as what was found.
-    known = water.detected & np.isfinite(received.peak) & (received.peak > 0.0)
-    ratio = np.where(known, received.peak, 1.0) / np.where(known, water.peak, 1.0)
-    return np.where(known, np.log(ratio), np.nan)
+    usable = water.detected & np.isfinite(received.peak) & (received.peak > 0.0)
+    ratio = np.where(usable, received.peak, 1.0) / np.where(usable, water.peak, 1.0)
+    return np.where(usable, np.log(ratio), np.nan)
 
 
 def _left_out(findings: list[Finding], like: Flags) -> Flags:

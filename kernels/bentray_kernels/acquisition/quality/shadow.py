@@ -44,40 +44,40 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
         log_ratio: (ntx, nrx), logarithm of the amplitude over that in water; NaN where unknown.
     """
     assert dataset.center_frequency_hz is not None
-    known = np.isfinite(log_ratio) & (dataset.tx[:, None] != dataset.rx[None, :])
-    if dataset.element_position_m.shape[1] != 2 or known.sum() < MIN_PAIRS:
+    usable = np.isfinite(log_ratio) & (dataset.tx[:, None] != dataset.rx[None, :])
+    if dataset.element_position_m.shape[1] != 2 or usable.sum() < MIN_PAIRS:
         return []
-    shadow = known & (log_ratio - np.median(log_ratio[known]) < SHADOWED)
-    if not 0 < shadow.sum() <= MAX_SHADOW * known.sum():
+    shadow = usable & (log_ratio - np.median(log_ratio[usable]) < SHADOWED)
+    if not 0 < shadow.sum() <= MAX_SHADOW * usable.sum():
         return []
-    pairs = np.argwhere(known)
+    pairs = np.argwhere(usable)
     pairs = pairs[:: -(-len(pairs) // MAX_PAIRS)]
     dark = shadow[pairs[:, 0], pairs[:, 1]]
     normal, height = _lines(dataset)
     normal, height = normal[pairs[:, 0], pairs[:, 1]], height[pairs[:, 0], pairs[:, 1]]
     width = HALF_WIDTH * dataset.water_speed_mps / dataset.center_frequency_hz
 
-    def darkness(place: Floats) -> float:
+    def darkness(line: Floats) -> float:
         """Part of the chords through a place in shadow; 0 where few cross it, or many beside it are dark."""
-        off = np.abs(normal @ place - height)
-        through, beside = off <= width, (off >= BESIDE[0] * width) & (off <= BESIDE[1] * width)
-        if through.sum() < MIN_PAIRS or not beside.any() or dark[beside].mean() > OUTSIDE:
+        off = np.abs(normal @ line - height)
+        through, outside = off <= width, (off >= BESIDE[0] * width) & (off <= BESIDE[1] * width)
+        if through.sum() < MIN_PAIRS or not outside.any() or dark[outside].mean() > OUTSIDE:
             return 0.0
         return float(dark[through].mean())
 
     coarse, spacing = _places(dataset)
-    found = max(coarse, key=darkness)
+    line = max(coarse, key=darkness)
     steps = np.linspace(-0.5, 0.5, REFINED)
-    found = max((found + spacing * np.array([x, y]) for x in steps for y in steps), key=darkness)
-    best = darkness(found)
+    line = max((line + spacing * np.array([x, y]) for x in steps for y in steps), key=darkness)
+    best = darkness(line)
     if best < INSIDE:
         return []
     normal, height = _lines(dataset)
-    crossing: Flags = shadow & (np.abs(normal @ found - height) <= width)
+    crossing: Flags = shadow & (np.abs(normal @ line - height) <= width)
     return [
         Finding(
             SCATTERER,
-            f"at ({1e3 * found[0]:.0f}, {1e3 * found[1]:.0f}) mm, such as a bubble: {int(crossing.sum())} "
+            f"at ({1e3 * line[0]:.0f}, {1e3 * line[1]:.0f}) mm, such as a bubble: {int(crossing.sum())} "
             "pairs through it have lost most of their amplitude",
             "an object without gas",
             "reported",

@@ -55,11 +55,11 @@ def find_swapped(dataset: Dataset, strongest_s: Floats, expected_s: Floats) -> l
 def _exchanged(times: Floats, expected: Floats, period: float) -> list[tuple[int, int, float]]:
     """Columns (a, b) to exchange, and their present deviation."""
     own = np.array([_scatter(times[:, r] - expected[:, r]) for r in range(times.shape[1])])
-    known = np.isfinite(own)
-    if not known.any():
+    finite = np.isfinite(own)
+    if not finite.any():
         return []
-    least = max(SUSPECT_PERIODS * period, SUSPECT_TIMES * float(np.median(own[known])))
-    suspects = np.flatnonzero(known & (own > least))
+    least = max(SUSPECT_PERIODS * period, SUSPECT_TIMES * float(np.median(own[finite])))
+    suspects = np.flatnonzero(finite & (own > least))
     candidates = []
     for a, b in combinations(suspects.tolist(), 2):
         there, back = _scatter(times[:, a] - expected[:, b]), _scatter(times[:, b] - expected[:, a])

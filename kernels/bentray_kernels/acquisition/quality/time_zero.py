@@ -38,8 +38,8 @@ def find_recording_shift(dataset: Dataset, line: WaterLine) -> list[Finding]:
     assert dataset.center_frequency_hz is not None
     if abs(line.intercept_s) <= LARGEST_DELAY / dataset.center_frequency_hz:
         return []
-    known = line.residual_s[np.isfinite(line.residual_s)]
-    action, more = _correctable(dataset, line.intercept_s, robust_deviation(known))
+    residuals = line.residual_s[np.isfinite(line.residual_s)]
+    action, more = _correctable(dataset, line.intercept_s, robust_deviation(residuals))
     return [
         Finding(
             RECORDING,

@@ -43,12 +43,12 @@ class WaterLine:
             strongest_s: (ntx, nrx), NaN where there is none.
         """
         distance = dataset.distance_m()
-        known = np.isfinite(strongest_s) & (distance > NEAR * distance.max())
-        if known.sum() < MIN_POINTS or np.ptp(distance[known]) == 0.0:
+        usable = np.isfinite(strongest_s) & (distance > NEAR * distance.max())
+        if usable.sum() < MIN_POINTS or np.ptp(distance[usable]) == 0.0:
             return None
-        x, y = distance[known], strongest_s[known]
+        x, y = distance[usable], strongest_s[usable]
         slope, _ = robust_line(x, y)
         late = strongest_s - distance / dataset.water_speed_mps
-        residual = np.where(known, late - np.median(late[known]), np.nan)
+        residual = np.where(usable, late - np.median(late[usable]), np.nan)
         speed = 1.0 / slope if slope > 0.0 else np.inf
-        return cls(float(speed), float(np.median(late[known])), residual)
+        return cls(float(speed), float(np.median(late[usable])), residual)

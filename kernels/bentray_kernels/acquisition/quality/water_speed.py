@@ -53,10 +53,10 @@ def find_water_speed(dataset: Dataset, speed_mps: float, sigma_mps: float) -> li
         accepted = (
             f"within {allowed:.1f} m/s; state it by --sound-speed {speed_mps:.1f} if the array is right"
         )
-    found = f"{stated_water(dataset)}; the travel times say {fitted_water(speed_mps, sigma_mps)}"
+    message = f"{stated_water(dataset)}; the travel times say {fitted_water(speed_mps, sigma_mps)}"
     if action == "reported":
-        found = f"water temperature contradicts the travel times: {found}"
-    return [Finding(WATER_SPEED, found, accepted, action, value=speed_mps, unit="m/s")]
+        message = f"water temperature contradicts the travel times: {message}"
+    return [Finding(WATER_SPEED, message, accepted, action, value=speed_mps, unit="m/s")]
 
 
 def water_summary(dataset: Dataset, speed_mps: float, sigma_mps: float) -> str:

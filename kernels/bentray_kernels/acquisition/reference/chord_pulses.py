@@ -39,9 +39,9 @@ class ChordPulses(NamedTuple):
     noise: Floats
 
     @classmethod
-    def joined(cls, parts: Sequence[ChordPulses]) -> ChordPulses:
+    def joined(cls, pulses: Sequence[ChordPulses]) -> ChordPulses:
         """Concatenate the pulses of parts of the emissions."""
-        return cls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+        return cls(*(np.concatenate(column) for column in zip(*pulses, strict=True)))
 
     def inverted(self, pairs: Flags) -> ChordPulses:
         """The pulses with the opposite sign for some pairs, (ntx, nrx)."""
@@ -76,7 +76,7 @@ def read_pulses(
     begin = np.floor(arrival).astype(np.int64) - before
     most = chords_of_emission(len(dataset.tx))
     whole = chords.pairs & (begin >= 0) & (begin + length <= traces.object.shape[-1])
-    found: list[tuple[int, int, int]] = []
+    pairs: list[tuple[int, int, int]] = []
     samples: list[NDArray[np.float32]] = []
     noise: list[float] = []
     for e in emissions:
@@ -90,11 +90,11 @@ def read_pulses(
             trace -= np.median(trace)
             if traces.object_scale is not None:
                 trace *= np.float32(traces.object_scale[e, r])
-            found.append((e, r, int(begin[e, r])))
+            pairs.append((e, r, int(begin[e, r])))
             samples.append(trace[begin[e, r] : begin[e, r] + length])
             before_it = trace[: begin[e, r]]
             noise.append(robust_deviation(before_it) if len(before_it) >= LEAD else np.nan)
-    index = np.array(found, dtype=np.int64).reshape(-1, 3)
+    index = np.array(pairs, dtype=np.int64).reshape(-1, 3)
     pulses = np.array(samples, dtype=np.float32).reshape(-1, length)
     return ChordPulses(index[:, 0], index[:, 1], index[:, 2], pulses, np.array(noise))
 

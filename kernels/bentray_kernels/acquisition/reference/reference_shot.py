@@ -106,8 +106,8 @@ class ReferenceShot:
         length = 2 ** math.ceil(math.log2(samples + pulse))
         frequency = np.fft.rfftfreq(length, 1.0 / dataset.sampling_rate_hz)
         real, imaginary = (
-            np.interp(frequency, self.frequency_hz, part, right=0.0)
-            for part in (self.spectrum.real, self.spectrum.imag)
+            np.interp(frequency, self.frequency_hz, component, right=0.0)
+            for component in (self.spectrum.real, self.spectrum.imag)
         )
         wave_number = np.interp(frequency, self.frequency_hz, self.wave_number)
         late = self.delay_s + self.emission_delay_s[emission] + self.reception_delay_s - dataset.t0_s
@@ -117,11 +117,11 @@ class ReferenceShot:
         shots = np.empty((len(distance), samples), dtype=np.float32)
         # Some receivers at once, so that the spectra take little memory.
         for begin in range(0, len(distance), RECEIVERS_AT_ONCE):
-            some = slice(begin, begin + RECEIVERS_AT_ONCE)
-            phase = 2.0 * np.pi * late[some, None] * frequency + distance[some, None] * wave_number
-            spectra = gain[some, None] * (real + 1j * imaginary) * np.exp(-1j * phase)
-            shots[some] = np.fft.irfft(spectra, length, axis=1)[:, :samples]
-            shots[some] += self.noise * random.standard_normal((len(phase), samples))
+            block = slice(begin, begin + RECEIVERS_AT_ONCE)
+            phase = 2.0 * np.pi * late[block, None] * frequency + distance[block, None] * wave_number
+            spectra = gain[block, None] * (real + 1j * imaginary) * np.exp(-1j * phase)
+            shots[block] = np.fft.irfft(spectra, length, axis=1)[:, :samples]
+            shots[block] += self.noise * random.standard_normal((len(phase), samples))
         return shots
 
 
@@ -281,7 +281,7 @@ class _Fit:
         """The result, with the fitted speed and its standard deviation."""
         size = np.log(np.maximum(self.amplitude, np.finfo(np.float64).tiny) * np.sqrt(self._distance))
         emission_gain, reception_gain = self._of_elements(size, centred=False)
-        known = self._pulses.noise[np.isfinite(self._pulses.noise)]
+        finite = self._pulses.noise[np.isfinite(self._pulses.noise)]
         speed, sigma = fitted
         return ReferenceShot(
             frequency_hz=np.asarray(self._omega / (2.0 * np.pi), dtype=np.float64),
@@ -296,7 +296,7 @@ class _Fit:
             speed_mps=speed,
             speed_sigma_mps=sigma,
             scatter_s=robust_deviation(self.lag_s[self.used]),
-            noise=float(np.median(known)) if known.size else 0.0,
+            noise=float(np.median(finite)) if finite.size else 0.0,
         )
 
     def _aligned(self) -> Spectrum:

@@ -93,11 +93,11 @@ def find_water_chords(
     """
     distance = dataset.distance_m()
     nearest = min(NEAREST * dataset.water_speed_mps * period_s, NEAREST_PART * float(distance.max()))
-    known = np.isfinite(arrival_s) & (distance > nearest)
-    known &= dataset.tx[:, None] != dataset.rx[None, :]
+    usable = np.isfinite(arrival_s) & (distance > nearest)
+    usable &= dataset.tx[:, None] != dataset.rx[None, :]
     if dataset.valid is not None:
-        known &= dataset.valid
-    pairs = np.flatnonzero(known)
+        usable &= dataset.valid
+    pairs = np.flatnonzero(usable)
     if pairs.size < MIN_CHORDS:
         raise _refusal(pairs.size)
     x, y = distance.ravel()[pairs], arrival_s.ravel()[pairs]
@@ -128,23 +128,23 @@ def find_water_chords(
     speed = 1.0 / slowness if slowness > 0.0 else float("inf")
     if not SLOWEST_MPS <= speed <= FASTEST_MPS:
         raise _refusal(agreeing.size)
-    found = np.zeros(distance.size, dtype=bool)
-    found[pairs[agreeing]] = True
+    chosen = np.zeros(distance.size, dtype=bool)
+    chosen[pairs[agreeing]] = True
     spread = robust_deviation(y[agreeing] - slowness * x[agreeing])
     sigma = spread / (np.std(x[agreeing]) * np.sqrt(agreeing.size)) * speed**2
-    return WaterChords(found.reshape(distance.shape), speed, delay, spread, float(sigma))
+    return WaterChords(chosen.reshape(distance.shape), speed, delay, spread, float(sigma))
 
 
 def chord_offset(dataset: Dataset) -> Floats:
     """Distance of chords from the axis of the array over that of the farthest element, (ntx, nrx)."""
     position = dataset.element_position_m[:, :2]
-    place = position - 0.5 * (position.min(axis=0) + position.max(axis=0))
-    start = place[dataset.tx][:, None]
-    along = place[dataset.rx][None] - start
+    centred = position - 0.5 * (position.min(axis=0) + position.max(axis=0))
+    start = centred[dataset.tx][:, None]
+    along = centred[dataset.rx][None] - start
     length = np.maximum((along**2).sum(axis=-1), np.finfo(np.float64).tiny)
-    part = np.clip(-(start * along).sum(axis=-1) / length, 0.0, 1.0)
-    nearest = np.linalg.norm(start + part[..., None] * along, axis=-1)
-    return np.asarray(nearest / np.linalg.norm(place, axis=1).max())
+    fraction = np.clip(-(start * along).sum(axis=-1) / length, 0.0, 1.0)
+    nearest = np.linalg.norm(start + fraction[..., None] * along, axis=-1)
+    return np.asarray(nearest / np.linalg.norm(centred, axis=1).max())
 
 
 def _near(line: tuple[float, float], x: Floats, y: Floats, chords: Ints, reach: float) -> Ints:
@@ -159,9 +159,9 @@ def _densest_line(x: Floats, y: Floats, width: float) -> tuple[float, float]:
     for slowness in 1.0 / np.linspace(SLOWEST_MPS, FASTEST_MPS, SPEEDS):
         delay = y - slowness * x
         least = float(np.percentile(delay, 0.5))
-        place = np.floor((delay - least) / width)
-        inside = (place >= 0.0) & (place < 1e5)
-        near = np.convolve(np.bincount(place[inside].astype(np.int64)), (0.5, 1.0, 0.5), "same")
+        index = np.floor((delay - least) / width)
+        inside = (index >= 0.0) & (index < 1e5)
+        near = np.convolve(np.bincount(index[inside].astype(np.int64)), (0.5, 1.0, 0.5), "same")
         peak = int(near.argmax())
         if near[peak] > most:
             most, best = float(near[peak]), (float(slowness), least + (peak + 0.5) * width)

@@ -72,13 +72,13 @@ def read(tof: Floats, spacing: float, source: Floats, points: Floats) -> Floats:
         (k,), s.
     """
     low = np.clip((points / spacing).astype(np.int64), 0, np.array(tof.shape) - 2)
-    part = points / spacing - low
+    fraction = points / spacing - low
     mean_slowness = np.zeros(len(points))
     weight_sum = np.zeros(len(points))
     for corner in product((0, 1), repeat=tof.ndim):
         node = low + np.array(corner)
         distance = np.linalg.norm(node * spacing - source, axis=1)
-        weight = np.prod(np.where(corner, part, 1.0 - part), axis=1)
+        weight = np.prod(np.where(corner, fraction, 1.0 - fraction), axis=1)
         weight = np.where(distance > 0.0, weight, 0.0)
         mean_slowness += weight * tof[tuple(node.T)] / np.where(distance > 0.0, distance, 1.0)
         weight_sum += weight

@@ -63,13 +63,13 @@ class _Rays:
 
 
 @contextmanager
-def _by_threads(parts: Sequence[Rows]) -> Iterator[_Rays]:
+def _by_threads(blocks: Sequence[Rows]) -> Iterator[_Rays]:
     """The rows for one solution."""
-    if sum(part.columns.size for part in parts) < MIN_ENTRIES:
-        yield _Rays(halves(parts), map)
+    if sum(block.columns.size for block in blocks) < MIN_ENTRIES:
+        yield _Rays(halves(blocks), map)
         return
     with ThreadPoolExecutor(2, "update") as pool:
-        yield _Rays(halves(parts), pool.map)
+        yield _Rays(halves(blocks), pool.map)
 
 
 @dataclass(frozen=True)
@@ -208,10 +208,10 @@ class Linearised:
     def _back_projected(self, change: Floats, half: Sequence[Rows]) -> tuple[list[Floats], Floats]:
         """Weights of the rows of some parts, and their weighted residuals of an image back-projected."""
         weights, into = [], np.zeros(change.size)
-        for part in half:
-            residual = part.residual - part.project(change)
+        for block in half:
+            residual = block.residual - block.project(change)
             weights.append(self._weights(residual))
-            part.back_project(weights[-1] * residual, into)
+            block.back_project(weights[-1] * residual, into)
         return weights, into
 
     def _weights(self, residual_part: Floats) -> Floats:
@@ -224,8 +224,8 @@ class Linearised:
 def _curvature(image: Floats, half: Sequence[Rows], weights: Sequence[Floats]) -> Floats:
     """Aᵀ·W·A·image of the rows of some parts, (nodes,), with weights by part."""
     into = np.zeros(image.size)
-    for part, weight in zip(half, weights, strict=True):
-        normal_product(part.pointers, part.columns, part.lengths, weight, image, into)
+    for block, weight in zip(half, weights, strict=True):
+        normal_product(block.pointers, block.columns, block.lengths, weight, image, into)
     return into
 
 

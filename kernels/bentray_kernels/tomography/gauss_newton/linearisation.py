@@ -73,26 +73,26 @@ class Rows:
         back_project(self.pointers, self.columns, self.lengths, values, into)
 
 
-def halves(parts: Sequence[Rows]) -> list[list[Rows]]:
+def halves(blocks: Sequence[Rows]) -> list[list[Rows]]:
     """The first and the last half of the rays; the same for any split into parts."""
-    middle = sum(part.residual.size for part in parts) // 2
-    found: list[list[Rows]] = [[], []]
+    middle = sum(block.residual.size for block in blocks) // 2
+    halved: list[list[Rows]] = [[], []]
     begin = 0
-    for part in parts:
-        count = part.residual.size
+    for block in blocks:
+        count = block.residual.size
         cut = min(max(middle - begin, 0), count)
         begin += count
-        for half, first, last in zip(found, (0, cut), (cut, count), strict=True):
+        for half, first, last in zip(halved, (0, cut), (cut, count), strict=True):
             if first < last:
-                half.append(part.between(first, last))
-    return found
+                half.append(block.between(first, last))
+    return halved
 
 
-def ray_density(problem: Problem, parts: Sequence[Rows]) -> Floats:
+def ray_density(problem: Problem, blocks: Sequence[Rows]) -> Floats:
     """Nodes of ray through each node, of the region's shape."""
     density = np.zeros(problem.region.size)
-    for part in parts:
-        part.back_project(np.ones(part.residual.size), density)
+    for block in blocks:
+        block.back_project(np.ones(block.residual.size), density)
     return density.reshape(problem.region.shape)
 
 
@@ -152,7 +152,7 @@ def _trace(
     """
     slowness, front = ray_slowness(problem, settings, slowness), front_smoothing(problem, settings)
     speed = smoothed(1.0 / slowness, front)
-    parts, splines = [], {}
+    traced, splines = [], {}
     for emitter in emitters:
         valid = np.flatnonzero(np.isfinite(data[emitter]))
         slab = problem.slab(int(emitter))
@@ -180,9 +180,9 @@ def _trace(
         residual = residual_of(
             int(emitter), valid, distance, predicted * problem.spacing, length * problem.spacing
         )
-        parts.append((counts, columns, lengths, residual))
-    counts, columns, lengths, residual = (np.concatenate(part) for part in zip(*parts, strict=True))
-    rays = np.array([part[0].size for part in parts])
+        traced.append((counts, columns, lengths, residual))
+    counts, columns, lengths, residual = (np.concatenate(arrays) for arrays in zip(*traced, strict=True))
+    rays = np.array([entries[0].size for entries in traced])
     return Rows(np.concatenate(([0], np.cumsum(counts))), columns, lengths, residual, rays)
 
 

@@ -31,8 +31,8 @@ class CandidateGraph(ReconstructionGraph):
 
     def _evaluated(self) -> list[Evaluation]:
         return [
-            Evaluation((part, self._index), *tasks, part.problem(self._index).active_emitters)
-            for part, tasks in zip(self._held_out, TASKS, strict=False)
+            Evaluation((held, self._index), *tasks, held.problem(self._index).active_emitters)
+            for held, tasks in zip(self._held_out, TASKS, strict=False)
         ]
 
     @property
@@ -58,7 +58,7 @@ class CandidateGraph(ReconstructionGraph):
 
 def sum_misfits(_scan: Scan, _index: int, _slowness: Floats, rows: Sequence[Rows]) -> Floats:
     """Task: number of pairs, sum of absolute residuals, s, and of their squares, s²."""
-    residual = np.concatenate([part.residual for part in rows])
+    residual = np.concatenate([row.residual for row in rows])
     return np.array([residual.size, np.abs(residual).sum(), (residual**2).sum()])
 
 

@@ -64,8 +64,8 @@ def choose_finite_frequency(trials: Sequence[Trial], mean_time_s: float) -> Tria
     if len(fat) < len(WIDE):
         return next(iter(fat.values()), None)
     straight, bent = fat["straight"], fat["curved"]
-    part = STRAIGHT if mean_misfit(bent) < EXPLAINED_PART * mean_time_s else 1.0
-    best = straight if mean_misfit(straight) < part * mean_misfit(bent) else bent
+    factor = STRAIGHT if mean_misfit(bent) < EXPLAINED_PART * mean_time_s else 1.0
+    best = straight if mean_misfit(straight) < factor * mean_misfit(bent) else bent
     thin = min((t for t in trials if "ray_width_m" not in t.settings), key=mean_misfit)
     return None if mean_misfit(thin) < EXACT * mean_misfit(best) else best
 

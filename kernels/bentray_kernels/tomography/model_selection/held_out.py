@@ -41,9 +41,9 @@ def part_of(dataset: Dataset, part: Part) -> Dataset:
         return dataset
     views, sparse = _views(dataset), part.endswith("sparse")
     scattered = np.zeros_like(views) if sparse else _scattered(dataset) & ~views
-    parts = {"shown": ~(views | scattered), "held-out": scattered, "views": views}
+    masks = {"shown": ~(views | scattered), "held-out": scattered, "views": views}
     least = ELEMENTS_OF_SPARSE if sparse else ELEMENTS
-    selected = parts[part.removesuffix("-sparse")]
+    selected = masks[part.removesuffix("-sparse")]
     selected &= np.logical_and.outer(_thinned(dataset.tx, least), _thinned(dataset.rx, least))
     shape = selected.shape if dataset.slice_z_m is None else (dataset.slices, *selected.shape)
     valid = np.broadcast_to(selected, shape)

@@ -129,11 +129,12 @@ def select_model(
         held = [part for part in parts[1:] if _has_pairs(scan_of(first, part), index)]
         if not held or not _has_pairs(scan_of(first, parts[0]), index):
             return []
-        tried = [one for one in candidates if settings.rays == "curved" or one["rays"] == "straight"]
+        curved = settings.rays == "curved"
+        tried = [changes for changes in candidates if curved or changes["rays"] == "straight"]
         plans = zip(tried, candidate_settings(settings, tried), strict=True)
         return [
-            (one, CandidateGraph(scan_of(plan, parts[0]), index, *(scan_of(plan, part) for part in held)))
-            for one, plan in plans
+            (changes, CandidateGraph(scan_of(plan, parts[0]), index, *(scan_of(plan, part) for part in held)))
+            for changes, plan in plans
         ]
 
     def run(tried: Graphs, later: int = 0) -> list[Trial]:
@@ -142,8 +143,8 @@ def select_model(
         run_graphs(graphs, before, later + rest)
         before += sum(graph.total for graph in graphs)
         return [
-            Trial(one, graph.held_out_rms_s, graph.history[-1].residual_rms_s, graph.held_out_mean_s)
-            for one, graph in tried
+            Trial(changes, graph.held_out_rms_s, graph.history[-1].residual_rms_s, graph.held_out_mean_s)
+            for changes, graph in tried
         ]
 
     thin = graphs_of(CANDIDATES, PARTS)
@@ -160,7 +161,7 @@ def select_model(
     others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
     selected = final_settings(settings, chosen.settings)
     # Scattered pairs, if there are any: errors of the model are larger in views.
-    misfit = next(graph.first_part_rms_s for one, graph in tried if one is chosen.settings)
+    misfit = next(graph.first_part_rms_s for changes, graph in tried if changes is chosen.settings)
     return stop_at_noise(selected, misfit, dataset), (chosen, *others), before
 
 
@@ -225,10 +226,10 @@ def rejection(trial: Trial, trials: Sequence[Trial]) -> str:
     chosen, misfit = trials[0], _misfit_of(trials)
     if trial is chosen or misfit(trial) >= misfit(chosen) or "ray_width_m" not in chosen.settings:
         return ""
-    part, why = STRAIGHT, "straight rays fit smooth times with a wrong image"
+    factor, why = STRAIGHT, "straight rays fit smooth times with a wrong image"
     if "ray_width_m" not in trial.settings:
-        part, why = EXACT, "thin rays fit wrong picks too"
-    return f"must be below {1e9 * part * misfit(chosen):.0f} ns: {why}"
+        factor, why = EXACT, "thin rays fit wrong picks too"
+    return f"must be below {1e9 * factor * misfit(chosen):.0f} ns: {why}"
 
 
 def _misfit_of(trials: Sequence[Trial]) -> Callable[[Trial], float]:
@@ -239,21 +240,21 @@ def _misfit_of(trials: Sequence[Trial]) -> Callable[[Trial], float]:
 
 def advice_of(result: Reconstruction) -> str:
     """How the model of a result was chosen, and what a full-waveform refinement gave or would give."""
-    parts = explain_trials(result.trials), result.provenance.get("waveform", "")
-    return "; ".join(part for part in parts if part)
+    advice = explain_trials(result.trials), result.provenance.get("waveform", "")
+    return "; ".join(sentence for sentence in advice if sentence)
 
 
 def label(changes: dict[str, Any]) -> str:
     """Label such as ``straight rays, SART`` or ``bent finite-frequency rays, Gauss-Newton``."""
     rays = "straight" if changes["rays"] == "straight" else "bent"
     wide = " finite-frequency" if changes.get("ray_width_m") else ""
-    parts = [f"{rays}{wide} rays"]
+    words = [f"{rays}{wide} rays"]
     if "method" in changes:
-        parts.append({"sart": "SART", "gauss-newton": "Gauss-Newton"}[changes["method"]])
+        words.append({"sart": "SART", "gauss-newton": "Gauss-Newton"}[changes["method"]])
     if changes.get("front_smoothing_nodes"):
-        parts.append("smoothed wave front")
+        words.append("smoothed wave front")
     if changes.get("edge_mps"):
-        parts.append("sharp edges")
+        words.append("sharp edges")
     if "penalty_strength" in changes and not wide:
-        parts.append(f"penalty {changes['penalty_strength']:g}")
-    return ", ".join(parts)
+        words.append(f"penalty {changes['penalty_strength']:g}")
+    return ", ".join(words)

@@ -85,10 +85,10 @@ def high_pass(traces: Floats, rate_hz: float, frequency_hz: float, later_s: Floa
     more = math.ceil(RESPONSE_PERIODS * rate_hz / frequency_hz)
     length = scipy.fft.next_fast_len(samples + more, real=True)
     spectrum = scipy.fft.rfft(traces, length, axis=1)
-    part = scipy.fft.rfftfreq(length, 1.0 / rate_hz) / frequency_hz
+    relative = scipy.fft.rfftfreq(length, 1.0 / rate_hz) / frequency_hz
     if later_s is not None:
-        spectrum *= np.exp(-2j * np.pi * frequency_hz * later_s[:, None] * part)
-    spectrum *= 0.5 - 0.5 * np.cos(np.pi * np.clip((part - STOPPED) / (PASSED - STOPPED), 0.0, 1.0))
+        spectrum *= np.exp(-2j * np.pi * frequency_hz * later_s[:, None] * relative)
+    spectrum *= 0.5 - 0.5 * np.cos(np.pi * np.clip((relative - STOPPED) / (PASSED - STOPPED), 0.0, 1.0))
     return np.asarray(scipy.fft.irfft(spectrum, length, axis=1, overwrite_x=True)[:, :samples])
 
 
@@ -143,7 +143,7 @@ def without_water_shot(
         period_s: of the centre frequency, s.
     """
     near = np.abs(times_s[None, :] - arrival_s[:, None]) <= PULSE_PERIODS * period_s
-    product, square = (np.einsum("ij,ij,ij->i", near, one, water) for one in (traces, water))
+    product, square = (np.einsum("ij,ij,ij->i", near, record, water) for record in (traces, water))
     scale = np.divide(product, square, out=np.zeros_like(square), where=square > 0.0)
     muted = traces * window
     less = muted - np.maximum(scale, 0.0)[:, None] * water * window

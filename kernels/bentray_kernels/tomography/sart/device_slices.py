@@ -130,8 +130,8 @@ def slices_in_flight(session: Session, size: SliceSize) -> int:
     device = session.device
     limit = MEMORY_SHARE * device.memory_bytes if device.memory_bytes else float("inf")
     largest = float(device.buffer_bytes or np.inf)
-    found = int(min(limit / size.bytes, largest / size.largest_bytes, 2**16))
-    if found < 1:
+    slices = int(min(limit / size.bytes, largest / size.largest_bytes, 2**16))
+    if slices < 1:
         raise InvalidInput(
             "nodes",
             f"{size.shape[0]}, for which a slice takes {size.bytes} bytes, {size.largest_bytes} in one array",
@@ -141,7 +141,7 @@ def slices_in_flight(session: Session, size: SliceSize) -> int:
     if ring_bytes(size.shape[1]) > local - 16 * GROUPS[0]:
         most = (local - 16 * GROUPS[0]) // 4 // (SLOTS + CROSSINGS) - BESIDE
         raise InvalidInput("nodes", size.shape[1], f"at most {most}, for the local memory of the device")
-    return min(found, PROCESSOR_SLICES) if device.kind == "cpu" else found
+    return min(slices, PROCESSOR_SLICES) if device.kind == "cpu" else slices
 
 
 def ring_bytes(nodes: int) -> int:
@@ -177,20 +177,20 @@ class DeviceSlices:
         self._session, self._update = session, update
         slices, nx, ny = slowness.shape
         self._shape, self._nodes, self._passes = (nx, ny), nx * ny, slices * update.members
-        self._emitters = max(len(one.emitters) for one in emissions)
+        self._emitters = max(len(emission.emitters) for emission in emissions)
         self._rings, self._receivers = emissions[0].receivers.shape[:2]
         self._most = LONGEST * (nx + ny)
         self._group = next(group for group in GROUPS if group <= session.handle.max_work_group_size)
-        self._numbers = np.array([len(one.emitters) for one in emissions], np.uint32)
+        self._numbers = np.array([len(emission.emitters) for emission in emissions], np.uint32)
         up, reserve = session.upload, session.reserve
         self._slowness = up(np.ascontiguousarray(slowness))
         self._coverage = up(np.ascontiguousarray(coverage))
         self._region = up(np.ascontiguousarray(region, np.uint8))
         self._count_of = up(self._numbers)
-        self._sources = up(self._padded([one.emitters for one in emissions], 0.0))
-        self._times = up(self._padded([one.delta_tof for one in emissions], np.nan))
-        self._ring = up(self._padded([one.ring for one in emissions], 0).astype(np.int32))
-        self._places = up(np.stack([one.receivers for one in emissions]))
+        self._sources = up(self._padded([emission.emitters for emission in emissions], 0.0))
+        self._times = up(self._padded([emission.delta_tof for emission in emissions], np.nan))
+        self._ring = up(self._padded([emission.ring for emission in emissions], 0).astype(np.int32))
+        self._places = up(np.stack([emission.receivers for emission in emissions]))
         self._scales, self._weights = up(scales / update.spacing), up(update.weights)
         self._edges = up(RESIDUAL_EDGES_S)
         grids, rays = self._passes * self._nodes, self._passes * self._receivers
@@ -212,9 +212,9 @@ class DeviceSlices:
         """Enqueue the updates by all emitters."""
         kernels = self._kernels()
         for step in range(-(-self._emitters // self._update.members)):
-            for kernel, place, size, group in kernels:
-                if place is not None:
-                    kernel.set_arg(place, np.uint32(step))
+            for kernel, index, size, group in kernels:
+                if index is not None:
+                    kernel.set_arg(index, np.uint32(step))
                 self._session.launch(kernel, size, group)
 
     def images(self) -> tuple[Floats, Floats]:
@@ -247,7 +247,7 @@ class DeviceSlices:
         (nx, ny), update, session = self._shape, self._update, self._session
         passes, nodes, slices, group = self._passes, self._nodes, len(self._numbers), self._group
         uint, at, members = np.uint32, np.uint32(0), np.uint32(update.members)
-        sides, one = (np.int32(nx), np.int32(ny)), (self._count_of, members, at)
+        sides, indices = (np.int32(nx), np.int32(ny)), (self._count_of, members, at)
         emitters, count = uint(self._emitters), uint(self._receivers)
         over_nodes, over_images = (_filled(nodes), passes), (_filled(nodes), slices)
         over_rays, rays_group = (_filled(self._receivers, RAYS_GROUP), passes), (RAYS_GROUP, 1)
@@ -261,19 +261,19 @@ class DeviceSlices:
 
         begin = kernel(
             "begin",
-            *(self._slowness, self._sources, *one, emitters, self._crossings, self._deviation),
+            *(self._slowness, self._sources, *indices, emitters, self._crossings, self._deviation),
             *(*sides, np.int32(update.curved)),
         )
-        interleave = kernel("interleave", *one, self._crossings, self._deviation, *sides, self._fields)
+        interleave = kernel("interleave", *indices, self._crossings, self._deviation, *sides, self._fields)
         trace = kernel(
             "trace",
-            *(self._slowness, self._sources, *one, emitters, self._places, self._ring, self._times),
+            *(self._slowness, self._sources, *indices, emitters, self._places, self._ring, self._times),
             *(uint(self._rings), count, *sides, spacing, np.float64(update.crossing_s)),
             *(self._fields, uint(self._most), self._tracks, *traced),
         )
         summarise = kernel(
             "summarise",
-            *(*one, emitters, count, *traced, self._exponents, self._squares),
+            *(*indices, emitters, count, *traced, self._exponents, self._squares),
             *(self._edges, uint(RESIDUAL_EDGES_S.size), self._bins),
         )
         project = kernel(
@@ -283,14 +283,14 @@ class DeviceSlices:
         )
         change = kernel(
             "change",
-            *(*one, np.int32(nodes), spacing, self._region, self._exponents, self._sums),
+            *(*indices, np.int32(nodes), spacing, self._region, self._exponents, self._sums),
             *(self._coverage, self._changes),
         )
         blur = kernel("blur", self._changes, self._blurred, self._weights, reach, *sides)
         bounds = (np.float64(bound) for bound in update.bounds)
         apply = kernel(
             "apply",
-            *(*one, self._blurred, self._weights, reach, *sides, self._scales, *bounds),
+            *(*indices, self._blurred, self._weights, reach, *sides, self._scales, *bounds),
             *(self._region, self._slowness),
         )
         launches: list[tuple[Any, int | None, tuple[int, ...], tuple[int, ...] | None]] = [
@@ -306,7 +306,7 @@ class DeviceSlices:
         if update.curved:
             front = kernel(
                 "front",
-                *(self._sources, *one, emitters, self._crossings, self._deviation, *sides),
+                *(self._sources, *indices, emitters, self._crossings, self._deviation, *sides),
                 local_memory(ring_bytes(ny)),
             )
             launches.insert(1, (front, 3, (passes * group,), (group,)))

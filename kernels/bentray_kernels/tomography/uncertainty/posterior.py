@@ -65,8 +65,8 @@ class Posterior:
             (LANES, nx, ny[, nz]), changes of the image, s of crossing time.
         """
         into = np.zeros((self.deviation.size, LANES))
-        for part, weight, values in zip(self.parts, self.weights, noise, strict=True):
-            back_projections(part.pointers, part.columns, part.lengths, weight[:, None] * values, into)
+        for block, weight, values in zip(self.parts, self.weights, noise, strict=True):
+            back_projections(block.pointers, block.columns, block.lengths, weight[:, None] * values, into)
         with self._by_threads() as spread:
             return self._image(self._solved(prior + self._coefficients(into), spread))
 
@@ -111,8 +111,8 @@ class Posterior:
                 images = gaussian_filter1d(images, self.width, axis=axis, mode="constant")
         return images
 
-    def _dot(self, one: Floats, other: Floats) -> Floats:
-        return np.asarray((one * other).sum(axis=self._axes, keepdims=True))
+    def _dot(self, first: Floats, other: Floats) -> Floats:
+        return np.asarray((first * other).sum(axis=self._axes, keepdims=True))
 
     @property
     def _axes(self) -> tuple[int, ...]:
@@ -125,9 +125,9 @@ class Posterior:
         weights: list[list[Floats]] = []
         for half in cut:
             weights.append([])
-            for part in half:
-                weights[-1].append(flat[begin : begin + part.residual.size])
-                begin += part.residual.size
+            for block in half:
+                weights[-1].append(flat[begin : begin + block.residual.size])
+                begin += block.residual.size
         return cut, weights
 
     @cached_property
@@ -150,7 +150,7 @@ class Posterior:
     @contextmanager
     def _by_threads(self) -> Iterator[Map]:
         """A ``map`` that computes both halves at the same time where that is worth a thread."""
-        if sum(part.columns.size for part in self.parts) < MIN_ENTRIES:
+        if sum(block.columns.size for block in self.parts) < MIN_ENTRIES:
             yield map
             return
         with ThreadPoolExecutor(2, "uncertainty") as pool:
@@ -159,6 +159,6 @@ class Posterior:
 
 def _products(probes: Floats, half: Sequence[Rows], weights: Sequence[Floats]) -> Floats:
     into = np.zeros_like(probes)
-    for part, weight in zip(half, weights, strict=True):
-        normal_products(part.pointers, part.columns, part.lengths, weight, probes, into)
+    for block, weight in zip(half, weights, strict=True):
+        normal_products(block.pointers, block.columns, block.lengths, weight, probes, into)
     return into

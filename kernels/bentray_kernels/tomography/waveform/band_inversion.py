@@ -123,18 +123,18 @@ def emitters(problem: WaveProblem) -> Ints:
     return np.concatenate((problem.used, problem.held))
 
 
-def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: Ints) -> EmitterMisfit:
+def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, emitters: Ints) -> EmitterMisfit:
     """Misfit of some of ``emitters(problem)``, and its gradient by the band's unknown."""
     medium, by = problem.medium(model.speed, model.attenuation), problem.band.of
     measure = settings.measure(by)
-    held_out = np.isin(some, problem.held)
+    held_out = np.isin(emitters, problem.held)
 
     def emissions(emitters: Ints) -> Emissions:
         valid = [problem.valid_receivers(emitter) for emitter in emitters.tolist()]
         wavelet = problem.wavelet if model.wavelet is None else model.wavelet
         until = [
-            problem.until(emitter, some, settings.window_s)
-            for emitter, some in zip(emitters.tolist(), valid, strict=True)
+            problem.until(emitter, samples, settings.window_s)
+            for emitter, samples in zip(emitters.tolist(), valid, strict=True)
         ]
         return Emissions(problem.emitters[emitters], problem.receivers, valid, wavelet, until)
 
@@ -144,13 +144,13 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: I
         return measure(traces, problem.recorded(emitter, valid), window)
 
     def parts(emitters: Ints) -> tuple[EmissionMisfit, Observed]:
-        some = emitters.tolist()
+        numbers = emitters.tolist()
         return (
-            lambda k, traces: compare(some[k], traces),
-            Observed(settings.program(by), lambda k: problem.observed(some[k], settings.window_s)),
+            lambda k, traces: compare(numbers[k], traces),
+            Observed(settings.program(by), lambda k: problem.observed(numbers[k], settings.window_s)),
         )
 
-    validated, used = some[held_out], some[~held_out]
+    validated, used = emitters[held_out], emitters[~held_out]
     here, observed = parts(validated)
     engine, poll = settings.engine, problem.poll
     held = sum(emission_misfits(medium, emissions(validated), here, poll, engine, observed), 0.0)
@@ -165,14 +165,14 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, some: I
 
 
 def step(
-    problem: WaveProblem, settings: WaveSettings, state: InversionState, parts: Sequence[EmitterMisfit]
+    problem: WaveProblem, settings: WaveSettings, state: InversionState, misfits: Sequence[EmitterMisfit]
 ) -> InversionState:
     """The next image from the misfits of all emitters, in their order."""
-    misfit = sum(part.misfit for part in parts) / problem.used.size
-    held = sum(part.held for part in parts) / problem.held.size if problem.held.size else math.nan
-    gradient = np.where(problem.region, sum(part.gradient for part in parts), 0.0) / problem.used.size
+    misfit = sum(term.misfit for term in misfits) / problem.used.size
+    held = sum(term.held for term in misfits) / problem.held.size if problem.held.size else math.nan
+    gradient = np.where(problem.region, sum(term.gradient for term in misfits), 0.0) / problem.used.size
     if not state.history:
-        illumination = sum(part.illumination for part in parts)
+        illumination = sum(term.illumination for term in misfits)
         state = replace(state, illumination=np.asarray(illumination))
     accepted = misfit < state.misfit
     history = (*state.history, Evaluation(misfit, held, accepted))

@@ -16,9 +16,9 @@ def resampled(image: Image, spacing: float, origin: tuple[float, float], shape: 
         (origin[axis] + spacing * np.arange(nodes) - image.origin[axis]) / image.spacing
         for axis, nodes in enumerate(shape)
     ]
-    places = np.meshgrid(*lines, indexing="ij")
+    nodes = np.meshgrid(*lines, indexing="ij")
     # Cubic, because linear interpolation blurs at every change of grid; cubic may overshoot.
-    speed = map_coordinates(image.speed, places, order=3, mode="nearest")
+    speed = map_coordinates(image.speed, nodes, order=3, mode="nearest")
     return np.asarray(np.clip(speed, image.speed.min(), image.speed.max()))
 
 
@@ -47,10 +47,10 @@ def resampled_pairs(
         moved, bent = (
             np.where(
                 region,
-                resampled(Image(part, curvature.spacing, curvature.origin), spacing, origin, region.shape),
+                resampled(Image(image, curvature.spacing, curvature.origin), spacing, origin, region.shape),
                 0.0,
             )
-            for part in (step, change)
+            for image in (step, change)
         )
         steps, changes = append_pair(steps, changes, moved, factor * bent, len(curvature.steps))
     return steps, changes

@@ -54,7 +54,7 @@ def half_plans(plan: WaveSettings, ran: Sequence[Band] | None = None) -> tuple[W
 
 def passes(plan: WaveSettings) -> int:
     """Emitter passes of both halves, at most."""
-    return sum(band.evaluations(0) for one in half_plans(plan) for band in one.bands)
+    return sum(band.evaluations(0) for half in half_plans(plan) for band in half.bands)
 
 
 def half_plans_after(
@@ -91,8 +91,8 @@ def deviation(image: Image, halves: Sequence[Image], width_m: float) -> Floats:
         width_m: of the Gaussian that smooths the truth, m.
     """
     grid = image.spacing, image.origin, image.speed.shape
-    one, other = (resampled(half, *grid) for half in halves)
+    first, other = (resampled(half, *grid) for half in halves)
     nodes = width_m / image.spacing
-    squares = gaussian_filter((0.5 * (one - other)) ** 2, AVERAGED_WIDTHS * nodes, mode="nearest")
+    squares = gaussian_filter((0.5 * (first - other)) ** 2, AVERAGED_WIDTHS * nodes, mode="nearest")
     squares += (image.speed - gaussian_filter(image.speed, nodes, mode="nearest")) ** 2
     return np.asarray(np.sqrt(squares))

@@ -52,11 +52,11 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, poll: Poll
     nodes = extent.nodes
     axis = spacing * (np.arange(nodes) - 0.5 * (nodes - 1))
     origin = centre + axis[0]
-    place = (float(origin[0]), float(origin[1]))
+    corner = (float(origin[0]), float(origin[1]))
     elements = flat[np.union1d(dataset.tx, dataset.rx)]
-    region = inside_array(elements, (nodes, nodes), spacing, place, REACH)
+    region = inside_array(elements, (nodes, nodes), spacing, corner, REACH)
     if settings.roi:
-        region &= inside(dataset, region.shape, spacing, place)
+        region &= inside(dataset, region.shape, spacing, corner)
     if not region.any():
         raise InvalidInput("spacing_m", spacing, "nodes inside the array and the region of interest")
     clock = Clock(dataset.t0_s - extent.lead_s, extent.step_s, extent.steps)
@@ -72,7 +72,7 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, poll: Poll
         use &= within_opening(dataset, settings.opening_angle_deg)
     used, held = _draw_emitters(np.flatnonzero(use.any(axis=1)), settings, number)
     traces, use = _without_dead_traces(recorded, use, np.concatenate((used, held)))
-    used, held = (some[use[some].any(axis=1)] for some in (used, held))
+    used, held = (emitters[use[emitters].any(axis=1)] for emitters in (used, held))
     if used.size == 0:
         raise InvalidInput(
             "waveform/object, waveform/water", "zeros alone", "traces of both for some emitters"
@@ -82,7 +82,7 @@ def prepare(dataset: Dataset, settings: WaveSettings, number: int, *, poll: Poll
         emitters=flat[dataset.tx] - origin,
         receivers=flat[dataset.rx] - origin,
         region=region,
-        origin=place,
+        origin=corner,
         clock=clock,
         wavelet=np.zeros(clock.steps),
         water=Water(dataset.water_speed_mps),
@@ -123,8 +123,8 @@ def _draw_emitters(candidates: Ints, settings: WaveSettings, number: int) -> tup
 
     The circle is divided into as many parts as emitters are requested; one is drawn from each part.
     """
-    places = np.linspace(0, candidates.size, settings.held_out, endpoint=False).astype(np.int64)
-    held = candidates[np.unique(places)] if candidates.size else candidates
+    indices = np.linspace(0, candidates.size, settings.held_out, endpoint=False).astype(np.int64)
+    held = candidates[np.unique(indices)] if candidates.size else candidates
     rest = np.setdiff1d(candidates, held)
     if rest.size == 0:
         raise InvalidInput("held_out", settings.held_out, f"fewer than the {candidates.size} emitters")

@@ -118,8 +118,8 @@ class Refinement:
                 replace(graph.image, speed=np.where(graph.image.speed != self._water_mps, deviation, 0.0))
             )
         grid = result.spacing_m[0], (result.origin_m[0], result.origin_m[1]), result.speed.shape[:2]
-        parts = [one.speed if _grid(one) == grid else resampled(one, *grid) for one in spread]
-        stacked = np.ascontiguousarray(np.stack(parts, axis=-1)) if result.speed.ndim == 3 else parts[0]
+        speeds = [image.speed if _grid(image) == grid else resampled(image, *grid) for image in spread]
+        stacked = np.ascontiguousarray(np.stack(speeds, axis=-1)) if result.speed.ndim == 3 else speeds[0]
         return replace(result, uncertainty=stacked, resolution_width_m=tuple(widths))
 
     @property
@@ -151,8 +151,8 @@ class Refinement:
         grid = _grid(finest)
 
         def stacked(images: Sequence[Image]) -> NDArray[np.float64]:
-            parts = [image.speed if _grid(image) == grid else resampled(image, *grid) for image in images]
-            return np.ascontiguousarray(np.stack(parts, axis=-1)) if rays.speed.ndim == 3 else parts[0]
+            speeds = [image.speed if _grid(image) == grid else resampled(image, *grid) for image in images]
+            return np.ascontiguousarray(np.stack(speeds, axis=-1)) if rays.speed.ndim == 3 else speeds[0]
 
         def of_rays(values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
             return None if values is None else stacked(_slices(rays, values))
@@ -167,7 +167,7 @@ class Refinement:
         bounds = self._settings.speed_bounds_mps
         cautions = [*bound_cautions(speed, coverage, bounds, rays.water_speed_mps)]
         # The bounds and the uncertainty of the rays do not belong to this image; it began with their misfit.
-        cautions += [one for one in rays.cautions if one.code not in ("bounds", "uncertainty")]
+        cautions += [caution for caution in rays.cautions if caution.code not in ("bounds", "uncertainty")]
         return replace(
             rays,
             speed=speed,

@@ -146,8 +146,8 @@ class RefinementGraph:
             return [Task(start_band, (self._scan, self.number, self.image, curvature))]
         model, number = self._band.model, self._emitters_of_a_task
         return [
-            Task(evaluate_emitter, (self._scan, self.number, model, place, number), keep_on_worker=True)
-            for place in range(0, self._band.emitters, number)
+            Task(evaluate_emitter, (self._scan, self.number, model, first, number), keep_on_worker=True)
+            for first in range(0, self._band.emitters, number)
         ]
 
     def after(self, task: Task, result: Any) -> list[Task]:
@@ -165,8 +165,8 @@ class RefinementGraph:
             if len(self._misfits) * self._emitters_of_a_task < self._band.emitters:
                 return []
             # In the order of the emitters, not of completion: floating-point sums depend on it.
-            parts = [part for _, part in sorted(self._misfits.items())]
-            return [Task(update_image, (self._scan, self.number, self._band.state, parts))]
+            misfits = [misfit for _, misfit in sorted(self._misfits.items())]
+            return [Task(update_image, (self._scan, self.number, self._band.state, misfits))]
         self._misfits = {}
         self._band = replace(self._band, state=result)
         if result.done:
@@ -231,18 +231,18 @@ def start_band(
     return ActiveBand(lossless, *grid, count, start.speed, start.wavelet)
 
 
-def evaluate_emitter(scan: WaveScan, number: int, model: Model, place: int, count: int = 1) -> EmitterMisfit:
+def evaluate_emitter(scan: WaveScan, number: int, model: Model, first: int, count: int = 1) -> EmitterMisfit:
     """Task: misfit and gradient of some emitters, by their places among the band's emitters."""
     problem = scan.problem(number)
-    some = band_inversion.emitters(problem)[place : place + count]
-    return band_inversion.evaluate(problem, scan.settings(), model, some)
+    emitters = band_inversion.emitters(problem)[first : first + count]
+    return band_inversion.evaluate(problem, scan.settings(), model, emitters)
 
 
 def update_image(
-    scan: WaveScan, number: int, state: InversionState, parts: list[EmitterMisfit]
+    scan: WaveScan, number: int, state: InversionState, misfits: list[EmitterMisfit]
 ) -> InversionState:
     """Task: the next image."""
-    return band_inversion.step(scan.problem(number), scan.settings(), state, parts)
+    return band_inversion.step(scan.problem(number), scan.settings(), state, misfits)
 
 
 def starting_models(image: Image, problem: WaveProblem, settings: WaveSettings) -> list[Model]:
@@ -259,7 +259,7 @@ def starting_models(image: Image, problem: WaveProblem, settings: WaveSettings) 
     speed = np.clip(resampled(image, problem.band.spacing_m, problem.origin, problem.region.shape), low, high)
     cleared = np.where(problem.region, speed, problem.water.speed)
     speeds = [speed] if np.array_equal(speed, cleared) else [speed, cleared]
-    return [Model(one, None, _source(one, problem, settings)) for one in speeds]
+    return [Model(speed, None, _source(speed, problem, settings)) for speed in speeds]
 
 
 def held_out_misfit(problem: WaveProblem, settings: WaveSettings, model: Model) -> float:

@@ -120,7 +120,7 @@ def _with_wavelet(problem: WaveProblem, shots: WaterShots, water: Water) -> Wave
     medium = problem.medium(np.full(problem.region.shape, water.speed))
     emitters = calibration_emitters(problem)
 
-    parts = []
+    readings = []
     for emitter in emitters:
         valid = problem.valid_receivers(emitter)
         model = simulate(
@@ -128,8 +128,8 @@ def _with_wavelet(problem: WaveProblem, shots: WaterShots, water: Water) -> Wave
         )
         recorded = shots.gain[emitter][valid][:, None] * (shots.traces[emitter][valid] @ sampler)
         window = problem.window(emitter, valid, shots.reach_s)
-        parts.append((model, np.asarray(recorded, dtype=np.float64), window))
-    models, data, windows = (np.concatenate(part) for part in zip(*parts, strict=True))
+        readings.append((model, np.asarray(recorded, dtype=np.float64), window))
+    models, data, windows = (np.concatenate(arrays) for arrays in zip(*readings, strict=True))
     wavelet = fit_wavelet(pulse, models, data)
     water_correlation = 1.0 - correlation(_filtered(models, pulse, wavelet), data, windows)[0]
     return replace(

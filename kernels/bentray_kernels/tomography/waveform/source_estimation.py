@@ -23,7 +23,7 @@ def estimate_source(problem: WaveProblem, speed: Floats, window_s: tuple[float, 
         window_s: (before, after) the arrival in water, in which traces are compared, s.
     """
     medium = problem.medium(speed)
-    parts = []
+    pairs = []
     for emitter in calibration_emitters(problem):
         valid = problem.valid_receivers(emitter)
         model = simulate(
@@ -33,6 +33,6 @@ def estimate_source(problem: WaveProblem, speed: Floats, window_s: tuple[float, 
         simulated, recorded = window * model, window * problem.recorded(emitter, valid)
         energies = [(traces**2).sum(axis=1, keepdims=True) for traces in (simulated, recorded)]
         gain = np.sqrt(energies[0] / np.where(energies[1] > 0.0, energies[1], 1.0))
-        parts.append((simulated, gain * recorded))
-    simulated, recorded = (np.concatenate(part) for part in zip(*parts, strict=True))
+        pairs.append((simulated, gain * recorded))
+    simulated, recorded = (np.concatenate(arrays) for arrays in zip(*pairs, strict=True))
     return fit_wavelet(problem.wavelet, simulated, recorded)

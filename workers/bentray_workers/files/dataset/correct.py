@@ -82,19 +82,19 @@ class Correction:
 
     def words(self) -> str:
         """The correction in words."""
-        parts = []
+        changes = []
         for what, factor, unit, read in (
             ("times", self.time_factor, self.times_in, self.times_read_as),
             ("lengths", self.length_factor, self.positions_in, self.positions_read_as),
         ):
             if factor != 1.0:
-                parts.append(f"{what} in {unit}, read as {read} before (x {factor:g})")
+                changes.append(f"{what} in {unit}, read as {read} before (x {factor:g})")
         for what, value in (("sampling rate", self.sampling_rate_hz), ("frequency", self.frequency_hz)):
             if value is not None:
-                parts.append(f"{what} {value:g} Hz")
+                changes.append(f"{what} {value:g} Hz")
         if self.arrangement is not None:
-            parts.append(f"{self.arrangement.replace('-', ' ')} before")
-        return ", ".join(parts)
+            changes.append(f"{self.arrangement.replace('-', ' ')} before")
+        return ", ".join(changes)
 
 
 def correct_dataset(
@@ -140,7 +140,7 @@ def corrected(dataset: Dataset, correction: Correction, origin: str) -> Dataset:
     changes = _scaled(dataset, TIMES, correction.time_factor) | _scaled(dataset, LENGTHS, factor)
     if dataset.truth is not None:
         spacing_m, origin_m = (
-            tuple(factor * one for one in lengths)
+            tuple(factor * length for length in lengths)
             for lengths in (dataset.truth.spacing_m, dataset.truth.origin_m)
         )
         changes["truth"] = replace(dataset.truth, spacing_m=spacing_m, origin_m=origin_m)
@@ -166,8 +166,8 @@ def corrected(dataset: Dataset, correction: Correction, origin: str) -> Dataset:
             )
     except InvalidInput as error:
         # A unit or an order that is proposed there is that of the corrected values.
-        known = ImplausibleUnit | WrongArrangement
-        accepted = error.plain if isinstance(error, known) else error.accepted
+        with_plain_words = ImplausibleUnit | WrongArrangement
+        accepted = error.plain if isinstance(error, with_plain_words) else error.accepted
         raise InvalidInput(error.field, f"{error.value}, after the correction", accepted) from error
     return made
 
@@ -181,8 +181,8 @@ def _sampled(dataset: Dataset) -> bool:
 def _scaled(dataset: Dataset, names: tuple[str, ...], factor: float) -> dict[str, Any]:
     if factor == 1.0:
         return {}
-    found = {name: getattr(dataset, name) for name in names}
-    return {name: factor * value for name, value in found.items() if value is not None}
+    arrays = {name: getattr(dataset, name) for name in names}
+    return {name: factor * value for name, value in arrays.items() if value is not None}
 
 
 def _ratio(units: Mapping[str, float], true: str | None, read: str) -> float:

@@ -139,12 +139,12 @@ class DatasetCounts:
     def from_dataset(cls, dataset: Dataset) -> DatasetCounts:
         """Counts of a dataset; its traces may be placeholders."""
         traces = dataset.waveform
-        both = [] if traces is None else [one for one in (traces.object, traces.water) if one is not None]
+        both = [] if traces is None else [data for data in (traces.object, traces.water) if data is not None]
         return cls(
             **array_counts(dataset.element_position_m, dataset.tx, dataset.rx, dataset.slice_z_m),
             times=dataset.picked,
             amplitudes=dataset.log_ratio_np is not None,
-            traces_bytes=sum(one.size * one.dtype.itemsize for one in both),
+            traces_bytes=sum(array.size * array.dtype.itemsize for array in both),
             samples=0 if traces is None else int(traces.object.shape[-1]),
             sample_bytes=both[0].dtype.itemsize if both else 0,
             rate_hz=dataset.sampling_rate_hz,

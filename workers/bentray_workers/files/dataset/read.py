@@ -28,7 +28,7 @@ from .units import POSITION_UNITS, TIME_UNITS
 
 NUMERIC = "iuf"
 # Arrays whose number of rows, pairs or nodes is checked before anything is read.
-SIZED = (*(place for place in COUNTED if place not in OVER_PAIRS), *OVER_PAIRS, *OVER_NODES)
+SIZED = (*(path for path in COUNTED if path not in OVER_PAIRS), *OVER_PAIRS, *OVER_NODES)
 TRACES = "real numbers, traces over (ntx, nrx, nt)"
 
 
@@ -62,8 +62,8 @@ def dataset_of(
         plausible: false: times and lengths may be in other units, to be corrected.
     """
     _check_format(reader)
-    for place in SIZED:
-        check_size(place, _shape(reader, place))
+    for path in SIZED:
+        check_size(path, _shape(reader, path))
     speed, temperature = _water(reader)
     accepted = "(elements, 2 or 3) numbers in m"
     position = np.ascontiguousarray(
@@ -76,13 +76,13 @@ def dataset_of(
     slices = _floats(reader, "slice/z_m", "(nz,) numbers in m")
     pairs = (*(() if slices is None else slices.shape[:1]), *tx.shape[:1], *rx.shape[:1])
     # Arrays that are not lists are rejected below.
-    for place in (*PAIR_ARRAYS, "mask/valid") if tx.ndim == rx.ndim == 1 else ():
+    for path in (*PAIR_ARRAYS, "mask/valid") if tx.ndim == rx.ndim == 1 else ():
         # Checked before reading: they are by far the largest.
-        shape = _shape(reader, place)
+        shape = _shape(reader, path)
         if 0 < math.prod(pairs) < math.prod(shape):
-            raise InvalidInput(place, f"shape {shape}", f"shape {pairs}")
+            raise InvalidInput(path, f"shape {shape}", f"shape {pairs}")
     fields: dict[str, Any] = {
-        name: _floats(reader, place, "numbers over (ntx, nrx)") for place, name in PAIR_ARRAYS.items()
+        name: _floats(reader, path, "numbers over (ntx, nrx)") for path, name in PAIR_ARRAYS.items()
     }
     fields |= {name: reader.number(group, attribute, unit) for group, attribute, unit, name in NUMBERS}
     fields |= {name: reader.text("", name) or "" for name in TEXTS}
@@ -147,17 +147,17 @@ def _check_plausible(dataset: Dataset) -> None:
         raise ImplausibleUnit(error.field, error.value, error.plain, likely + hint, error.unit) from None
 
 
-def _shape(reader: Reader, place: str) -> tuple[int, ...]:
+def _shape(reader: Reader, path: str) -> tuple[int, ...]:
     """Shape of an array as the file declares it; () where it is absent, or one number."""
-    stored = reader.checked(place, "iufb", "an array of numbers")
+    stored = reader.checked(path, "iufb", "an array of numbers")
     return () if stored is None else tuple(stored.shape)
 
 
 def _check_format(reader: Reader) -> None:
     for name, expected in (("format", FORMAT), ("format_version", VERSION)):
-        found = reader.attribute("", name)
-        if not isinstance(found, str) or found != expected:
-            shown = "nothing" if found is None else repr(found if isinstance(found, str) else found.tolist())
+        value = reader.attribute("", name)
+        if not isinstance(value, str) or value != expected:
+            shown = "nothing" if value is None else repr(value if isinstance(value, str) else value.tolist())
             raise InvalidInput(f"@{name}", shown[:60], f'"{expected}"')
 
 

@@ -18,7 +18,7 @@ def record_of(dataset: Dataset) -> dict[str, Any]:
     """Fields of the record by name; ``counts`` is for plans."""
     return {
         "title": text(dataset.title),
-        "source": text("; ".join(part for part in (left_out(dataset), dataset.source) if part)),
+        "source": text("; ".join(note for note in (left_out(dataset), dataset.source) if note)),
         "license": text(dataset.license),
         "dimension": int(dataset.element_position_m.shape[1]),
         "elements": len(dataset.element_position_m),

@@ -34,8 +34,8 @@ def counts_in(path: Path) -> DatasetCounts:
     """
     with opened(path, Limits()) as reader:
         position, tx, rx = (
-            _sized(reader, place)
-            for place in ("geometry/element_position_m", "acquisition/tx", "acquisition/rx")
+            _sized(reader, path)
+            for path in ("geometry/element_position_m", "acquisition/tx", "acquisition/rx")
         )
         heights = _sized(reader, "slice/z_m") if reader.has("slice/z_m") else None
         received = reader.checked("waveform/object", NUMERIC, "traces")
@@ -67,11 +67,11 @@ def summary_of(path: Path, settings: Settings) -> Summary:
     return counts_in(path).summary(settings)
 
 
-def _sized(reader: Reader, place: str) -> NDArray[Any]:
+def _sized(reader: Reader, path: str) -> NDArray[Any]:
     """An array, whose size is checked before it is read."""
-    declared = reader.checked(place, NUMERIC, "numbers")
-    check_size(place, () if declared is None else declared.shape)
-    return reader.required(place, NUMERIC, "numbers")
+    declared = reader.checked(path, NUMERIC, "numbers")
+    check_size(path, () if declared is None else declared.shape)
+    return reader.required(path, NUMERIC, "numbers")
 
 
 def _bytes(reader: Reader, path: str) -> int:

@@ -30,8 +30,8 @@ def trace_samples(path: Path) -> int:
 def lacks_water(path: Path) -> bool:
     """Whether a dataset file has traces of the object, but no water shot."""
     with opened(path, Limits()) as reader:
-        found = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
-    return found[0] is not None and found[1] is None
+        stored = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
+    return stored[0] is not None and stored[1] is None
 
 
 def samples_in(reader: Reader) -> int:
@@ -94,10 +94,10 @@ def emissions_in(
     # Emissions in the same chunks are decompressed together, since they are accessed in order.
     @lru_cache(maxsize=1)
     def rows(number: int) -> NDArray[Any]:
-        some = slice(number * block, (number + 1) * block)
+        selected = slice(number * block, (number + 1) * block)
         with rejecting_hdf5_damage(path, TRACES):
-            found = stored[some] if index is None else stored[index, some]
-        return kept_traces(found)
+            traces = stored[selected] if index is None else stored[index, selected]
+        return kept_traces(traces)
 
     def emission(e: int) -> NDArray[Any]:
         poll()

@@ -52,13 +52,13 @@ def propose(dataset: Dataset, measured_hz: float | None) -> list[Proposal]:
         dataset: the scan, without traces.
         measured_hz: centre frequency of its traces; None without traces.
     """
-    found = [
+    proposals = [
         _positions(dataset),
         _times(dataset),
         _frequency(dataset, measured_hz),
         _arrangement(dataset),
     ]
-    return [one for one in found if one is not None]
+    return [proposal for proposal in proposals if proposal is not None]
 
 
 def _positions(dataset: Dataset) -> Proposal | None:
@@ -75,8 +75,8 @@ def _positions(dataset: Dataset) -> Proposal | None:
 def _times(dataset: Dataset) -> Proposal | None:
     if dataset.delta_tof_s is None or dataset.tof_s is not None:
         return None
-    known = np.abs(dataset.delta_tof_s[np.isfinite(dataset.delta_tof_s)])
-    largest = float(np.percentile(known, 95.0)) if known.size else 0.0
+    sizes = np.abs(dataset.delta_tof_s[np.isfinite(dataset.delta_tof_s)])
+    largest = float(np.percentile(sizes, 95.0)) if sizes.size else 0.0
     longest = float(np.ptp(dataset.element_position_m, axis=0).max()) / dataset.water_speed_mps
     if not 0.0 < largest < LEAST_SHARE * longest:
         return None

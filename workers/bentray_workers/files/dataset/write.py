@@ -49,8 +49,8 @@ def write_dataset(path: Path, dataset: Dataset, pieces: Pieces | None = None) ->
 
 def bytes_of(dataset: Dataset) -> int:
     """Size of all arrays of a dataset, uncompressed, without headers of its file."""
-    parts = [part for part in (dataset, dataset.waveform, dataset.truth) if part is not None]
-    arrays = (getattr(part, one.name) for part in parts for one in fields(part))
+    records = [record for record in (dataset, dataset.waveform, dataset.truth) if record is not None]
+    arrays = (getattr(record, field.name) for record in records for field in fields(record))
     return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 
@@ -90,9 +90,9 @@ def _write(file: h5py.File, dataset: Dataset, pieces: Pieces | None) -> None:
         water.attrs["temperature_c"] = dataset.water_temperature_c
     if dataset.water_temperature_assumed:
         water.attrs["temperature_assumed"] = 1
-    for place, name in PAIR_ARRAYS.items():
+    for path, name in PAIR_ARRAYS.items():
         if getattr(dataset, name) is not None:
-            group, leaf = place.split("/")
+            group, leaf = path.split("/")
             write_array(file.require_group(group), leaf, getattr(dataset, name))
     if dataset.picker:
         file.require_group("traveltime").attrs["picker"] = printable(dataset.picker)

@@ -12,5 +12,5 @@ from bentray_kernels.errors import InvalidInput
 def check_even_spacing(spacing_m: Sequence[float], name: str) -> None:
     """Raise InvalidInput for slices with uneven spacing (not finite, m), which the format cannot store."""
     if not np.isfinite(spacing_m).all():
-        found = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
-        raise InvalidInput("volume", found, f"even spacing for {name}; hdf5 holds any")
+        given = f"uneven slices (spacing {tuple(float(step) for step in spacing_m)} m)"
+        raise InvalidInput("volume", given, f"even spacing for {name}; hdf5 holds any")

@@ -37,7 +37,7 @@ def format_of(path: Path, suffixes: Mapping[str, str] = SUFFIXES) -> str:
         InvalidInput: naming ``output``, for a name that ends in none of the suffixes.
     """
     name = path.name.lower()
-    found = next((form for suffix, form in suffixes.items() if name.endswith(suffix)), None)
-    if found is None:
+    file_format = next((form for suffix, form in suffixes.items() if name.endswith(suffix)), None)
+    if file_format is None:
         raise InvalidInput("output", path, "a name ending in " + ", ".join(suffixes))
-    return found
+    return file_format

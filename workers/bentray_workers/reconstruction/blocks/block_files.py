@@ -118,8 +118,8 @@ class BlockFiles(NamedTuple):
             if not block:
                 every = math.ceil(max(self.shape[0], *read_planes(path, 0, 1).shape[1:2]) / most)
             for plane in range(start + -start % every, stop, every):
-                one = read_planes(path, plane - start, plane - start + 1)[0]
-                rows.append(one[::every, one.shape[1] // 2])
+                plane_values = read_planes(path, plane - start, plane - start + 1)[0]
+                rows.append(plane_values[::every, plane_values.shape[1] // 2])
         return np.array(rows), every
 
 

@@ -114,7 +114,7 @@ class BlockSartGraph:
     def after(self, task: Task, result: Any) -> list[Task]:
         """Like ``task_graph.TaskGraph``: the tasks of a round follow when all of the last one are there."""
         assert self._rounds is not None
-        self._results[next(k for k, one in enumerate(self._round) if one is task)] = result
+        self._results[next(k for k, started in enumerate(self._round) if started is task)] = result
         if len(self._results) < len(self._round):
             return []
         # In their order, not that of completion: the bits of sums depend on it.
@@ -142,7 +142,7 @@ class BlockSartGraph:
                 sums.append((name, blocks))
             common = problem.spacing, sums, settings, state.sweep, state.emitter == 0
             yield [Task(update_block, (files, update, block, *common)) for block in range(files.blocks)]
-            squares = state.squares + float(sum((one * one).sum() for one in residuals))
+            squares = state.squares + float(sum((residual * residual).sum() for residual in residuals))
             counts = residual_counts(np.concatenate(residuals))
             images = state.slowness, state.coverage
             self._state = advanced(problem, settings, state, len(batch), images, squares, counts, self._index)
@@ -158,19 +158,19 @@ class BlockSartGraph:
         if curved:
             versions = yield from self._travel_time(name, source)
         at_source = in_nodes(source, problem.spacing, files.shape)
-        places = in_nodes(receivers, problem.spacing, files.shape)
-        rays = RaysInBlocks(files, places, at_source, curved=curved, name=name)
+        positions = in_nodes(receivers, problem.spacing, files.shape)
+        rays = RaysInBlocks(files, positions, at_source, curved=curved, name=name)
         while blocks := rays.next_blocks():
             visits = [(block, *rays.visit(block)) for block in blocks]
-            found = yield [
+            traced = yield [
                 Task(
                     trace_rays_in_block,
-                    (files, update, block, problem.spacing, versions, at_source, some, points),
+                    (files, update, block, problem.spacing, versions, at_source, waiting, points),
                 )
-                for block, some, _, points in visits
+                for block, waiting, _, points in visits
             ]
-            for (block, _, mine, points), parts in zip(visits, found, strict=True):
-                rays.visited(block, mine, points, parts)
+            for (block, _, numbers, points), paths in zip(visits, traced, strict=True):
+                rays.visited(block, numbers, points, paths)
         residual = measured - rays.predicted
         passes = rays.lengths > 0.0
         corrections = np.divide(residual, rays.lengths, out=np.full(len(residual), np.nan), where=passes)
@@ -186,7 +186,7 @@ class BlockSartGraph:
         files, spacing, update = self._files, self._problem.spacing, self._updates
         seeds = self._seeds(source)
         versions: list[str | None] = [None] * files.blocks
-        beyond: dict[int, list[str | None]] = {block: [None, None] for block, one in enumerate(seeds) if one}
+        beyond: dict[int, list[str | None]] = {block: [None, None] for block, own in enumerate(seeds) if own}
         turn = 0
         while beyond:
             turn += 1

@@ -68,32 +68,32 @@ class RaysInBlocks:
     def visit(self, block: int) -> tuple[WaitingRays, Ints, str]:
         """The rays that continue in a block, their numbers, and a name for the file of their points."""
         self._visits += 1
-        mine = np.flatnonzero(self._waiting & ((self._blocks == block) | (not self._curved)))
-        rays = WaitingRays(self._places[mine], self._counts[mine], self._by_nodes[mine])
-        return rays, mine, f"{self._name}-points-{self._visits:04d}"
+        numbers = np.flatnonzero(self._waiting & ((self._blocks == block) | (not self._curved)))
+        rays = WaitingRays(self._places[numbers], self._counts[numbers], self._by_nodes[numbers])
+        return rays, numbers, f"{self._name}-points-{self._visits:04d}"
 
-    def visited(self, block: int, mine: Ints, points: str, found: TracedParts) -> None:
+    def visited(self, block: int, numbers: Ints, points: str, traced: TracedParts) -> None:
         """Take the result of a visit.
 
         Args:
-            block, mine, points: as of ``visit``.
-            found: the parts of these rays.
+            block, numbers, points: as of ``visit``.
+            traced: the parts of these rays.
         """
-        attempts = self._by_nodes[mine].astype(np.int64)
-        self._parts.setdefault(block, []).append(_Part(points, mine, found.starts, attempts))
-        self.predicted[mine] += found.predicted
-        self.lengths[mine] += found.lengths
+        attempts = self._by_nodes[numbers].astype(np.int64)
+        self._parts.setdefault(block, []).append(_Part(points, numbers, traced.starts, attempts))
+        self.predicted[numbers] += traced.predicted
+        self.lengths[numbers] += traced.lengths
         if not self._curved:
             self._waiting[:] = False
             return
-        self._places[mine] = found.places
-        self._counts[mine] += np.diff(found.starts) - 1
-        self._waiting[mine[found.ends == ARRIVED]] = False
-        caught = mine[found.ends == CAUGHT]
+        self._places[numbers] = traced.places
+        self._counts[numbers] += np.diff(traced.starts) - 1
+        self._waiting[numbers[traced.ends == ARRIVED]] = False
+        caught = numbers[traced.ends == CAUGHT]
         self._by_nodes[caught], self._counts[caught] = True, 1
         self._places[caught] = self._receivers[caught]
         self.predicted[caught] = self.lengths[caught] = 0.0
-        for ray in mine:
+        for ray in numbers:
             self._blocks[ray] = self._files.block_of(float(self._places[ray, 0]))
 
     def back_projected(self, corrections: Floats) -> dict[int, list[BackProjected]]:
@@ -103,11 +103,11 @@ class RaysInBlocks:
             corrections: (rays,), residual over length, s per node.
         """
         by_block: dict[int, list[BackProjected]] = {}
-        for block, parts in sorted(self._parts.items()):
-            for one in parts:
-                last = one.attempts == self._by_nodes[one.rays]
-                valid = np.where(last, corrections[one.rays], np.nan)
-                by_block.setdefault(block, []).append(BackProjected(one.points, one.starts, valid))
+        for block, paths in sorted(self._parts.items()):
+            for path in paths:
+                last = path.attempts == self._by_nodes[path.rays]
+                valid = np.where(last, corrections[path.rays], np.nan)
+                by_block.setdefault(block, []).append(BackProjected(path.points, path.starts, valid))
         return by_block
 
 

@@ -115,9 +115,9 @@ def trace_rays_in_block(
     scratch, state = files.scratch(update), files.state(update)
     tof = files.read(scratch, versions, planes.low, planes.high) if versions else None
     slowness = files.read(state, SLOWNESS, planes.low, planes.high)
-    parts = trace_block(tof, slowness, spacing, planes, source, rays)
-    write_array(scratch / file_name(points, block), parts.points)
-    return TracedParts(parts.starts, parts.ends, parts.places, parts.predicted, parts.lengths)
+    paths = trace_block(tof, slowness, spacing, planes, source, rays)
+    write_array(scratch / file_name(points, block), paths.points)
+    return TracedParts(paths.starts, paths.ends, paths.places, paths.predicted, paths.lengths)
 
 
 def back_project_in_block(
@@ -132,13 +132,13 @@ def back_project_in_block(
     """
     planes, scratch = files.planes(block), files.scratch(update)
     shape = planes.high - planes.low, *files.shape[1:]
-    found = np.zeros((2, *shape))
-    for one in parts:
-        points = read_planes(scratch / file_name(one.points, block))
-        back_project_block(shape, points, one.starts, one.corrections, *found)
+    added = np.zeros((2, *shape))
+    for path in parts:
+        points = read_planes(scratch / file_name(path.points, block))
+        back_project_block(shape, points, path.starts, path.corrections, *added)
     # By planes, so that neighbours can read some of them.
     for number, name in enumerate(sum_names(sums)):
-        write_array(scratch / file_name(name, block), found[number])
+        write_array(scratch / file_name(name, block), added[number])
 
 
 def update_block(
@@ -168,9 +168,9 @@ def update_block(
         for other in blocks:
             planes = files.planes(other)
             begin, end = max(low, planes.low), min(high, planes.high)
-            for part, into in zip(sum_names(name), (corrections, weights), strict=True):
+            for values, into in zip(sum_names(name), (corrections, weights), strict=True):
                 if begin < end:
-                    path = files.scratch(update) / file_name(part, other)
+                    path = files.scratch(update) / file_name(values, other)
                     into[begin - low : end - low] += read_planes(path, begin - planes.low, end - planes.low)
     region = files.read(files.folder, REGION, low, high, np.bool_)
     own = slice(start - low, stop - low)
