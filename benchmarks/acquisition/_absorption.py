@@ -98,8 +98,8 @@ class Absorbing:
         fade = (1.0 - turned) / (1.0 + turned)
         drive = medium.drive * (1.0 + sponge) / (1.0 + turned)
         keep, fade, drive, pull, gain = (
-            np.ascontiguousarray(part, dtype=dtype)
-            for part in (
+            np.ascontiguousarray(array, dtype=dtype)
+            for array in (
                 keep,
                 fade,
                 drive,

@@ -54,10 +54,10 @@ def picture(scans: Mapping[str, tuple[Dataset, Mapping[str, Any]]], seconds: str
                 )
             ]
             for axes, way in zip(row[2:], SHOWN, strict=True):
-                one = images[way]
-                title = f"{way}\n{one.rms:.1f} m/s, {one.seconds:.0f} s"
-                grid = (one.result.spacing_m, one.result.origin_m)
-                maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=title))
+                image = images[way]
+                title = f"{way}\n{image.rms:.1f} m/s, {image.seconds:.0f} s"
+                grid = (image.result.spacing_m, image.result.origin_m)
+                maps.append(draw_map(axes, image.result.speed, *grid, limits, colormap=SPEED, title=title))
             draw_bar(maps, "speed (m/s)")
             same_extent(row[1:])
         # One for all gathers, outside the data.
@@ -83,8 +83,8 @@ def gather(axes: Axes, name: str, dataset: Dataset) -> None:
     assert dataset.sampling_rate_hz is not None
     assert dataset.center_frequency_hz is not None
     water = dataset.distance_m()[0] / dataset.water_speed_mps
-    one, period = first_emission(dataset), 1.0 / dataset.center_frequency_hz
-    picks = {picker: pick(one, picker).differential_tof()[0] for picker in PICKERS}
+    scan, period = first_emission(dataset), 1.0 / dataset.center_frequency_hz
+    picks = {picker: pick(scan, picker).differential_tof()[0] for picker in PICKERS}
     every = np.stack(list(picks.values()))
     late = np.arange(np.nanmin(every) - 2.0 * period, np.nanmax(every) + 4.0 * period, 0.05 * period)
     samples = dataset.t0_s + np.arange(dataset.waveform.object.shape[-1]) / dataset.sampling_rate_hz
@@ -113,7 +113,7 @@ def first_emission(dataset: Dataset) -> Dataset:
     """The dataset with its first emission alone."""
     traces = dataset.waveform
     assert traces is not None
-    scales = [None if part is None else part[:1] for part in (traces.object_scale, traces.water_scale)]
+    scales = [None if scale is None else scale[:1] for scale in (traces.object_scale, traces.water_scale)]
     water = None if traces.water is None else traces.water[:1]
     return replace(
         dataset,

@@ -24,14 +24,14 @@ def ideal(dataset: Dataset) -> NDArray[np.float64]:
     reach = np.abs(dataset.element_position_m).max()
     room = max(0, int(np.ceil((reach - np.abs(origin).min()) / spacing))) + 4
     speed = np.pad(speed, room, constant_values=dataset.water_speed_mps)
-    places = dataset.element_position_m - (origin - room * spacing)
+    positions = dataset.element_position_m - (origin - room * spacing)
     water = np.full_like(speed, dataset.water_speed_mps)
-    heard = places[dataset.rx].T / spacing
-    found = np.empty((len(dataset.tx), len(dataset.rx)))
+    heard = positions[dataset.rx].T / spacing
+    delta = np.empty((len(dataset.tx), len(dataset.rx)))
     for k, emitter in enumerate(dataset.tx):
         times = [
-            map_coordinates(solve(medium, spacing, places[emitter]), heard, order=1)
+            map_coordinates(solve(medium, spacing, positions[emitter]), heard, order=1)
             for medium in (speed, water)
         ]
-        found[k] = times[0] - times[1]
-    return found
+        delta[k] = times[0] - times[1]
+    return delta

@@ -38,8 +38,8 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
             in the model of the inversion.
     """
     phantom, nodes = table6(settings.coupling_mps), settings.fine_nodes
-    part = settings.frequency_hz / TABLE6_HZ
-    speed, loss = phantom.speed(nodes, TABLE6_SIDE_M), part * phantom.attenuation(nodes, TABLE6_SIDE_M)
+    ratio = settings.frequency_hz / TABLE6_HZ
+    speed, loss = phantom.speed(nodes, TABLE6_SIDE_M), ratio * phantom.attenuation(nodes, TABLE6_SIDE_M)
     grid = settings.spacing_m, settings.step_s
     water = Medium.from_speed(np.full_like(speed, settings.coupling_mps), *grid, edge_nodes=EDGE_NODES)
     tissue: Medium | Absorbing
@@ -50,16 +50,16 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
         )
     else:
         tissue = Medium.from_speed(speed, *grid, attenuation=loss, edge_nodes=EDGE_NODES)
-    places = settings.elements_m() + 0.5 * settings.side_m
+    positions = settings.elements_m() + 0.5 * settings.side_m
     late = settings.step_s * settings.frequency_hz * np.arange(settings.samples * settings.skip) - BEFORE
     pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
     traces = np.empty((2, settings.emissions, settings.elements, settings.samples), np.float32)
 
     def emission(k: int) -> None:
-        emitter = places[settings.senders()[k]]
+        emitter = positions[settings.senders()[k]]
         for of_medium, medium in zip(traces, (tissue, water), strict=True):
             through = simulate_absorbed if isinstance(medium, Absorbing) else simulate
-            of_medium[k] = through(medium, emitter, places, pulse, ORDER)[:, :: settings.skip]
+            of_medium[k] = through(medium, emitter, positions, pulse, ORDER)[:, :: settings.skip]
 
     # The simulators release the GIL.
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -77,7 +77,7 @@ def lossy_scan(settings: WaveSimulationSettings, progress: Step, *, proportional
             phantom.speed(settings.nodes, TABLE6_SIDE_M),
             (apart, apart),
             (-0.5 * settings.side_m, -0.5 * settings.side_m),
-            part * phantom.attenuation(settings.nodes, TABLE6_SIDE_M),
+            ratio * phantom.attenuation(settings.nodes, TABLE6_SIDE_M),
         ),
         radius_m=ring_radius(settings.side_m, settings.nodes),
         center_frequency_hz=settings.frequency_hz,

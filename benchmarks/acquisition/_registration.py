@@ -41,13 +41,13 @@ def registered(image: Reconstruction, truth: Truth, radius_m: float) -> Register
         truth: on its own grid.
         radius_m: m.
     """
-    inside, places = _nodes_within(image, radius_m)
+    inside, nodes = _nodes_within(image, radius_m)
     speed = image.speed[inside]
-    found = []
+    fits = []
     for transposed in (False, True):
 
         def error(shift: NDArray[np.float64], transposed: bool = transposed) -> float:
-            true = _read(truth, places, shift, transposed)
+            true = _read(truth, nodes, shift, transposed)
             return float(np.sqrt(np.mean((true - speed) ** 2)))
 
         first = min(((a, b) for a in SHIFTS_M for b in SHIFTS_M), key=lambda s: error(np.array(s)))
@@ -58,17 +58,17 @@ def registered(image: Reconstruction, truth: Truth, radius_m: float) -> Register
             method="Nelder-Mead",
             options={"xatol": 1e-5, "fatol": 1e-3, "initial_simplex": simplex},
         )
-        found.append(Registered(float(best.fun), (float(best.x[0]), float(best.x[1])), transposed))
-    return min(found, key=lambda one: one.rms_mps)
+        fits.append(Registered(float(best.fun), (float(best.x[0]), float(best.x[1])), transposed))
+    return min(fits, key=lambda fit: fit.rms_mps)
 
 
-def registered_error(found: Registered, truth: Truth, radius_m: float) -> ErrorOn:
+def registered_error(fit: Registered, truth: Truth, radius_m: float) -> ErrorOn:
     """Root mean square error, m/s, at a shift of the truth that was found before."""
 
     def error_on(image: Reconstruction) -> ImageError:
-        inside, places = _nodes_within(image, radius_m)
+        inside, nodes = _nodes_within(image, radius_m)
         true = np.full(image.speed.shape, np.nan)
-        true[inside] = _read(truth, places, np.array(found.shift_m), found.transposed)
+        true[inside] = _read(truth, nodes, np.array(fit.shift_m), fit.transposed)
         return ImageError(true, inside)
 
     return error_on
@@ -86,10 +86,10 @@ def _nodes_within(image: Reconstruction, radius_m: float) -> tuple[NDArray[np.bo
 
 
 def _read(
-    truth: Truth, places: NDArray[np.float64], shift: NDArray[np.float64], transposed: bool
+    truth: Truth, nodes: NDArray[np.float64], shift: NDArray[np.float64], transposed: bool
 ) -> NDArray[np.float64]:
     """The shifted truth at places, m/s."""
-    at = (places - np.reshape(shift, (2, 1)) - np.reshape(truth.origin_m[:2], (2, 1))) / np.reshape(
+    at = (nodes - np.reshape(shift, (2, 1)) - np.reshape(truth.origin_m[:2], (2, 1))) / np.reshape(
         truth.spacing_m[:2], (2, 1)
     )
     drawn = truth.sound_speed_mps.T if transposed else truth.sound_speed_mps

@@ -54,12 +54,12 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         best = min((way for way in errors if way.startswith("straight")), key=lambda way: errors[way])
         for way, (image, seconds) in made.items():
             straight = made[best].result if way == "waveforms" else None
-            one = images.compared(image, error_on, straight=straight)
-            beside = [*CONSTANTS, *([] if way.startswith("straight") else [STRAIGHT_RAYS])]
-            worse = any(one.error >= one.baselines[name] for name in beside)
+            compared = images.compared(image, error_on, straight=straight)
+            baselines = [*CONSTANTS, *([] if way.startswith("straight") else [STRAIGHT_RAYS])]
+            worse = any(compared.error >= compared.baselines[name] for name in baselines)
             detail = f"{image.speed.shape[0]}² nodes, {seconds:.0f} s"
             detail += "; experimental: worse than a constant or straight rays" if worse else ""
-            yield one.row(f"R8 waves, {name}, {way}", one.error, GOAL, "<=", "of range", detail)
+            yield compared.row(f"R8 waves, {name}, {way}", compared.error, GOAL, "<=", "of range", detail)
 
 
 def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:

@@ -67,22 +67,22 @@ def blurred_times(dataset: Dataset) -> np.ndarray:
     return ideal(replace(dataset, truth=replace(truth, sound_speed_mps=wide)))
 
 
-def pick_rows(label: str, found: np.ndarray, true: np.ndarray, dataset: Dataset) -> Iterable[Row]:
+def pick_rows(label: str, picks: np.ndarray, true: np.ndarray, dataset: Dataset) -> Iterable[Row]:
     """The rows of one set of picks."""
     assert dataset.center_frequency_hz is not None
     period = 1e9 / dataset.center_frequency_hz
     asked = dataset.distance_m() > NEAREST_M
-    error = 1e9 * (found - true)[asked]
-    known = error[np.isfinite(error)]
-    middle = float(np.median(known))
-    spread = 1.4826 * float(np.median(np.abs(known - middle)))
-    far = float(np.percentile(np.abs(known), 95.0))
-    rms = float(np.sqrt(np.mean(known**2)))
-    detail = f"{known.size} of {error.size} pairs, rms {rms:.0f} ns, period {period:.0f} ns"
+    error = 1e9 * (picks - true)[asked]
+    finite = error[np.isfinite(error)]
+    middle = float(np.median(finite))
+    spread = 1.4826 * float(np.median(np.abs(finite - middle)))
+    far = float(np.percentile(np.abs(finite), 95.0))
+    rms = float(np.sqrt(np.mean(finite**2)))
+    detail = f"{finite.size} of {error.size} pairs, rms {rms:.0f} ns, period {period:.0f} ns"
     yield Row(f"{label}, median", abs(middle), 0.02 * period, "<=", "ns", detail)
     yield Row(f"{label}, MAD", spread, 0.05 * period, "<=", "ns", detail)
     yield Row(f"{label}, 95 %", far, 0.2 * period, "<=", "ns", detail)
-    yield Row(f"{label}, picked", known.size / error.size, 0.9, ">=", "of pairs", detail)
+    yield Row(f"{label}, picked", finite.size / error.size, 0.9, ">=", "of pairs", detail)
 
 
 def guided_rows(name: str, dataset: Dataset, true: np.ndarray) -> Iterable[Row]:
@@ -91,14 +91,14 @@ def guided_rows(name: str, dataset: Dataset, true: np.ndarray) -> Iterable[Row]:
     far = dataset.distance_m() > 0.9 * dataset.distance_m().max()
     peak = float(np.median(np.abs(dataset.waveform.object[far]).max(axis=-1)))
     noisy = with_trace_noise(dataset, HARD_SNR, peak)
-    errors = [1e9 * (one.delta_tof_s - true) for one in (pick(noisy), guided_picks(noisy))]
+    errors = [1e9 * (picked.delta_tof_s - true) for picked in (pick(noisy), guided_picks(noisy))]
     rms = [float(np.sqrt(np.nanmean(error**2))) for error in errors]
-    known = [int(np.isfinite(error).sum()) for error in errors]
+    pairs = [int(np.isfinite(error).sum()) for error in errors]
     detail = (
-        f"trace SNR {HARD_SNR:g}: alone {rms[0]:.0f} ns, {known[0]} pairs; guided {rms[1]:.0f} ns, {known[1]}"
+        f"trace SNR {HARD_SNR:g}: alone {rms[0]:.0f} ns, {pairs[0]} pairs; guided {rms[1]:.0f} ns, {pairs[1]}"
     )
     yield Row(f"picks {name}, guided rms over alone", rms[1] / rms[0], 1.0, "<=", "", detail)
-    yield Row(f"picks {name}, guided count over alone", known[1] / known[0], 1.0, ">=", "", detail)
+    yield Row(f"picks {name}, guided count over alone", pairs[1] / pairs[0], 1.0, ">=", "", detail)
 
 
 def guided_picks(dataset: Dataset) -> Dataset:

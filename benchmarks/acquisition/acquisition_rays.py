@@ -79,28 +79,30 @@ def scan_rows(name: str, dataset: Dataset) -> Iterable[Row]:
     exact_error = error_on(exact).of(exact)
     useful = exact_error < compared["Gauss-Newton"].error
     detail = ", ".join(
-        f"{way} {one.error:.1f} (straight {one.baselines[STRAIGHT_RAYS]:.1f})"
-        for way, one in compared.items()
+        f"{way} {figures.error:.1f} (straight {figures.baselines[STRAIGHT_RAYS]:.1f})"
+        for way, figures in compared.items()
     )
     yardstick = "" if useful else ", worse than picks"
     detail += f", Gauss-Newton with ideal times {exact_error:.1f}{yardstick} (m/s)"
-    for way, one in compared.items():
-        ratio = one.error / one.baselines[STRAIGHT_RAYS]
-        yield one.row(f"R4 {name}, {way}, bent over straight", ratio, 0.9, "<=", "", detail)
+    for way, figures in compared.items():
+        ratio = figures.error / figures.baselines[STRAIGHT_RAYS]
+        yield figures.row(f"R4 {name}, {way}, bent over straight", ratio, 0.9, "<=", "", detail)
     if useful:
         ratio = compared["Gauss-Newton"].error / exact_error
         target = f"R4 {name}, Gauss-Newton, bent over ideal times"
         yield compared["Gauss-Newton"].row(target, ratio, 1.15, "<=", "", detail)
     default = images.default().result
-    one = images.compared(default, error_on)
+    figures = images.compared(default, error_on)
     why = explain_trials(default.trials)
-    straight = {way: other.baselines[STRAIGHT_RAYS] for way, other in (compared | {"default": one}).items()}
+    straight = {
+        way: other.baselines[STRAIGHT_RAYS] for way, other in (compared | {"default": figures}).items()
+    }
     for against, error in (
         ("straight SART", straight["SART"]),
         ("the best straight image, chosen by the truth", min(straight.values())),
     ):
         target = f"R4 {name}, default over {against}"
-        yield one.row(target, one.error / error, 1.0, "<=", "", f"{detail}; {why}")
+        yield figures.row(target, figures.error / error, 1.0, "<=", "", f"{detail}; {why}")
 
 
 def measured(quick: bool) -> Iterable[Row]:

@@ -76,8 +76,8 @@ class WaveScan:
         wide = {"method": "gauss-newton", "ray_width_m": width}
         changes = {**RAYS, "bent, finite frequency": wide}
         self.made = {
-            way: reconstruct_on_workers(replace(picked, waveform=None), Settings.of(**one), context)
-            for way, one in changes.items()
+            way: reconstruct_on_workers(replace(picked, waveform=None), Settings.of(**words), context)
+            for way, words in changes.items()
         }
         self.made["ideal times"] = reconstruct_on_workers(
             replace(picked, delta_tof_s=ideal(dataset), sigma_s=None, waveform=None),
@@ -97,10 +97,10 @@ class WaveScan:
 
     def rows(self, name: str) -> Iterable[Row]:
         """The rows of this scan; ideal times are a yardstick only where they are better than picks."""
-        errors = {way: one.rms for way, one in self.made.items()}
+        errors = {way: made.rms for way, made in self.made.items()}
         useful = errors["ideal times"] < errors["bent, Gauss-Newton"]
         detail = ", ".join(
-            f"{way} {one.rms:.1f} m/s in {one.seconds:.0f} s" for way, one in self.made.items()
+            f"{way} {made.rms:.1f} m/s in {made.seconds:.0f} s" for way, made in self.made.items()
         )
         detail += "" if useful else "; ideal times are worse than picks by the same rays"
         load = f"{os.getloadavg()[0]:.1f}"

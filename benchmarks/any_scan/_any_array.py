@@ -84,7 +84,7 @@ def arrays(*, quick: bool) -> dict[str, Array]:
     count = ELEMENTS // 2 if quick else ELEMENTS
     ring, per_degree = arc(count, RADIUS_M).position_m, count / 360.0
     half = count // 2
-    found = {
+    by_name = {
         "ring": Array(ring),
         "arc of 270°": Array(arc(round(270 * per_degree), RADIUS_M, 270.0).position_m, limited=True),
         "arc of 200°": Array(arc(round(200 * per_degree), RADIUS_M, 200.0).position_m, limited=True),
@@ -95,14 +95,14 @@ def arrays(*, quick: bool) -> dict[str, Array]:
         "emitters apart": Array(ring, np.arange(0, count, 2), np.arange(1, count, 2)),
     }
     if quick:
-        return found
+        return by_name
     side = np.linspace(-0.075, 0.075, PLANE)
     flat = np.stack(np.meshgrid(side, np.linspace(-0.085, 0.005, PLANE)), axis=-1).reshape(-1, 2)
     planes = np.concatenate([np.insert(flat, 1, y, axis=1) for y in (-0.085, 0.085)])
     each = PLANE**2
-    found["bowl"] = Array(bowl(BOWL, RADIUS_M).position_m)
-    found["facing planes"] = Array(planes, np.arange(each), np.arange(each, 2 * each), True)
-    return found
+    by_name["bowl"] = Array(bowl(BOWL, RADIUS_M).position_m)
+    by_name["facing planes"] = Array(planes, np.arange(each), np.arange(each, 2 * each), True)
+    return by_name
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
@@ -118,7 +118,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         for name, array in chosen.items()
     )
     detail = "; ".join(
-        f"{name}: {one.result.provenance.get('geometry', 'nothing')}" for name, one in images.items()
+        f"{name}: {made.result.provenance.get('geometry', 'nothing')}" for name, made in images.items()
     )
     yield Row(
         "A3 arrays that state a limited angle, if they have one", stated, len(chosen), "==", "arrays", detail
@@ -161,17 +161,17 @@ def made(dataset: Dataset) -> Made:
     return Made(result, error_on(result), images.compared(result, error_on), seconds)
 
 
-def array_row(name: str, array: Array, one: Made) -> Row:
+def array_row(name: str, array: Array, made: Made) -> Row:
     """The error by default settings over that of the better constant."""
-    least = min(one.compared.baselines[constant] for constant in CONSTANTS)
-    nodes = " by ".join(map(str, one.result.speed.shape))
+    least = min(made.compared.baselines[constant] for constant in CONSTANTS)
+    nodes = " by ".join(map(str, made.result.speed.shape))
     detail = (
-        f"{one.compared.error:.1f} m/s inside the hull, {one.seconds:.1f} s; {len(array.position_m)} "
-        f"elements, {nodes} nodes; {one.result.settings.rays} {one.result.settings.method}; "
+        f"{made.compared.error:.1f} m/s inside the hull, {made.seconds:.1f} s; {len(array.position_m)} "
+        f"elements, {nodes} nodes; {made.result.settings.rays} {made.result.settings.method}; "
         f"load at the end {os.getloadavg()[0]:.1f}"
     )
     target = f"A3 {name}: error over that of the best constant"
-    return one.compared.row(target, one.compared.error / least, 1.0, "<", "", detail)
+    return made.compared.row(target, made.compared.error / least, 1.0, "<", "", detail)
 
 
 def picture(images: Mapping[str, Made]) -> bytes:
@@ -188,18 +188,18 @@ def picture(images: Mapping[str, Made]) -> bytes:
         for above, below in pairs[len(images) :]:
             above.remove()
             below.remove()
-        limits = robust_limits([one.error.true for one in images.values()])
+        limits = robust_limits([made.error.true for made in images.values()])
         maps = []
-        for column, (name, one) in zip(pairs, images.items(), strict=False):
-            water = one.compared.baselines[WATER_ALONE]
-            titles = name, f"{one.compared.error:.1f} m/s (water {water:.1f})"
+        for column, (name, made) in zip(pairs, images.items(), strict=False):
+            water = made.compared.baselines[WATER_ALONE]
+            titles = name, f"{made.compared.error:.1f} m/s (water {water:.1f})"
             at = ...
-            if one.error.true.ndim == 3:
-                height = (MIDDLE_M - one.result.origin_m[2]) / one.result.spacing_m[2]
+            if made.error.true.ndim == 3:
+                height = (MIDDLE_M - made.result.origin_m[2]) / made.result.spacing_m[2]
                 at = (slice(None), slice(None), round(height))
-            grid = one.result.spacing_m[:2], one.result.origin_m[:2]
-            for axes, values, title in zip(column, (one.error.true, one.result.speed), titles, strict=True):
-                outline = one.error.region[at]
+            grid = made.result.spacing_m[:2], made.result.origin_m[:2]
+            for axes, values, title in zip(column, (made.error.true, made.result.speed), titles, strict=True):
+                outline = made.error.region[at]
                 maps.append(
                     draw_map(axes, values[at], *grid, limits, colormap=SPEED, title=title, outline=outline)
                 )

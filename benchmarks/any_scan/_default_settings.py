@@ -61,7 +61,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         )
         compared = made.compared(default.result, object_error(dataset))
         detail = f"truth blurred by 1 mm {blurred:.1f}, "
-        detail += ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.1f} s" for way, one in images.items())
+        detail += ", ".join(f"{way} {made.rms:.1f} in {made.seconds:.1f} s" for way, made in images.items())
         nodes = default.result.settings.nodes
         detail += f" (m/s); {nodes} nodes; {explain_trials(default.result.trials)}"
         detail += f"; load at the end {os.getloadavg()[0]:.1f}"

@@ -31,9 +31,9 @@ def images_beside_truth(title: str, scans: Mapping[str, tuple[Dataset, Mapping[s
             grid = truth.spacing_m, truth.origin_m
             heading = f"{name}: truth"
             maps = [draw_map(row[0], truth.sound_speed_mps, *grid, limits, colormap=SPEED, title=heading)]
-            for axes, (way, one) in zip(row[1:], images.items(), strict=True):
-                heading = f"{way}: {one.rms:.1f} m/s, {one.seconds:.0f} s"
-                grid = one.result.spacing_m, one.result.origin_m
-                maps.append(draw_map(axes, one.result.speed, *grid, limits, colormap=SPEED, title=heading))
+            for axes, (way, made) in zip(row[1:], images.items(), strict=True):
+                heading = f"{way}: {made.rms:.1f} m/s, {made.seconds:.0f} s"
+                grid = made.result.spacing_m, made.result.origin_m
+                maps.append(draw_map(axes, made.result.speed, *grid, limits, colormap=SPEED, title=heading))
             draw_bar(maps, "speed (m/s)")
         return figure_png(figure)

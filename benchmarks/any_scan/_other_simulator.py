@@ -43,15 +43,15 @@ GOALS = {"auto": 0.9, "waveform": 0.5}
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """The rows of a scan by k-Wave, where it is installed."""
-    found, _ = installed()
-    if not found or context.quick:
+    peers, _ = installed()
+    if not peers or context.quick:
         return
-    dataset = without_water_shot(planted(simulated(found["k-Wave"], context.progress), 2))
+    dataset = without_water_shot(planted(simulated(peers["k-Wave"], context.progress), 2))
     images = {
         way: reconstruct_on_workers(dataset, Settings.of(attenuation=False, **changes), context)
         for way, changes in WAYS.items()
     }
-    detail = ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.0f} s" for way, one in images.items())
+    detail = ", ".join(f"{way} {made.rms:.1f} in {made.seconds:.0f} s" for way, made in images.items())
     detail += f" (m/s); load at the end {os.getloadavg()[0]:.1f}"
     made = Images(
         dataset,

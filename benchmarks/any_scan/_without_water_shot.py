@@ -73,7 +73,7 @@ def scans(quick: bool, progress: Step) -> Iterable[tuple[str, Dataset]]:
 
 def scan_rows(name: str, dataset: Dataset, images: Mapping[str, Made], made: Images) -> Iterable[Row]:
     """The rows of one scan."""
-    detail = ", ".join(f"{way} {one.rms:.1f} in {one.seconds:.0f} s" for way, one in images.items())
+    detail = ", ".join(f"{way} {made.rms:.1f} in {made.seconds:.0f} s" for way, made in images.items())
     detail += f" (m/s; water shot with or none); load at the end {os.getloadavg()[0]:.1f}"
     for way, goal in GOALS.items():
         image = images[f"{way}, none"]

@@ -146,8 +146,8 @@ def rendering(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Ro
         thread.join()
     detail = f"{count} pictures, median {np.median(taken):.3f} s, longest {max(taken):.3f} s"
     detail += f"; a reconstruction of {slices} slices of {nodes}², {elements} transducers, ran beside them"
-    found = float(np.percentile(taken, 95)) if busy else None
-    return Row("S2 render during a reconstruction, p95", found, 1.0, "<", "s", detail)
+    p95 = float(np.percentile(taken, 95)) if busy else None
+    return Row("S2 render during a reconstruction, p95", p95, 1.0, "<", "s", detail)
 
 
 def resuming(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Row:
@@ -158,8 +158,8 @@ def resuming(cluster: Cluster, folder: Path, quick: bool, progress: Step) -> Row
     progress(0, 1, "resuming")
     whole = seconds(lambda: reconstruct(cluster.client, path, settings, work_dir=folder / "whole"))
 
-    def torn(found: Any) -> None:
-        if 2 * found.done >= found.total:
+    def torn(graph: Any) -> None:
+        if 2 * graph.done >= graph.total:
             raise InterruptedError
 
     def half() -> None:

@@ -64,7 +64,7 @@ def blocks(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
                 progress(count, 8, f"{side}² in blocks on {count} processes")
                 source = (0.1 * TABLE6_SIDE_M, 0.5 * TABLE6_SIDE_M)
                 run = in_blocks(cluster, speed, spacing, source, (along_x, along_y))
-                found = least(run, RUNS)
+                least_s = least(run, RUNS)
                 single = least(partial(eikonal.solve, speed, spacing, source, "fsm"), RUNS)
                 detail = (
                     f"{along_x} by {along_y} blocks; alone without a cluster "
@@ -72,7 +72,7 @@ def blocks(folder: Path, quick: bool, progress: Step) -> Iterable[Row]:
                 )
                 yield Row(
                     f"Table 8 {side}² FSM cluster, {count} processes",
-                    found,
+                    least_s,
                     THEIRS_S[side],
                     "<=",
                     "s",
@@ -109,15 +109,15 @@ def solve_all(volume: Floats, sources: Floats, method: str = "fsm", **options: A
 
 def threads(name: str, volume: Floats, sources: Floats, cores: int) -> Iterable[Row]:
     """One solve that threads share; and the published way, each thread a copy and an order."""
-    one = least(partial(solve_all, volume, sources), RUNS)
+    single = least(partial(solve_all, volume, sources), RUNS)
     several = least(partial(solve_all, volume, sources, threads=cores), RUNS)
     yield Row(
         f"FSM {volume.shape[0]}³, {name}, shared by {cores} threads, speed-up",
-        one / several,
+        single / several,
         THREADS_EFFICIENCY * cores,
         ">=",
         "",
-        f"one source; one thread {one:.2f} s, {cores} threads {several:.2f} s; theirs 3.5 on four cores",
+        f"one source; one thread {single:.2f} s, {cores} threads {several:.2f} s; theirs 3.5 on four cores",
     )
     alone = least(partial(solve_all, volume, sources, method="fsm-simultaneous"), 1)
     together = least(partial(solve_all, volume, sources, method="fsm-simultaneous", threads=cores), 1)
@@ -141,15 +141,15 @@ def in_space(cluster: Cluster, file: Path, sources: Floats, count: int, alone: f
         )
         return sum(field.rounds for field in fields)
 
-    found = least(run, 1)
+    seconds = least(run, 1)
     nodes = len(np.load(file, mmap_mode="r"))
     return Row(
         f"FSM in blocks {nodes}³, {file.stem}, on {count} processes, speed-up",
-        alone / found,
+        alone / seconds,
         BLOCKS_EFFICIENCY * count,
         ">=",
         "",
-        f"{len(sources)} sources, {blocks[0]} by {blocks[1]} by 1 blocks {found:.2f} s; "
+        f"{len(sources)} sources, {blocks[0]} by {blocks[1]} by 1 blocks {seconds:.2f} s; "
         f"one process without blocks {alone:.2f} s{more}",
     )
 

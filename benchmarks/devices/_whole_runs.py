@@ -84,14 +84,14 @@ def waveform(label: str, dataset: Dataset, context: BenchmarkContext, device: De
         path = folder / "scan.h5"
         write_dataset(path, dataset)
         begun = time.perf_counter()
-        found = reconstruct(
+        result = reconstruct(
             None, path, settings, lambda now: context.progress(now.done, now.total, label), threads=None
         )
         seconds = time.perf_counter() - begun
-    error = object_error(dataset)(found)
+    error = object_error(dataset)(result)
     constant, water = error.of_constant(error.best_constant), error.of_constant(dataset.water_speed_mps)
     detail = (
-        f"{device.label}, driver {device.driver}; error {error.of(found):.2f} m/s, "
+        f"{device.label}, driver {device.driver}; error {error.of(result):.2f} m/s, "
         f"best constant {constant:.1f}, water alone {water:.1f}"
     )
     return Row(label, seconds, WAVEFORM_S, "<=", "s", detail)

@@ -26,16 +26,16 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     if choice.device is None:
         yield Row("D1 engines on a device", None, WORTH_OTHER, ">=", "", choice.reason)
         return
-    for number, found in enumerate(compare(context.quick)):
-        context.progress(number + 1, ENGINES_COMPARED, found.engine.name)
-        yield from rows_of(found, choice.device)
-        yield from rates_of(found, choice.device)
+    for number, timed in enumerate(compare(context.quick)):
+        context.progress(number + 1, ENGINES_COMPARED, timed.engine.name)
+        yield from rows_of(timed, choice.device)
+        yield from rates_of(timed, choice.device)
     yield from whole_runs(context, choice.device)
 
 
-def rates_of(found: Comparison, device: Device) -> Iterable[Row]:
+def rates_of(timed: Comparison, device: Device) -> Iterable[Row]:
     """Times and rates that have a goal of their own on a graphics card."""
-    engine, seconds = found.engine, found.device_s
+    engine, seconds = timed.engine, timed.device_s
     if seconds is None:
         return
     where = f"{device.label}, driver {device.driver}"
@@ -49,22 +49,22 @@ def rates_of(found: Comparison, device: Device) -> Iterable[Row]:
         yield Row(label, 1.0 / seconds, FRAMES_PER_S, ">=", "1/s", where)
 
 
-def rows_of(found: Comparison, device: Device) -> Iterable[Row]:
+def rows_of(timed: Comparison, device: Device) -> Iterable[Row]:
     """The rows of an engine."""
-    engine = found.engine
+    engine = timed.engine
     speed, difference = f"D1 {engine.name}, speed over compiled", f"D1 {engine.name}, difference"
-    if found.compiled_s is None or found.device_s is None:
+    if timed.compiled_s is None or timed.device_s is None:
         reason = f"{device.label} computes it wrong"
         yield Row(speed, None, WORTH_OTHER, ">=", "", reason)
         yield Row(difference, None, engine.bound, "<=", engine.error_unit, reason)
         return
-    share = found.bandwidth_share
+    share = timed.bandwidth_share
     threads = f"{engine.threads} thread{'s' if engine.threads > 1 else ''}"
     detail = (
-        f"{device.label}: {1e3 * found.device_s:.3g} ms, {engine.size / found.device_s:.3g} {engine.unit} a "
+        f"{device.label}: {1e3 * timed.device_s:.3g} ms, {engine.size / timed.device_s:.3g} {engine.unit} a "
         f"second{'' if share is None else f', {share:.2g} of the bandwidth of a copy'}; "
-        f"compiled, {threads}: {1e3 * found.compiled_s:.3g} ms"
+        f"compiled, {threads}: {1e3 * timed.compiled_s:.3g} ms"
     )
     worth = WORTH_SAME if device.kind == "cpu" else WORTH_OTHER
-    yield Row(speed, found.compiled_s / found.device_s, worth, ">=", "", detail)
-    yield Row(difference, found.difference, engine.bound, "<=", engine.error_unit, device.label)
+    yield Row(speed, timed.compiled_s / timed.device_s, worth, ">=", "", detail)
+    yield Row(difference, timed.difference, engine.bound, "<=", engine.error_unit, device.label)

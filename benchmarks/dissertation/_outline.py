@@ -80,7 +80,9 @@ def read(file: Path = FILE) -> tuple[Chapter, ...]:
         return Item(**entry, **lists, sources=sources)
 
     chapters = tomllib.loads(file.read_text())["chapters"]
-    return tuple(Chapter(one["number"], one["title"], tuple(map(item, one["items"]))) for one in chapters)
+    return tuple(
+        Chapter(entry["number"], entry["title"], tuple(map(item, entry["items"]))) for entry in chapters
+    )
 
 
 CHAPTERS = read()

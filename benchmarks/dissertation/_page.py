@@ -41,12 +41,12 @@ def _template() -> Any:
 
 def _embedded(report: Mapping[str, Any], find: Find) -> dict[str, str]:
     """Data URIs by file name; each picture once."""
-    found: dict[str, str] = {}
+    pictures: dict[str, str] = {}
     for chapter in report["chapters"]:
         for item in chapter["items"]:
             for picture in item["pictures"]:
                 path = find(picture["benchmark"], picture["file"])
-                if path is not None and path.is_file() and picture["file"] not in found:
+                if path is not None and path.is_file() and picture["file"] not in pictures:
                     coded = base64.b64encode(path.read_bytes()).decode()
-                    found[picture["file"]] = f"data:image/png;base64,{coded}"
-    return found
+                    pictures[picture["file"]] = f"data:image/png;base64,{coded}"
+    return pictures

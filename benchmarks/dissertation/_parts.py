@@ -85,9 +85,9 @@ class Parts:
         self.forget(benchmark)
         drawn.mkdir(parents=True)
         connected = ConnectedContext(**vars(replace(context, pictures=drawn)))
-        started, found, error = time.perf_counter(), [], ""
+        started, measured, error = time.perf_counter(), [], ""
         try:
-            found += rows(connected)
+            measured += rows(connected)
         except Exception as exception:  # Of any package that a benchmark compares with.
             error = f"{type(exception).__name__}: {exception}"
         return self._kept(
@@ -97,7 +97,7 @@ class Parts:
                 date.today().isoformat(),
                 time.perf_counter() - started,
                 os.getloadavg()[0],
-                [row.to_dict() for row in found],
+                [row.to_dict() for row in measured],
                 sorted(path.name for path in drawn.iterdir()),
                 error,
                 bool(connected.connections),

@@ -67,15 +67,15 @@ CASES = (
     ),
     *(
         Case(
-            f"Figure 32, speed, {place}, water {water}",
+            f"Figure 32, speed, {section}, water {water}",
             "chapter7",
-            f"Figure 32 default, whole image, {place}, coupling {water}",
-            f"Figure 32 tuned, whole image, {place}, coupling {water}",
+            f"Figure 32 default, whole image, {section}, coupling {water}",
+            f"Figure 32 tuned, whole image, {section}, coupling {water}",
             0.04,
             0.25,
         )
         for water in (1375, 1500)
-        for place in ("centre", "bottom")
+        for section in ("centre", "bottom")
     ),
     *(
         Case(
@@ -142,12 +142,12 @@ def best_peer(
     if not case.peers or default is None:
         return None
     water = case.default.rsplit(", ", 1)[1]
-    found = {
+    peers = {
         label.removeprefix(case.peers).removesuffix(f", {water}"): row["value"] * default
         for label, row in rows.items()
         if label.startswith(case.peers) and label.endswith(water) and row["value"] is not None
     }
-    if not found:
+    if not peers:
         return None
-    name = min(found, key=found.__getitem__)
-    return {"name": name, "error": found[name]}
+    name = min(peers, key=peers.__getitem__)
+    return {"name": name, "error": peers[name]}

@@ -87,19 +87,19 @@ def selected(only: Iterable[str]) -> tuple[Item, ...]:
     """
     names = {chapter.key: chapter.items for chapter in CHAPTERS}
     names |= {item.key: (item,) for item in items()}
-    found: list[Item] = []
+    chosen: list[Item] = []
     for name in only:
         key = name.lower().replace(" ", "").replace("-", "")
         if key not in names:
             raise InvalidInput("--only", repr(name), "one of " + ", ".join(names))
-        found += names[key]
-    return tuple(found) if only else tuple(items())
+        chosen += names[key]
+    return tuple(chosen) if only else tuple(items())
 
 
 def kept(store: Parts, measures: dict[str, Rows], context: BenchmarkContext) -> dict[str, Part]:
     """The parts that are complete for the settings of this run."""
-    found = {name: store.complete(name, settings_of(rows, context)) for name, rows in measures.items()}
-    return {name: part for name, part in found.items() if part is not None}
+    complete = {name: store.complete(name, settings_of(rows, context)) for name, rows in measures.items()}
+    return {name: part for name, part in complete.items() if part is not None}
 
 
 def written(store: Parts, parts: dict[str, Part], context: BenchmarkContext) -> dict[str, Any]:

@@ -53,11 +53,11 @@ def pyekfmm(module) -> Solver:
     def solve(speed, spacing, node):
         # Its grids are (x, y, z) in Fortran order and always three-dimensional.
         shape = (*speed.shape, 1)[:3]
-        place = [i * spacing for i in (*node, 0)[:3]]
+        source = [i * spacing for i in (*node, 0)[:3]]
         flat = np.ascontiguousarray(speed, np.float32).reshape(shape).ravel(order="F")
         with contextlib.redirect_stdout(io.StringIO()):
             time = module.eikonal(
-                flat, xyz=np.array(place), ax=[0, spacing, shape[0]], ay=[0, spacing, shape[1]],
+                flat, xyz=np.array(source), ax=[0, spacing, shape[0]], ay=[0, spacing, shape[1]],
                 az=[0, spacing, shape[2]], order=2,
             )  # fmt: skip
         return np.asarray(time).reshape(shape, order="F").reshape(speed.shape)
@@ -72,9 +72,9 @@ def pyfmm_kit(module) -> Solver:
     def solve(speed, spacing, node):
         shape = (*speed.shape, 1)[:3]
         axes = [np.arange(n) * spacing for n in shape]
-        place = [i * spacing for i in (*node, 0)[:3]]
+        source = [i * spacing for i in (*node, 0)[:3]]
         slowness = (1.0 / speed).reshape(shape)
-        return module.travel_time_source(place, *axes, slowness, maxodr=2).reshape(speed.shape)
+        return module.travel_time_source(source, *axes, slowness, maxodr=2).reshape(speed.shape)
 
     return solve
 

@@ -87,13 +87,13 @@ def draw_fronts(row: Sequence[Axes], case: Case, names: Sequence[str]) -> None:
     """Iso-lines of the travel time over the speed, the source as a dot."""
     p = case.problem
     limits = float(p.speed.min()), float(p.speed.max())
-    places = [1e3 * p.spacing * np.arange(n) for n in p.speed.shape]
+    axes_mm = [1e3 * p.spacing * np.arange(n) for n in p.speed.shape]
     maps = []
     for axes, name in zip(row, names, strict=True):
         time = case.solved[name].time
         maps.append(draw(axes, p, p.speed, limits, SPEED, name))
         levels = np.arange(case.step, time.max(), case.step)
-        axes.contour(*places, time.T, levels=levels, colors="#ffffff", linewidths=0.7)
+        axes.contour(*axes_mm, time.T, levels=levels, colors="#ffffff", linewidths=0.7)
         axes.plot(*(1e3 * p.source), "o", color="#d1495b", markersize=4.5)
     label(row, f"{case.title}\nfronts every {case.step_text}")
     draw_bar(maps, "speed (m/s)")
@@ -102,15 +102,15 @@ def draw_fronts(row: Sequence[Axes], case: Case, names: Sequence[str]) -> None:
 def draw_errors(row: Sequence[Axes], case: Case, names: Sequence[str]) -> None:
     """Absolute errors in log colour, the ring of receivers as a line."""
     p = case.problem
-    worst = max(float(np.percentile(found.error, 99.9)) for found in case.solved.values())
+    worst = max(float(np.percentile(solution.error, 99.9)) for solution in case.solved.values())
     high = case.per_second * worst
     limits = high / 10.0**DECADES, high
     maps = []
     for axes, name in zip(row, names, strict=True):
-        found = case.solved[name]
-        rms = case.per_second * float(np.sqrt((found.ring**2).mean()))
+        solution = case.solved[name]
+        rms = case.per_second * float(np.sqrt((solution.ring**2).mean()))
         text = f"{rms:.0f}" if rms >= 100.0 else f"{rms:#.3g}"
-        maps.append(draw(axes, p, case.per_second * found.error, limits, ERROR, ""))
+        maps.append(draw(axes, p, case.per_second * solution.error, limits, ERROR, ""))
         maps[-1].set_norm(LogNorm(*limits))
         axes.set_title(f"ring rms {text} {case.unit}", fontweight="normal")
         around = np.vstack((p.receivers, p.receivers[:1]))
@@ -118,7 +118,7 @@ def draw_errors(row: Sequence[Axes], case: Case, names: Sequence[str]) -> None:
     label(row, f"{case.title}\nabsolute error")
     draw_bar(maps, f"absolute error ({case.unit})")
     # The style shows no formulas, so powers of ten are written out.
-    maps[0].colorbar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:,g}"))
+    maps[0].colorbar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:,g}"))
 
 
 def draw(

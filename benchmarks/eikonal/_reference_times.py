@@ -33,12 +33,12 @@ def godunov(tof: np.ndarray, slowness: np.ndarray, spacing: float) -> np.ndarray
     crossing = slowness * spacing
     time = earlier[0] + crossing
     for axes in range(2, tof.ndim + 1):
-        known = np.where(np.isfinite(earlier[:axes]), earlier[:axes], 0.0)
+        finite = np.where(np.isfinite(earlier[:axes]), earlier[:axes], 0.0)
         # About the earliest, so that close times keep their digits.
-        off = known - known[0]
+        off = finite - finite[0]
         total, squares = off.sum(axis=0), (off**2).sum(axis=0)
         root = total**2 - axes * (squares - crossing**2)
-        joint = known[0] + (total + np.sqrt(np.maximum(root, 0.0))) / axes
+        joint = finite[0] + (total + np.sqrt(np.maximum(root, 0.0))) / axes
         time = np.where(time > earlier[axes - 1], joint, time)
     return time
 
@@ -55,8 +55,8 @@ def equation_error(tof: np.ndarray, speed: np.ndarray, source: np.ndarray) -> fl
     """
     wanted = godunov(tof, 1.0 / speed, 1.0)
     off = np.abs(np.indices(tof.shape) - source.reshape((-1,) + (1,) * tof.ndim))
-    beside = (off < 1.0).all(axis=0)
-    error = np.where(beside, np.maximum(tof - wanted, 0.0), np.abs(tof - wanted)) / np.maximum(wanted, 1e-300)
+    near = (off < 1.0).all(axis=0)
+    error = np.where(near, np.maximum(tof - wanted, 0.0), np.abs(tof - wanted)) / np.maximum(wanted, 1e-300)
     return float(error.max())
 
 
@@ -74,7 +74,7 @@ def edge_times(speed: np.ndarray, source: np.ndarray) -> np.ndarray:
     rows, columns, costs = [], [], []
     for axis in range(speed.ndim):
         low, high = (
-            tuple(slice(*ends) if one == axis else slice(None) for one in range(speed.ndim))
+            tuple(slice(*ends) if other == axis else slice(None) for other in range(speed.ndim))
             for ends in ((None, -1), (1, None))
         )
         cost = np.maximum(crossing[low], crossing[high]).ravel()
@@ -83,15 +83,15 @@ def edge_times(speed: np.ndarray, source: np.ndarray) -> np.ndarray:
         costs += [cost, cost]
     # The source is one node more, joined to those of its cell.
     off = np.abs(np.indices(speed.shape) - source.reshape((-1,) + (1,) * speed.ndim))
-    beside = np.flatnonzero((off < 1.0).all(axis=0).ravel())
-    first = crossing.ravel()[beside].max()
-    straight = np.sqrt((off**2).sum(axis=0)).ravel()[beside]
-    rows.append(np.full(beside.size, speed.size))
-    columns.append(beside)
+    near = np.flatnonzero((off < 1.0).all(axis=0).ravel())
+    first = crossing.ravel()[near].max()
+    straight = np.sqrt((off**2).sum(axis=0)).ravel()[near]
+    rows.append(np.full(near.size, speed.size))
+    columns.append(near)
     costs.append(np.maximum(straight * first, 1e-300))
     begin, end, cost = np.concatenate(rows), np.concatenate(columns), np.concatenate(costs)
     # Straight times are final: nothing leads back into the cell.
-    kept = (begin == speed.size) | ~np.isin(end, beside)
+    kept = (begin == speed.size) | ~np.isin(end, near)
     graph = coo_array((cost[kept], (begin[kept], end[kept])), shape=(speed.size + 1,) * 2)
     times = dijkstra(graph.tocsr(), indices=speed.size)[:-1]
     return np.asarray(times).reshape(speed.shape)

@@ -107,7 +107,7 @@ def alternate(
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """E1 to E11; ``quick`` covers E1 to E5 and E7 on the small problems."""
     peers, missing = installed()
-    parts: list[Callable[[dict, dict, bool], Iterable[Row]]] = [
+    tables: list[Callable[[dict, dict, bool], Iterable[Row]]] = [
         marching,
         accurate,
         sweeping,
@@ -115,11 +115,11 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         batches,
     ]
     if not context.quick:
-        parts += [tracing, threads, three_dimensions, sharp_edges, robustness]
-    for k, part in enumerate(parts):
-        context.progress(k, len(parts), part.__name__)
-        yield from part(peers, missing, context.quick)
-    context.progress(len(parts), len(parts), "done")
+        tables += [tracing, threads, three_dimensions, sharp_edges, robustness]
+    for k, table in enumerate(tables):
+        context.progress(k, len(tables), table.__name__)
+        yield from table(peers, missing, context.quick)
+    context.progress(len(tables), len(tables), "done")
 
 
 def against(

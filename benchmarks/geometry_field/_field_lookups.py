@@ -46,17 +46,17 @@ class Lookups:
         """Name to run, and name to what it found last: distances or (u, v); faces and weights of them all."""
         o, d = as_columns(rays)
         count, n = o.shape[1], self.field.samples
-        found = {name: np.empty(count, np.float32) for name in ("plane", "walk", "linear place")}
-        found |= {name: np.empty((count, 2), np.float32) for name in ("nearest uv", "linear uv")}
-        found |= {"faces": np.empty(count, np.int32), "weights": np.empty((2, count), np.float32)}
-        here, faces, weights = (self.surface, self.field), found["faces"], found["weights"]
+        results = {name: np.empty(count, np.float32) for name in ("plane", "walk", "linear place")}
+        results |= {name: np.empty((count, 2), np.float32) for name in ("nearest uv", "linear uv")}
+        results |= {"faces": np.empty(count, np.int32), "weights": np.empty((2, count), np.float32)}
+        here, faces, weights = (self.surface, self.field), results["faces"], results["weights"]
         return {
-            "plane": lambda: find_by_plane(self.planes, o, d, found["plane"]),
-            "walk": lambda: find(*here, o, d, STEPS, faces, found["walk"], weights),
-            "linear place": lambda: find_linear(*here, self.known, o, d, faces, found["linear place"]),
-            "nearest uv": lambda: nearest_uv(n, self.table, o, d, found["nearest uv"]),
-            "linear uv": lambda: linear_uv(n, self.table, o, d, found["linear uv"]),
-        }, found
+            "plane": lambda: find_by_plane(self.planes, o, d, results["plane"]),
+            "walk": lambda: find(*here, o, d, STEPS, faces, results["walk"], weights),
+            "linear place": lambda: find_linear(*here, self.known, o, d, faces, results["linear place"]),
+            "nearest uv": lambda: nearest_uv(n, self.table, o, d, results["nearest uv"]),
+            "linear uv": lambda: linear_uv(n, self.table, o, d, results["linear uv"]),
+        }, results
 
     def normals(self, faces: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """(rays, 3) smooth normals at what ``find`` found, not unit vectors; NaN for nothing."""
@@ -68,11 +68,11 @@ class Lookups:
 
 def between_pixels(image: GeometryImage, values: np.ndarray, uv: np.ndarray) -> np.ndarray:
     """``values`` of an image's pixels at (u, v), (rays, 3); NaN for no (u, v) and beside the chart."""
-    some = np.isfinite(uv[:, 0])
-    at = np.where(some[:, None], uv, 0.0) * (image.size - 1)
+    hit = np.isfinite(uv[:, 0])
+    at = np.where(hit[:, None], uv, 0.0) * (image.size - 1)
     low = np.clip(at.astype(int), 0, image.size - 2)
     way = at - low
-    mean, valid = np.zeros((len(uv), 3)), some
+    mean, valid = np.zeros((len(uv), 3)), hit
     for i, j in np.ndindex(2, 2):
         pixel = low[:, 0] + i, low[:, 1] + j
         mean += (np.abs(1 - i - way[:, 0]) * np.abs(1 - j - way[:, 1]))[:, None] * values[pixel]

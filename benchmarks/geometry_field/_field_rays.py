@@ -25,8 +25,8 @@ def load_mesh() -> tuple[str, TriangleMesh]:
     words = BUNNY.read_text().split()
     vertices, faces = int(words[1]), int(words[2])
     numbers = np.array(words[4:], dtype=float)
-    places, corners = numbers[: 3 * vertices].reshape(-1, 3), numbers[3 * vertices :].reshape(faces, 4)[:, 1:]
-    return f"bunny, {faces} faces", TriangleMesh(places, corners.astype(np.int32)).in_unit_cube()
+    points, corners = numbers[: 3 * vertices].reshape(-1, 3), numbers[3 * vertices :].reshape(faces, 4)[:, 1:]
+    return f"bunny, {faces} faces", TriangleMesh(points, corners.astype(np.int32)).in_unit_cube()
 
 
 def build_outer_field(surface: Surface, n: int) -> OuterField:
@@ -49,8 +49,8 @@ def incoherent_rays(count: int) -> tuple[np.ndarray, np.ndarray]:
 def camera_rays(pixels: int) -> tuple[np.ndarray, np.ndarray]:
     """Rays of a picture that the unit cube fills, row by row."""
     camera = perspective((1.1, 0.9, 1.95), (0.5, 0.5, 0.5), (0.0, 1.0, 0.0), 34.0)
-    place = (np.arange(pixels) + 0.5) / pixels - 0.5
-    u, v = np.tile(place, pixels)[:, None], np.repeat(place, pixels)[:, None]
+    position = (np.arange(pixels) + 0.5) / pixels - 0.5
+    u, v = np.tile(position, pixels)[:, None], np.repeat(position, pixels)[:, None]
     ahead = camera.direction[0] + u * camera.direction[1] + v * camera.direction[2]
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     return np.float32(np.broadcast_to(camera.origin[0], ahead.shape)), np.float32(ahead)

@@ -17,12 +17,12 @@ from bentray_workers.images.canvas import drawing, new_figure, to_png
 LIGHT = np.array((0.4, 0.6, 0.7)) / np.linalg.norm((0.4, 0.6, 0.7))
 
 
-def picture(found: Mapping[str, tuple[Parameterisation, GeometryImage, np.ndarray]]) -> bytes:
+def picture(images: Mapping[str, tuple[Parameterisation, GeometryImage, np.ndarray]]) -> bytes:
     """PNG: a row for each surface, with its view, (3, 3) right, up and towards the eye."""
     with drawing():
-        figure = new_figure(6.0, 1.65 * len(found))
-        panels = figure.subplots(len(found), 4, squeeze=False)
-        for row, (name, (chart, image, view)) in enumerate(found.items()):
+        figure = new_figure(6.0, 1.65 * len(images))
+        panels = figure.subplots(len(images), 4, squeeze=False)
+        for row, (name, (chart, image, view)) in enumerate(images.items()):
             for axes in panels[row]:
                 axes.set_axis_off()
                 axes.set_aspect("equal")
@@ -45,22 +45,22 @@ def picture(found: Mapping[str, tuple[Parameterisation, GeometryImage, np.ndarra
 def shaded(axes: Axes, mesh: TriangleMesh, view: np.ndarray) -> None:
     """The faces that look to the eye, the nearest last, as bright as the light meets them."""
     normals = mesh.face_normals / np.maximum(np.linalg.norm(mesh.face_normals, axis=1), 1e-300)[:, np.newaxis]
-    places, facing = mesh.corners @ view.T, normals @ view.T
-    order = np.argsort(places[..., 2].mean(axis=1))
+    corners, facing = mesh.corners @ view.T, normals @ view.T
+    order = np.argsort(corners[..., 2].mean(axis=1))
     order = order[facing[order, 2] > 0.0]
     grey = 0.15 + 0.8 * np.maximum(facing[order] @ LIGHT, 0.0)
     colours = np.repeat(grey[:, np.newaxis], 3, axis=1)
-    faces = PolyCollection(places[order, :, :2], facecolors=colours, edgecolors="face", linewidths=0.2)
+    faces = PolyCollection(corners[order, :, :2], facecolors=colours, edgecolors="face", linewidths=0.2)
     axes.add_collection(faces)
     axes.autoscale_view()
 
 
-def stretched(axes: Axes, found: Parameterisation) -> None:
+def stretched(axes: Axes, layout: Parameterisation) -> None:
     """Each face where it is laid out, dark where a pixel stands for much of the surface."""
-    uv = found.chart.uv
-    one, other = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    flat = 0.5 * np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
-    area = np.linalg.norm(found.chart.mesh.face_normals, axis=1)
+    uv = layout.chart.uv
+    first, other = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    flat = 0.5 * np.abs(first[:, 0] * other[:, 1] - first[:, 1] * other[:, 0])
+    area = np.linalg.norm(layout.chart.mesh.face_normals, axis=1)
     share = np.log10(area / np.maximum(flat, 1e-300))
     faces = PolyCollection(uv, array=share, cmap="viridis_r", edgecolors="face", linewidths=0.2)
     faces.set_clim(*np.percentile(share, (1, 99)))

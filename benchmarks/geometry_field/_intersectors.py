@@ -98,8 +98,8 @@ def mitsuba_of(module) -> Callable[[TriangleMesh], object]:
             drjit.eval(ray)
 
             def once() -> None:
-                found = self.scene.ray_intersect_preliminary(ray)
-                drjit.eval(found)
+                hit = self.scene.ray_intersect_preliminary(ray)
+                drjit.eval(hit)
                 drjit.sync_thread()
 
             return once

@@ -28,18 +28,18 @@ def lookup_panels(pixels: int) -> list[Panel]:
     chart = parameterise(load_mesh()[1]).chart
     image, lookups = geometry_image(chart, PIXELS), Lookups.from_chart(chart, SAMPLES)
     camera = perspective(EYE, (0.45, 0.5, 0.5), (0.0, 1.0, 0.0), 38.0)
-    place = (np.arange(2 * pixels) + 0.5) / (2 * pixels) - 0.5
-    u, v = np.tile(place, 2 * pixels)[:, None], np.repeat(place, 2 * pixels)[:, None]
+    position = (np.arange(2 * pixels) + 0.5) / (2 * pixels) - 0.5
+    u, v = np.tile(position, 2 * pixels)[:, None], np.repeat(position, 2 * pixels)[:, None]
     ahead = camera.direction[0] + u * camera.direction[1] + v * camera.direction[2]
     rays = np.float32(np.broadcast_to(camera.origin[0], ahead.shape)), np.float32(ahead)
-    runs, found = lookups.runs(rays)
+    runs, results = lookups.runs(rays)
     panels = []
     for way, words in NAMES.items():
         runs[way]()
         if way.endswith("uv"):
-            normals = between_pixels(image, image.normals, found[way])
+            normals = between_pixels(image, image.normals, results[way])
         else:
-            normals = lookups.normals(found["faces"], found["weights"])
+            normals = lookups.normals(results["faces"], results["weights"])
         panels.append(Panel(words, shaded(normals, 2 * pixels)))
     return panels
 

@@ -61,7 +61,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 def timed(lookups: Lookups, exact: dict, rays: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:
     """ns a ray of every lookup and every exact intersector, in turn, one thread."""
-    runs = lookups.runs(rays)[0] | {peer: one.run(*rays) for peer, one in exact.items()}
+    runs = lookups.runs(rays)[0] | {peer: engine.run(*rays) for peer, engine in exact.items()}
     return {name: 1e9 * least / len(rays[0]) for name, least in alternate(runs, REPEATS).items()}
 
 
@@ -81,10 +81,10 @@ def incoherent_rows(lookups: Lookups, exact: dict, missing: str, count: int) -> 
     ns = timed(lookups, exact, rays)
     yield ratio_row("G2 nearest entry and plane, speed", 2.0, ns, "plane", exact, missing)
     yield ratio_row("G2 nearest entry and walk, speed", 1.0, ns, "walk", exact, missing)
-    runs, found = lookups.runs(rays)
+    runs, results = lookups.runs(rays)
     for way, goal in (("plane", 1e-3), ("walk", 1e-6)):
         runs[way]()
-        errors, wrong = against_exact(lookups, rays, found[way])
+        errors, wrong = against_exact(lookups, rays, results[way])
         detail = (
             f"edges of the cube; mean {errors.mean():.2g}, 90 % within {np.quantile(errors, 0.9):.2g}, "
             f"99 % within {np.quantile(errors, 0.99):.2g}"
@@ -116,15 +116,15 @@ def published_rows(lookups: Lookups, image: GeometryImage, count: int) -> Iterab
     """G4: where the geometry image puts the published (u, v), beside our places on the rays."""
     rays = incoherent_rays(count)
     faces, exact = Ours(lookups.surface).first(*rays)
-    runs, found = lookups.runs(rays)
+    runs, results = lookups.runs(rays)
     errors = {}
     for way, run in runs.items():
         run()
-        places = rays[0] + found[way][:, None] * rays[1] if found[way].ndim == 1 else None
-        if places is None:
-            places = between_pixels(image, image.positions, found[way])
+        points = rays[0] + results[way][:, None] * rays[1] if results[way].ndim == 1 else None
+        if points is None:
+            points = between_pixels(image, image.positions, results[way])
         ends = rays[0] + np.where(faces >= 0, exact, np.nan)[:, None] * rays[1]
-        off = np.linalg.norm(places - ends, axis=1)
+        off = np.linalg.norm(points - ends, axis=1)
         errors[way] = off[np.isfinite(off)]
     for way, off in errors.items():
         far = 100.0 * float((off > 0.1).mean())

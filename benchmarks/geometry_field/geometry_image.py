@@ -51,18 +51,18 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     surfaces["bumpy ball"] = bumpy_ball(5_000 if context.quick else 75_408)
     # So that nothing is compiled in the time that counts.
     made(bumpy_ball(1_000), 1)
-    found = {}
+    images = {}
     for k, (name, surface) in enumerate(surfaces.items()):
         context.progress(k, len(surfaces), name)
         if surface is not None:
-            found[name] = made(surface, 1 if context.quick else REPEATS)
+            images[name] = made(surface, 1 if context.quick else REPEATS)
     for name, theirs in TABLE5.items():
-        yield from table5_rows(name, theirs, found.get(name))
+        yield from table5_rows(name, theirs, images.get(name))
     for name, goal in (("bunny", ""), ("bumpy ball", ", bumpy ball")):
-        yield from target_rows(goal, found.get(name))
+        yield from target_rows(goal, images.get(name))
     views = {"sphere": FRONT, "torus": ASLANT, "bunny": FRONT}
     shown = {
-        name: (found[name].chart, found[name].image, view) for name, view in views.items() if name in found
+        name: (images[name].chart, images[name].image, view) for name, view in views.items() if name in images
     }
     context.save_picture("geometry_image.png", lambda: picture(shown))
     context.progress(len(surfaces), len(surfaces), "done")
@@ -89,17 +89,17 @@ def made(surface: TriangleMesh, repeats: int) -> Made:
     return Made(chart, image, min(chart_seconds), min(image_seconds), min(chart_busy))
 
 
-def table5_rows(name: str, theirs: tuple[float, float], found: Made | None) -> Iterable[Row]:
+def table5_rows(name: str, theirs: tuple[float, float], made: Made | None) -> Iterable[Row]:
     """Seconds beside the dissertation's."""
-    for part, seconds, goal in (
-        ("parameterisation", found and found.chart_seconds, theirs[0]),
-        ("geometry image", found and found.image_seconds, theirs[1]),
+    for step, seconds, goal in (
+        ("parameterisation", made and made.chart_seconds, theirs[0]),
+        ("geometry image", made and made.image_seconds, theirs[1]),
     ):
-        detail = absent() if found is None else f"{faces(found)}; theirs {goal:g} s"
-        yield Row(f"Table 5 {name}, {part}", seconds, goal, "<=", "s", detail)
+        detail = absent() if made is None else f"{faces(made)}; theirs {goal:g} s"
+        yield Row(f"Table 5 {name}, {step}", seconds, goal, "<=", "s", detail)
 
 
-def target_rows(label: str, found: Made | None) -> Iterable[Row]:
+def target_rows(label: str, made: Made | None) -> Iterable[Row]:
     """G1's parameterisation and G5 of one surface."""
     goals = {
         f"G1 parameterisation{label}": (3.0, "<=", "s"),
@@ -109,28 +109,28 @@ def target_rows(label: str, found: Made | None) -> Iterable[Row]:
     }
     values: list[float | None] = [None] * len(goals)
     details = [absent()] * len(goals)
-    if found is not None:
-        mesh, uv = found.chart.chart.mesh, found.chart.chart.uv
-        error = geometric_error(mesh, found.image.mesh())
-        factors = found.chart.quasi_conformal
+    if made is not None:
+        mesh, uv = made.chart.chart.mesh, made.chart.chart.uv
+        error = geometric_error(mesh, made.image.mesh())
+        factors = made.chart.quasi_conformal
         values = [
-            found.chart_seconds,
+            made.chart_seconds,
             error.rms,
             float((signed_areas(uv) <= 0.0).sum()),
             float(np.median(factors)),
         ]
         details = [
-            f"{faces(found)}, one thread, {found.chart_busy:.1f} s of processor time; least of the runs",
+            f"{faces(made)}, one thread, {made.chart_busy:.1f} s of processor time; least of the runs",
             f"{SIZE}², both ways; largest distance {error.greatest:.1e}",
-            f"area stretch {found.chart.area_stretch:.2f}, {signed_areas(uv).sum():.0%} of the square filled",
+            f"area stretch {made.chart.area_stretch:.2f}, {signed_areas(uv).sum():.0%} of the square filled",
             f"99 of 100 below {np.quantile(factors, 0.99):.3f}, largest {factors.max():.2f}",
         ]
     for (name, (goal, op, unit)), value, detail in zip(goals.items(), values, details, strict=True):
         yield Row(name, value, goal, op, unit, detail)
 
 
-def faces(found: Made) -> str:
-    return f"{len(found.chart.quasi_conformal):,} faces"
+def faces(made: Made) -> str:
+    return f"{len(made.chart.quasi_conformal):,} faces"
 
 
 def absent() -> str:

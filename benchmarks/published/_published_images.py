@@ -29,13 +29,13 @@ def image_rows(quick: bool, progress: Step) -> Iterable[Row]:
         scan = PhantomScan.of_table6(wanted, progress)
         ours = scan.run("our fronts and rays")
         for words, changes in WAYS.items():
-            found = scan.run(words, attenuation=False, **changes)
-            mean = scan.compared(found, scan.mean_absolute)
+            result = scan.run(words, attenuation=False, **changes)
+            mean = scan.compared(result, scan.mean_absolute)
             label, goal = f"{name} in {FAT_MPS:g} m/s, SART, {words}", ours.mae_percent
-            detail = f"ours, SART with deviation and differences, {goal:.2f} %; {found.how}"
+            detail = f"ours, SART with deviation and differences, {goal:.2f} %; {result.how}"
             yield mean.row(label, mean.error, goal, ">=", "% of range", detail)
-        found = scan.run("attenuation by SART", attenuation_solver="sart")
-        loss = scan.compared(found, scan.attenuation_rms)
+        result = scan.run("attenuation by SART", attenuation_solver="sart")
+        loss = scan.compared(result, scan.attenuation_rms)
         goal = ours.attenuation_rmse
-        detail = f"rms; ours, with a penalty, {goal:.3f}; {found.how}"
+        detail = f"rms; ours, with a penalty, {goal:.3f}; {result.how}"
         yield loss.row(f"{name}, attenuation by SART", loss.error, goal, ">=", "of range", detail)

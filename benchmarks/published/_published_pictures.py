@@ -87,15 +87,15 @@ def backdrop_rows(quick: bool) -> Iterable[Row]:
         settings = RenderSettings(pixels, pixels, seed=None, **how)
         return render(scene, FRONT, backdrop, settings).image.astype(float)
 
-    seconds = alternate({name: lambda one=one: picture(one) for name, one in boards.items()}, 3)
+    seconds = alternate({name: lambda board=board: picture(board) for name, board in boards.items()}, 3)
     detail = f"{pixels}², one core: " + ", ".join(f"{name} {1e3 * s:.0f} ms" for name, s in seconds.items())
     ratio = seconds["warped"] / seconds["flat"]
     yield Row("warped / flat backdrop, time", ratio, 2.0, "<=", "", f"{detail}; theirs are flat alone")
     gains = {}
-    for name, one in boards.items():
-        many = picture(one, supersampling="real", degree=8)
+    for name, pattern in boards.items():
+        many = picture(pattern, supersampling="real", degree=8)
         error = {
-            way: float(np.sqrt(((picture(one, supersampling=way) - many) ** 2).mean()))
+            way: float(np.sqrt(((picture(pattern, supersampling=way) - many) ** 2).mean()))
             for way in ("none", "prss")
         }
         gains[name] = 20.0 * float(np.log10(error["none"] / error["prss"]))

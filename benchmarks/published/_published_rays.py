@@ -80,8 +80,8 @@ def front_rows(quick: bool) -> Iterable[Row]:
     for name in methods[1:]:
         ratio = error["fmm-first-order"][-1] / error[name][-1]
         orders = {
-            one: float(np.log2(error[one][0] / error[one][-1])) / (len(sides) - 1)
-            for one in ("fmm-first-order", name)
+            solver: float(np.log2(error[solver][0] / error[solver][-1])) / (len(sides) - 1)
+            for solver in ("fmm-first-order", name)
         }
         detail = (
             f"rms of times {sides[-1]}²: {error['fmm-first-order'][-1]:.2g} s, order "

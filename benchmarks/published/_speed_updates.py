@@ -66,7 +66,7 @@ def errors(phantom: str, seeds: int = SEEDS) -> dict[str, dict[str, list[float]]
     dataset, scan = simulate(asked), asked.scan()
     inside, truth = scan.phantom.inside(NODES, scan.side_m), scan.phantom.speed(NODES, scan.side_m)
     low, high = scan.phantom.speed_range()
-    found: dict[str, dict[str, list[float]]] = {start: {} for start in STARTS}
+    errors: dict[str, dict[str, list[float]]] = {start: {} for start in STARTS}
     for seed in range(seeds):
         settings = Settings.of(
             method="sart",
@@ -93,8 +93,8 @@ def errors(phantom: str, seeds: int = SEEDS) -> dict[str, dict[str, list[float]]
                     while not state.done:
                         state = sart_step.advance(problem, settings, state, ELEMENTS)
                 error = 100.0 * np.abs(1.0 / state.slowness - truth)[inside].mean() / (high - low)
-                found[start].setdefault(name, []).append(float(error))
-    return found
+                errors[start].setdefault(name, []).append(float(error))
+    return errors
 
 
 def rows(seeds: int = SEEDS) -> Iterable[Row]:

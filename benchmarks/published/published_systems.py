@@ -25,7 +25,7 @@ PARTS = (
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """One table; each row names both figures, and its goal is that ours is no worse."""
-    for number, (name, part) in enumerate(PARTS):
+    for number, (name, table) in enumerate(PARTS):
         context.progress(number, len(PARTS), name)
-        yield from part(context.quick, context.progress)
+        yield from table(context.quick, context.progress)
     context.progress(len(PARTS), len(PARTS), "done")

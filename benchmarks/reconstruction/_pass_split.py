@@ -37,8 +37,8 @@ class Split:
         return self.front + self.rays + self.update
 
     def __str__(self) -> str:
-        parts = {"wave front": self.front, "rays": self.rays, "update": self.update}
-        return ", ".join(f"{name} {1e3 * seconds:.2f} ms" for name, seconds in parts.items())
+        seconds_of = {"wave front": self.front, "rays": self.rays, "update": self.update}
+        return ", ".join(f"{name} {1e3 * seconds:.2f} ms" for name, seconds in seconds_of.items())
 
 
 def split(nodes: int, elements: int) -> Split:
@@ -46,8 +46,8 @@ def split(nodes: int, elements: int) -> Split:
     spacing = TABLE7_SIDE_M / (nodes - 1)
     # As smooth as an image of SART is; the front goes round its grid more often where edges are sharp.
     slowness = 1.0 / gaussian_filter(table7(1375.0, max(nodes, 128)).at(0.0).speed(nodes, TABLE7_SIDE_M), 2.0)
-    places = Ring(elements, ring_radius(TABLE7_SIDE_M, nodes)).positions() + 0.5 * TABLE7_SIDE_M
-    source, receivers = places[0], places[1:]
+    positions = Ring(elements, ring_radius(TABLE7_SIDE_M, nodes)).positions() + 0.5 * TABLE7_SIDE_M
+    source, receivers = positions[0], positions[1:]
     measured = np.linalg.norm(receivers - source, axis=1) / 1375.0
     work = EmitterPass.for_grid(slowness.shape, elements)
     region, coverage = np.ones(slowness.shape, bool), np.zeros(slowness.shape)

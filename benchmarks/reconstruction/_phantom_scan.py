@@ -139,9 +139,9 @@ class PhantomScan:
             how,
         )
 
-    def compared(self, found: ReconstructionError, error_on: ErrorOn) -> Compared:
+    def compared(self, error: ReconstructionError, error_on: ErrorOn) -> Compared:
         """One of the errors below, and those of the baselines."""
-        return self.images.compared(found.result, error_on)
+        return self.images.compared(error.result, error_on)
 
     def mean_absolute(self, image: Reconstruction) -> ImageError:
         """Mean absolute error of the speed inside the breast, per cent of the phantom's range."""

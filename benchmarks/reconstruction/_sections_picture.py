@@ -29,16 +29,16 @@ def picture(title: str, panels: Sequence[Panel], columns: int, side_m: float) ->
     with drawing():
         figure = new_figure(1.9 * columns + 0.9, 2.3 * rows + 0.5)
         figure.suptitle(title)
-        places = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+        grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
         maps = []
-        for axes, panel in zip(places.flat, panels, strict=False):
+        for axes, panel in zip(grid.flat, panels, strict=False):
             side = panel.side_m or side_m
             spacing = (side / (len(panel.image) - 1),) * 2
             origin = (-side / 2,) * 2
             maps.append(draw_map(axes, panel.image, spacing, origin, limits, colormap=SPEED, title=""))
             axes.set_title(panel.title, fontsize=8)
             axes.label_outer()
-        for axes in list(places.flat)[len(panels) :]:
+        for axes in list(grid.flat)[len(panels) :]:
             axes.set_visible(False)
         draw_bar(maps, "sound speed (m/s)")
         return figure_png(figure)

@@ -32,8 +32,8 @@ def straight_matrix(times: TravelTimes) -> csr_array:
     return csr_array(
         vstack(
             [
-                _fan(times, times.emitters[one], times.receivers[receiver[emitter == one]], number)
-                for one in np.unique(emitter)
+                _fan(times, times.emitters[index], times.receivers[receiver[emitter == index]], number)
+                for index in np.unique(emitter)
             ],
             format="csr",
         )
@@ -44,8 +44,8 @@ def _fan(times: TravelTimes, start: np.ndarray, ends: np.ndarray, number: np.nda
     """Rows of one emitter; ``number`` is the column of a node, -1 outside the region."""
     length = np.linalg.norm(ends - start, axis=1)
     count = math.ceil(SAMPLES * length.max() / times.spacing)
-    part = (np.arange(count) + 0.5) / count
-    points = (start + part[:, None] * (ends - start)[:, None, :]) / times.spacing
+    fraction = (np.arange(count) + 0.5) / count
+    points = (start + fraction[:, None] * (ends - start)[:, None, :]) / times.spacing
     low = points.astype(int)
     beyond = points - low
     row = np.repeat(np.arange(len(ends)), count)
@@ -79,8 +79,8 @@ def roughness(times: TravelTimes, strength: float) -> csr_array:
 
 
 def _differences(count: int) -> csr_array:
-    ones = np.ones(count - 1)
-    return csr_array(diags_array([-ones, ones], offsets=[0, 1], shape=(count - 1, count)))
+    unit = np.ones(count - 1)
+    return csr_array(diags_array([-unit, unit], offsets=[0, 1], shape=(count - 1, count)))
 
 
 def cgls(times: TravelTimes) -> np.ndarray:
@@ -100,7 +100,7 @@ def sirt(times: TravelTimes) -> np.ndarray:
 def sart(times: TravelTimes) -> np.ndarray:
     """As ``sirt`` with an update after each emitter, in random order."""
     emitter, _ = times.pairs()
-    fans = [np.flatnonzero(emitter == one) for one in np.unique(emitter)]
+    fans = [np.flatnonzero(emitter == index) for index in np.unique(emitter)]
     return _sweeps(times, fans, SART_RELAXATION, SART_SWEEPS, SART_LEAST_GAIN)
 
 
@@ -109,18 +109,18 @@ def _sweeps(
 ) -> np.ndarray:
     matrix = straight_matrix(times)
     measured = times.delta_tof[times.pairs()]
-    parts = []
+    systems = []
     for rows in blocks:
         block = csr_array(matrix[rows])
         weights = _reciprocal(block.sum(axis=1)), _reciprocal(block.sum(axis=0))
-        parts.append((block, csr_array(block.T), *weights, measured[rows]))
+        systems.append((block, csr_array(block.T), *weights, measured[rows]))
     change = np.zeros(matrix.shape[1])
     random = np.random.default_rng(0)
     last = math.inf
     for _ in range(sweeps):
         squares = 0.0
-        for k in random.permutation(len(parts)):
-            block, back, of_rays, of_nodes, wanted = parts[k]
+        for k in random.permutation(len(systems)):
+            block, back, of_rays, of_nodes, wanted = systems[k]
             residual = wanted - block @ change
             squares += float(residual @ residual)
             change += relaxation * of_nodes * (back @ (of_rays * residual))

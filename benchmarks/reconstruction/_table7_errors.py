@@ -34,8 +34,8 @@ def on_phantom_nodes(image: Reconstruction, outside_mps: float) -> Floats:
         image: of a slice, on any grid.
         outside_mps: speed beyond the image, m/s.
     """
-    places = node_positions(NODES, TABLE7_SIDE_M)
-    fine = (places[:, None] + VOXEL_M * ((np.arange(PER_CELL) + 0.5) / PER_CELL - 0.5)).ravel()
+    nodes = node_positions(NODES, TABLE7_SIDE_M)
+    fine = (nodes[:, None] + VOXEL_M * ((np.arange(PER_CELL) + 0.5) / PER_CELL - 0.5)).ravel()
     x, y = ((fine - origin) / image.spacing_m[0] for origin in image.origin_m[:2])
     at = np.meshgrid(x, y, indexing="ij")
     values = map_coordinates(image.speed, at, order=1, mode="constant", cval=outside_mps)
@@ -61,8 +61,8 @@ class Slices:
     def constants(self) -> dict[str, float]:
         """Of the best constant and of water alone."""
         values = np.concatenate([true[on] for true, on in zip(self._truths, self._regions, strict=True)])
-        known = {BEST_CONSTANT: float(values.mean()), WATER_ALONE: self.phantoms[0].coupling_mps}
-        return {name: self.error(np.full_like(t, one) for t in self._truths) for name, one in known.items()}
+        means = {BEST_CONSTANT: float(values.mean()), WATER_ALONE: self.phantoms[0].coupling_mps}
+        return {name: self.error(np.full_like(t, mean) for t in self._truths) for name, mean in means.items()}
 
     @property
     def _truths(self) -> list[Floats]:
@@ -71,11 +71,11 @@ class Slices:
     @property
     def _regions(self) -> list[Flags]:
         inside = [phantom.inside(NODES, TABLE7_SIDE_M) for phantom in self.phantoms]
-        return [np.ones_like(one) for one in inside] if self.whole else inside
+        return [np.ones_like(mask) for mask in inside] if self.whole else inside
 
     def _rms(self, off: Sequence[Floats]) -> float:
         low, high = self.phantoms[0].speed_range()
-        values = np.concatenate([one[on] for one, on in zip(off, self._regions, strict=True)])
+        values = np.concatenate([deviation[on] for deviation, on in zip(off, self._regions, strict=True)])
         return float(np.sqrt((values**2).mean())) / (high - low)
 
 
@@ -88,7 +88,7 @@ def contrasts(phantom: PhantomSlice, speed: Floats) -> dict[str, float]:
     """
     axis = node_positions(NODES, TABLE7_SIDE_M)
     true = phantom.speed(NODES, TABLE7_SIDE_M)
-    found = {}
+    contrast = {}
     for part in phantom.volume.parts[3:]:
         a, b, half_height = part.solid.semi_axes_m  # type: ignore[attr-defined]
         x, y, z = part.solid.centre_m  # type: ignore[attr-defined]
@@ -96,10 +96,12 @@ def contrasts(phantom: PhantomSlice, speed: Floats) -> dict[str, float]:
         if abs(phantom.z_m - z) > NEAR_MIDDLE * half_height or not core.any():
             continue
         name = f"{2.0 * max(a, b) / VOXEL_M:.0f} voxels at ({1e3 * x:.0f}, {1e3 * y:.0f}) mm"
-        found[name] = float((speed[core] - TISSUE_MPS).mean() / (true[core] - TISSUE_MPS).mean())
-    return found
+        contrast[name] = float((speed[core] - TISSUE_MPS).mean() / (true[core] - TISSUE_MPS).mean())
+    return contrast
 
 
-def least_contrast(found: Mapping[str, float], voxels: int) -> float:
+def least_contrast(contrast: Mapping[str, float], voxels: int) -> float:
     """Of the lesions of this diameter the least contrast; NaN without one."""
-    return min((one for name, one in found.items() if name.startswith(f"{voxels} ")), default=float("nan"))
+    return min(
+        (value for name, value in contrast.items() if name.startswith(f"{voxels} ")), default=float("nan")
+    )

@@ -56,21 +56,21 @@ def pygimli(module) -> Peer:
     def solve(times):
         module.setLogLevel(logging.ERROR)
         module.setThreadCount(1)
-        places, sensor = np.unique(
+        sensors, sensor = np.unique(
             np.concatenate((times.emitters, times.receivers)), axis=0, return_inverse=True
         )
-        x, y = (places - places.mean(axis=0)).T
+        x, y = (sensors - sensors.mean(axis=0)).T
         round_the_ring = np.argsort(np.arctan2(y, x))
         outline = meshtools.createPolygon(
-            places[round_the_ring], isClosed=True, area=PYGIMLI_AREA * times.spacing**2
+            sensors[round_the_ring], isClosed=True, area=PYGIMLI_AREA * times.spacing**2
         )
         mesh = meshtools.createMesh(outline, quality=34)
         emitter, receiver = times.pairs()
         data = module.DataContainer()
         for name in "sg":
             data.registerSensorIndex(name)
-        for place in places:
-            data.createSensor(list(place))
+        for sensor_xy in sensors:
+            data.createSensor(list(sensor_xy))
         data.resize(emitter.size)
         data["s"] = sensor[emitter]
         data["g"] = sensor[len(times.emitters) + receiver]
@@ -100,11 +100,11 @@ def pygimli(module) -> Peer:
     return solve
 
 
-def _on_nodes(times: TravelTimes, places: np.ndarray, speed: np.ndarray) -> np.ndarray:
+def _on_nodes(times: TravelTimes, points: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Values at scattered places read linearly at the nodes; water outside their hull."""
     axis = np.arange(times.region.shape[0]) * times.spacing
     nodes = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1)
-    return np.asarray(LinearNDInterpolator(places, speed, fill_value=times.water_speed)(nodes))
+    return np.asarray(LinearNDInterpolator(points, speed, fill_value=times.water_speed)(nodes))
 
 
 def ttcrpy(module) -> Peer:

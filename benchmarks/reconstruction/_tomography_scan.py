@@ -77,18 +77,18 @@ def scan(
     # An even refinement: the middle of the square, where the ring is centred, is a node.
     fine, spacing = REFINEMENT * (nodes - 1) + 1, fine_spacing(nodes)
     speed = phantom.speed(fine, SIDE_M)
-    place = positions(nodes, elements)
-    index = np.rint(place / spacing).astype(int) + fine // 2
+    position = positions(nodes, elements)
+    index = np.rint(position / spacing).astype(int) + fine // 2
     delta = np.empty((elements, elements))
     for emitter, (i, j) in enumerate(index):
         tof = solve(speed, spacing, (int(i), int(j)))
-        water = np.linalg.norm(place - place[emitter], axis=1) / coupling_mps
+        water = np.linalg.norm(position - position[emitter], axis=1) / coupling_mps
         delta[emitter] = tof[index[:, 0], index[:, 1]] - water
         step(emitter + 1, elements)
     np.fill_diagonal(delta, np.nan)
     coarse = SIDE_M / (nodes - 1)
     return Dataset(
-        element_position_m=place,
+        element_position_m=position,
         tx=np.arange(elements),
         rx=np.arange(elements),
         water_speed_mps=coupling_mps,

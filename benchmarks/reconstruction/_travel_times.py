@@ -38,10 +38,10 @@ class TravelTimes:
         A pair measured both ways keeps the mean, in one of its places: twice the rays would cost twice the
         time and tell nothing more. Each emitter keeps the half of the ring that follows it.
         """
-        place = dataset.element_position_m + 0.5 * side_m
+        position = dataset.element_position_m + 0.5 * side_m
         both = dataset.delta_tof_s
         assert both is not None
-        count = len(place)
+        count = len(position)
         ahead = (np.arange(count) - np.arange(count)[:, None]) % count
         opposite = np.triu(2 * ahead == count)
         first = ((ahead > 0) & (2 * ahead < count)) | opposite
@@ -49,8 +49,8 @@ class TravelTimes:
         axis = np.linspace(-0.5 * side_m, 0.5 * side_m, nodes)
         reach = np.linalg.norm(dataset.element_position_m, axis=1).min() - RIM_NODES * spacing
         return cls(
-            emitters=place,
-            receivers=place,
+            emitters=position,
+            receivers=position,
             delta_tof=np.where(first, 0.5 * (both + both.T), np.nan),
             water_speed=dataset.water_speed_mps,
             region=np.hypot(axis[:, None], axis[None, :]) <= reach,

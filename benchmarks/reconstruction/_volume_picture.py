@@ -14,9 +14,9 @@ from bentray_workers.images.maps import SPEED, draw_bar, draw_map, robust_limits
 from ..shared._small_png import figure_png
 
 
-def picture(truth: Truth, found: Mapping[str, Reconstruction]) -> bytes:
+def picture(truth: Truth, results: Mapping[str, Reconstruction]) -> bytes:
     """PNG: a column for the truth and each reconstruction, a row for each of three sections."""
-    volumes = {"truth": truth.sound_speed_mps, **{name: result.speed for name, result in found.items()}}
+    volumes = {"truth": truth.sound_speed_mps, **{name: result.speed for name, result in results.items()}}
     middle = [n // 2 for n in truth.sound_speed_mps.shape]
     spacing, origin = truth.spacing_m, truth.origin_m
     limits = robust_limits([truth.sound_speed_mps])

@@ -37,19 +37,19 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
             for name in LADDER:
                 if snr is not None and name not in ("straight", "HAFMM data-driven"):
                     continue
-                found = ladder_step(scan, name)
-                detail = f"theirs {THEIRS[name]:g} %, noise-free; {found.how}"
-                yield speed_row(scan, f"{name}, {where}", found, THEIRS[name], detail)
-                panels.append(Panel(f"{name}{noise}\n{found.mae_percent:.1f} %", found.result.speed))
+                error = ladder_step(scan, name)
+                detail = f"theirs {THEIRS[name]:g} %, noise-free; {error.how}"
+                yield speed_row(scan, f"{name}, {where}", error, THEIRS[name], detail)
+                panels.append(Panel(f"{name}{noise}\n{error.mae_percent:.1f} %", error.result.speed))
             for name in BESIDE if snr is None else ():
-                found = ladder_step(scan, name)
-                yield speed_row(scan, f"{name}, {where}", found, THEIRS["fixed"], found.how)
+                error = ladder_step(scan, name)
+                yield speed_row(scan, f"{name}, {where}", error, THEIRS["fixed"], error.how)
             images = {"default": scan.run_default(), "tuned": scan.run("tuned", **TUNED)}
-            for name, found in images.items():
+            for name, error in images.items():
                 goal = THEIRS["HAFMM data-driven"]
-                yield speed_row(scan, f"{name}, {where}", found, goal, found.how, tuned=name == "tuned")
+                yield speed_row(scan, f"{name}, {where}", error, goal, error.how, tuned=name == "tuned")
                 panels.append(
-                    Panel(f"{name}{noise}\n{found.mae_percent:.1f} %", found.result.speed, found.side_m)
+                    Panel(f"{name}{noise}\n{error.mae_percent:.1f} %", error.result.speed, error.side_m)
                 )
             loss = scan.compared(images["default"], scan.attenuation_rms)
             detail = f"theirs below 7 %; {images['default'].how}"
@@ -62,12 +62,12 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 def speed_row(
     scan: PhantomScan,
     label: str,
-    found: ReconstructionError,
+    error: ReconstructionError,
     goal: float,
     detail: str,
     *,
     tuned: bool = False,
 ) -> Row:
     """Mean absolute error beside its baselines."""
-    mean = scan.compared(found, scan.mean_absolute)
+    mean = scan.compared(error, scan.mean_absolute)
     return mean.row(f"Figure 31 {label}", mean.error, goal, "<=", "% of range", detail, tuned=tuned)

@@ -28,24 +28,24 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     panels: list[Panel] = []
     cases = [(c, z, None) for c in (FAT_MPS, WATER_MPS) for z in HEIGHTS]
     cases += [(c, "centre", SNR) for c in (FAT_MPS, WATER_MPS)]
-    for coupling, place, snr in cases:
-        scan = PhantomScan.of_table7(HEIGHTS[place], nodes, elements, coupling, snr, context.progress)
-        where = f"{place}, coupling {coupling:g}" + ("" if snr is None else f", SNR {snr:g}")
-        panels.append(Panel(f"{place} in {coupling:g} m/s", scan.truth))
+    for coupling, height, snr in cases:
+        scan = PhantomScan.of_table7(HEIGHTS[height], nodes, elements, coupling, snr, context.progress)
+        where = f"{height}, coupling {coupling:g}" + ("" if snr is None else f", SNR {snr:g}")
+        panels.append(Panel(f"{height} in {coupling:g} m/s", scan.truth))
         images = {name: scan.run(name, **changes) for name, changes in WAYS.items()}
-        for name, found in (images | {"default": scan.run_default()}).items():
+        for name, error in (images | {"default": scan.run_default()}).items():
             noise = "" if snr is None else f", SNR {snr:g}"
             panels.append(
-                Panel(f"{name}{noise}\n{found.whole_image_rmse:.3f}", found.result.speed, found.side_m)
+                Panel(f"{name}{noise}\n{error.whole_image_rmse:.3f}", error.result.speed, error.side_m)
             )
-            detail = f"theirs {THEIRS[name]:g} of the whole image; {found.how}"
+            detail = f"theirs {THEIRS[name]:g} of the whole image; {error.how}"
             tuned = name == "tuned"
             for region, error_on in (("whole image", scan.whole_image_rms), ("inside the breast", scan.rms)):
-                one = scan.compared(found, error_on)
+                shown = scan.compared(error, error_on)
                 target = f"Figure 32 {name}, {region}, {where}"
-                yield one.row(target, one.error, THEIRS[name], "<=", "of range", detail, tuned=tuned)
+                yield shown.row(target, shown.error, THEIRS[name], "<=", "of range", detail, tuned=tuned)
             if name == "default":
-                loss = scan.compared(found, scan.attenuation_rms)
+                loss = scan.compared(error, scan.attenuation_rms)
                 detail = f"inside the breast; theirs {THEIR_ATTENUATION:g} of the whole image"
                 target = f"Figure 33 attenuation, {where}"
                 yield loss.row(target, loss.error, THEIR_ATTENUATION, "<=", "of range", detail)

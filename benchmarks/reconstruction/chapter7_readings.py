@@ -111,14 +111,14 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         for region, error_on in (("whole image", scan.whole_image_rms), ("inside", scan.rms)):
             images = straight.result, bent.result
             both.add(f"{reading.name}, {region}", scan, error_on(bent.result), *images)
-            for way, found in (("straight", straight), ("bent", bent)):
-                one = scan.compared(found, error_on)
-                value, goal = one.error, BENT
+            for way, error in (("straight", straight), ("bent", bent)):
+                compared = scan.compared(error, error_on)
+                value, goal = compared.error, BENT
                 if way == "straight":
-                    value, goal = abs(one.error - STRAIGHT), TOLERANCE
+                    value, goal = abs(compared.error - STRAIGHT), TOLERANCE
                 target = f"{reading.name}: {way}, {region}"
-                detail = others(scan, error_on(found.result), found.result)
-                yield one.row(target, value, goal, "<=", "of range", detail)
+                detail = others(scan, error_on(error.result), error.result)
+                yield compared.row(target, value, goal, "<=", "of range", detail)
     yield from both.rows()
     for data in (FULL,) if context.quick else (FULL, Data("skin", 1500.0), Data("skin", 1500.0, "waves")):
         for grid in (nodes,) if context.quick else KNOWN_NODES:
@@ -131,14 +131,14 @@ def rows_knowing_skin(scan: PhantomScan, data: Data, nodes: int) -> Iterator[Row
     image = knowing_skin(scan, bent.result)
     residual = image.history[-1].residual_rms_s
     for region, error_on in (("whole image", scan.whole_image_rms), ("inside", scan.rms)):
-        one = scan.compared(replace(bent, result=image), error_on)
+        compared = scan.compared(replace(bent, result=image), error_on)
         without = error_on(bent.result).of(bent.result)
         detail = (
             f"SART begins with the true skin, {nodes}² nodes, {KNOWN_ITERATIONS} iterations; "
             f"explains the times to {1e9 * residual:.0f} ns; without the skin {without:.3f}"
         )
         target = f"{Reading(data).name}, skin known, {nodes} nodes: bent, {region}"
-        yield one.row(target, one.error, BENT, "<=", "of range", detail)
+        yield compared.row(target, compared.error, BENT, "<=", "of range", detail)
 
 
 def scanned(data: Data, nodes: int, elements: int) -> PhantomScan:
@@ -152,10 +152,10 @@ def scanned(data: Data, nodes: int, elements: int) -> PhantomScan:
         )
         return PhantomScan(scan, pick(simulate(waves)), silent)
     everyone = np.arange(elements)
-    medium, places = scan.medium(), scan.elements()
+    medium, positions = scan.medium(), scan.elements()
     with ThreadPoolExecutor(cpu_count()) as pool:
         batches = np.array_split(everyone, elements // 8)
-        delta = np.concatenate(list(pool.map(lambda some: medium.arrivals(places, some)[0], batches)))
+        delta = np.concatenate(list(pool.map(lambda batch: medium.arrivals(positions, batch)[0], batches)))
     if snr is not None:
         delta, _ = with_noise(delta, snr, np.random.default_rng(0), ~np.eye(elements, dtype=bool))
     dataset = Dataset(ring.positions(), everyone, everyone, coupling, delta_tof_s=delta)
@@ -208,9 +208,9 @@ class Both:
 
     def rows(self) -> Iterator[Row]:
         """How many readings give the one, the other and both; and the closest of all."""
-        straight = {name for name, one in self.found.items() if abs(one[0] - STRAIGHT) <= TOLERANCE}
-        bent = {name for name, one in self.found.items() if one[1] <= BENT}
-        ratio, most = max((one[0] / one[1], name) for name, one in self.found.items())
+        straight = {name for name, errors in self.found.items() if abs(errors[0] - STRAIGHT) <= TOLERANCE}
+        bent = {name for name, errors in self.found.items() if errors[1] <= BENT}
+        ratio, most = max((errors[0] / errors[1], name) for name, errors in self.found.items())
         count = f"of {len(self.found)} readings by scan, region and norm"
         yield Row("readings with straight rays at 0.25", len(straight), 1, ">=", "", count)
         yield Row("readings with bent rays at 0.036", len(bent), 1, ">=", "", count)

@@ -98,11 +98,13 @@ def summarised(
     for name, slices in (("no noise", [*chosen, *judged]), (f"SNR {SNR:g}", noisy)):
         if not slices:
             continue
-        found = {one.place: contrasts(one.asked.phantom, one.speeds[WAVEFORM]) for one in slices}
-        least = np.nanmin([least_contrast(one, SMALLEST_VOXELS) for one in found.values()])
-        parts = (f"{where}, {what}: {part:.2f}" for where, one in found.items() for what, part in one.items())
+        inside = {scan.place: contrasts(scan.asked.phantom, scan.speeds[WAVEFORM]) for scan in slices}
+        least = np.nanmin([least_contrast(each, SMALLEST_VOXELS) for each in inside.values()])
+        facts = (
+            f"{where}, {what}: {read:.2f}" for where, each in inside.items() for what, read in each.items()
+        )
         target = f"M1 lesions of {SMALLEST_VOXELS} voxels, {name}, least part of their contrast"
-        yield Row(target, float(least), VISIBLE, ">=", "", "; ".join(parts))
+        yield Row(target, float(least), VISIBLE, ">=", "", "; ".join(facts))
     yield Row("M1 in space", None, IN_SPACE, "<=", "of range", NO_SPACE)
 
 
@@ -127,29 +129,29 @@ def errors(name: str, slices: Sequence[Scanned]) -> Iterator[Row]:
     size = (
         f"{NODES}², {asked.elements} transducers, {asked.emissions} emit, {1e-3 * asked.frequency_hz:.0f} kHz"
     )
-    where = ", ".join(one.place for one in slices)
+    where = ", ".join(scan.place for scan in slices)
     for region, whole in (("whole image", True), ("inside", False)):
-        over = Slices([one.asked.phantom for one in slices], whole)
-        found = {way: over.error([one.speeds[way] for one in slices]) for way in slices[0].speeds}
-        beside = over.constants() | {way: found[way] for way in (STRAIGHT_RAYS, DEFAULT_SETTINGS)}
+        over = Slices([scan.asked.phantom for scan in slices], whole)
+        errors = {way: over.error([scan.speeds[way] for scan in slices]) for way in slices[0].speeds}
+        baselines = over.constants() | {way: errors[way] for way in (STRAIGHT_RAYS, DEFAULT_SETTINGS)}
         for way in SETTINGS:
             detail = f"{where}; {size}, water {asked.coupling_mps:g} m/s"
             if way == WAVEFORM:
-                detail += "; " + "; ".join(one.summary for one in slices)
+                detail += "; " + "; ".join(scan.summary for scan in slices)
             target = f"M1 {name}, {way}, {region}"
-            yield Row(target, found[way], BY_SLICES, "<=", "of range", detail, baselines=beside)
+            yield Row(target, errors[way], BY_SLICES, "<=", "of range", detail, baselines=baselines)
 
 
 def drawn(clean: Sequence[Scanned], noisy: Sequence[Scanned]) -> bytes:
     """The phantom and the images of each slice, side by side, those with noise last."""
     panels = []
-    named = [(one.place, one) for one in clean] + [(f"{one.place}, SNR {SNR:g}", one) for one in noisy]
-    for name, one in named:
-        over = Slices([one.asked.phantom])
-        panels.append(Panel(name, one.asked.phantom.speed(NODES, TABLE7_SIDE_M)))
+    named = [(scan.place, scan) for scan in clean] + [(f"{scan.place}, SNR {SNR:g}", scan) for scan in noisy]
+    for name, scan in named:
+        over = Slices([scan.asked.phantom])
+        panels.append(Panel(name, scan.asked.phantom.speed(NODES, TABLE7_SIDE_M)))
         panels += [
             Panel(f"{way}\n{over.error([speed]):.4f}", speed)
-            for way, speed in ((way, one.speeds[way]) for way in (STRAIGHT_RAYS, *SETTINGS))
+            for way, speed in ((way, scan.speeds[way]) for way in (STRAIGHT_RAYS, *SETTINGS))
         ]
     title = "3-D breast phantom (Li 2008, Table 7), scanned by waves: rms error over the range"
     return picture(title, panels, 4, TABLE7_SIDE_M)

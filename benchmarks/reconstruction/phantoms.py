@@ -76,8 +76,8 @@ def figure28() -> bytes:
             maps.append(
                 draw_map(axes, speed, *where, robust_limits([speed]), colormap=SPEED, title=f"{water:g} m/s")
             )
-            place = 1e3 * (np.arange(NODES) * spacing - half)
-            axes.contour(place, place, 1e6 * time.T, np.arange(5, 150, 5), colors="white", linewidths=0.5)
+            x_mm = 1e3 * (np.arange(NODES) * spacing - half)
+            axes.contour(x_mm, x_mm, 1e6 * time.T, np.arange(5, 150, 5), colors="white", linewidths=0.5)
             for path, end in zip(rays.trace(time, spacing, receivers, source), receivers, strict=True):
                 straight = 1e3 * (np.array([source, end]) - half)
                 axes.plot(*straight.T, color="#ffd23f", linewidth=0.7)
@@ -95,8 +95,8 @@ def figure30() -> bytes:
     with drawing():
         figure = new_figure(8.4, 7.6)
         figure.suptitle("Figures 29 and 30: slices of the phantom")
-        places = figure.subplots(2, 2, sharex=True, sharey=True)
-        for column, (name, phantom) in zip(places, slices.items(), strict=True):
+        columns = figure.subplots(2, 2, sharex=True, sharey=True)
+        for column, (name, phantom) in zip(columns, slices.items(), strict=True):
             for axes, image, colours, label in (
                 (column[0], phantom.speed(NODES, TABLE6_SIDE_M), SPEED, "sound speed (m/s)"),
                 (column[1], phantom.attenuation(NODES, TABLE6_SIDE_M), ATTENUATION, "attenuation (Np/m)"),

@@ -31,21 +31,21 @@ def fat_coupling(nodes: int, elements: int, progress: Step) -> Iterable[Row]:
         "SART": scan.run("SART"),
         "tuned": scan.run("tuned", **TUNED),
     }
-    for name, found in images.items():
+    for name, error in images.items():
         tuned = name == "tuned"
-        mean, rms = scan.compared(found, scan.mean_absolute), scan.compared(found, scan.rms)
+        mean, rms = scan.compared(error, scan.mean_absolute), scan.compared(error, scan.rms)
         yield mean.row(
-            f"R1 mean absolute error, {name}", mean.error, 2.0, "<=", "% of range", found.how, tuned=tuned
+            f"R1 mean absolute error, {name}", mean.error, 2.0, "<=", "% of range", error.how, tuned=tuned
         )
-        yield rms.row(f"R1 rms error, {name}", rms.error, 0.04, "<=", "of range", found.how, tuned=tuned)
+        yield rms.row(f"R1 rms error, {name}", rms.error, 0.04, "<=", "of range", error.how, tuned=tuned)
         ratio = mean.baselines[STRAIGHT_RAYS] / mean.error
-        how = f"mean absolute errors, the same method; {found.how}"
+        how = f"mean absolute errors, the same method; {error.how}"
         yield mean.row(f"R1 straight over bent rays, {name}", ratio, 3.0, ">=", "", how, tuned=tuned)
     yield from ordering(scan, ladder, "1375")
-    for name, found in images.items():
-        loss = scan.compared(found, scan.attenuation_rms)
+    for name, error in images.items():
+        loss = scan.compared(error, scan.attenuation_rms)
         target = f"R8 line integrals, {name}"
-        yield loss.row(target, loss.error, 0.05, "<=", "of range", found.how, tuned=name == "tuned")
+        yield loss.row(target, loss.error, 0.05, "<=", "of range", error.how, tuned=name == "tuned")
 
 
 def water_coupling(nodes: int, elements: int, progress: Step) -> Iterable[Row]:
@@ -57,14 +57,14 @@ def water_coupling(nodes: int, elements: int, progress: Step) -> Iterable[Row]:
     straight = scan.compared(ladder["straight"], scan.mean_absolute)
     target = "R2 straight rays, difference from 25 %"
     yield straight.row(target, abs(straight.error - 25.0), 2.0, "<=", "% of range", ladder["straight"].how)
-    for name, found, goal in (
+    for name, error, goal in (
         ("curved SART", scan.run("SART"), 11.0),
         ("default", scan.run_default(), 6.0),
         ("best method, tuned", scan.run("tuned", **TUNED), 6.0),
     ):
-        mean = scan.compared(found, scan.mean_absolute)
+        mean = scan.compared(error, scan.mean_absolute)
         tuned = name.endswith("tuned")
-        yield mean.row(f"R2 {name}", mean.error, goal, "<=", "% of range", found.how, tuned=tuned)
+        yield mean.row(f"R2 {name}", mean.error, goal, "<=", "% of range", error.how, tuned=tuned)
     yield from ordering(scan, ladder, "1500")
 
 

@@ -70,14 +70,14 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         dataset = scan(coupling, nodes, elements, solvers[SOLVER], made)
         ours = run_ours(dataset, tiny, nodes, context.progress)
         how = f"{nodes}² nodes of the truth, {elements} elements, {SOLVER} times"
-        for name, (found, compared) in ours.items():
+        for name, (own, compared) in ours.items():
             label = f"{name}, {water}"
-            took = f"{found}, {how}"
+            took = f"{own}, {how}"
             yield compared.row(
-                f"R6 unseen slice rmse, {label}", found.rmse_mps, RMSE_GOAL_MPS, "<=", "m/s", took
+                f"R6 unseen slice rmse, {label}", own.rmse_mps, RMSE_GOAL_MPS, "<=", "m/s", took
             )
-            clock = f"{found.processor_s:.1f} s of processors, {how}"
-            yield compared.row(f"R6 unseen slice time, {label}", found.seconds, SECONDS_GOAL, "<", "s", clock)
+            clock = f"{own.processor_s:.1f} s of processors, {how}"
+            yield compared.row(f"R6 unseen slice time, {label}", own.seconds, SECONDS_GOAL, "<", "s", clock)
         first = next(iter(OURS))
         for k, name in enumerate(_tomography_peers.PEERS):
             context.progress(k, len(_tomography_peers.PEERS), f"{name}, {water}")

@@ -57,10 +57,10 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 def where(nodes: int, slices: int, elements: int) -> Row:
     """What one emitter's pass takes of a core, in parts, against what the time asked for leaves it."""
-    parts = split(nodes, elements)
+    seconds = split(nodes, elements)
     goal = 1e3 * 2 * GOALS.get((nodes, slices), 10.0) / (slices * elements * SWEEPS)
     label = f"R5 one pass, {nodes}², {elements} transducers"
-    return Row(label, 1e3 * parts.whole, goal, "<=", "ms", str(parts))
+    return Row(label, 1e3 * seconds.whole, goal, "<=", "ms", str(seconds))
 
 
 def volume(nodes: int, slices: int, elements: int, distinct: int, context: BenchmarkContext) -> Iterable[Row]:
@@ -191,11 +191,11 @@ def sweep(nodes: int, elements: int) -> tuple[float, int]:
     state = advance(problem, settings, state, elements)
     seconds = time.perf_counter() - started
     once = problem.each_pair_once()
-    parts = [
+    blocks = [
         trace_rays(once, settings, state.slowness, emitters)
         for emitters in batches_of(once.active_emitters)[:1]
     ]
-    held = sum(part.columns.nbytes + part.lengths.nbytes + part.pointers.nbytes for part in parts)
+    held = sum(block.columns.nbytes + block.lengths.nbytes + block.pointers.nbytes for block in blocks)
     return seconds, held * len(batches_of(once.active_emitters))
 
 

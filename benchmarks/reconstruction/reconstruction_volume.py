@@ -51,7 +51,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         sigma = float(np.sqrt(np.nanmean(delta**2))) / SNR
         noise = np.random.default_rng(0).normal(0.0, sigma, delta.shape)
         noisy = replace(clean, delta_tof_s=delta + noise)
-        found: dict[str, Reconstruction] = {}
+        results: dict[str, Reconstruction] = {}
         for label, dataset in (("exact", clean), (f"SNR {SNR:g}", noisy)):
             images = Images(
                 dataset, lambda scan, settings, n=label: run(context, cluster, scan, settings, show(n))
@@ -63,15 +63,15 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
                 )
                 image, seconds = images.made(settings)
                 name = f"{label}, {way}"
-                found[name] = inner(image, slices)
-                one = compared[way] = images.compared(image, object_error(clean, relative=True))
-                yield one.row(
-                    f"R9 {name}", one.error, 0.04, "<=", "of range", f"NRMSE, {size}, {seconds:.0f} s"
+                results[name] = inner(image, slices)
+                error = compared[way] = images.compared(image, object_error(clean, relative=True))
+                yield error.row(
+                    f"R9 {name}", error.error, 0.04, "<=", "of range", f"NRMSE, {size}, {seconds:.0f} s"
                 )
             worse = compared["slices"].error - compared["volume"].error
             target = f"R9 slice-wise over 3-D, {label}"
             yield compared["slices"].row(target, worse, 0.003, "<=", "of range", f"NRMSE, {size}")
-        context.save_picture("reconstruction_volume.png", lambda: picture(clean.truth, found))
+        context.save_picture("reconstruction_volume.png", lambda: picture(clean.truth, results))
         context.progress(1, 1, "done")
 
 

@@ -35,10 +35,10 @@ class Size(NamedTuple):
 
 
 METHODS = ("sart", "gauss-newton", "auto")
-QUICK = tuple(Size(*one, method) for one in ((64, 64, 1), (64, 64, 4)) for method in METHODS)
+QUICK = tuple(Size(*row, method) for row in ((64, 64, 1), (64, 64, 4)) for method in METHODS)
 SIZES = (
-    *(Size(*one, method) for one in ((64, 96, 1), (128, 128, 1), (256, 192, 1)) for method in METHODS),
-    *(Size(*one, method) for one in ((256, 192, 8), (512, 256, 1), (512, 256, 4)) for method in METHODS[:2]),
+    *(Size(*row, method) for row in ((64, 96, 1), (128, 128, 1), (256, 192, 1)) for method in METHODS),
+    *(Size(*row, method) for row in ((256, 192, 8), (512, 256, 1), (512, 256, 4)) for method in METHODS[:2]),
 )
 # Loads the compiled code of all methods.
 SMALL = Size(16, 32, 1, "auto")
@@ -63,15 +63,15 @@ def measured(folder: Path, size: Size) -> Iterable[Row]:
 
     def saved() -> None:
         nonlocal stored
-        stored = max(stored, sum(one.stat().st_size for one in work.rglob("*") if one.is_file()))
+        stored = max(stored, sum(path.stat().st_size for path in work.rglob("*") if path.is_file()))
 
     with open_cluster(workers=1, local_directory=folder) as cluster:
         small = made_up_scan(folder / "small.h5", SMALL.elements, SMALL.slices)
         reconstruct(cluster.client, small, settings_of(SMALL))
         _of_worker(cluster.client.run(forget_peak))
-        warm, before = (_of_worker(cluster.client.run(one)) for one in (peak_bytes, cpu_seconds))
+        warm, before = (_of_worker(cluster.client.run(figure)) for figure in (peak_bytes, cpu_seconds))
         result = reconstruct(cluster.client, path, settings, work_dir=work, on_saved=saved)
-        peak, after = (_of_worker(cluster.client.run(one)) for one in (peak_bytes, cpu_seconds))
+        peak, after = (_of_worker(cluster.client.run(figure)) for figure in (peak_bytes, cpu_seconds))
     write_reconstruction(volume, result)
     planned = plan(summary_of(path, settings), settings, ())
     files = {"scan": path.stat().st_size, "checkpoints": stored, "volume": volume.stat().st_size}
@@ -112,5 +112,5 @@ def settings_of(size: Size) -> Settings:
 
 def _of_worker(answers: dict[str, Any]) -> Any:
     """What the only worker answered."""
-    (found,) = answers.values()
-    return found
+    (answer,) = answers.values()
+    return answer

@@ -63,14 +63,14 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     names = tuple(dict.fromkeys(column.ours for column in COLUMNS))
     device, refusal = opencl()
     for i, nodes in enumerate(sides):
-        found: dict[str, Figures] = {}
+        figures_of: dict[str, Figures] = {}
         for k, name in enumerate(names):
             context.progress(i * len(names) + k, len(sides) * len(names), f"{name} {nodes}²")
             if device or not eikonal.METHODS[name].on_device:
-                found[name] = measured(name, nodes)
+                figures_of[name] = measured(name, nodes)
         for column in COLUMNS:
             ran_on = device if eikonal.METHODS[column.ours].on_device else "one core"
-            yield from beside(column, nodes, found.get(column.ours), ran_on, refusal)
+            yield from beside(column, nodes, figures_of.get(column.ours), ran_on, refusal)
     context.progress(len(sides) * len(names), len(sides) * len(names), "done")
 
 

@@ -56,24 +56,24 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         path = folder / "scan.h5"
         write_dataset(path, scan(elements, 31 if context.quick else 61))
         # Few iterations in a short time; with the default relaxation of 0.1 the image is still water.
-        known = {"method": "sart", "decomposition": "volume", "iterations": 2, "relaxation": 0.5}
-        settings = Settings.of(nodes=nodes, **known)
+        common = {"method": "sart", "decomposition": "volume", "iterations": 2, "relaxation": 0.5}
+        settings = Settings.of(nodes=nodes, **common)
         ways = {
             "whole": settings.changed(eikonal="fsm"),
             "accurate": settings,
             **{f"{blocks} blocks": settings.changed(blocks=blocks) for blocks in BLOCKS},
         }
-        found = {}
-        for number, (name, one) in enumerate(ways.items()):
+        runs = {}
+        for number, (name, settings_of_run) in enumerate(ways.items()):
             context.progress(number, len(ways), f"{nodes}², {name}")
-            found[name] = measured(folder, path, one)
+            runs[name] = measured(folder, path, settings_of_run)
         for blocks in BLOCKS:
-            yield from compared(path, ways[f"{blocks} blocks"], found[f"{blocks} blocks"], found)
+            yield from compared(path, ways[f"{blocks} blocks"], runs[f"{blocks} blocks"], runs)
 
 
-def compared(path: Path, settings: Settings, divided: Run, found: dict[str, Run]) -> Iterable[Row]:
+def compared(path: Path, settings: Settings, divided: Run, runs: dict[str, Run]) -> Iterable[Row]:
     """Rows of one number of blocks."""
-    whole, default = found["whole"], found["accurate"]
+    whole, default = runs["whole"], runs["accurate"]
     planned = plan(summary_of(path, settings), settings, ())
     undivided = plan(summary_of(path, settings), settings.changed(blocks=1), ())
     shape = " x ".join(str(n) for n in whole.result.speed.shape)
@@ -97,15 +97,15 @@ def compared(path: Path, settings: Settings, divided: Run, found: dict[str, Run]
         "",
         f"one worker, {divided.seconds:.0f} and {whole.seconds:.0f} s",
     )
-    mine, theirs = error(divided.result), error(default.result)
+    own, theirs = error(divided.result), error(default.result)
     water = error(default.result, WATER_MPS)
     yield Row(
         f"{name}: image error over that of the default with the whole volume",
-        mine / theirs,
+        own / theirs,
         ERROR,
         "<=",
         "",
-        f"rms inside the sphere {mine:.2f} m/s by fsm in blocks, {theirs:.2f} m/s by accurate, "
+        f"rms inside the sphere {own:.2f} m/s by fsm in blocks, {theirs:.2f} m/s by accurate, "
         f"{water:.2f} m/s of water alone; two iterations, relaxation 0.5",
     )
 
@@ -156,11 +156,11 @@ def error(result: Reconstruction, value: float | None = None) -> float:
     ]
     x, y, z = np.meshgrid(*lines, indexing="ij")
     inside = x**2 + y**2 + z**2 < 0.03**2
-    found = result.speed if value is None else np.full(x.shape, value)
-    return float(np.sqrt(np.mean((found - truth(x, y, z))[inside] ** 2)))
+    speed = result.speed if value is None else np.full(x.shape, value)
+    return float(np.sqrt(np.mean((speed - truth(x, y, z))[inside] ** 2)))
 
 
 def _of_worker(client: Client, function: Callable[[], Any]) -> Any:
     """The answer of the only worker."""
-    (found,) = client.run(function).values()
-    return found
+    (answer,) = client.run(function).values()
+    return answer

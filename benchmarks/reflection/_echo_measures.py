@@ -26,22 +26,22 @@ def amplitude(image: Reflection) -> Floats:
     return np.asarray(10.0 ** (image.db / 20.0))
 
 
-def echo_near(image: Reflection, place: tuple[float, float], window_m: float) -> Echo:
+def echo_near(image: Reflection, point: tuple[float, float], window_m: float) -> Echo:
     """The brightest echo within a distance of a point.
 
     Args:
         image: 2-D.
-        place: of the point, m.
+        point: of the point, m.
         window_m: radius, m.
     """
     size = amplitude(image)
     x, y = axes_of(image)
-    far = np.hypot(x - place[0], y - place[1]) > window_m
+    far = np.hypot(x - point[0], y - point[1]) > window_m
     i, j = np.unravel_index(np.argmax(np.where(far, 0.0, size)), size.shape)
     peak = _refined_peak(size, int(i), int(j))
     at = np.array(image.origin_m) + image.spacing_m[0] * peak
     widths = [_width(size, peak, np.pi * k / DIRECTIONS) for k in range(DIRECTIONS)]
-    return Echo(float(np.hypot(*(at - place))), image.spacing_m[0] * float(np.mean(widths)))
+    return Echo(float(np.hypot(*(at - point))), image.spacing_m[0] * float(np.mean(widths)))
 
 
 def line_offset(image: Reflection, ends: tuple[tuple[float, float], ...], window_m: float) -> float:

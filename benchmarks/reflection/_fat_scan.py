@@ -159,8 +159,8 @@ class FatScan:
 
     def _clock(self) -> tuple[float, int]:
         """Time step, s, and steps from sample to sample."""
-        part = STEP if self.peer is None else PEER_STEP
-        longest = part * longest_step(1.1 * WATER_MPS, self.spacing_m)
+        step = STEP if self.peer is None else PEER_STEP
+        longest = step * longest_step(1.1 * WATER_MPS, self.spacing_m)
         sample = 1.0 / (SAMPLES_A_PERIOD * self.frequency_hz)
         skip = math.ceil(sample / longest)
         return sample / skip, skip

@@ -46,8 +46,8 @@ def picture(size: FatScan, images: Mapping[str, Reflection], result: Reconstruct
             axes.set_xlim(-reach, reach)
             axes.set_ylim(-reach, reach)
             turn = np.linspace(0.0, 2.0 * np.pi, 60)
-            for place, radius in (*((point, size.wavelength_m) for point in POINTS), (CYST, CYST_M)):
-                circle = np.array(place)[:, None] + radius * np.stack((np.cos(turn), np.sin(turn)))
+            for centre, radius in (*((point, size.wavelength_m) for point in POINTS), (CYST, CYST_M)):
+                circle = np.array(centre)[:, None] + radius * np.stack((np.cos(turn), np.sin(turn)))
                 axes.plot(*(1e3 * circle), color="#ffb000", linewidth=0.6)
             for side in (-1.0, 1.0):
                 height = LINE[0][1] + side * size.wavelength_m

@@ -78,8 +78,8 @@ def glass(
     indices: Sequence[float] = (1.0, INDEX),
 ) -> Scene:
     """A volume, read by one of ``FILTERS``, as glass of 2 along its longest edge."""
-    known, prefilter, smoothing = FILTERS[name]
-    spline = Spline.from_volume(volume, known, prefilter=prefilter, smoothing=smoothing, dtype=np.float32)
+    kernel, prefilter, smoothing = FILTERS[name]
+    spline = Spline.from_volume(volume, kernel, prefilter=prefilter, smoothing=smoothing, dtype=np.float32)
     return Scene.build(spline, Layers(tuple(isos), tuple(indices)), 2.0 / (max(volume.shape) - 1))
 
 

@@ -67,12 +67,12 @@ def rows(subject: Subject, pixels: int = PIXELS) -> Iterable[Row]:
     scene = Scene.build(
         Spline(subject.volume, smoothing=1.0), Layers((subject.iso,), (1.0, 1.5)), bound="accc"
     )
-    found = {one: operations(scene, subject, one, pixels) for one in ("steps", "dda", "octree")}
-    listed = ", ".join(f"{one} {values:.1f} and {nodes:.1f}" for one, (values, nodes) in found.items())
+    counts = {search: operations(scene, subject, search, pixels) for search in ("steps", "dda", "octree")}
+    listed = ", ".join(f"{search} {values:.1f} and {nodes:.1f}" for search, (values, nodes) in counts.items())
     theirs = subject.seconds["steps"] / subject.seconds["accc octree"]
     yield Row(
         f"V5 {subject.name}, evaluations a ray, steps / accc octree",
-        found["steps"][0] / found["octree"][0],
+        counts["steps"][0] / counts["octree"][0],
         theirs,
         ">=",
         "",

@@ -101,7 +101,7 @@ def exact(radius: float) -> tuple[np.ndarray, np.ndarray]:
     return compared, start * (ends / np.maximum(offset, 1e-12))[:, None]
 
 
-def errors(found: np.ndarray, radius: float) -> np.ndarray:
-    """How far from the exact places, nodes, the compared rays end; ``found`` is (pixels², 2), NaN: lost."""
+def errors(points: np.ndarray, radius: float) -> np.ndarray:
+    """How far from the exact places, nodes, the compared rays end; ``points`` is (pixels², 2), NaN: lost."""
     compared, ends = exact(radius)
-    return np.linalg.norm(found - ends, axis=1)[compared]
+    return np.linalg.norm(points - ends, axis=1)[compared]

@@ -85,8 +85,8 @@ def cells(subject: Subject) -> Iterable[Row]:
         spline = Spline(subject.volume, order)
         # The exact range takes minutes in a large volume.
         bounds = ("bmcc", "accc", "bernstein", "ccc")[: 4 if subject.volume.size < 1e6 else 3]
-        found = {bound: cell_ranges(spline, [subject.iso], bound) for bound in bounds}
-        count = {bound: ranges.candidates(subject.iso) for bound, ranges in found.items()}
+        ranges_of = {bound: cell_ranges(spline, [subject.iso], bound) for bound in bounds}
+        count = {bound: ranges.candidates(subject.iso) for bound, ranges in ranges_of.items()}
         detail = ", ".join(f"{bound} {number}" for bound, number in count.items())
         ours = count["accc"] / count["bmcc"]
         yield Row(
@@ -102,7 +102,7 @@ def cells(subject: Subject) -> Iterable[Row]:
         surface = holding_corners(subject)
         lost = sum(
             int((surface & ~((ranges.low <= subject.iso) & (ranges.high >= subject.iso))).sum())
-            for ranges in found.values()
+            for ranges in ranges_of.values()
         )
         detail = f"of {int(surface.sum())} cells with corners on both sides of the iso-value, by any bound"
         yield Row(f"V4 {subject.name}, order {order}, lost", lost, 0, "==", "cells", detail)

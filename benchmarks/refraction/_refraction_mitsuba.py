@@ -88,9 +88,9 @@ class Mitsuba:
         leaving = scene.ray_intersect(inside)
         out = self._refracted(inside.d, leaving, INDEX)
         end = leaving.p + out * ((SCREEN_Z - leaving.p.z) / out.z)
-        found = np.array(end).T[:, :2].astype(float)
+        points = np.array(end).T[:, :2].astype(float)
         through = (np.array(entry.p.z) < SCREEN_Z - 1) & (np.array(leaving.p.z) < SCREEN_Z - 1)
-        return np.where((through & (np.array(out.z) > 0.0))[:, None], found, np.nan)
+        return np.where((through & (np.array(out.z) > 0.0))[:, None], points, np.nan)
 
     def _refracted(self, direction, surface, ratio: float):
         dr, normal = self.drjit, surface.sh_frame.n

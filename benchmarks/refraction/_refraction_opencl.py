@@ -53,20 +53,20 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         )
         return
     context.progress(1, 2, "rendering")
-    one, all_of_them = "compiled, 1 thread", f"compiled, {PROCESSORS} threads"
+    single, all_of_them = "compiled, 1 thread", f"compiled, {PROCESSORS} threads"
     runs = {precision: _frame(made, 1, caster) for precision, caster in casters.items()}
-    runs |= {one: _frame(made, 1, None), all_of_them: _frame(made, PROCESSORS, None)}
+    runs |= {single: _frame(made, 1, None), all_of_them: _frame(made, PROCESSORS, None)}
     seconds = alternate(runs, 5 if context.quick else 15)
-    expected = runs[one]().image.astype(int)
+    expected = runs[single]().image.astype(int)
     listed = ", ".join(f"{name} {1.0 / least:.1f}" for name, least in seconds.items())
     for precision, caster in casters.items():
         odd = np.abs(pictures[precision].image - expected).max(axis=2) > 1
-        found = (
+        values = (
             (1.0 / seconds[precision], f"{caster.session.handle.name}; frames a second: {listed}"),
             (seconds[all_of_them] / seconds[precision], f"frames a second: {listed}"),
             (100.0 * odd.mean(), f"{odd.sum()} of {odd.size} differ by more than 1 of 255"),
         )
-        for (label, goal, op, unit), (value, detail) in zip(_targets(precision), found, strict=True):
+        for (label, goal, op, unit), (value, detail) in zip(_targets(precision), values, strict=True):
             yield Row(label, float(value), goal, op, unit, detail)
     context.progress(2, 2, "done")
 

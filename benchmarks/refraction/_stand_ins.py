@@ -25,7 +25,7 @@ def head() -> np.ndarray:
 
     def ball(centre: tuple[float, ...], axes: tuple[float, ...]) -> np.ndarray:
         away = ((v - c) / a for v, c, a in zip((x, y, z), centre, axes, strict=True))
-        return np.sqrt(sum(part**2 for part in away))
+        return np.sqrt(sum(offset**2 for offset in away))
 
     cranium, jaw = ball((0.0, 0.08, 0.2), (0.6, 0.75, 0.62)), ball((0.0, -0.22, -0.42), (0.4, 0.42, 0.42))
     nose, neck = ball((0.0, -0.62, -0.12), (0.1, 0.16, 0.18)), np.hypot(x / 0.34, (y - 0.2) / 0.36) + 0.0 * z

@@ -47,13 +47,13 @@ FRAME_POVRAY, FRAME_MITSUBA, SAMPLE_MITSUBA = 30.0, 2.0, 1.1
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """V2 to V6, with a picture; the quick run leaves out the teapot and table 4."""
-    parts: list[Callable[[bool], Iterable[Row]]] = [mitsuba_rows, povray_rows, supersampling_rows, table_rows]
-    for k, part in enumerate(parts):
-        context.progress(k, len(parts), part.__name__)
-        yield from part(context.quick)
+    steps: list[Callable[[bool], Iterable[Row]]] = [mitsuba_rows, povray_rows, supersampling_rows, table_rows]
+    for k, step in enumerate(steps):
+        context.progress(k, len(steps), step.__name__)
+        yield from step(context.quick)
     yield from opencl_rows(context)
     context.save_picture("refraction.png", picture_of_balls)
-    context.progress(len(parts), len(parts), "done")
+    context.progress(len(steps), len(steps), "done")
 
 
 def picture(made: Scene, **settings) -> Picture:
@@ -71,9 +71,9 @@ def eight_bit_scene() -> Scene:
     return scene(Spline(eight_bit(), smoothing=1.0), 127.5)
 
 
-def summary(name: str, found: np.ndarray) -> str:
-    lost = int(np.isnan(found).sum())
-    return f"{name} {np.nanmean(found):.2g} (median {np.nanmedian(found):.2g}, {lost} lost)"
+def summary(name: str, values: np.ndarray) -> str:
+    lost = int(np.isnan(values).sum())
+    return f"{name} {np.nanmean(values):.2g} (median {np.nanmedian(values):.2g}, {lost} lost)"
 
 
 def error_row(label: str, goal: float, ours: np.ndarray, name: str, theirs: np.ndarray) -> Row:
@@ -97,11 +97,11 @@ def mitsuba_rows(quick: bool) -> Iterable[Row]:
     labels = iter(goals.items())
     distances = scene(Spline(signed_distance()), 0.0)
     theirs = mitsuba.scene(signed_distance(), 0.0, 1.0)
-    found = errors(mitsuba.ends(theirs), DISTANCE_RADIUS)
-    yield error_row(*next(labels), errors(ends(distances), DISTANCE_RADIUS), "Mitsuba", found)
+    theirs_off = errors(mitsuba.ends(theirs), DISTANCE_RADIUS)
+    yield error_row(*next(labels), errors(ends(distances), DISTANCE_RADIUS), "Mitsuba", theirs_off)
     rounded = mitsuba.scene(eight_bit(), 127.5, 1.0 / 24.0)
-    found = errors(mitsuba.ends(rounded), RIM_RADIUS)
-    yield error_row(*next(labels), errors(ends(eight_bit_scene()), RIM_RADIUS), "Mitsuba", found)
+    theirs_off = errors(mitsuba.ends(rounded), RIM_RADIUS)
+    yield error_row(*next(labels), errors(ends(eight_bit_scene()), RIM_RADIUS), "Mitsuba", theirs_off)
     runs = {
         "ours": lambda: picture(distances),
         "a sample of ours": lambda: picture(distances, supersampling="none"),
@@ -128,8 +128,8 @@ def povray_rows(quick: bool) -> Iterable[Row]:
             yield Row(labels[1], None, FRAME_POVRAY, ">=", "", str(error))
             return
         ours = eight_bit_scene()
-        found = errors(povray.ends(eight_bit()), RIM_RADIUS)
-        yield error_row(labels[0], POVRAY, errors(ends(ours), RIM_RADIUS), "POV-Ray", found)
+        theirs_off = errors(povray.ends(eight_bit()), RIM_RADIUS)
+        yield error_row(labels[0], POVRAY, errors(ends(ours), RIM_RADIUS), "POV-Ray", theirs_off)
         seconds, theirs = np.inf, np.inf
         for _ in range(5):
             seconds = min(seconds, alternate({"ours": lambda: picture(ours)}, 1)["ours"])

@@ -111,7 +111,7 @@ def read_cases(folder: Path) -> Iterator[PublicCase]:
 def _openbreastus(path: Path) -> Iterator[PublicCase]:
     accepted = "MATLAB 7.3 with one array of square maps in m/s"
     with _opened(path, path.name, accepted) as file:
-        cubes = [one for one in file.values() if isinstance(one, h5py.Dataset) and one.ndim == 3]
+        cubes = [item for item in file.values() if isinstance(item, h5py.Dataset) and item.ndim == 3]
         if len(cubes) != 1:
             raise InvalidInput(path.name, f"{len(cubes)} arrays of three axes", accepted)
         stored = cubes[0]
@@ -165,7 +165,7 @@ def _speeds(name: str, speed: Floats) -> Floats:
 
 def _centred(speed: Floats, inside: Flags) -> Floats:
     """The part with the breast in its middle, with a margin of water of a pixel."""
-    window = tuple(slice(max(0, places.min() - 1), places.max() + 2) for places in np.nonzero(inside))
+    window = tuple(slice(max(0, indices.min() - 1), indices.max() + 2) for indices in np.nonzero(inside))
     return np.pad(speed[window], 1, constant_values=WATER_MPS)
 
 
@@ -204,7 +204,7 @@ def scores(image: Reconstruction | float, case: PublicCase) -> Scores:
 
     Its SSIM uses windows of 7 by 7 nodes within the tissue and the range of the whole truth, as ours does.
     """
-    places = _places(SCORED_NODES, SIDE_M)
+    points = _places(SCORED_NODES, SIDE_M)
     true = case.at(SCORED_NODES, SIDE_M)
     region = tissue(true)
     if isinstance(image, Reconstruction):
@@ -215,7 +215,7 @@ def scores(image: Reconstruction | float, case: PublicCase) -> Scores:
         read = RegularGridInterpolator(
             lines, image.speed, bounds_error=False, fill_value=image.water_speed_mps
         )
-        speed = np.asarray(read(places))
+        speed = np.asarray(read(points))
     else:
         speed = np.full_like(true, image)
     figures = {

@@ -31,12 +31,12 @@ def density_scans(peer: Peer | None, context: BenchmarkContext) -> Iterator[tupl
     centre, elements, emissions = QUICK if context.quick else (CENTRE_HZ, ELEMENTS, EMISSIONS)
     names = list(DENSITIES)[: 1 if context.quick else None]
     breasts = {name: DetailedBreast(WATER_MPS, anatomy=DENSITIES[name]) for name in names}
-    lowest, highest = zip(*(one.speed_range() for one in breasts.values()), strict=True)
+    lowest, highest = zip(*(breast.speed_range() for breast in breasts.values()), strict=True)
     size = RingScan(
         SIDE_M, RADIUS_M, centre, elements, emissions, (min(lowest), max(highest)), WATER_MPS, peer
     )
     # The phantom of full size on a grid of half of it.
-    speeds = {name: one.speed(size.nodes, DETAILED_SIDE_M) for name, one in breasts.items()}
+    speeds = {name: breast.speed(size.nodes, DETAILED_SIDE_M) for name, breast in breasts.items()}
     still = np.full((size.nodes, size.nodes), WATER_MPS)
     water = size.recorded({"water": still}, context.progress)["water"]
     for seed, (name, breast) in enumerate(breasts.items()):

@@ -42,8 +42,8 @@ WAVEFORM_MPS, WAVEFORM_S = 10.0, 300.0
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Rows of the breasts, and of the cases in the folder ``--data``, if it is given."""
-    found, why = installed()
-    peer = found.get("k-Wave")
+    peers, why = installed()
+    peer = peers.get("k-Wave")
     solver = "waves by k-Wave" if peer else f"waves on a grid twice as fine; {why['k-Wave']}"
     drawn: dict[str, tuple[Dataset, Mapping[str, Made]]] = {}
     for name, scan in density_scans(peer, context):
@@ -60,8 +60,8 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 def _public(case: PublicCase, runs: _Runs, solver: str) -> Iterator[Row]:
     """Rows of a case of usct-benchlab, on its grid and in its region."""
     constants = {BEST_CONSTANT: mean_speed(case), WATER_ALONE: WATER_MPS}
-    beside = {name: scores(value, case).rmse for name, value in constants.items()}
-    beside[DEFAULT_SETTINGS] = scores(runs.images.default().result, case).rmse
+    baselines = {name: scores(value, case).rmse for name, value in constants.items()}
+    baselines[DEFAULT_SETTINGS] = scores(runs.images.default().result, case).rmse
     for way, made in runs.by_way.items():
         score = scores(made.result, case)
         straight = scores(runs.images.straight(made.result), case).rmse
@@ -72,7 +72,7 @@ def _public(case: PublicCase, runs: _Runs, solver: str) -> Iterator[Row]:
             "<=",
             "m/s",
             f"{solver}; on the grid and in the tissue of usct-benchlab; load {os.getloadavg()[0]:.1f}",
-            baselines={**beside, STRAIGHT_RAYS: straight},
+            baselines={**baselines, STRAIGHT_RAYS: straight},
             figures={**score.figures, "seconds": made.seconds},
         )
 
@@ -110,7 +110,7 @@ def _compared(name: str, scan: Dataset, runs: _Runs, solver: str) -> Iterator[Ro
     assert scan.truth is not None
     size = f"{len(scan.element_position_m)} elements, {len(scan.tx)} emit; {solver}"
     for way, made in runs.by_way.items():
-        found, compared = compare(made.result, scan.truth, scan.roi), runs.compared[way]
+        comparison, compared = compare(made.result, scan.truth, scan.roi), runs.compared[way]
         settings = made.result.settings
         detail = f"{size}; {settings.rays} {settings.method}, {made.result.speed.shape[0]}² nodes; "
         goal, kind = WAVEFORM_MPS, "<="
@@ -129,10 +129,10 @@ def _compared(name: str, scan: Dataset, runs: _Runs, solver: str) -> Iterator[Ro
             detail + f"load {os.getloadavg()[0]:.1f}",
             baselines=compared.baselines,
             figures={
-                "RMSE": found.rms,
-                "MAE": found.mean_absolute,
-                "SSIM": found.ssim,
-                "PCC": found.correlation,
+                "RMSE": comparison.rms,
+                "MAE": comparison.mean_absolute,
+                "SSIM": comparison.ssim,
+                "PCC": comparison.correlation,
                 "seconds": made.seconds,
             },
         )

@@ -43,15 +43,15 @@ class Calls:
 
 
 def connect(url: str) -> http.client.HTTPConnection:
-    parts = urlsplit(url)
-    assert parts.hostname in ("127.0.0.1", "localhost")
-    return http.client.HTTPConnection(parts.hostname, parts.port, timeout=TIMEOUT_S)
+    address = urlsplit(url)
+    assert address.hostname in ("127.0.0.1", "localhost")
+    return http.client.HTTPConnection(address.hostname, address.port, timeout=TIMEOUT_S)
 
 
 @contextmanager
 def calling(url: str, callers: int, call: Call, pause_s: float = 0.0) -> Iterator[Calls]:
     """Call all the time that the block takes; what is yielded is complete after it."""
-    found, stop, begun = Calls(), threading.Event(), time.perf_counter()
+    calls, stop, begun = Calls(), threading.Event(), time.perf_counter()
     lock = threading.Lock()
 
     def work(first: int) -> None:
@@ -65,8 +65,8 @@ def calling(url: str, callers: int, call: Call, pause_s: float = 0.0) -> Iterato
                 connection.close()
             taken = time.perf_counter() - at
             with lock:
-                found.seconds.append(taken)
-                found.failed += not good
+                calls.seconds.append(taken)
+                calls.failed += not good
             number += callers
             stop.wait(pause_s)
         connection.close()
@@ -75,19 +75,19 @@ def calling(url: str, callers: int, call: Call, pause_s: float = 0.0) -> Iterato
     for thread in threads:
         thread.start()
     try:
-        yield found
+        yield calls
     finally:
         stop.set()
         for thread in threads:
             thread.join()
-        found.lasted_s = time.perf_counter() - begun
+        calls.lasted_s = time.perf_counter() - begun
 
 
 def load(url: str, callers: int, call: Call, seconds: float, pause_s: float = 0.0) -> Calls:
     """Call for so many seconds."""
-    with calling(url, callers, call, pause_s) as found:
+    with calling(url, callers, call, pause_s) as calls:
         time.sleep(seconds)
-    return found
+    return calls
 
 
 def got(connection: http.client.HTTPConnection, path: str) -> bool:

@@ -89,18 +89,18 @@ def send(url: str, process: psutil.Process, path: Path) -> Sent:
     connection.blocksize = 2**20
     with watched(process, most):
         length = {**TUS, "Upload-Length": str(size)}
-        place = _asked(connection, "POST", "/v1/uploads", length).headers["Location"]
+        location = _asked(connection, "POST", "/v1/uploads", length).headers["Location"]
         headers = {**TUS, "Content-Type": "application/offset+octet-stream", "Upload-Offset": "0"}
         begun = time.perf_counter()
         with path.open("rb") as file:
-            connection.request("PATCH", place, file, {**headers, "Content-Length": str(size)})
+            connection.request("PATCH", location, file, {**headers, "Content-Length": str(size)})
             answer = connection.getresponse()
             answer.read()
         sent = time.perf_counter()
         if answer.status != 204:
             raise RuntimeError(f"the upload was answered with {answer.status}")
         while True:
-            there = _asked(connection, "HEAD", place, TUS).headers
+            there = _asked(connection, "HEAD", location, TUS).headers
             if there["Bentray-State"] in ("done", "refused"):
                 break
             time.sleep(SAMPLE_S)

@@ -97,11 +97,11 @@ def turn(page: Any, address: str, seconds: float, motions: int) -> Turned:
         page.mouse.move(x, y)
         page.mouse.down()
         begun = time.perf_counter()
-        place = 0
+        at = 0
         while time.perf_counter() - begun < seconds:
-            place += STEP_PX
-            page.mouse.move(x + abs(place % (2 * SWING_PX) - SWING_PX), y)
-            time.sleep(max(0.0, begun + place / STEP_PX / MOVES_HZ - time.perf_counter()))
+            at += STEP_PX
+            page.mouse.move(x + abs(at % (2 * SWING_PX) - SWING_PX), y)
+            time.sleep(max(0.0, begun + at / STEP_PX / MOVES_HZ - time.perf_counter()))
         moving_s += time.perf_counter() - begun
         page.mouse.up()
         page.wait_for_function(RESTED)

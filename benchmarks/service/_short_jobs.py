@@ -67,7 +67,7 @@ def _row(name: str, seconds: list[float], goal_s: float, load: float) -> Row:
 @contextmanager
 def _running(url: str, asked: list[dict[str, Any]]) -> Iterator[None]:
     """Long jobs of the other tenant within the block."""
-    jobs = [_asked(url, HOSPITAL, "POST", "/v1/jobs", one)["id"] for one in asked]
+    jobs = [_asked(url, HOSPITAL, "POST", "/v1/jobs", request)["id"] for request in asked]
     try:
         yield
         states = [_asked(url, HOSPITAL, "GET", f"/v1/jobs/{job}")["state"] for job in jobs]
@@ -110,7 +110,7 @@ def _sent(
         answer = connection.getresponse()
         text = answer.read()
         assert answer.status < 300, (answer.status, text[:300])
-        found: dict[str, Any] = json.loads(text)
-        return found
+        body: dict[str, Any] = json.loads(text)
+        return body
     finally:
         connection.close()

@@ -15,12 +15,12 @@ ANNOUNCED_BYTES = 10**6
 @contextmanager
 def dripping(url: str, requests: list[tuple[str, str, Mapping[str, str]]]) -> Iterator[None]:
     """Hold one connection for each ``(method, path, headers)``, each sending a byte a second."""
-    parts, stop = urlsplit(url), threading.Event()
+    address, stop = urlsplit(url), threading.Event()
     with contextlib.ExitStack() as stack:
         connections = []
         for method, path, headers in requests:
-            connection = stack.enter_context(socket.create_connection((parts.hostname, parts.port)))
-            lines = {"Host": parts.netloc, "Content-Length": str(ANNOUNCED_BYTES), **headers}
+            connection = stack.enter_context(socket.create_connection((address.hostname, address.port)))
+            lines = {"Host": address.netloc, "Content-Length": str(ANNOUNCED_BYTES), **headers}
             head = "".join(f"{name}: {value}\r\n" for name, value in lines.items())
             connection.sendall(f"{method} {path} HTTP/1.1\r\n{head}\r\n".encode())
             connections.append(connection)

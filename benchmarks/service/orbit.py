@@ -147,10 +147,10 @@ def stored_field(http: httpx.Client, quick: bool) -> tuple[str, str]:
 def processor_s() -> dict[str, float]:
     """Processor time of the processes below this one so far, s: of the service with workers, the browser."""
     spent = {"service": 0.0, "browser": 0.0}
-    for one in psutil.Process().children(recursive=True):
+    for process in psutil.Process().children(recursive=True):
         with suppress(psutil.Error):
-            times = one.cpu_times()
-            spent["service" if "python" in one.name() else "browser"] += times.user + times.system
+            times = process.cpu_times()
+            spent["service" if "python" in process.name() else "browser"] += times.user + times.system
     return spent
 
 

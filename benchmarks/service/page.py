@@ -93,5 +93,5 @@ def _first_paint_ms(address: str) -> float:
         page.goto(address)
         page.locator("main h1").first.wait_for()
         page.wait_for_function(PAINT)
-        found: Any = page.evaluate(PAINT)
-        return float(found)
+        painted_ms: Any = page.evaluate(PAINT)
+        return float(painted_ms)

@@ -65,9 +65,9 @@ def slow_clients(url: str, seconds: float) -> Iterator[Row]:
     pieces = [("PATCH", begun(url), piece_headers()) for _ in range(SLOW)]
     for name, requests in (("one-shot uploads", [one_shot] * SLOW), ("pieces by tus", pieces)):
         with dripping(url, requests):
-            found = load(url, 2, lambda connection, number: got(connection, "/health/live"), seconds, 0.01)
-        detail = f"{SLOW} clients with a byte a second at {name}; health: {found}"
-        yield Row(f"health beside slow {name}, p99", p99_ms(found), 200.0, "<", "ms", detail)
+            calls = load(url, 2, lambda connection, number: got(connection, "/health/live"), seconds, 0.01)
+        detail = f"{SLOW} clients with a byte a second at {name}; health: {calls}"
+        yield Row(f"health beside slow {name}, p99", p99_ms(calls), 200.0, "<", "ms", detail)
 
 
 def beside_work(url: str, folder: Path, seconds: float, quick: bool) -> Iterator[Row]:
@@ -95,13 +95,13 @@ def beside_work(url: str, folder: Path, seconds: float, quick: bool) -> Iterator
             (f"uploads of {len(content) // 1000} kB", 2, upload, 0.5, 10_000.0),
         )
         for name, callers, call, goal, most_ms in ways:
-            found = load(url, callers, call, seconds)
+            calls = load(url, callers, call, seconds)
             state = client.job(job).state
-            detail = f"{callers} callers, {found}; beside a reconstruction of {slices} slices of {nodes}², "
+            detail = f"{callers} callers, {calls}; beside a reconstruction of {slices} slices of {nodes}², "
             detail += f"{elements} transducers, {state} at the end"
-            good = not found.failed and state == "running"
-            yield Row(f"{name} a second", found.per_second if good else None, goal, ">=", "1/s", detail)
-            yield Row(f"{name}, p99", p99_ms(found) if good else None, most_ms, "<", "ms", detail)
+            good = not calls.failed and state == "running"
+            yield Row(f"{name} a second", calls.per_second if good else None, goal, ">=", "1/s", detail)
+            yield Row(f"{name}, p99", p99_ms(calls) if good else None, most_ms, "<", "ms", detail)
         client.cancel(job)
 
 
@@ -140,8 +140,8 @@ def piece_headers() -> Mapping[str, str]:
     return {**TUS, "Content-Type": "application/offset+octet-stream", "Upload-Offset": "0"}
 
 
-def p99_ms(found: Calls) -> float | None:
-    return None if found.failed else 1e3 * found.percentile(99)
+def p99_ms(calls: Calls) -> float | None:
+    return None if calls.failed else 1e3 * calls.percentile(99)
 
 
 @contextmanager

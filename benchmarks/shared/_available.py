@@ -11,11 +11,11 @@ Peer = TypeVar("Peer")
 
 def available(peers: Mapping[str, tuple[str, Callable[..., Peer]]]) -> tuple[dict[str, Peer], dict[str, str]]:
     """The peers that can be imported, and why the others cannot; ``peers`` is name to (module, adapter)."""
-    found: dict[str, Peer] = {}
+    modules: dict[str, Peer] = {}
     missing: dict[str, str] = {}
     for name, (module, adapt) in peers.items():
         try:
-            found[name] = adapt(importlib.import_module(module))
+            modules[name] = adapt(importlib.import_module(module))
         except ImportError as error:
             missing[name] = f"{name} is not installed ({error})"
-    return found, missing
+    return modules, missing

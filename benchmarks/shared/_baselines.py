@@ -104,7 +104,7 @@ class Images:
         return Compared(
             error.of(image),
             {name: error.of_constant(value) for name, value in constants.items()}
-            | {name: error_on(one).of(one) for name, one in images.items()},
+            | {name: error_on(image).of(image) for name, image in images.items()},
         )
 
     def _water(self, quantity: str) -> float:

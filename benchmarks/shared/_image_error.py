@@ -70,9 +70,9 @@ def object_error(dataset: Dataset, *, relative: bool = False) -> ErrorOn:
 
     def error_on(image: Reconstruction) -> ImageError:
         assert dataset.truth is not None
-        found = compare(image, dataset.truth, dataset.roi)
-        low, high = found.range
-        return ImageError(found.other, found.region, high - low if relative else 1.0)
+        comparison = compare(image, dataset.truth, dataset.roi)
+        low, high = comparison.range
+        return ImageError(comparison.other, comparison.region, high - low if relative else 1.0)
 
     return error_on
 

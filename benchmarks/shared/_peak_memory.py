@@ -28,8 +28,8 @@ def ramp(shape: tuple[int, ...]) -> np.ndarray:
 def solve(method: str, shape: tuple[int, ...]) -> None:
     """One solve, the source off the middle."""
     n = shape[0] - 1
-    place = (round(0.1 * n),) + (round(0.5 * n),) * (len(shape) - 1)
-    eikonal.solve(ramp(shape), 1.0 / n, np.array(place) / n, method)
+    source = (round(0.1 * n),) + (round(0.5 * n),) * (len(shape) - 1)
+    eikonal.solve(ramp(shape), 1.0 / n, np.array(source) / n, method)
 
 
 def peak(run: Callable[[], object]) -> int:

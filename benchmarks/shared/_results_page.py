@@ -58,13 +58,13 @@ def recorded(folder: Path = RESULTS) -> dict[str, dict[str, Recorded]]:
     Raises:
         ValueError: if a label is in a file twice.
     """
-    found: dict[str, dict[str, Recorded]] = {}
+    by_file: dict[str, dict[str, Recorded]] = {}
     for path in sorted(folder.glob("*.json")):
         rows = json.loads(path.read_text())
-        found[path.stem] = {row["target"]: row for row in rows}
-        if len(found[path.stem]) != len(rows):
+        by_file[path.stem] = {row["target"]: row for row in rows}
+        if len(by_file[path.stem]) != len(rows):
             raise ValueError(f"{path.name}: a label occurs twice")
-    return found
+    return by_file
 
 
 def tables(text: str) -> Iterator[list[dict[str, str]]]:
@@ -93,18 +93,18 @@ def claims(text: str) -> Iterator[Claim]:
             targets = split(rest)
             columns = {}
             for name, cell in line.items():
-                parts = split(cell)
-                columns[name] = parts * len(targets) if len(parts) == 1 else parts
+                cells_of = split(cell)
+                columns[name] = cells_of * len(targets) if len(cells_of) == 1 else cells_of
                 if name in ("result", "goal", "error", *BASELINES) and len(columns[name]) != len(targets):
-                    raise ValueError(f"{file}, {rest}: {len(targets)} labels, {len(parts)} in {name}")
+                    raise ValueError(f"{file}, {rest}: {len(targets)} labels, {len(cells_of)} in {name}")
             for k, target in enumerate(targets):
-                cells = {name: parts[k] for name, parts in columns.items() if len(parts) > k}
+                cells = {name: values[k] for name, values in columns.items() if len(values) > k}
                 yield Claim(file, target, cells)
 
 
 def split(cell: str) -> list[str]:
     """The parts of a cell."""
-    return [part.strip() for part in cell.split(";")]
+    return [value.strip() for value in cell.split(";")]
 
 
 def contradictions(claim: Claim, rows: Mapping[str, Mapping[str, Recorded]]) -> list[str]:
@@ -123,11 +123,11 @@ def contradictions(claim: Claim, rows: Mapping[str, Mapping[str, Recorded]]) -> 
     goal = claim.cells["goal"]
     if not agrees(goal, row["goal"], row["unit"]) or not goal.startswith(SIGNS[row["op"]] + " "):
         wrong.append(f"{name}: goal {goal}, recorded {row['op']} {row['goal']} {row['unit']}")
-    beside = {"error": row.get("error"), **row.get("baselines", {})}
+    baselines = {"error": row.get("error"), **row.get("baselines", {})}
     for column in ("error", *BASELINES):
         cell = claim.cells.get(column)
-        if cell is not None and not agrees(cell, beside.get(column), row["unit"]):
-            wrong.append(f"{name}: {column} {cell}, recorded {beside.get(column)}")
+        if cell is not None and not agrees(cell, baselines.get(column), row["unit"]):
+            wrong.append(f"{name}: {column} {cell}, recorded {baselines.get(column)}")
     return wrong
 
 
@@ -149,15 +149,15 @@ def agrees(text: str, value: float | None, unit: str) -> bool:
 
 def missed_goals(rows: Mapping[str, Mapping[str, Recorded]]) -> str:
     """Tables of all rows that miss their goal, file by file, in Markdown."""
-    parts = []
+    lines = []
     for file, of_file in rows.items():
         missed = [row for row in of_file.values() if not row["met"]]
         if missed:
             dates = sorted({row["measured"] for row in missed})
             when = dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"
-            parts.append(f"`{file}`, {len(missed)} of {len(of_file)} rows, measured {when}:")
-            parts.append(_table(missed))
-    return "\n\n".join(parts)
+            lines.append(f"`{file}`, {len(missed)} of {len(of_file)} rows, measured {when}:")
+            lines.append(_table(missed))
+    return "\n\n".join(lines)
 
 
 def _table(missed: Sequence[Recorded]) -> str:
@@ -167,8 +167,8 @@ def _table(missed: Sequence[Recorded]) -> str:
     for row in missed:
         value = NOT_MEASURED if row["value"] is None else f"{rounded(row['value'])} {row['unit']}".strip()
         goal = f"{SIGNS[row['op']]} {rounded(row['goal'])} {row['unit']}".strip()
-        beside = {"error": row.get("error"), **row.get("baselines", {})}
-        errors = [rounded(beside.get(name)) for name in columns[3:]]
+        baselines = {"error": row.get("error"), **row.get("baselines", {})}
+        errors = [rounded(baselines.get(name)) for name in columns[3:]]
         lines.append([row["target"], value, goal, *errors])
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 

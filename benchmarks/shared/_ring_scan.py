@@ -75,8 +75,8 @@ class RingScan:
     def ring(self) -> Ints:
         """The nodes on which the elements lie, (elements, 2)."""
         turn = 2.0 * np.pi * np.arange(self.elements) / self.elements
-        place = self.radius_m * np.column_stack((np.cos(turn), np.sin(turn)))
-        return np.rint((place + 0.5 * self.side_m) / self.spacing_m).astype(int)
+        position = self.radius_m * np.column_stack((np.cos(turn), np.sin(turn)))
+        return np.rint((position + 0.5 * self.side_m) / self.spacing_m).astype(int)
 
     def emitters(self) -> Ints:
         """Indices of the emitting elements."""
@@ -92,14 +92,14 @@ class RingScan:
             progress: of the emissions.
             threads: that simulate at the same time.
         """
-        part = self.peer_step if self.peer else OWN_STEP
-        skip = math.ceil(1.0 / (self.rate_hz * part * longest_step(self.speeds_mps[1], self.spacing_m)))
+        fraction = self.peer_step if self.peer else OWN_STEP
+        skip = math.ceil(1.0 / (self.rate_hz * fraction * longest_step(self.speeds_mps[1], self.spacing_m)))
         step = 1.0 / (self.rate_hz * skip)
         longest_s = 2.0 * self.radius_m / self.speeds_mps[0] + (BEFORE + AFTER) / self.centre_hz
         samples = round(longest_s * self.rate_hz)
         late = step * np.arange(samples * skip) * self.centre_hz - BEFORE
         pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
-        found = {}
+        recorded = {}
         for name, speed in speeds.items():
             shoot = self._shooter(speed, step, pulse)
             shots = np.zeros((self.emissions, self.elements, samples), np.float32)
@@ -107,8 +107,8 @@ class RingScan:
                 for number, traces in enumerate(pool.map(shoot, self.emitters())):
                     progress(number, self.emissions, f"waves, {name}")
                     shots[number] = traces[:, ::skip]
-            found[name] = shots
-        return found
+            recorded[name] = shots
+        return recorded
 
     def _shooter(self, speed: Floats, step: float, pulse: Floats) -> Callable[[int], np.ndarray]:
         """Simulates the emission of an element, (elements, steps)."""

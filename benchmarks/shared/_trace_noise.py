@@ -25,7 +25,7 @@ def with_trace_noise(dataset: Dataset, snr: float, peak: float | None = None, se
         peak = float(np.median(np.abs(traces.water).max(axis=-1)))
     random = np.random.default_rng(seed)
     noisy = (
-        (one + peak / snr * random.standard_normal(one.shape)).astype(np.float32)
-        for one in (traces.object, traces.water)
+        (values + peak / snr * random.standard_normal(values.shape)).astype(np.float32)
+        for values in (traces.object, traces.water)
     )
     return replace(dataset, waveform=Waveform(*noisy))

@@ -68,8 +68,8 @@ def draw(axes: Axes, title: str, curves: Sequence[Curve], *, slopes: bool) -> No
 
 def response(spline: Spline, *, slopes: bool) -> tuple[np.ndarray, np.ndarray]:
     """Magnitude of the Fourier transform of what a node of 1 gives."""
-    places = np.arange(0.5 / FINE, NODES - 1, 1.0 / FINE)[:, np.newaxis]
-    read = spline.gradient(places)[:, 0] if slopes else spline.value(places)
+    points = np.arange(0.5 / FINE, NODES - 1, 1.0 / FINE)[:, np.newaxis]
+    read = spline.gradient(points)[:, 0] if slopes else spline.value(points)
     frequencies = np.linspace(0.0, HIGHEST, 301)
-    waves = np.exp(-2j * np.pi * np.outer(frequencies, places[:, 0] - NODES // 2))
+    waves = np.exp(-2j * np.pi * np.outer(frequencies, points[:, 0] - NODES // 2))
     return frequencies, np.abs(waves @ read) / FINE

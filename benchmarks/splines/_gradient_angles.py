@@ -30,9 +30,9 @@ def rings() -> dict[str, float]:
     field = MarschnerLobb()
     volume = sampled(field, RINGS_NODES)
     points = circle(RINGS_RADIUS)
-    found = {name: mean_angle(field, Spline.from_volume(volume, name), points) for name in PREFILTERED}
-    found["half-node differences"] = half_node_differences(field, volume, points)
-    return found
+    angles = {name: mean_angle(field, Spline.from_volume(volume, name), points) for name in PREFILTERED}
+    angles["half-node differences"] = half_node_differences(field, volume, points)
+    return angles
 
 
 def ball() -> dict[str, float]:
@@ -61,11 +61,11 @@ def half_node_differences(field: CubeField, volume: np.ndarray, points: np.ndarr
     """Another reading of central differences: of trilinear values half a node away, in the plane."""
     linear, nodes = Spline.from_volume(volume, "trilinear"), in_nodes(points, volume.shape[0])
     steps = 0.5 * np.eye(3)[:2]
-    found = np.stack([linear.value(nodes + step) - linear.value(nodes - step) for step in steps], axis=1)
-    return between(found, field.gradient(points)[:, :2])
+    slopes = np.stack([linear.value(nodes + step) - linear.value(nodes - step) for step in steps], axis=1)
+    return between(slopes, field.gradient(points)[:, :2])
 
 
-def between(found: np.ndarray, true: np.ndarray) -> float:
+def between(slope: np.ndarray, true: np.ndarray) -> float:
     """Mean angle of vectors, degrees."""
-    cosines = (found * true).sum(axis=1) / np.linalg.norm(found, axis=1) / np.linalg.norm(true, axis=1)
+    cosines = (slope * true).sum(axis=1) / np.linalg.norm(slope, axis=1) / np.linalg.norm(true, axis=1)
     return float(np.rad2deg(np.arccos(np.clip(cosines, -1.0, 1.0))).mean())

@@ -32,12 +32,12 @@ def drjit(module) -> Reader:
         n = len(coefficients)
         texture = llvm.Texture3f(llvm.TensorXf(coefficients[..., np.newaxis].astype(np.float32)))
         # Its places are those of the nodes in a unit cube whose cells are centred on them, last axis first.
-        places = llvm.Array3f(*[llvm.Float((points[:, k] + 0.5) / n) for k in (2, 1, 0)])
-        module.eval(places)
+        positions = llvm.Array3f(*[llvm.Float((points[:, k] + 0.5) / n) for k in (2, 1, 0)])
+        module.eval(positions)
         module.sync_thread()
 
         def read() -> tuple[np.ndarray, np.ndarray]:
-            (value,), (gradient,) = texture.eval_cubic_grad(places)
+            (value,), (gradient,) = texture.eval_cubic_grad(positions)
             module.eval(value, gradient)
             module.sync_thread()
             return value, gradient
@@ -63,5 +63,5 @@ def nd_bspline(coefficients: np.ndarray, points: np.ndarray) -> Callable[[], obj
 
 def installed() -> tuple[dict[str, Reader], dict[str, str]]:
     """The readers that can be used here, and why the others cannot."""
-    found, missing = available({"Dr.Jit": ("drjit", drjit)})
-    return {**found, "ndimage": ndimage, "NdBSpline": nd_bspline}, missing
+    peers, missing = available({"Dr.Jit": ("drjit", drjit)})
+    return {**peers, "ndimage": ndimage, "NdBSpline": nd_bspline}, missing

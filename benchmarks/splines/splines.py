@@ -27,12 +27,12 @@ DRJIT, NDIMAGE, ND_BSPLINE = 1.25, 6.0, 40.0
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """V1 and V7, with Figure 1."""
-    parts: list[Callable[[bool], Iterable[Row]]] = [speed, rings_rows, ball_rows]
-    for k, part in enumerate(parts):
-        context.progress(k, len(parts), part.__name__)
-        yield from part(context.quick)
+    tables: list[Callable[[bool], Iterable[Row]]] = [speed, rings_rows, ball_rows]
+    for k, table in enumerate(tables):
+        context.progress(k, len(tables), table.__name__)
+        yield from table(context.quick)
     context.save_picture("filters.png", picture)
-    context.progress(len(parts), len(parts), "done")
+    context.progress(len(tables), len(tables), "done")
 
 
 def speed(quick: bool) -> Iterable[Row]:
@@ -99,50 +99,50 @@ def nanoseconds(least: dict[str, float], number: int) -> str:
 
 def rings_rows(quick: bool) -> Iterable[Row]:
     """V7, figure 6: gradients of the Marschner-Lobb signal."""
-    found = rings()
+    angles = rings()
     how = f"{RINGS_NODES}³, circle of radius {RINGS_RADIUS} about z, mean of 180 angles"
     theirs = {"catmull-rom": 6.1, "bspline2": 3.69}
     for name, angle in theirs.items():
-        detail = f"{found[name]:.2f}°, theirs {angle:.2f}°; {how}"
-        yield Row(f"V7 rings {name}, off theirs", abs(found[name] - angle), 0.2, "<=", "°", detail)
+        detail = f"{angles[name]:.2f}°, theirs {angle:.2f}°; {how}"
+        yield Row(f"V7 rings {name}, off theirs", abs(angles[name] - angle), 0.2, "<=", "°", detail)
     detail = f"theirs below 0.01°, reached on finer grids or nearer the axis; {how}"
-    yield Row("V7 rings bspline6", found["bspline6"], 0.2, "<=", "°", detail)
-    orders = [found[f"bspline{order}"] for order in range(2, 7)]
+    yield Row("V7 rings bspline6", angles["bspline6"], 0.2, "<=", "°", detail)
+    orders = [angles[f"bspline{order}"] for order in range(2, 7)]
     listed = " > ".join(f"{angle:.2f}°" for angle in orders)
     least = min(before / after for before, after in pairwise(orders))
     yield Row("V7 rings, each order over the next", least, 1.0, ">", "", f"B-spline 2 to 6: {listed}")
-    detail = f"{found['trilinear']:.2f}°, theirs about Catmull-Rom's 6.10°; {how}"
-    yield Row("V7 rings trilinear, off theirs", abs(found["trilinear"] - 6.1), 1.0, "<=", "°", detail)
-    halves = found["half-node differences"]
+    detail = f"{angles['trilinear']:.2f}°, theirs about Catmull-Rom's 6.10°; {how}"
+    yield Row("V7 rings trilinear, off theirs", abs(angles["trilinear"] - 6.1), 1.0, "<=", "°", detail)
+    halves = angles["half-node differences"]
     detail = (
-        f"{found['central']:.1f}° for differences between the nodes on either side, theirs about 6.10°; "
+        f"{angles['central']:.1f}° for differences between the nodes on either side, theirs about 6.10°; "
         f"{halves:.1f}° in the plane for differences of trilinear values half a node away"
     )
-    yield Row("V7 rings central, off theirs", abs(found["central"] - 6.1), 1.0, "<=", "°", detail)
+    yield Row("V7 rings central, off theirs", abs(angles["central"] - 6.1), 1.0, "<=", "°", detail)
 
 
 def ball_rows(quick: bool) -> Iterable[Row]:
     """V7, figure 5: gradients of the 8-bit ball."""
-    found = ball()
+    error = ball()
     how = f"{BALL_NODES}³ in 8 bits, plateau 0.3 and sigma 0.2 of a half edge, circle at half the value"
     detail = f"theirs below 0.01, the unit not given; {how}"
-    yield Row("V7 ball smooth, λ = 1", found["smooth 1"], 0.3, "<=", "°", detail)
+    yield Row("V7 ball smooth, λ = 1", error["smooth 1"], 0.3, "<=", "°", detail)
     detail = f"B-spline 3, λ from the noise of rounding, 1/√12 of a step; {how}"
-    yield Row("V7 ball smooth, λ by the noise", found["smooth noise"], 0.3, "<=", "°", detail)
+    yield Row("V7 ball smooth, λ by the noise", error["smooth noise"], 0.3, "<=", "°", detail)
     claims = {
         "Catmull-Rom worse than trilinear": ("catmull-rom", ["trilinear"]),
         "Catmull-Rom worse than central": ("catmull-rom", ["central"]),
         "no prefiltered order better than Catmull-Rom": (
-            min((f"bspline{n}" for n in range(2, 7)), key=found.__getitem__),
+            min((f"bspline{n}" for n in range(2, 7)), key=error.__getitem__),
             ["catmull-rom"],
         ),
         "prefiltered worse than not": ("bspline2", [f"raw {n}" for n in range(2, 7)]),
         "smooth the best of all": (
-            min((name for name in found if "smooth" not in name), key=found.__getitem__),
+            min((name for name in error if "smooth" not in name), key=error.__getitem__),
             ["smooth 1"],
         ),
     }
     for claim, (worse, better) in claims.items():
-        best = max(found[name] for name in better)
-        detail = f"{worse} {found[worse]:.3f}°, {', '.join(f'{name} {found[name]:.3f}°' for name in better)}"
-        yield Row(f"V7 ball, {claim}", found[worse] / best, 1.0, ">", "", detail)
+        best = max(error[name] for name in better)
+        detail = f"{worse} {error[worse]:.3f}°, {', '.join(f'{name} {error[name]:.3f}°' for name in better)}"
+        yield Row(f"V7 ball, {claim}", error[worse] / best, 1.0, ">", "", detail)

@@ -61,11 +61,11 @@ def breast_scans(count: int, seed: int = SEED, water_mps: float | None = None) -
 
 def detailed(random: np.random.Generator, water_mps: float) -> DetailedBreast:
     """A breast of any density with a tumour and a cyst."""
-    places = [_place(random, 0.045) for _ in range(2)]
+    centres = [_place(random, 0.045) for _ in range(2)]
     sizes = random.uniform(0.0025, 0.007, 2)
     lesions = (
-        Ellipse(places[0], (sizes[0], 0.8 * sizes[0]), 1575.0, 25.0, "tumour", random.uniform(0.0, np.pi)),
-        Ellipse(places[1], (sizes[1], sizes[1]), 1480.0, 0.0, "cyst"),
+        Ellipse(centres[0], (sizes[0], 0.8 * sizes[0]), 1575.0, 25.0, "tumour", random.uniform(0.0, np.pi)),
+        Ellipse(centres[1], (sizes[1], sizes[1]), 1480.0, 0.0, "cyst"),
     )
     axis = random.uniform(0.062, 0.076)
     anatomy = Anatomy(
@@ -84,21 +84,21 @@ def _of_ellipses(random: np.random.Generator, water_mps: float) -> EllipsePhanto
     axes = wide, wide * random.uniform(0.85, 1.0)
     turn = random.uniform(0.0, np.pi)
     inner = axes[0] - 0.002, axes[1] - 0.002
-    parts = [
+    ellipses = [
         Ellipse((0.0, 0.0), axes, 1560.0, 20.0, "skin", turn),
         Ellipse((0.0, 0.0), inner, random.uniform(1435.0, 1465.0), 5.0, "fat", turn),
     ]
     for _ in range(int(random.integers(1, 4))):
         size = random.uniform(0.2, 0.5) * axes[1]
-        place = _place(random, 0.9 * axes[1] - size - 0.004)
+        centre = _place(random, 0.9 * axes[1] - size - 0.004)
         shape = size, size * random.uniform(0.4, 1.0)
-        parts.append(Ellipse(place, shape, random.uniform(1500.0, 1540.0), 10.0, "gland", turn))
+        ellipses.append(Ellipse(centre, shape, random.uniform(1500.0, 1540.0), 10.0, "gland", turn))
     for _ in range(int(random.integers(1, 6))):
         size = random.uniform(0.002, 0.008)
-        place = _place(random, 0.75 * axes[1] - size)
+        centre = _place(random, 0.75 * axes[1] - size)
         speed = float(random.choice((1480.0, 1550.0, 1570.0)))
-        parts.append(Ellipse(place, (size, size * random.uniform(0.6, 1.0)), speed, 25.0, "lesion"))
-    return EllipsePhantom(water_mps, tuple(parts))
+        ellipses.append(Ellipse(centre, (size, size * random.uniform(0.6, 1.0)), speed, 25.0, "lesion"))
+    return EllipsePhantom(water_mps, tuple(ellipses))
 
 
 def _place(random: np.random.Generator, within_m: float) -> tuple[float, float]:

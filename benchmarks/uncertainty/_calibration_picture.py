@@ -24,12 +24,12 @@ def calibration_picture(judged: Sequence[Judged]) -> bytes:
         curve, bars, image, spread = figure.subplots(1, 4)
         deviations = np.linspace(0.0, 4.0, 81)
         curve.plot(deviations, erf(deviations / np.sqrt(2.0)), color="#555555", dashes=(4, 2), label="normal")
-        worst = min(judged, key=lambda one: one.within)
+        worst = min(judged, key=lambda image: image.within)
         for label, group, colour in (
             ("all scans", judged, OTHER),
             ("scan with the fewest", [worst], SHADOW),
         ):
-            sizes = np.concatenate([np.abs(one.error) / one.deviation for one in group])
+            sizes = np.concatenate([np.abs(image.error) / image.deviation for image in group])
             curve.plot(deviations, [(sizes <= k).mean() for k in deviations], color=colour, label=label)
         curve.plot([2.0], [0.85], "o", color="#e08a00", label="goal")
         curve.set_xlabel("deviations")
@@ -39,10 +39,10 @@ def calibration_picture(judged: Sequence[Judged]) -> bytes:
         curve.set_title("Calibration")
         curve.legend(loc="lower right", fontsize=8)
         colours = [
-            SHADOW if one is worst else CAUTION if one.result.caution("uncertainty") else OTHER
-            for one in judged
+            SHADOW if image is worst else CAUTION if image.result.caution("uncertainty") else OTHER
+            for image in judged
         ]
-        bars.bar(range(len(judged)), [100.0 * one.within for one in judged], color=colours)
+        bars.bar(range(len(judged)), [100.0 * image.within for image in judged], color=colours)
         bars.axhline(85.0, color="#e08a00", linewidth=1.0)
         bars.set_xlabel("scan (grey: with a caution)")
         bars.set_ylabel("nodes within two deviations (%)")

@@ -44,7 +44,7 @@ class Judged:
 
 def part_within(judged: Sequence[Judged], deviations: float) -> float:
     """Part of all nodes whose error is at most so many deviations."""
-    return float(np.mean(np.concatenate([relative(one) for one in judged]) <= deviations))
+    return float(np.mean(np.concatenate([relative(image) for image in judged]) <= deviations))
 
 
 def row_of(target: str, error: Floats, deviation: Floats, goal: float, about: str) -> Row:

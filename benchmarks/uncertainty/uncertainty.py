@@ -49,8 +49,8 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         judged.append(judge(scan))
     chosen_with, others = judged[: count // 2], judged[count // 2 :]
     constant = constant_deviation(chosen_with)
-    flat = float(np.mean(np.concatenate([np.abs(one.error) for one in others]) <= DEVIATIONS * constant))
-    each = "; ".join(f"{one.name}: {100.0 * one.within:.0f} %" for one in judged)
+    flat = float(np.mean(np.concatenate([np.abs(image.error) for image in others]) <= DEVIATIONS * constant))
+    each = "; ".join(f"{image.name}: {100.0 * image.within:.0f} %" for image in judged)
     yield Row(
         "U1 nodes within two deviations, scans that chose nothing",
         part_within(others, DEVIATIONS),
@@ -68,7 +68,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         "",
         f"{len(judged)} scans, {100.0 * part_within(judged, 1.0):.0f} % within one deviation; {each}",
     )
-    least = min(judged, key=lambda one: one.within)
+    least = min(judged, key=lambda image: image.within)
     yield Row(
         "U1 nodes within two deviations, the scan with the fewest",
         least.within,
@@ -78,7 +78,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         f"{least.name}; error {rms(least.error):.1f} m/s, deviations {rms(least.deviation):.1f} m/s",
     )
     yield from cautions(judged)
-    correlations = [correlation(one) for one in judged]
+    correlations = [correlation(image) for image in judged]
     yield Row(
         "U1 rank correlation of deviation and error, least of all scans",
         min(correlations),
@@ -87,7 +87,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         "",
         f"median {float(np.median(correlations)):.2f}; a deviation that is the same at all nodes has 0",
     )
-    image, own = (sum(getattr(one, name) for one in judged) for name in ("image_s", "uncertainty_s"))
+    image, own = (sum(getattr(image, name) for image in judged) for name in ("image_s", "uncertainty_s"))
     yield Row(
         "U1 time of image and uncertainty over that of the image",
         (image + own) / image,
@@ -105,13 +105,13 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 def cautions(judged: Sequence[Judged]) -> Iterable[Row]:
     """Error of the images whose result says that its deviations may be too small, over that of the others."""
-    told = [one for one in judged if one.result.caution("uncertainty")]
-    rest = [one for one in judged if not one.result.caution("uncertainty")]
-    names = ", ".join(one.name.split(":")[0] for one in told)
-    parts = [f"{100.0 * part_within(group, DEVIATIONS):.0f} %" if group else "none" for group in (told, rest)]
-    error = [
-        math.sqrt(float(np.mean([rms(one.error) ** 2 for one in group]))) for group in (told, rest) if group
+    told = [image for image in judged if image.result.caution("uncertainty")]
+    rest = [image for image in judged if not image.result.caution("uncertainty")]
+    names = ", ".join(image.name.split(":")[0] for image in told)
+    shares = [
+        f"{100.0 * part_within(group, DEVIATIONS):.0f} %" if group else "none" for group in (told, rest)
     ]
+    error = [math.sqrt(float(np.mean([rms(x.error) ** 2 for x in group]))) for group in (told, rest) if group]
     yield Row(
         "U1 rms error of images with a caution over that of the others",
         float(error[0] / error[1]) if told and rest else None,
@@ -119,7 +119,7 @@ def cautions(judged: Sequence[Judged]) -> Iterable[Row]:
         ">",
         "",
         f"{len(told)} of {len(judged)} images have one: {names or 'none'}; within two deviations "
-        f"{parts[0]} of their nodes, {parts[1]} of those of the others",
+        f"{shares[0]} of their nodes, {shares[1]} of those of the others",
     )
 
 
@@ -129,13 +129,13 @@ def slow_water(context: BenchmarkContext) -> Iterable[Row]:
     for number, scan in enumerate(breast_scans(SLOW_SCANS, SLOW_SEED, SLOW_MPS)):
         context.progress(number, SLOW_SCANS, scan.name)
         judged.append(judge(scan))
-    least = min(judged, key=lambda one: one.within)
-    told = [bool(one.result.caution("uncertainty")) for one in judged]
+    least = min(judged, key=lambda image: image.within)
+    told = [bool(image.result.caution("uncertainty")) for image in judged]
     each = "; ".join(
-        f"{one.name}{', with a caution' if doubted else ''}: {100.0 * one.within:.0f} %"
-        for one, doubted in zip(judged, told, strict=True)
+        f"{image.name}{', with a caution' if doubted else ''}: {100.0 * image.within:.0f} %"
+        for image, doubted in zip(judged, told, strict=True)
     )
-    correlations = [correlation(one) for one in judged]
+    correlations = [correlation(image) for image in judged]
     yield Row(
         f"U1 water of {SLOW_MPS:.0f} m/s, nodes within two deviations, the scan with the fewest",
         least.within,
@@ -150,7 +150,7 @@ def slow_water(context: BenchmarkContext) -> Iterable[Row]:
 
 def picked_times(context: BenchmarkContext) -> Row:
     """Nodes within two deviations of images from times that were picked from waves; they chose nothing."""
-    errors, deviations, parts = [], [], []
+    errors, deviations, details = [], [], []
     for number, scan in enumerate(wave_scans(WAVE_SCANS, context, WAVE_HZ)):
         result = reconstruct(replace(scan, waveform=None), Settings.of(uncertainty=True, attenuation=False))
         error, deviation = beside_truth(scan, result)
@@ -158,8 +158,8 @@ def picked_times(context: BenchmarkContext) -> Row:
         deviations.append(deviation)
         rays = "bent" if result.settings.rays == "curved" else "straight"
         within = 100.0 * np.mean(error <= DEVIATIONS * deviation)
-        parts.append(f"{number}: {rays} {result.settings.method} {within:.0f} %")
-    about = f"{len(parts)} scans at {1e-3 * WAVE_HZ:.0f} kHz; {'; '.join(parts)}"
+        details.append(f"{number}: {rays} {result.settings.method} {within:.0f} %")
+    about = f"{len(details)} scans at {1e-3 * WAVE_HZ:.0f} kHz; {'; '.join(details)}"
     error, deviation = np.concatenate(errors), np.concatenate(deviations)
     return row_of("U1 picked wave times", error, deviation, PART, about)
 
@@ -187,17 +187,17 @@ def seconds_of_uncertainty(dataset: Dataset, result: Reconstruction) -> float:
     begun = time.process_time()
     problem = Problem.of(dataset, result.settings, 0).each_pair_once()
     slowness = 1.0 / result.speed
-    parts = [
+    blocks = [
         trace_probed_rays(problem, result.settings, slowness, batch)
         for batch in batches_of(problem.active_emitters)
     ]
-    ray_uncertainty(problem, result.settings, slowness, parts)
+    ray_uncertainty(problem, result.settings, slowness, blocks)
     return time.process_time() - begun
 
 
 def constant_deviation(judged: Sequence[Judged]) -> float:
     """One deviation for all nodes with ``CHOSEN_PART`` of them within ``DEVIATIONS``, m/s."""
-    errors = np.concatenate([np.abs(one.error) for one in judged])
+    errors = np.concatenate([np.abs(image.error) for image in judged])
     return float(np.quantile(errors, CHOSEN_PART)) / DEVIATIONS
 
 

@@ -30,7 +30,7 @@ PLAN = Settings.of(method="waveform", attenuation=False, uncertainty=True)
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Rows of the calibration and of the time."""
-    errors, deviations, parts, seconds = [], [], [], np.zeros(2)
+    errors, deviations, details, seconds = [], [], [], np.zeros(2)
     for number, scan in enumerate(wave_scans(QUICK_SCANS if context.quick else SCANS, context)):
         begun = time.process_time()
         result = reconstruct(scan, PLAN)
@@ -41,16 +41,16 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         error, deviation = beside_truth(scan, result)
         errors.append(error)
         deviations.append(deviation)
-        parts.append(f"{number}: {100.0 * np.mean(error <= 2.0 * deviation):.0f} %")
+        details.append(f"{number}: {100.0 * np.mean(error <= 2.0 * deviation):.0f} %")
     error, deviation = np.concatenate(errors), np.concatenate(deviations)
-    each = "; ".join(parts)
+    each = "; ".join(details)
     yield Row(
         "U1 full waveform, nodes within two deviations",
         float(np.mean(error <= 2.0 * deviation)),
         0.85,
         ">=",
         "",
-        f"{len(parts)} scans of {EMISSIONS} emitters at {1e-3 * CENTRE_HZ:.0f} kHz, nodes in the breast; "
+        f"{len(details)} scans of {EMISSIONS} emitters at {1e-3 * CENTRE_HZ:.0f} kHz, nodes in the breast; "
         f"{each}; "
         f"{100.0 * np.mean(error <= deviation):.0f} % within one; error {rms(error):.1f} m/s, deviations "
         f"{rms(deviation):.1f} m/s",
@@ -93,10 +93,10 @@ def beside_truth(scan: Dataset, result: Reconstruction) -> tuple[Floats, Floats]
         / truth.spacing_m[axis]
         for axis, count in enumerate(result.speed.shape)
     ]
-    places = np.meshgrid(*lines, indexing="ij")
-    inside = map_coordinates(scan.roi.astype(float), places, order=0, mode="constant") > 0.5
+    points = np.meshgrid(*lines, indexing="ij")
+    inside = map_coordinates(scan.roi.astype(float), points, order=0, mode="constant") > 0.5
     inside &= spread > 0.0
-    true = map_coordinates(smooth, places, order=1, mode="nearest")
+    true = map_coordinates(smooth, points, order=1, mode="nearest")
     return np.abs(result.speed - true)[inside], spread[inside]
 
 

@@ -50,10 +50,10 @@ def python_solver() -> Any:
         ImportError: where it, or a package that it needs, is not installed.
     """
     if "kwave" not in sys.modules:
-        found = importlib.util.find_spec("kwave")
-        if found is None:
+        spec = importlib.util.find_spec("kwave")
+        if spec is None:
             raise ImportError("No module named 'kwave'")
-        package: Any = importlib.util.module_from_spec(found)
+        package: Any = importlib.util.module_from_spec(spec)
         package.__version__ = version("k-wave-python")
         sys.modules["kwave"] = package
     return importlib.import_module("kwave.solvers.kspace_solver").Simulation
@@ -92,10 +92,10 @@ def kwave(_: Any) -> Peer:
             dtype=np.float32,
         )
         simulation.xp = Arrays()
-        found = simulation.run()["p"]
+        pressure = simulation.run()["p"]
         traces = np.zeros((len(receivers), wavelet.size))
         # Its receivers are in the order of the grid, and its first sample is that after one step.
-        traces[np.argsort(np.ravel_multi_index(nodes, c.shape)), 1:] = found[:, :-1]
+        traces[np.argsort(np.ravel_multi_index(nodes, c.shape)), 1:] = pressure[:, :-1]
         return traces
 
     return simulate

@@ -104,8 +104,8 @@ class Shot:
     def ring(self) -> np.ndarray:
         """Nodes of the elements, the emitter first, (1 + receivers, 2)."""
         turn = 2.0 * np.pi * np.arange(self.receivers + 1) / (self.receivers + 1)
-        place = RING * self.side_m * np.column_stack((np.cos(turn), np.sin(turn)))
-        return np.rint((place + 0.5 * self.side_m) / self.spacing).astype(int)
+        position = RING * self.side_m * np.column_stack((np.cos(turn), np.sin(turn)))
+        return np.rint((position + 0.5 * self.side_m) / self.spacing).astype(int)
 
     @cached_property
     def distance(self) -> np.ndarray:
@@ -121,12 +121,12 @@ class Shot:
         """Traces, (receivers, nt)."""
         return self._simulated(pulse(self.time))
 
-    def theirs(self, peer, parts: int = THEIR_PARTS) -> np.ndarray:
-        """The same of a peer, in ``parts`` of our time steps."""
-        step = self.step / parts
-        fine = self.time[0] + step * np.arange(self.time.size * parts)
+    def theirs(self, peer, steps: int = THEIR_PARTS) -> np.ndarray:
+        """The same of a peer, in ``steps`` of our time steps."""
+        step = self.step / steps
+        fine = self.time[0] + step * np.arange(self.time.size * steps)
         ring = self.ring
-        return peer(self.speed, self.spacing, step, ring[0], ring[1:], pulse(fine), self.loss)[:, ::parts]
+        return peer(self.speed, self.spacing, step, ring[0], ring[1:], pulse(fine), self.loss)[:, ::steps]
 
     def as_a_refinement(self, recorded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Ours and recorded traces as a refinement compares them: filtered, our dispersion put into both.
@@ -152,7 +152,7 @@ class Shot:
             the median of the receivers.
         """
         both = [self._budget_at(float(speed), traces) for speed in (self.speed.min(), self.speed.max())]
-        return max(one[0] for one in both), max(one[1] for one in both)
+        return max(pair[0] for pair in both), max(pair[1] for pair in both)
 
     def _budget_at(self, speed: float, traces: np.ndarray) -> tuple[float, float]:
         size = 2 * self.time.size
@@ -180,18 +180,18 @@ def pulse(time: np.ndarray) -> np.ndarray:
     return np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
 
 
-def misfit(found: np.ndarray, expected: np.ndarray) -> float:
+def misfit(traces: np.ndarray, expected: np.ndarray) -> float:
     """Relative rms difference over all traces; nothing is scaled or shifted to fit."""
-    return float(np.sqrt(((found - expected) ** 2).sum() / (expected**2).sum()))
+    return float(np.sqrt(((traces - expected) ** 2).sum() / (expected**2).sum()))
 
 
-def delays(found: np.ndarray, expected: np.ndarray, step: float) -> np.ndarray:
+def delays(traces: np.ndarray, expected: np.ndarray, step: float) -> np.ndarray:
     """How much later each trace comes, by the highest of their correlation, (receivers,), s."""
-    fine, size = 8, 2 * found.shape[1]
-    cross = np.fft.rfft(found, size) * np.fft.rfft(expected, size).conj()
+    fine, size = 8, 2 * traces.shape[1]
+    cross = np.fft.rfft(traces, size) * np.fft.rfft(expected, size).conj()
     alike = np.fft.irfft(cross, fine * size, axis=1)
-    top, rows = alike.argmax(axis=1), np.arange(len(found))
+    top, rows = alike.argmax(axis=1), np.arange(len(traces))
     low, middle, high = (alike[rows, (top + k) % (fine * size)] for k in (-1, 0, 1))
-    place = top + 0.5 * (low - high) / (low - 2.0 * middle + high)
-    place -= fine * size * (place > 0.5 * fine * size)
-    return np.asarray(place * step / fine)
+    peak = top + 0.5 * (low - high) / (low - 2.0 * middle + high)
+    peak -= fine * size * (peak > 0.5 * fine * size)
+    return np.asarray(peak * step / fine)

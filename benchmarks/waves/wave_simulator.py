@@ -30,7 +30,7 @@ TURNS = 5
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Two for each medium and grid, one of the time; with a picture of all."""
-    found, missing = installed()
+    peers, missing = installed()
     side_m = QUICK_SIDE_M if context.quick else SIDE_M
     shots = [Shot(name, points, side_m) for name in MEDIA for points in POINTS]
     shown = []
@@ -41,7 +41,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
             yield Row(f"{label}, over the budget", None, OVER_BUDGET, "<=", "", missing["k-Wave"])
             yield Row(f"{label}, dispersion put in", None, REFINED, "<=", "", missing["k-Wave"])
             continue
-        theirs = shot.theirs(found["k-Wave"])
+        theirs = shot.theirs(peers["k-Wave"])
         ours = shot.ours()
         refined = shot.as_a_refinement(theirs)
         yield from judged(label, shot, (ours, theirs), refined)
@@ -51,7 +51,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     if missing:
         yield Row(label, None, 1.0, "<", "", missing["k-Wave"])
         return
-    yield timed(label, next(shot for shot in shots if shot.name == "breast"), found["k-Wave"])
+    yield timed(label, next(shot for shot in shots if shot.name == "breast"), peers["k-Wave"])
     context.save_picture("wave_simulator.png", lambda: picture(shown))
 
 
