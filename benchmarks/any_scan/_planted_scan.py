@@ -43,6 +43,6 @@ def planted(dataset: Dataset, seed: int) -> Dataset:
 
 
 def without_water_shot(dataset: Dataset) -> Dataset:
-    """The same scan without its water shot."""
+    """This scan without its water shot."""
     assert dataset.waveform is not None
     return replace(dataset, waveform=replace(dataset.waveform, water=None, water_scale=None))

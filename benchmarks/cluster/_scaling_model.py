@@ -58,7 +58,7 @@ class Model:
         return tasks * self.scheduler_task + beats(workers) * self.scheduler_beat + self.scheduler_idle
 
     def driver_share(self, workers: float, length: float, used: float = 1.0) -> float:
-        """The same of the process that submits."""
+        """Share of one processor for the process that submits."""
         return workers * used * self.driver_task / length
 
     def most_workers(self, length: float) -> float:

@@ -26,7 +26,7 @@ OWN_WORKERS = "own workers"
 
 @dataclass(frozen=True)
 class Part:
-    """What one benchmark gave.
+    """Rows, pictures and errors of one benchmark.
 
     Attributes:
         benchmark: its name.
@@ -131,13 +131,13 @@ class ConnectedContext(BenchmarkContext):
     connections: list[str] = field(default_factory=list)
 
     def cluster(self) -> Any:
-        """As of ``BenchmarkContext``."""
+        """See ``BenchmarkContext``."""
         self.connections.append(self.scheduler or OWN_WORKERS)
         return super().cluster()
 
 
 def settings_of(rows: Rows, context: BenchmarkContext) -> dict[str, Any]:
-    """What the rows of a benchmark depend on: size, version, sources and cluster."""
+    """Settings that the rows of a benchmark depend on: size, version, sources and cluster."""
     return {
         "quick": context.quick,
         "version": version("bentray"),

@@ -126,7 +126,7 @@ def sentence(item: Item, state: str, rows: Sequence[Mapping[str, Any]], *, quick
 
 
 def described_part(name: str, part: Part | None) -> dict[str, Any]:
-    """What the report states about the run of a benchmark."""
+    """Description of the run of a benchmark in the report."""
     if part is None:
         return {"benchmark": name, "measured": None}
     return {

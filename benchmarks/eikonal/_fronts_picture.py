@@ -129,7 +129,7 @@ def draw(
 
 
 def label(row: Sequence[Axes], text: str) -> None:
-    """What a row shows, at its left; the axis along y is labelled there alone."""
+    """Name a row at its left; the axis along y is labelled there alone."""
     row[0].set_ylabel(f"{text}\n\ny (mm)")
     for axes in row[1:]:
         axes.set_ylabel("")

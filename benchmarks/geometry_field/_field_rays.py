@@ -57,6 +57,6 @@ def camera_rays(pixels: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def as_columns(rays: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The same rays as lookups take them: (3, n), one row an axis."""
+    """Rays in the form that lookups take: (3, n), one row an axis."""
     origins, directions = (np.ascontiguousarray(a.T, np.float32) for a in rays)
     return origins, directions

@@ -36,7 +36,7 @@ ASLANT = np.array([(0.8, 0.6, 0.0), (-0.3, 0.4, 0.866), (0.52, -0.693, 0.5)])
 
 @dataclass(frozen=True)
 class Made:
-    """What was made of a surface, and the least seconds that it took, of the clock and of the processor."""
+    """Chart and image of a surface, with the least seconds of the clock and of the processor."""
 
     chart: Parameterisation
     image: GeometryImage

@@ -50,7 +50,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 
 def rows_of(theirs: PublishedTimes) -> Iterable[Row]:
-    """Of one surface; a bumpy ball of as many faces stands for the heads, which are not ours to give."""
+    """Rows of one surface; a bumpy ball of as many faces stands for the heads, which are not ours to give."""
     mesh = {"sphere": sphere, "torus": torus}.get(theirs.surface, lambda: bumpy_ball(theirs.faces))()
     figures, whole = made(mesh, SETTINGS)
     what = f"{figures['faces']:,} faces" + ("" if len(mesh.faces) <= 7_938 else ", a bumpy ball")

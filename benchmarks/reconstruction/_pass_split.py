@@ -42,7 +42,7 @@ class Split:
 
 
 def split(nodes: int, elements: int) -> Split:
-    """Of a pass through the middle slice of the 3-D breast phantom in water as fast as fat."""
+    """Times of a pass through the middle slice of the 3-D breast phantom in water as fast as fat."""
     spacing = TABLE7_SIDE_M / (nodes - 1)
     # As smooth as an image of SART is; the front goes round its grid more often where edges are sharp.
     slowness = 1.0 / gaussian_filter(table7(1375.0, max(nodes, 128)).at(0.0).speed(nodes, TABLE7_SIDE_M), 2.0)

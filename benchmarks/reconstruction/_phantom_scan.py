@@ -154,12 +154,12 @@ class PhantomScan:
         return self._speed_error(image, high - low, "rms")
 
     def whole_image_rms(self, image: Reconstruction) -> ImageError:
-        """As ``rms``, over the whole image."""
+        """The error ``rms`` over the whole image."""
         error = self.rms(image)
         return replace(error, region=np.ones(error.true.shape, dtype=bool))
 
     def attenuation_rms(self, image: Reconstruction) -> ImageError:
-        """As ``rms``, of the attenuation and its range inside the breast."""
+        """The error ``rms`` of the attenuation, over its range inside the breast."""
         nodes, side = _grid(image)
         phantom = self.scan.phantom
         true, inside = phantom.attenuation(nodes, side), phantom.inside(nodes, side)

@@ -98,7 +98,7 @@ def sirt(times: TravelTimes) -> np.ndarray:
 
 
 def sart(times: TravelTimes) -> np.ndarray:
-    """As ``sirt`` with an update after each emitter, in random order."""
+    """The method ``sirt`` with an update after each emitter, in random order."""
     emitter, _ = times.pairs()
     fans = [np.flatnonzero(emitter == index) for index in np.unique(emitter)]
     return _sweeps(times, fans, SART_RELAXATION, SART_SWEEPS, SART_LEAST_GAIN)

@@ -55,11 +55,11 @@ class Slices:
     whole: bool = True
 
     def error(self, speeds: Iterable[Floats]) -> float:
-        """Of images on the nodes of the phantom, one of each slice."""
+        """Error of images on the nodes of the phantom, one of each slice."""
         return self._rms([speed - true for speed, true in zip(speeds, self._truths, strict=True)])
 
     def constants(self) -> dict[str, float]:
-        """Of the best constant and of water alone."""
+        """Errors of the best constant and of water alone."""
         values = np.concatenate([true[on] for true, on in zip(self._truths, self._regions, strict=True)])
         means = {BEST_CONSTANT: float(values.mean()), WATER_ALONE: self.phantoms[0].coupling_mps}
         return {name: self.error(np.full_like(t, mean) for t in self._truths) for name, mean in means.items()}
@@ -101,7 +101,7 @@ def contrasts(phantom: PhantomSlice, speed: Floats) -> dict[str, float]:
 
 
 def least_contrast(contrast: Mapping[str, float], voxels: int) -> float:
-    """Of the lesions of this diameter the least contrast; NaN without one."""
+    """Least contrast of the lesions of this diameter; NaN without one."""
     return min(
         (value for name, value in contrast.items() if name.startswith(f"{voxels} ")), default=float("nan")
     )

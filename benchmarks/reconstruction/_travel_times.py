@@ -1,4 +1,4 @@
-"""What every peer of the tomography is given: travel times of pairs, and the grid to answer on."""
+"""Input of every tomography peer: travel times of pairs, and the grid of the image."""
 
 from __future__ import annotations
 

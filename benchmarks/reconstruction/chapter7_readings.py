@@ -43,7 +43,7 @@ FREQUENCY_HZ, EMISSIONS = 2e5, 32
 
 
 class Data(NamedTuple):
-    """What was scanned.
+    """One scanned data set.
 
     Attributes:
         skin: see ``Skin``.

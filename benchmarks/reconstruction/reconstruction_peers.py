@@ -137,7 +137,7 @@ def run_peer(peer: Peer, dataset: Dataset, tiny: Dataset) -> Found:
 
 
 def timed(run: Callable[[], np.ndarray], dataset: Dataset) -> Found:
-    """What one run gives and takes."""
+    """Result and cost of one run."""
     assert dataset.truth is not None
     started, spent = time.perf_counter(), time.process_time()
     speed = run()

@@ -56,7 +56,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 
 
 def where(nodes: int, slices: int, elements: int) -> Row:
-    """What one emitter's pass takes of a core, in parts, against what the time asked for leaves it."""
+    """Core time of one emitter's pass, in parts, against the share of the time goal."""
     seconds = split(nodes, elements)
     goal = 1e3 * 2 * GOALS.get((nodes, slices), 10.0) / (slices * elements * SWEEPS)
     label = f"R5 one pass, {nodes}², {elements} transducers"
@@ -200,6 +200,6 @@ def sweep(nodes: int, elements: int) -> tuple[float, int]:
 
 
 def exponent(points: list[tuple[int, float]]) -> float:
-    """Of the power law that fits best in logarithms."""
+    """Exponent of the power law that fits best in logarithms."""
     size, value = np.log(np.array(points, dtype=np.float64)).T
     return float(np.polyfit(size, value, 1)[0])

@@ -111,6 +111,6 @@ def settings_of(size: Size) -> Settings:
 
 
 def _of_worker(answers: dict[str, Any]) -> Any:
-    """What the only worker answered."""
+    """The answer of the only worker."""
     (answer,) = answers.values()
     return answer

@@ -61,7 +61,7 @@ class FatScan:
 
     @property
     def spacing_m(self) -> float:
-        """Of its nodes, m."""
+        """Node spacing, m."""
         return SIDE_M / (self.nodes - 1)
 
     def places(self) -> tuple[Floats, Floats]:

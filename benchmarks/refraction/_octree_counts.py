@@ -63,7 +63,7 @@ def operations(scene: Scene, subject: Subject, structure: str, pixels: int = PIX
 
 
 def rows(subject: Subject, pixels: int = PIXELS) -> Iterable[Row]:
-    """What the octree leaves of the work, beside the published gain in time."""
+    """Work that remains with the octree, beside the published gain in time."""
     scene = Scene.build(
         Spline(subject.volume, smoothing=1.0), Layers((subject.iso,), (1.0, 1.5)), bound="accc"
     )

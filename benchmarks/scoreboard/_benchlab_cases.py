@@ -228,7 +228,7 @@ def scores(image: Reconstruction | float, case: PublicCase) -> Scores:
 
 
 def mean_speed(case: PublicCase) -> float:
-    """Of the tissue: the best constant, m/s."""
+    """Mean speed of the tissue, the best constant, m/s."""
     true = case.at(SCORED_NODES, SIDE_M)
     return float(true[tissue(true)].mean())
 

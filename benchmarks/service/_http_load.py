@@ -20,7 +20,7 @@ Call = Callable[[http.client.HTTPConnection, int], bool]
 
 @dataclass
 class Calls:
-    """What callers measured: seconds of each call, and how many were refused or broke."""
+    """Measurements of callers: seconds of each call, and how many were refused or broke."""
 
     seconds: list[float] = field(default_factory=list)
     failed: int = 0

@@ -32,7 +32,7 @@ RESTED = "() => window.seen.pictures.some(([at, quality]) => quality === 'full' 
 
 @dataclass(frozen=True)
 class Turned:
-    """What was shown.
+    """Pictures shown during a turn.
 
     Attributes:
         rate: previews a second.

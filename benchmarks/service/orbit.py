@@ -194,7 +194,7 @@ def turned(http: httpx.Client, picture: str, mode: Shown, quick: bool, detail: s
 
 
 def turned_in_page(page: str, mode: Shown, quick: bool, detail: str) -> Iterator[Row]:
-    """The same in Chromium, where it is installed."""
+    """Turn the object in Chromium, where it is installed."""
     labels = (
         (f"orbit in the page, {mode.name} at 256²", 10.0, ">=", "1/s"),
         (f"orbit in the page, {mode.name}: full quality at rest", 1.0, "<", "s"),

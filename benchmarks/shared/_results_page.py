@@ -80,7 +80,7 @@ def tables(text: str) -> Iterator[list[dict[str, str]]]:
 
 
 def claims(text: str) -> Iterator[Claim]:
-    """What the tables with a column ``label`` state about single rows.
+    """Statements about single rows, from the tables with a column ``label``.
 
     A label is the name of a file in backticks and the label of a row. Several rows share a line: labels and
     results are then separated by semicolons, a goal may be shared.
@@ -108,7 +108,7 @@ def split(cell: str) -> list[str]:
 
 
 def contradictions(claim: Claim, rows: Mapping[str, Mapping[str, Recorded]]) -> list[str]:
-    """What is wrong with a line of the page: empty if it agrees with the recorded row."""
+    """Errors in a line of the page: empty if it agrees with the recorded row."""
     row = rows.get(claim.file, {}).get(claim.target)
     name = f"{claim.file}: {claim.target}"
     if row is None:

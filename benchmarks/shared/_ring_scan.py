@@ -64,7 +64,7 @@ class RingScan:
 
     @property
     def spacing_m(self) -> float:
-        """Of its nodes, m."""
+        """Node spacing, m."""
         return self.side_m / (self.nodes - 1)
 
     @property

@@ -25,7 +25,7 @@ def figure_png(figure: Figure) -> bytes:
 
 
 def in_full_colour(png: bytes) -> bytes:
-    """The same pixels as RGB, compressed as far as PNG can."""
+    """The picture as RGB, compressed as far as PNG can."""
     with Image.open(io.BytesIO(png)) as image:
         buffer = io.BytesIO()
         image.convert("RGB").save(buffer, "png", optimize=True)

@@ -70,12 +70,12 @@ class Shot:
 
     @cached_property
     def step(self) -> float:
-        """Of time, s."""
+        """Time step, s."""
         return STEP * longest_step(table6(WATER_MPS).speed_range()[1], self.spacing)
 
     @cached_property
     def time(self) -> np.ndarray:
-        """Of the samples, the middle of the pulse at 0, (nt,), s."""
+        """Times of the samples, the middle of the pulse at 0, (nt,), s."""
         last = 2.0 * RING * self.side_m / self.slowest + AFTER / CENTRE_HZ
         return np.arange(-BEFORE / CENTRE_HZ, last, self.step)
 
@@ -122,7 +122,7 @@ class Shot:
         return self._simulated(pulse(self.time))
 
     def theirs(self, peer, steps: int = THEIR_PARTS) -> np.ndarray:
-        """The same of a peer, in ``steps`` of our time steps."""
+        """Traces of a peer, in ``steps`` of our time steps."""
         step = self.step / steps
         fine = self.time[0] + step * np.arange(self.time.size * steps)
         ring = self.ring
@@ -143,7 +143,7 @@ class Shot:
         return simulate(self.medium, ring[0], ring[1:], wavelet)
 
     def budget(self, traces: np.ndarray) -> tuple[float, float]:
-        """What ``phase_error`` states, for straight paths in the slowest of the media or the fastest.
+        """Phase error by ``phase_error``, for straight paths in the slowest of the media or the fastest.
 
         Space makes waves late and time makes them early, so that either may be the worse.
 
@@ -166,7 +166,7 @@ class Shot:
         return misfit(spectrum + error, spectrum), float(np.median(np.abs(self.lateness(speed))))
 
     def lateness(self, speed: float, frequency: float = CENTRE_HZ) -> np.ndarray:
-        """What ``phase_error`` makes of straight paths at one speed, (receivers,), s, > 0 where later."""
+        """Delay by ``phase_error`` of straight paths at one speed, (receivers,), s, > 0 where later."""
         across = self.ring[1:] - self.ring[0]
         courant = speed * self.step / self.spacing
         points = speed / (frequency * self.spacing)
@@ -175,7 +175,7 @@ class Shot:
 
 
 def pulse(time: np.ndarray) -> np.ndarray:
-    """What the emitter sends, the shape of ``time``, s."""
+    """Pulse of the emitter, the shape of ``time``, s."""
     late = time * CENTRE_HZ
     return np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
 

@@ -196,7 +196,7 @@ class Diagonals:
         _surround(nodes, self.shape, into.low, into.high)
 
     def flip(self, columns: Columns, into: Columns, crew: Crew = ALONE) -> None:
-        """The same nodes, or more, in the grid whose j is flipped."""
+        """Write these nodes, or more, in the grid whose j is flipped."""
         into.clear()
 
         def some(first: int, end: int) -> None:

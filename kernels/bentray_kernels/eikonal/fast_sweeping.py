@@ -42,7 +42,7 @@ Outcome = tuple[int, int, int, int, int, int, int]
 
 
 class Grid(NamedTuple):
-    """What a sweep reads and changes, stored by diagonals.
+    """Arrays that a sweep reads and changes, stored by diagonals.
 
     Attributes:
         time: s; changed in place.

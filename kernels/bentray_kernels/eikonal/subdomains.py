@@ -28,7 +28,7 @@ Faces = Sequence[Floats | None]
 
 @dataclass(frozen=True)
 class Edges:
-    """What a block tells its neighbours after a sweep.
+    """Halo of a block that its neighbours receive after a sweep.
 
     Attributes:
         faces: the block's own outermost times on each side, s, in the order of ``Faces``.

@@ -1,4 +1,4 @@
-"""What event streams watch: a job, or all jobs of a tenant; filled by the feed, read by the streams."""
+"""Jobs watched by event streams: one, or all of a tenant; filled by the feed, read by the streams."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ async def picture(
 
 
 def _share(how: Mapping[str, Any]) -> float:
-    """What a picture counts in the rate limit; a viewer that turns an object requests many small ones."""
+    """Weight of a picture in the rate limit; a viewer that turns an object requests many small ones."""
     times = how.get("rays", how.get("degree", 1) if how.get("supersampling") == "real" else 1)
     rays: float = (
         how.get("width", math.inf) * how.get("height", math.inf) * (times / how.get("ray_spacing", 1)) ** 2

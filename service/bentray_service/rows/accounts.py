@@ -22,7 +22,7 @@ def account_of(session: Session, tenant: Tenant) -> Account:
 
 
 def account_in(tenant: SQLColumnExpression[Tenant]) -> ColumnElement[str]:
-    """The same for a column of tenants, in a query."""
+    """Account for a column of tenants, in a query."""
     owner = select(ProjectRow.tenant).where(ProjectRow.id == tenant)
     # Otherwise the table of a query two levels up would be joined again.
     return func.coalesce(owner.correlate_except(ProjectRow).scalar_subquery(), tenant)

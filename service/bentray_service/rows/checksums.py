@@ -106,5 +106,5 @@ def _record(session: Session, tenant: Tenant, name: str, path: str, digest: Dige
 
 
 def delete_checksums(session: Session, tenant: Tenant, names: Collection[str]) -> None:
-    """The same within the transaction of the caller."""
+    """Delete checksums within the transaction of the caller."""
     session.execute(delete(ChecksumRow).where(ChecksumRow.tenant == tenant, ChecksumRow.id.in_(names)))

@@ -82,6 +82,6 @@ def is_claimed(session: Session, tenant: Tenant) -> bool:
 
 
 def keep_from_claims(session: Session, tenants: Collection[Tenant]) -> None:
-    """As ``ClaimedTenants.keep_from_claims``."""
+    """See ``ClaimedTenants.keep_from_claims``."""
     named = ClaimedTenantRow.issuer == "", ClaimedTenantRow.tenant.in_(tenants)
     session.execute(delete(ClaimedTenantRow).where(*named))

@@ -281,7 +281,7 @@ class NewJob:
 
 @dataclass(frozen=True)
 class Submission:
-    """What holds for all jobs of a request.
+    """Properties common to all jobs of a request.
 
     Attributes:
         most_bytes: quota of the tenant; None: nothing is reserved.

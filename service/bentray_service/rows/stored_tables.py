@@ -117,7 +117,7 @@ class Datasets(UploadedTable[DatasetRow], NamedTable[DatasetRow]):
     def add_once(
         self, tenant: Tenant, name: str, request: RequestKey, *, size: int, sha256: str, summary: Plain
     ) -> DatasetRow:
-        """As ``add``, for a request; gives the row of an equal one that was faster, which has another id.
+        """Add a row for a request, or return an equal row that was added first, which has another id.
 
         Raises:
             KeyReused: as ``made_by``.

@@ -88,7 +88,7 @@ class SchemaVersion(Base):
 
 
 class About(Base):
-    """What holds for the database; one row."""
+    """Facts about the database; one row."""
 
     __tablename__ = "about"
 
@@ -244,7 +244,7 @@ class BatchRow(Base):
 
     @property
     def state(self) -> str:
-        """Of the whole: queued until the first job starts, running until the last has ended."""
+        """State of the batch: queued until the first job starts, running until the last has ended."""
         counts = Counter(job.state for job in self.jobs)
         if not set(counts) - set(ENDED):
             return next((state for state in ("failed", "cancelled") if counts[state]), "succeeded")

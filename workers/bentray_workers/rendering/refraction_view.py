@@ -178,7 +178,7 @@ class RefractionView:
         return SMOOTHING_8_BIT if self._smooths and dtype == "uint8" else 0.0
 
     def filtered_within(self, low: float, high: float) -> RefractionView:
-        """As ``within`` for a filtered volume with values from ``low`` to ``high`` at the nodes.
+        """Check by ``within`` a filtered volume with values from ``low`` to ``high`` at the nodes.
 
         Raises:
             InvalidInput: as ``within``.

@@ -34,7 +34,7 @@ MAX_EMITTERS = 64
 
 
 def fine_nodes(settings: Timed) -> int:
-    """Of the grid that one wave front crosses."""
+    """Nodes of the grid that one wave front crosses."""
     side = settings.refinement * (settings.nodes - 1) + 1
     if isinstance(settings, VolumeSimulationSettings) and settings.three_d:
         return side**2 * ((settings.slices - 1 + 2 * AXIAL_MARGIN_NODES) * settings.refinement + 1)
@@ -78,14 +78,14 @@ def costly_setting(settings: Timed | WaveSimulationSettings, task: str) -> str:
 
 
 def result_bytes(settings: Timed | WaveSimulationSettings) -> int:
-    """Of the arrays in the file, before compression."""
+    """Bytes of the arrays in the file, before compression."""
     if isinstance(settings, WaveSimulationSettings):
         return 2 * 4 * settings.emissions * settings.elements * settings.samples
     return REAL * pairs(settings) * (1 + settings.attenuation + _noisy(settings))
 
 
 def cpu_seconds(settings: Timed | WaveSimulationSettings) -> tuple[float, float]:
-    """Of all tasks without media, and of the media that each worker makes for itself."""
+    """Seconds of all tasks without media, and of the media that each worker makes for itself."""
     packing = BYTE_S * result_bytes(settings)
     if isinstance(settings, WaveSimulationSettings):
         steps = settings.samples * settings.skip * settings.emissions
@@ -100,7 +100,7 @@ def cpu_seconds(settings: Timed | WaveSimulationSettings) -> tuple[float, float]
 
 
 def pairs(settings: Timed) -> int:
-    """Of all scans."""
+    """Number of pairs of all scans."""
     return settings.scans * settings.emitters**2
 
 
