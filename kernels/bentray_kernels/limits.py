@@ -70,26 +70,26 @@ OVER_PAIRS = (
 OVER_NODES = ("mask/roi", "truth/sound_speed_mps", "truth/attenuation_np_m")
 
 
-def check_size(place: str, shape: Sequence[int], shown: str = "") -> None:
+def check_size(path: str, shape: Sequence[int], shown: str = "") -> None:
     """Refuse an array of a scan that is larger than any scan has, from its shape alone.
 
     Args:
-        place: of the array in the upload format, as ``acquisition/tx``.
+        path: of the array in the upload format, as ``acquisition/tx``.
         shape: as the file declares it; whether it has the right axes is for others to check.
         shown: the name that it has in this file, if that is another.
 
     Raises:
         InvalidInput: naming the array, the number and the limit.
     """
-    counts = [*COUNTED.get(place, ())]
-    if len(counts) == 1 and place not in OVER_PAIRS:
+    counts = [*COUNTED.get(path, ())]
+    if len(counts) == 1 and path not in OVER_PAIRS:
         # A list may come as a row or a column.
         shape = (math.prod(shape),)
     for (what, within), count in zip(counts, reversed(shape), strict=False):
         if count > within.most:
-            raise InvalidInput(shown or place, f"{count} {what}", f"at most {within.most} {what}")
-    for places, what, within in ((OVER_PAIRS, "pairs", PAIRS), (OVER_NODES, "nodes", NODES)):
+            raise InvalidInput(shown or path, f"{count} {what}", f"at most {within.most} {what}")
+    for paths, what, within in ((OVER_PAIRS, "pairs", PAIRS), (OVER_NODES, "nodes", NODES)):
         # Traces have their samples beside.
         count = math.prod(shape[: len(shape) - len(counts)])
-        if place in places and count > within.most:
-            raise InvalidInput(shown or place, f"{count} {what}", f"at most {within.most} {what}")
+        if path in paths and count > within.most:
+            raise InvalidInput(shown or path, f"{count} {what}", f"at most {within.most} {what}")

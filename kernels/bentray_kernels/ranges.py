@@ -48,7 +48,7 @@ class Range:
         """The range in words, for errors and descriptions."""
         unit = f" {self.unit}" if self.unit else ""
         # Whole numbers in full: 9.0072e+15 is above the highest seed.
-        least, most = (str(one) if isinstance(one, int) else f"{one:g}" for one in (self.least, self.most))
+        least, most = (str(end) if isinstance(end, int) else f"{end:g}" for end in (self.least, self.most))
         if self.above or self.below:
             low, high = "above" if self.above else "from", "below" if self.below else "at most"
             return f"a number {low} {least} and {high} {most}{unit}"
@@ -78,7 +78,7 @@ def ranged(default: Any, within: Range, **metadata: Any) -> Any:
 
 def ranges_of(kind: Any) -> Mapping[str, Range]:
     """The ranges of a dataclass by its fields."""
-    return {one.name: one.metadata[RANGE] for one in fields(kind) if RANGE in one.metadata}
+    return {setting.name: setting.metadata[RANGE] for setting in fields(kind) if RANGE in setting.metadata}
 
 
 def check_ranges(record: Any, before: str = "") -> None:
@@ -91,8 +91,8 @@ def check_ranges(record: Any, before: str = "") -> None:
     Raises:
         InvalidInput: naming the first field that is wrong, or the ``place`` in its metadata.
     """
-    for one in fields(record):
-        within = one.metadata.get(RANGE)
-        value = getattr(record, one.name)
+    for setting in fields(record):
+        within = setting.metadata.get(RANGE)
+        value = getattr(record, setting.name)
         if within is not None and value is not None:
-            within.check(before + one.metadata.get("place", one.name), value)
+            within.check(before + setting.metadata.get("place", setting.name), value)

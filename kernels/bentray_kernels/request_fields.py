@@ -74,12 +74,12 @@ def choices_of(kind: type) -> Mapping[str, tuple[str, ...]]:
     """The accepted words by field: those of its ``Literal`` type, or ``enum`` of its schema."""
     hints = get_type_hints(kind)
     choices = {}
-    for one in fields(kind):
-        parts = [hints[one.name], *get_args(hints[one.name])]
-        words = next((get_args(part) for part in parts if get_origin(part) is Literal), ())
-        words = words or (one.metadata.get("json_schema_extra") or {}).get("enum", ())
+    for entry in fields(kind):
+        types = [hints[entry.name], *get_args(hints[entry.name])]
+        words = next((get_args(hint) for hint in types if get_origin(hint) is Literal), ())
+        words = words or (entry.metadata.get("json_schema_extra") or {}).get("enum", ())
         if words:
-            choices[one.name] = tuple(words)
+            choices[entry.name] = tuple(words)
     return choices
 
 
@@ -96,7 +96,7 @@ def check(record: Any, choices: Mapping[str, Sequence[str]] | None = None, place
     """
     before = f"{place}." if place else ""
     kind: Any = type(record)
-    optional = {one.name for one in fields(record) if one.default is None} if choices is None else set()
+    optional = {entry.name for entry in fields(record) if entry.default is None} if choices is None else set()
     for name, words in (choices_of(kind) if choices is None else choices).items():
         value = getattr(record, name)
         if value not in words and not (value is None and name in optional):
@@ -120,25 +120,25 @@ class Declared(NamedTuple):
     neutral: tuple[Any, ...]
 
 
-def declared(kind: Any, place: str = "") -> dict[str, Declared]:
+def declared(kind: Any, path: str = "") -> dict[str, Declared]:
     """The fields of a dataclass, and of the dataclasses in it, by their own names.
 
     A field ``enabled`` has the name of its record: ``reflection`` is ``reflection.enabled``.
     """
-    found: dict[str, Declared] = {}
-    for one in fields(kind):
-        if is_dataclass(one.default):
-            found |= declared(one.default, f"{place}{one.name}.")
+    by_name: dict[str, Declared] = {}
+    for entry in fields(kind):
+        if is_dataclass(entry.default):
+            by_name |= declared(entry.default, f"{path}{entry.name}.")
         else:
-            name = place.rstrip(".") if one.name == "enabled" and place else one.name
-            known = one.metadata.get(USED_WHEN, ALWAYS), one.metadata.get(NEUTRAL, ())
-            found[name] = Declared(place + one.name, one.default, *known)
-    return found
+            name = path.rstrip(".") if entry.name == "enabled" and path else entry.name
+            conditions = entry.metadata.get(USED_WHEN, ALWAYS), entry.metadata.get(NEUTRAL, ())
+            by_name[name] = Declared(path + entry.name, entry.default, *conditions)
+    return by_name
 
 
-def value_at(record: Any, place: str) -> Any:
+def value_at(record: Any, path: str) -> Any:
     """The value of a field by its place, such as ``sart.relaxation``."""
-    for name in place.split("."):
+    for name in path.split("."):
         record = getattr(record, name)
     return record
 
@@ -153,17 +153,17 @@ def unused(
         facts: see ``FACTS``; what is not known may hold.
         requested: the same as requested, where some fields were decided since.
     """
-    known = declared(type(record))
-    values: dict[str, Any] = {name: value_at(record, one.place) for name, one in known.items()}
+    settings = declared(type(record))
+    values: dict[str, Any] = {name: value_at(record, setting.place) for name, setting in settings.items()}
     values |= facts or {}
     idle = {}
-    for place, default, uses, neutral in known.values():
-        value = value_at(record if requested is None else requested, place)
-        lacking = [_lacking(use, values, known) for use in uses]
+    for path, default, uses, neutral in settings.values():
+        value = value_at(record if requested is None else requested, path)
+        lacking = [_lacking(use, values, settings) for use in uses]
         if value not in (default, *neutral) and all(lacking):
             # What needs more than another alternative says nothing new.
-            shortest = [one for one in lacking if not any(other < one for other in lacking)]
-            idle[place] = default, ", or ".join(" and ".join(sorted(one)) for one in shortest)
+            shortest = [terms for terms in lacking if not any(other < terms for other in lacking)]
+            idle[path] = default, ", or ".join(" and ".join(sorted(terms)) for terms in shortest)
     return idle
 
 
@@ -173,29 +173,29 @@ def check_used(record: Any) -> Any:
     Raises:
         InvalidInput: naming the first field that has none, and when it would.
     """
-    for place, (default, lacking) in unused(record).items():
-        value = value_at(record, place)
-        found = repr(value) if isinstance(value, str) else value
-        raise InvalidInput(place, found, f"{_word(default)}, unless {lacking}")
+    for path, (default, lacking) in unused(record).items():
+        value = value_at(record, path)
+        shown = repr(value) if isinstance(value, str) else value
+        raise InvalidInput(path, shown, f"{_word(default)}, unless {lacking}")
     return record
 
 
 def effective_when(kind: Any) -> dict[str, str]:
     """When fields of a dataclass have an effect, in words, by place; without those that always have one."""
-    known = declared(kind)
+    settings = declared(kind)
     return {
-        one.place: ", or ".join(
-            " and ".join(_in_words(*term, known) for term in use.items()) for use in one.uses
+        setting.place: ", or ".join(
+            " and ".join(_in_words(*term, settings) for term in use.items()) for use in setting.uses
         )
-        for one in known.values()
-        if all(one.uses)
+        for setting in settings.values()
+        if all(setting.uses)
     }
 
 
-def _lacking(use: Use, values: Mapping[str, Any], known: Mapping[str, Declared]) -> set[str]:
+def _lacking(use: Use, values: Mapping[str, Any], settings: Mapping[str, Declared]) -> set[str]:
     """The conditions of an alternative that do not hold, as ``method is sart or auto``; empty if all may."""
     return {
-        _in_words(name, accepted, known)
+        _in_words(name, accepted, settings)
         for name, accepted in use.items()
         if name in values and not _meets(values[name], accepted)
     }
@@ -207,16 +207,16 @@ def _meets(value: Any, accepted: tuple[Any, ...] | Range) -> bool:
     return value in accepted
 
 
-def _in_words(name: str, accepted: tuple[Any, ...] | Range, known: Mapping[str, Declared]) -> str:
+def _in_words(name: str, accepted: tuple[Any, ...] | Range, settings: Mapping[str, Declared]) -> str:
     if name in FACTS:
         return FACTS[name]
     if accepted == ABOVE_ZERO:
-        return f"{known[name].place} is above 0"
+        return f"{settings[name].place} is above 0"
     *others, last = [accepted.words] if isinstance(accepted, Range) else map(_word, accepted)
     return (
-        f"{known[name].place} is {', '.join(others)} or {last}"
+        f"{settings[name].place} is {', '.join(others)} or {last}"
         if others
-        else f"{known[name].place} is {last}"
+        else f"{settings[name].place} is {last}"
     )
 
 

@@ -23,13 +23,13 @@ def answer(engine: str) -> dict[str, Any]:
     """Times of a small and a large problem, or why the device may not compute this engine."""
     timings: list[tuple[float, float, float]] = []
     for problem in benchmark_problems(engine):
-        found = measured(problem, None, REPEATS)
-        if found.compiled_s is None or found.device_s is None:
+        comparison = measured(problem, None, REPEATS)
+        if comparison.compiled_s is None or comparison.device_s is None:
             return _fault(engine, "it computes wrong results")
-        if not found.right:
-            reason = f"{problem.name} differs by {found.difference:.3g} {problem.error_unit}"
+        if not comparison.right:
+            reason = f"{problem.name} differs by {comparison.difference:.3g} {problem.error_unit}"
             return _fault(engine, f"{reason}, {problem.bound:g} is allowed")
-        timings.append((problem.size, found.compiled_s, found.device_s))
+        timings.append((problem.size, comparison.compiled_s, comparison.device_s))
     return {"engine": engine, "fault": "", "timings": timings}
 
 

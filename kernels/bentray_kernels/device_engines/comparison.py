@@ -62,7 +62,7 @@ def measured(engine: Engine, bandwidth: float | None, repeats: int) -> Compariso
     if engine.there is None:
         return Comparison(engine)
     runs = engine.here, engine.there
-    expected, found = (run() for run in runs)
+    expected, computed = (run() for run in runs)
     least = [float("inf"), float("inf")]
     for _ in range(repeats):
         for k, run in enumerate(runs):
@@ -72,7 +72,7 @@ def measured(engine: Engine, bandwidth: float | None, repeats: int) -> Compariso
     share = None
     if engine.least_bytes is not None and bandwidth is not None:
         share = engine.least_bytes / least[1] / bandwidth
-    return Comparison(engine, least[0], least[1], engine.error(found, expected), share)
+    return Comparison(engine, least[0], least[1], engine.error(computed, expected), share)
 
 
 def copy_bytes_per_s(session: Session) -> float:

@@ -41,16 +41,16 @@ class Engine:
     threads: int = 1
 
 
-def relative(found: Floats, expected: Floats) -> float:
+def relative(computed: Floats, expected: Floats) -> float:
     """Largest difference over the largest value."""
-    return float(np.abs(found - expected).max() / np.abs(expected).max())
+    return float(np.abs(computed - expected).max() / np.abs(expected).max())
 
 
-def rms_difference(found: Floats, expected: Floats) -> float:
+def rms_difference(computed: Floats, expected: Floats) -> float:
     """Root of the mean squared difference."""
-    return float(np.sqrt(((found - expected) ** 2).mean()))
+    return float(np.sqrt(((computed - expected) ** 2).mean()))
 
 
-def odd_pixels(found: Floats, expected: Floats) -> float:
+def odd_pixels(computed: Floats, expected: Floats) -> float:
     """Fraction of pixels that differ by more than one of 255."""
-    return float((np.abs(found - expected).max(axis=2) > 1.0).mean())
+    return float((np.abs(computed - expected).max(axis=2) > 1.0).mean())

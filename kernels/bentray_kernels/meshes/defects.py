@@ -62,21 +62,21 @@ def sound(vertices: Floats, faces: NDArray[np.integer]) -> SoundMesh:
     _plain(vertices, rows)
     in_a_face = np.unique(rows)
     # Adding 0 makes −0 the same as 0.
-    _, first, place = np.unique(vertices[in_a_face] + 0.0, axis=0, return_index=True, return_inverse=True)
+    _, first, number = np.unique(vertices[in_a_face] + 0.0, axis=0, return_index=True, return_inverse=True)
     origin = in_a_face[first]
-    joined: Ints = place.ravel()[np.searchsorted(in_a_face, rows)]
-    places = vertices[origin]
+    joined: Ints = number.ravel()[np.searchsorted(in_a_face, rows)]
+    points = vertices[origin]
     joined, repeated = without_repetition(joined)
-    joined, flat = without_flat_faces(places, joined)
-    _check_area(places, origin, joined, flat)
-    joined, near = merged_nearly(places, joined)
+    joined, flat = without_flat_faces(points, joined)
+    _check_area(points, origin, joined, flat)
+    joined, near = merged_nearly(points, joined)
     joined, repeated_near = without_repetition(joined) if near else (joined, 0)
     oriented, turned = _turned_alike(joined, origin, vertices)
     topology = topology_of(oriented)
-    _check_one_piece(places, topology)
+    _check_one_piece(points, topology)
     whole = cut_open(topology, np.zeros(len(topology.edges), bool))
     holes = len(topology.boundary_loops)
-    result = TriangleMesh(places[whole.origin], whole.faces.astype(np.int32))
+    result = TriangleMesh(points[whole.origin], whole.faces.astype(np.int32))
     if holes == 0 and _volume(result) < 0.0:
         result = TriangleMesh(result.vertices, np.ascontiguousarray(result.faces[:, ::-1]))
         turned = len(oriented) - turned
@@ -107,38 +107,38 @@ def _plain(vertices: Floats, faces: Ints) -> None:
     infinite = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     infinite = infinite[np.isin(infinite, faces)]
     if infinite.size:
-        found = f"{infinite.size} that are not finite, the first number {infinite[0]} (from 0)"
-        raise InvalidInput("vertices", found, "finite numbers, or no face with them")
+        given = f"{infinite.size} that are not finite, the first number {infinite[0]} (from 0)"
+        raise InvalidInput("vertices", given, "finite numbers, or no face with them")
     # The square of an area must neither overflow nor vanish.
     span = float(np.ptp(vertices[faces.ravel()], axis=0).max())
     if not 1e-60 < span < 1e60:
         raise InvalidInput("vertices", f"a box of {span:g}", "a longest side between 1e-60 and 1e60")
 
 
-def _check_area(places: Floats, origin: Ints, faces: Ints, left_out: int) -> None:
+def _check_area(points: Floats, origin: Ints, faces: Ints, left_out: int) -> None:
     """Reject faces without area that are left; ``left_out`` others are gone."""
     if not len(faces):
         raise InvalidInput("faces", f"{left_out} without area and no other", "triangles with an area")
-    thin = thinness(places, faces)
+    thin = thinness(points, faces)
     number = int((thin < THINNEST).sum())
     if number:
         corners = ", ".join(map(str, origin[faces[np.argmin(thin)]]))
-        found = f"{number} without area, the first between the vertices {corners}"
+        given = f"{number} without area, the first between the vertices {corners}"
         raise InvalidInput(
-            "faces", found, f"triangles as high as {THINNEST:g} of their longest side or higher"
+            "faces", given, f"triangles as high as {THINNEST:g} of their longest side or higher"
         )
 
 
-def _check_one_piece(places: Floats, topology: Topology) -> None:
+def _check_one_piece(points: Floats, topology: Topology) -> None:
     """Reject several pieces, with the distance of their vertices: what belongs together may lie apart."""
     pieces = int(topology.pieces.max()) + 1
     if pieces == 1:
         return
     largest = topology.pieces == np.bincount(topology.pieces).argmax()
-    own, others = (np.unique(topology.faces[part]) for part in (largest, ~largest))
-    apart = float(cKDTree(places[own]).query(places[others])[0].min())
-    found = f"{pieces} pieces that share no edges, their nearest corners {apart:g} apart"
-    raise InvalidInput("faces", found, "one connected surface: merge its corners, or keep the largest piece")
+    own, others = (np.unique(topology.faces[piece]) for piece in (largest, ~largest))
+    apart = float(cKDTree(points[own]).query(points[others])[0].min())
+    given = f"{pieces} pieces that share no edges, their nearest corners {apart:g} apart"
+    raise InvalidInput("faces", given, "one connected surface: merge its corners, or keep the largest piece")
 
 
 def _turned_alike(faces: Ints, origin: Ints, vertices: Floats) -> tuple[Ints, int]:
@@ -154,15 +154,15 @@ def _turned_alike(faces: Ints, origin: Ints, vertices: Floats) -> tuple[Ints, in
         start, end = origin[edges[np.argmax(count > 2)]]
         where = ", ".join(f"{value:g}" for value in vertices[start])
         first = f"the first from vertex {start} ({where}) to {end}"
-        found = f"{(count > 2).sum()} edges of three faces or more, {first}"
-        raise InvalidInput("faces", found, "two at most along an edge")
+        given = f"{(count > 2).sum()} edges of three faces or more, {first}"
+        raise InvalidInput("faces", given, "two at most along an edge")
     order = np.argsort(side_edge, kind="stable")
     second = np.cumsum(count)[count == 2] - 1
-    one, other = order[second - 1], order[second]
+    earlier, other = order[second - 1], order[second]
     start, _ = side_ends(faces)
     # Each face occurs in both orientations; compatible ones along an edge are linked.
-    number, alike = len(faces), (start[one] == start[other]).astype(np.int64)
-    f, g = one // 3, other // 3
+    number, alike = len(faces), (start[earlier] == start[other]).astype(np.int64)
+    f, g = earlier // 3, other // 3
     labels = components(
         2 * number,
         np.concatenate((f, f + number)),

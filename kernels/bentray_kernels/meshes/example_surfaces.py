@@ -102,25 +102,25 @@ def _strips(numbers: Ints, closed: bool) -> Ints:
     return faces
 
 
-def _geodesic(parts: int) -> TriangleMesh:
+def _geodesic(divisions: int) -> TriangleMesh:
     """The unit sphere as an icosahedron, each edge in so many parts."""
     corners, base = _icosahedron()
-    steps = [(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]
+    steps = [(i, j) for i in range(divisions + 1) for j in range(divisions + 1 - i)]
     number = {step: k for k, step in enumerate(steps)}
-    upright = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in steps if i + j < parts]
+    upright = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in steps if i + j < divisions]
     turned = [
-        (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i, j in steps if i + j < parts - 1
+        (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i, j in steps if i + j < divisions - 1
     ]
     inner = np.array(upright + turned)
-    share = np.array([(parts - i - j, i, j) for i, j in steps]) / parts
-    places = (share[np.newaxis, ..., np.newaxis] * corners[base][:, np.newaxis]).sum(axis=2).reshape(-1, 3)
-    places /= np.linalg.norm(places, axis=1, keepdims=True)
+    share = np.array([(divisions - i - j, i, j) for i, j in steps]) / divisions
+    points = (share[np.newaxis, ..., np.newaxis] * corners[base][:, np.newaxis]).sum(axis=2).reshape(-1, 3)
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
     faces = (inner + len(steps) * np.arange(len(base))[:, np.newaxis, np.newaxis]).reshape(-1, 3)
     # The faces of the icosahedron share the vertices along their edges.
     _, first, shared = np.unique(
-        np.round(places * 1e9).astype(np.int64), axis=0, return_index=True, return_inverse=True
+        np.round(points * 1e9).astype(np.int64), axis=0, return_index=True, return_inverse=True
     )
-    return TriangleMesh(places[first], shared.ravel()[faces].astype(np.int32))
+    return TriangleMesh(points[first], shared.ravel()[faces].astype(np.int32))
 
 
 def _icosahedron() -> tuple[Floats, Ints]:

@@ -54,12 +54,12 @@ def isosurface_mesh(values: NDArray[np.floating | np.integer], spacing: Floats, 
     shape = np.array(field.shape)
     a, b = field.ravel()[start], field.ravel()[end]
     with np.errstate(divide="ignore", invalid="ignore"):
-        part = (iso - a) / (b - a)
-    places = [np.column_stack(np.unravel_index(at, field.shape)).astype(np.float64) for at in (start, end)]
+        fraction = (iso - a) / (b - a)
+    end_nodes = [np.column_stack(np.unravel_index(at, field.shape)).astype(np.float64) for at in (start, end)]
     # Outside of the volume nothing is above the iso-value: there the surface lies on the outermost nodes.
-    outer = ((places[1] == 0) | (places[1] == shape - 1)).any(axis=1)
-    part = np.clip(np.where(outer, 0.0, part), MIN_FRACTION, 1.0 - MIN_FRACTION)[:, np.newaxis]
-    vertices = (places[0] + part * (places[1] - places[0]) - 1.0) * spacing
+    outer = ((end_nodes[1] == 0) | (end_nodes[1] == shape - 1)).any(axis=1)
+    fraction = np.clip(np.where(outer, 0.0, fraction), MIN_FRACTION, 1.0 - MIN_FRACTION)[:, np.newaxis]
+    vertices = (end_nodes[0] + fraction * (end_nodes[1] - end_nodes[0]) - 1.0) * spacing
     return TriangleMesh(vertices, inverse.reshape(-1, 3).astype(np.int32))
 
 
@@ -69,9 +69,9 @@ def _tetrahedra(inside: Flags) -> Ints:
     low = np.ones(tuple(n - 1 for n in shape), bool)
     high = np.zeros_like(low)
     for corner in np.ndindex(2, 2, 2):
-        part = inside[tuple(slice(c, n - 1 + c) for c, n in zip(corner, shape, strict=True))]
-        low &= part
-        high |= part
+        corner_inside = inside[tuple(slice(c, n - 1 + c) for c, n in zip(corner, shape, strict=True))]
+        low &= corner_inside
+        high |= corner_inside
     cells = np.ravel_multi_index(np.nonzero(high & ~low), shape)
     steps = np.array([shape[1] * shape[2], shape[2], 1])
     nodes: Ints = cells[:, np.newaxis, np.newaxis] + TETRAHEDRA @ steps

@@ -64,13 +64,13 @@ def merged_nearly(vertices: Floats, faces: Ints) -> Repaired:
         return Repaired(faces, 0)
     reach = min(ROUNDED * float(np.abs(vertices).max()), float(_sides(vertices, faces).min()) / CLEAR)
     pairs = cKDTree(vertices[ends]).query_pairs(reach, output_type="ndarray")
-    place = _merged(len(vertices), ends[pairs])
-    joined = place[faces]
+    number = _merged(len(vertices), ends[pairs])
+    joined = number[faces]
     after = edges_of(joined)[2]
     closes = (after == 1).sum() < (count == 1).sum() and (after > 2).sum() <= (count > 2).sum()
     if not closes or _repeats_a_vertex(joined).any():
         return Repaired(faces, 0)
-    return Repaired(joined, int((place != np.arange(len(place))).sum()))
+    return Repaired(joined, int((number != np.arange(len(number))).sum()))
 
 
 def without_flat_faces(vertices: Floats, faces: Ints) -> Repaired:
@@ -103,7 +103,7 @@ def _divided(vertices: Floats, faces: Ints, flat: Flags) -> Repaired | None:
     """One pass of ``without_flat_faces`` over faces on a line; None where nothing can be repaired."""
     edges, side_edge, count = edges_of(faces)
     span = int(faces.max()) + 1
-    known = edges[:, 0] * span + edges[:, 1]
+    existing = edges[:, 0] * span + edges[:, 1]
     thin = np.flatnonzero(flat)
     longest = np.argmax(_sides(vertices, faces[thin]), axis=1)
     edge = side_edge[3 * thin + longest]
@@ -113,11 +113,11 @@ def _divided(vertices: Floats, faces: Ints, flat: Flags) -> Repaired | None:
     start, end, middle = (faces[thin, (longest + step) % 3] for step in range(3))
     corner = faces[across].sum(axis=1) - start - end
     new = np.minimum(middle, corner) * span + np.maximum(middle, corner)
-    gives = (across >= 0) & ~flat[across] & (corner != middle) & ~np.isin(new, known)
+    gives = (across >= 0) & ~flat[across] & (corner != middle) & ~np.isin(new, existing)
     # Each neighbour and each new edge once in a pass.
-    for one in (across, new):
+    for edge_of in (across, new):
         first = np.zeros(len(thin), bool)
-        first[np.flatnonzero(gives)[np.unique(one[gives], return_index=True)[1]]] = True
+        first[np.flatnonzero(gives)[np.unique(edge_of[gives], return_index=True)[1]]] = True
         gives &= first
     # No edge opens without a face none of whose sides has two faces.
     loose = (count[side_edge.reshape(-1, 3)[thin]] != 2).all(axis=1)
@@ -127,8 +127,8 @@ def _divided(vertices: Floats, faces: Ints, flat: Flags) -> Repaired | None:
         return None
     neighbour = faces[across[gives]]
     halves = [
-        np.where(neighbour == one[gives, np.newaxis], middle[gives, np.newaxis], neighbour)
-        for one in (start, end)
+        np.where(neighbour == ends[gives, np.newaxis], middle[gives, np.newaxis], neighbour)
+        for ends in (start, end)
     ]
     kept = faces.copy()
     kept[across[gives]] = halves[0]

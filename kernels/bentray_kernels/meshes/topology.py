@@ -58,11 +58,11 @@ class Topology:
 
     def fans(self, joined: Flags) -> Ints:
         """(3·faces,) the fan of each corner: corners of one vertex that joined edges, (edges,), connect."""
-        one, other = self.edge_sides[joined].T
+        first, other = self.edge_sides[joined].T
         # Two faces run along their edge in opposite directions: where one starts there, the other ends.
         return components(
             self.faces.size,
-            np.concatenate((one, side_end(one))),
+            np.concatenate((first, side_end(first))),
             np.concatenate((side_end(other), other)),
         )
 
@@ -115,9 +115,9 @@ def edges_of(faces: NDArray[np.integer]) -> tuple[Ints, Ints, Ints]:
     return np.column_stack((keys // span, keys % span)), side_edge.ravel(), count
 
 
-def components(number: int, one: Ints, other: Ints) -> Ints:
+def components(number: int, first: Ints, other: Ints) -> Ints:
     """(number,) labels from 0 of what the links one–other connect."""
-    graph = coo_array((np.ones(len(one), np.int8), (one, other)), shape=(number, number))
+    graph = coo_array((np.ones(len(first), np.int8), (first, other)), shape=(number, number))
     labels: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
     return labels
 

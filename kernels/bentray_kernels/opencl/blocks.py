@@ -38,9 +38,9 @@ def travel_times(
     times = np.empty((len(seeds), *shape))
     at_once = max(1, session.doubles_at_once() // blocks.points)
     for start in range(0, len(seeds), at_once):
-        part = slice(start, start + at_once)
-        fields = crossings if shared else crossings[part]
-        times[part] = _advance_until_settled(session, blocks, fields, seeds[part], tolerance)
+        batch = slice(start, start + at_once)
+        fields = crossings if shared else crossings[batch]
+        times[batch] = _advance_until_settled(session, blocks, fields, seeds[batch], tolerance)
     return times
 
 
@@ -106,10 +106,10 @@ def _advance_until_settled(
     lists: tuple[set[int], set[int]] = set(), set()
     for k, (nodes, values) in enumerate(seeds):
         start[k, nodes] = values
-        places = list(blocks.around(nodes))
-        for place in places:
-            entry = k * blocks.number + int(np.ravel_multi_index(place, blocks.counts))
-            lists[(sum(place) - sum(places[0])) % 2].add(entry)
+        indices = list(blocks.around(nodes))
+        for index in indices:
+            entry = k * blocks.number + int(np.ravel_multi_index(index, blocks.counts))
+            lists[(sum(index) - sum(indices[0])) % 2].add(entry)
     cut = blocks.cut(start.reshape(len(seeds), *blocks.shape))
     queued = np.zeros(len(seeds) * blocks.number, np.int32)
     counts = np.array([len(lists[0]), len(lists[1]), 0], np.uint32)

@@ -61,13 +61,13 @@ class DeviceBenchmark:
         """Whether the device takes less time than compiled code for a problem of that size."""
         if not self.timings:
             return False
-        compiled = _seconds([(one.size, one.compiled_s) for one in self.timings], size)
-        return _seconds([(one.size, one.device_s) for one in self.timings], size) < compiled
+        compiled = _seconds([(timing.size, timing.compiled_s) for timing in self.timings], size)
+        return _seconds([(timing.size, timing.device_s) for timing in self.timings], size) < compiled
 
 
-def _seconds(known: Sequence[tuple[float, float]], size: float) -> float:
+def _seconds(timings: Sequence[tuple[float, float]], size: float) -> float:
     """Time of a problem: a start and a time per unit, from the smallest and the largest known problem."""
-    (small, first), (large, last) = min(known), max(known)
+    (small, first), (large, last) = min(timings), max(timings)
     each = max(0.0, (last - first) / (large - small)) if large > small else last / large
     start = max(0.0, first - each * small)
     return start + each * size
@@ -77,11 +77,11 @@ def stored_benchmark(device: Device, engine: str) -> DeviceBenchmark | None:
     """The benchmark in the cache; None if it is absent or damaged."""
     content = read_record(_file(device, engine))
     try:
-        timings = tuple(Timing(*map(float, one)) for one in content["timings"])
+        timings = tuple(Timing(*map(float, pair)) for pair in content["timings"])
         result = DeviceBenchmark(timings, str(content["fault"]), int(content["attempts"]))
     except (ValueError, KeyError, TypeError):
         return None
-    numbers = [number for one in timings for number in one]
+    numbers = [number for timing in timings for number in timing]
     whole = all(math.isfinite(number) and number > 0.0 for number in numbers)
     return result if whole and bool(timings) != bool(result.fault) else None
 
@@ -102,9 +102,9 @@ def benchmark_of(device: Device, engine: str) -> DeviceBenchmark:
 def examine(device: Device, engine: str, child: Child, time_out_s: float) -> DeviceBenchmark:
     """Try an engine; a device that ends or stops the child has a fault."""
     answers, ending = child(device, engine, time_out_s)
-    answer = next((one for one in answers if one.get("engine") == engine), {"fault": ending})
+    answer = next((answer for answer in answers if answer.get("engine") == engine), {"fault": ending})
     if not answer["fault"]:
-        return DeviceBenchmark(tuple(Timing(*map(float, one)) for one in answer["timings"]))
+        return DeviceBenchmark(tuple(Timing(*map(float, pair)) for pair in answer["timings"]))
     before = stored_benchmark(device, engine)
     return DeviceBenchmark((), str(answer["fault"]), 1 + (before.attempts if before else 0))
 

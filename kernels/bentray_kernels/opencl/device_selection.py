@@ -75,13 +75,13 @@ def session_or_warning(instead: str) -> Session | None:
         return None
     # Only one thread may test or open a device at a time.
     with _OPENING:
-        found = _found(os.environ.get(WISH), hidden())
-        if isinstance(found, str):
-            _warn_once(instead, found)
+        session = _found(os.environ.get(WISH), hidden())
+        if isinstance(session, str):
+            _warn_once(instead, session)
             return None
-    if found.lost:
-        raise DeviceLostError(found.lost)
-    return found
+    if session.lost:
+        raise DeviceLostError(session.lost)
+    return session
 
 
 def open_session(device: Device) -> Session:

@@ -108,9 +108,9 @@ def select_devices(devices: Sequence[Device], selection: str | None) -> tuple[De
     fitting = [device for device in devices if str(device.index) == word]
     fitting = fitting or [device for device in devices if word in device.label.lower()]
     if len(fitting) != 1:
-        known = "; ".join(f"{device.index} = {device.label}" for device in devices) or "there is none here"
+        listed = "; ".join(f"{device.index} = {device.label}" for device in devices) or "there is none here"
         value = f"{selection!r}, which fits {len(fitting)} devices"
-        raise InvalidInput(WISH, value, f"an index or a part of the name of one OpenCL device: {known}")
+        raise InvalidInput(WISH, value, f"an index or a part of the name of one OpenCL device: {listed}")
     return tuple(fitting)
 
 

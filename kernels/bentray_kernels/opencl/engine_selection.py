@@ -127,8 +127,8 @@ def misfit(work: Work, device: Device) -> str:
 def _required() -> Device:
     chosen = select_device()
     if chosen.device is None:
-        found = f"'opencl', but {chosen.reason}"
-        raise InvalidInput("device", found, "auto or cpu, or see `bentray devices`")
+        given = f"'opencl', but {chosen.reason}"
+        raise InvalidInput("device", given, "auto or cpu, or see `bentray devices`")
     return chosen.device
 
 
@@ -140,7 +140,7 @@ def _tested_device() -> Device | None:
             return _passing(devices)[0]
     for device in devices:
         if stored_self_test_result(device) is not None and any(
-            stored_benchmark(device, one) for one in ENGINES
+            stored_benchmark(device, engine) for engine in ENGINES
         ):
             return device
     return None

@@ -37,10 +37,10 @@ def library_of(handle: Any) -> str:
     function = ctypes.c_void_p.from_address(table).value if table else None
     info = _SymbolInfo()
     try:
-        known = function and ctypes.CDLL(None).dladdr(ctypes.c_void_p(function), ctypes.byref(info))
+        located = function and ctypes.CDLL(None).dladdr(ctypes.c_void_p(function), ctypes.byref(info))
     except (OSError, AttributeError):  # a system without dladdr
         return ""
-    return os.fsdecode(info.file) if known and info.file else ""
+    return os.fsdecode(info.file) if located and info.file else ""
 
 
 @cache

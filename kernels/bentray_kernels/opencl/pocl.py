@@ -61,8 +61,8 @@ def prepare(handle: Any) -> None:
 
 def system_links(root: Path = Path("/")) -> bool:
     """Whether the system has a linker and the libraries that PoCL links."""
-    found = (any(any(root.glob(pattern)) for pattern in patterns) for patterns in SYSTEM_LIBRARIES)
-    return shutil.which("ld") is not None and all(found)
+    matches = (any(any(root.glob(pattern)) for pattern in patterns) for patterns in SYSTEM_LIBRARIES)
+    return shutil.which("ld") is not None and all(matches)
 
 
 def _provide_linker() -> None:
@@ -78,8 +78,8 @@ def _name_processor(handle: Any) -> None:
     name = processor_name(processor())
     field = ctypes.c_char_p.from_address(handle.int_ptr + NAME_OFFSET)
     # The version string, already built, ends with the original name.
-    known = (field.value or b"").decode()
-    if name in (None, known) or not known or not handle.version.strip().endswith(f"-{known}"):
+    own_name = (field.value or b"").decode()
+    if name in (None, own_name) or not own_name or not handle.version.strip().endswith(f"-{own_name}"):
         return
     copy = ctypes.CDLL(None).strdup
     copy.restype = ctypes.c_void_p

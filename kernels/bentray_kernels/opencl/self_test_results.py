@@ -87,8 +87,8 @@ def in_a_child(device: Device, stages: Sequence[str], time_out_s: float) -> tupl
         The faults of the completed stages, and how the process ended in the next one.
     """
     answers, ending = answers_of(f"{__package__}.self_test", device, stages, time_out_s)
-    known = [answer for answer in answers if {"stage", "fault"} <= answer.keys()]
-    return {str(answer["stage"]): str(answer["fault"]) for answer in known}, ending
+    faults = [answer for answer in answers if {"stage", "fault"} <= answer.keys()]
+    return {str(answer["stage"]): str(answer["fault"]) for answer in faults}, ending
 
 
 def _file(device: Device) -> Path | None:

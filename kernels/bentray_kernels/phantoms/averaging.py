@@ -52,15 +52,15 @@ def _cover(solid: Solid, axis: Floats, z: float, height: float) -> tuple[Flags, 
     """Cells that lie wholly in the solid, and cells that its boundary may pass through."""
     half = 0.5 * (axis[1] - axis[0])
     edges = np.append(axis - half, axis[-1] + half)
-    some = np.zeros((len(axis), len(axis)), bool)
-    every = ~some
+    mixed = np.zeros((len(axis), len(axis)), bool)
+    every = ~mixed
     for level in (z,) if height == 0.0 else (z - 0.5 * height, z, z + 0.5 * height):
         within = solid.level(edges[:, None], edges[None, :], np.array(level)) <= 1.0
         for corner in (within[:-1, :-1], within[1:, :-1], within[:-1, 1:], within[1:, 1:]):
-            some |= corner
+            mixed |= corner
             every &= corner
     # One cell more all round: a boundary may dip into a cell and leave all its corners on one side.
-    partly = binary_dilation(some & ~every, np.ones((3, 3), bool))
+    partly = binary_dilation(mixed & ~every, np.ones((3, 3), bool))
     return every & ~partly, partly
 
 
@@ -74,9 +74,9 @@ def _labels(
 ) -> NDArray[np.uint8]:
     """Number of the solid on top, from 1, at each point of each cell in ``cut``; (cells, points)."""
     count = SUBSAMPLES if height == 0.0 else VOLUME_SUBSAMPLES
-    parts = (np.arange(count) + 0.5) / count - 0.5
-    levels = parts * height if height > 0.0 else np.zeros(1)
-    across = parts * (axis[1] - axis[0])
+    offsets = (np.arange(count) + 0.5) / count - 0.5
+    levels = offsets * height if height > 0.0 else np.zeros(1)
+    across = offsets * (axis[1] - axis[0])
     dx, dy, dz = (p.ravel() for p in np.meshgrid(across, across, levels, indexing="ij"))
     label = np.zeros((np.count_nonzero(cut), len(dx)), np.uint8)
     for number, (solid, (wholly, partly)) in enumerate(zip(solids, covers, strict=True), start=1):

@@ -53,18 +53,18 @@ def table7(coupling_mps: float = 1500.0, nodes: int = 128) -> VolumePhantom:
         return Dome(CHEST_M, NIPPLE_M - thickness, (0.0, 0.0), axes, 2.4, (0.004, -0.003))
 
     def lesion(
-        place: tuple[float, float, float], voxels: tuple[float, float, float], angle: float = 0.0
+        centre: tuple[float, float, float], voxels: tuple[float, float, float], angle: float = 0.0
     ) -> Solid:
         a, b, h = (0.5 * count * voxel for count in voxels)
-        return Ellipsoid(place, (a, b, h), angle)
+        return Ellipsoid(centre, (a, b, h), angle)
 
     def large(
-        place: tuple[float, float, float], voxels: tuple[float, float, float], attenuation: float
+        centre: tuple[float, float, float], voxels: tuple[float, float, float], attenuation: float
     ) -> Part:
-        return Part(lesion(place, voxels, 0.5), LARGE_MPS, attenuation, "large lesion")
+        return Part(lesion(centre, voxels, 0.5), LARGE_MPS, attenuation, "large lesion")
 
-    def small(place: tuple[float, float, float], voxels: float) -> Part:
-        return Part(lesion(place, (voxels, voxels, voxels)), SMALL_MPS, SMALL_NP_M, "small lesion")
+    def small(centre: tuple[float, float, float], voxels: float) -> Part:
+        return Part(lesion(centre, (voxels, voxels, voxels)), SMALL_MPS, SMALL_NP_M, "small lesion")
 
     tissue = Dome(
         CHEST_M,

@@ -113,7 +113,7 @@ class VolumePhantom:
         if not (height > 0.0 and np.allclose(np.diff(z), height, rtol=1e-6, atol=0.0)):
             raise InvalidInput("z_m", z.tolist(), "two or more evenly rising positions in m")
         solids = [part.solid for part in self.parts]
-        planes = [plane_means(solids, nodes, side_m, place, height, values) for place in z]
+        planes = [plane_means(solids, nodes, side_m, z_m, height, values) for z_m in z]
         return np.ascontiguousarray(np.stack(planes, axis=-1))
 
 

@@ -126,11 +126,11 @@ def trace_block(
     low, high = planes.limits(0 if tof is None else GUARD)
     most = longest((planes.nodes, *slowness.shape[1:]))
     crossing = slowness.ravel() * spacing
-    found = RayParts(
+    traced = RayParts(
         *_trace(fan, most, rays.counts, rays.by_nodes, crossing, low - offset, high - offset, offset)
     )
-    found.places[:, 0] += offset
-    return found
+    traced.places[:, 0] += offset
+    return traced
 
 
 def back_project_block(

@@ -90,7 +90,7 @@ class OpenCLCaster:
         medium: RefractiveMedium,
         search: Search,
         camera: tuple[Floats, Floats],
-        places: Floats,
+        pixels: Floats,
         depth: int,
         traced: Traced,
     ) -> None:
@@ -113,7 +113,7 @@ class OpenCLCaster:
                 name = self.session.handle.name
                 message = f"{name} casts rays wrong ({way.lower()}), caster.cast takes over: {fault}"
                 warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
-        rays = medium, search, camera, places, depth, traced
+        rays = medium, search, camera, pixels, depth, traced
         if self._faults[way]:
             cast(*rays)
         else:
@@ -129,13 +129,13 @@ class OpenCLCaster:
         """Difference from ``caster.cast`` for rays at the object, as a message; empty if correct."""
         import pyopencl as cl
 
-        camera, places = _towards_the_object(self.scene)
+        camera, pixels = _towards_the_object(self.scene)
         traced, expected = (allocate_results(TRIED, TRIED_DEPTH, False) for _ in range(2))
         try:
-            self.follow(medium, search, camera, places, TRIED_DEPTH, traced)
+            self.follow(medium, search, camera, pixels, TRIED_DEPTH, traced)
         except cl.Error as error:
             return f"it ends with {str(error).splitlines()[0]}"
-        cast(medium, search, camera, places, TRIED_DEPTH, expected)
+        cast(medium, search, camera, pixels, TRIED_DEPTH, expected)
         far, allowed = TOLERANCES[self.precision]
         same = (traced.fate == expected.fate) & (traced.crossed == expected.crossed)
         same &= np.abs(traced.direction - expected.direction).max(axis=1) <= far
@@ -147,7 +147,7 @@ class OpenCLCaster:
         medium: RefractiveMedium,
         search: Search,
         camera: tuple[Floats, Floats],
-        places: Floats,
+        pixels: Floats,
         depth: int,
         traced: Traced,
     ) -> None:
@@ -156,10 +156,10 @@ class OpenCLCaster:
         at_once = max(1, self.session.doubles_at_once() // (10 + 3 * traced.vertices.shape[1]))
         program = _program(self.precision, self._sum.name, medium.field.stencil, _way(search))
         kernel = self.session.kernel(program, "follow")
-        for start in range(0, len(places), at_once):
+        for start in range(0, len(pixels), at_once):
             rays = slice(start, start + at_once)
             with self.session.lock:
-                self._launch(kernel, medium, search, camera, places[rays], depth, traced.part(rays))
+                self._launch(kernel, medium, search, camera, pixels[rays], depth, traced.part(rays))
 
     def _launch(
         self,
@@ -167,7 +167,7 @@ class OpenCLCaster:
         medium: RefractiveMedium,
         search: Search,
         camera: tuple[Floats, Floats],
-        places: Floats,
+        pixels: Floats,
         depth: int,
         traced: Traced,
     ) -> None:
@@ -176,7 +176,7 @@ class OpenCLCaster:
         # Setting an argument does not keep its buffer alive: the names do.
         levels, indices, frames, views, at = (
             session.upload(np.ascontiguousarray(array, real))
-            for array in (medium.levels, medium.indices, frame, np.stack(camera), places)
+            for array in (medium.levels, medium.indices, frame, np.stack(camera), pixels)
         )
         filled: list[Any] = [*traced]
         there = [self._room_for(array) for array in filled]
@@ -199,12 +199,12 @@ class OpenCLCaster:
             views,
             np.int32(depth),
             np.int32(traced.vertices.shape[1]),
-            np.uint32(len(places)),
+            np.uint32(len(pixels)),
             at,
             *there,
         )
         set_arguments(kernel, *arguments)
-        session.launch(kernel, (-(-len(places) // GROUP) * GROUP,), (GROUP,))
+        session.launch(kernel, (-(-len(pixels) // GROUP) * GROUP,), (GROUP,))
         for array, buffer in zip(filled, there, strict=True):
             if array.size:
                 self._download(array, buffer)
@@ -254,8 +254,8 @@ def _program(precision: str, summed: str, stencil: Stencil, way: str) -> Program
 
 def work_of(scene: Scene, rays: int) -> Work:
     """The rays of a picture of a scene, as work for ``opencl.place``; rays are cast in parts that fit."""
-    parts = (scene.field.coefficients, scene.octree.masks, scene.octree.bend)
-    sizes = [part.nbytes for part in parts]
+    arrays = (scene.field.coefficients, scene.octree.masks, scene.octree.bend)
+    sizes = [array.nbytes for array in arrays]
     # Rays take a quarter of the memory, see ``Session.doubles_at_once``.
     return Work("refraction", rays, 4 * sum(sizes) // 3, max(sizes))
 
@@ -269,8 +269,8 @@ def _towards_the_object(scene: Scene) -> tuple[tuple[Floats, Floats], Floats]:
     low, high = scene.origin + scene.box * scene.spacing
     middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low))
     camera = perspective(middle - 1.5 * size * np.array([0.48, 0.6, 0.64]), middle, (0.0, 0.0, 1.0), 40.0)
-    places = np.random.default_rng(0).uniform(-0.5, 0.5, (TRIED, 2))
-    return (camera.origin, camera.direction), places
+    pixels = np.random.default_rng(0).uniform(-0.5, 0.5, (TRIED, 2))
+    return (camera.origin, camera.direction), pixels
 
 
 def on_the_device(scene: Scene, precision: str | None = None) -> OpenCLCaster | None:

@@ -114,11 +114,11 @@ def render(
     times = settings.degree if settings.supersampling == "real" else 1
     spacing = settings.ray_spacing
     rows, columns = -(-times * settings.rows // spacing), -(-times * settings.columns // spacing)
-    places = _places(rows, columns, settings.seed if settings.supersampling == "real" else None)
+    pixels = _places(rows, columns, settings.seed if settings.supersampling == "real" else None)
     if spacing > 1:
         # The last ray may lie beyond the edge of the picture.
         covered = np.array([columns / settings.columns, rows / settings.rows])
-        places = (places + 0.5) * spacing * covered - 0.5
+        pixels = (pixels + 0.5) * spacing * covered - 0.5
     traced = allocate_results(rows * columns, settings.depth, False)
     plane, where = np.empty(rows * columns, dtype=np.int8), np.empty((rows * columns, 2))
     medium = medium_of(scene, settings.structure)
@@ -126,18 +126,18 @@ def render(
     # A device takes all rays at once.
     follow, at_once = (cast, TILE_ROWS) if caster is None else (caster.cast, rows)
 
-    def tile(part: slice) -> None:
+    def tile(rays: slice) -> None:
         pause()
-        filled = traced.part(part)
-        follow(medium, search, (camera.origin, camera.direction), places[part], settings.depth, filled)
-        locate(backdrop, filled.point, filled.direction, plane[part], where[part])
+        filled = traced.part(rays)
+        follow(medium, search, (camera.origin, camera.direction), pixels[rays], settings.depth, filled)
+        locate(backdrop, filled.point, filled.direction, plane[rays], where[rays])
 
     with ThreadPoolExecutor(settings.threads) as pool:
         list(pool.map(tile, _tiles(rows, columns, at_once)))
     shape = (rows, columns)
     lost = traced.fate == LOST
     plane[lost], where[lost] = -1, np.nan
-    found = _Found(
+    hits = _Found(
         plane.reshape(shape),
         where.reshape(*shape, 2),
         traced.fate.reshape(shape),
@@ -145,23 +145,23 @@ def render(
         traced.weight.reshape(shape),
     )
     if spacing > 1:
-        found = _of_pixels(found, settings)
-    image = np.empty((*found.plane.shape, 3), dtype=np.uint8)
-    light = found.weight if settings.fresnel else np.ones(found.plane.shape)
-    grid = (backdrop, found.plane, found.where)
+        hits = _of_pixels(hits, settings)
+    image = np.empty((*hits.plane.shape, 3), dtype=np.uint8)
+    light = hits.weight if settings.fresnel else np.ones(hits.plane.shape)
+    grid = (backdrop, hits.plane, hits.where)
     if settings.supersampling == "prss":
-        post_refraction_colours(*grid, found.crossed, light, settings.degree, image)
+        post_refraction_colours(*grid, hits.crossed, light, settings.degree, image)
     else:
         point_colours(*grid, light, image)
     # Where there is no plane, any edge leaves NaN what it is.
-    position = found.where * backdrop.edges[found.plane]
+    position = hits.where * backdrop.edges[hits.plane]
     return Picture(
         image if times == 1 else averaged(image, times),
         position,
-        found.plane,
-        found.fate,
-        found.crossed,
-        found.weight,
+        hits.plane,
+        hits.fate,
+        hits.crossed,
+        hits.weight,
     )
 
 

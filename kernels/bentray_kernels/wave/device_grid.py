@@ -114,11 +114,11 @@ class DeviceGrid:
 
     def taps(self, elements: Points) -> Ints:
         """Places of the taps of elements, (elements, 2 REACH, 2 REACH[, 2 REACH])."""
-        places: Ints = np.full((len(elements.first), *(1,) * len(self.shape)), self.shift, np.int64)
+        indices: Ints = np.full((len(elements.first), *(1,) * len(self.shape)), self.shift, np.int64)
         for axis, stride in enumerate(self.strides):
             along = (elements.first[:, axis, None] + np.arange(2 * REACH)) * stride
-            places = places + along.reshape(len(along), *_axis(axis, len(self.shape)))
-        return places
+            indices = indices + along.reshape(len(along), *_axis(axis, len(self.shape)))
+        return indices
 
 
 @dataclass(frozen=True)
@@ -140,14 +140,14 @@ class Gather:
     @classmethod
     def from_receivers(cls, grid: DeviceGrid, receivers: Points) -> Gather:
         """The taps of the receivers on a grid."""
-        places = grid.taps(receivers)
+        indices = grid.taps(receivers)
         dims = len(grid.shape)
         weights = np.ones((1,) * (1 + dims), receivers.weights.dtype)
         for axis in range(dims):
-            weights = weights * receivers.weights[:, axis].reshape(len(places), *_axis(axis, dims))
-        owner = np.broadcast_to(np.arange(len(places)).reshape(-1, *(1,) * dims), places.shape).ravel()
-        order = np.lexsort((owner, places.ravel()))
-        node, begin = np.unique(places.ravel()[order], return_index=True)
+            weights = weights * receivers.weights[:, axis].reshape(len(indices), *_axis(axis, dims))
+        owner = np.broadcast_to(np.arange(len(indices)).reshape(-1, *(1,) * dims), indices.shape).ravel()
+        order = np.lexsort((owner, indices.ravel()))
+        node, begin = np.unique(indices.ravel()[order], return_index=True)
         return cls(
             node.astype(np.uint32),
             np.append(begin, order.size).astype(np.uint32),
@@ -158,4 +158,4 @@ class Gather:
 
 def _axis(axis: int, dims: int) -> tuple[int, ...]:
     """Shape of the taps along one axis."""
-    return tuple(2 * REACH if one == axis else 1 for one in range(dims))
+    return tuple(2 * REACH if k == axis else 1 for k in range(dims))

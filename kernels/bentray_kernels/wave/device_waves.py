@@ -95,7 +95,7 @@ class DeviceWaves:
         self.drive, self.gather, self.gathered = self._factors[2], None, 0
         if scan.every:
             gather = Gather.from_receivers(self.grid, scan.receivers)
-            self.gather = [session.upload(part) for part in vars(gather).values()]
+            self.gather = [session.upload(array) for array in vars(gather).values()]
             self.gathered = len(gather.node)
 
     @property
@@ -136,13 +136,13 @@ class DeviceWaves:
 
     def advance(self, now: Any, new: Any) -> Any:
         """The kernel of a step from ``now``: the field before it, in ``new``, becomes the one after it."""
-        place = (np.uint32(self.grid.first), *self._strides, np.uint32(self.grid.blocks))
-        return self._kernel("advance", NOTHING, *self._stepping(now, new), *place)
+        layout = (np.uint32(self.grid.first), *self._strides, np.uint32(self.grid.blocks))
+        return self._kernel("advance", NOTHING, *self._stepping(now, new), *layout)
 
     def scatter(self, now: Any, before: Any, stored: Any) -> Any:
         """The kernel that stores what a change of the medium would scatter in the step from ``now``."""
-        place = (np.uint32(self.grid.shift), *self._strides, self.grid.nodes, stored, np.uint32(0))
-        return self._kernel("scatter", self.scan.store, *self._stepping(now, before), *place)
+        layout = (np.uint32(self.grid.shift), *self._strides, self.grid.nodes, stored, np.uint32(0))
+        return self._kernel("scatter", self.scan.store, *self._stepping(now, before), *layout)
 
     def _stepping(self, now: Any, before: Any) -> tuple[Any, ...]:
         return now, before, *self._factors, self._taps, self.kind.type(FLUSH)
@@ -160,15 +160,15 @@ class DeviceWaves:
         traces, *emitters = points
         receivers = len(self.scan.receivers.first) if reading else 0
         sizes = uints(self.scan.steps, receivers, self.grid.shift)
-        place = (*self._strides, self.grid.nodes, stored, *uints(0, 0))
+        layout = (*self._strides, self.grid.nodes, stored, *uints(0, 0))
         return self._kernel(
-            "exchange", store, now, new, self.drive, *self._receivers, traces, *emitters, *sizes, *place
+            "exchange", store, now, new, self.drive, *self._receivers, traces, *emitters, *sizes, *layout
         )
 
     def correlate(self, now: Any, stored: Any, image: Any, light: Any) -> Any:
         """The kernel that correlates the adjoint field ``now`` with a stored one."""
-        place = (np.uint32(self.grid.shift), *self._strides, self.grid.nodes, *uints(0, 0))
-        return self._kernel("correlate", NOTHING, now, stored, image, light, *place)
+        layout = (np.uint32(self.grid.shift), *self._strides, self.grid.nodes, *uints(0, 0))
+        return self._kernel("correlate", NOTHING, now, stored, image, light, *layout)
 
     def inject(self, new: Any, residual: Any) -> Any:
         """The kernel that ends a step backwards."""

@@ -48,8 +48,8 @@ def seam_sides(chart: Chart) -> Ints:
     alone = topology.edge_sides[topology.on_boundary, 0]
     pairs = topology.edge_sides[~topology.on_boundary]
     ends = chart.uv.reshape(-1, 2), np.roll(chart.uv, -1, axis=1).reshape(-1, 2)
-    one, other = pairs.T
-    apart = (ends[0][one] != ends[1][other]).any(axis=1) | (ends[1][one] != ends[0][other]).any(axis=1)
+    first, other = pairs.T
+    apart = (ends[0][first] != ends[1][other]).any(axis=1) | (ends[1][first] != ends[0][other]).any(axis=1)
     return np.concatenate((alone, pairs[apart].ravel()))
 
 

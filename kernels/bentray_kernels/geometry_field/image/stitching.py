@@ -59,14 +59,14 @@ def stitched(chart: Chart, raster: Raster) -> TriangleMesh:
     scale = len(raster.kind) - 1
     sides = seam_sides(chart)
     edges = topology_of(chart.mesh.faces).side_edge[sides]
-    parts = _parts(chart, sides, edges, scale)
+    divisions = _parts(chart, sides, edges, scale)
     for _ in range(HALVINGS):
-        seam = _seam(chart, sides, edges, parts, scale)
+        seam = _seam(chart, sides, edges, divisions, scale)
         pixels, quads = _inner(raster, seam)
         strip, missing = _strip(pixels, quads, seam)
         if not missing.any():
             break
-        parts[np.isin(edges, seam.edge[missing])] *= 2
+        divisions[np.isin(edges, seam.edge[missing])] *= 2
     numbers = np.full(raster.kind.shape, -1)
     numbers[tuple(pixels.T)] = np.arange(len(pixels))
     inner = np.argwhere(_in_quads(quads) & (numbers < 0))
@@ -79,9 +79,9 @@ def stitched(chart: Chart, raster: Raster) -> TriangleMesh:
         (np.arange(first), first + seam.vertex, first + len(seam.places) + np.arange(len(inner)))
     )
     assert last + len(inner) == len(vertex)
-    places = np.concatenate((positions[tuple(pixels.T)], seam.places, positions[tuple(inner.T)]))
+    points = np.concatenate((positions[tuple(pixels.T)], seam.places, positions[tuple(inner.T)]))
     used, inverse = np.unique(_without_folds(vertex[faces]), return_inverse=True)
-    return TriangleMesh(places[used], inverse.reshape(-1, 3).astype(np.int32))
+    return TriangleMesh(points[used], inverse.reshape(-1, 3).astype(np.int32))
 
 
 def _without_folds(faces: Ints) -> Ints:
@@ -103,36 +103,36 @@ def _parts(chart: Chart, sides: Ints, edges: Ints, scale: int) -> Ints:
     return np.maximum(np.ceil(longest[edges] / STEP).astype(np.int64), 1)
 
 
-def _seam(chart: Chart, sides: Ints, edges: Ints, parts: Ints, scale: int) -> Seam:
+def _seam(chart: Chart, sides: Ints, edges: Ints, divisions: Ints, scale: int) -> Seam:
     faces = chart.mesh.faces.astype(np.int64)
     start_uv, end_uv = chart.uv.reshape(-1, 2)[sides], np.roll(chart.uv, -1, axis=1).reshape(-1, 2)[sides]
     start, end = faces.reshape(-1)[sides], np.roll(faces, -1, axis=1).reshape(-1)[sides]
-    first = np.concatenate(([0], np.cumsum(parts)[:-1]))
-    side = np.repeat(np.arange(len(sides)), parts)
+    first = np.concatenate(([0], np.cumsum(divisions)[:-1]))
+    side = np.repeat(np.arange(len(sides)), divisions)
     step = np.arange(len(side)) - first[side]
-    share = (step / parts[side])[:, np.newaxis]
+    share = (step / divisions[side])[:, np.newaxis]
     uv = (start_uv[side] * (1.0 - share) + end_uv[side] * share) * scale
     # An edge's points are numbered from its lower vertex; the vertices themselves come first.
     upward = (start < end)[side]
-    along = np.where(upward, step, parts[side] - step)
+    along = np.where(upward, step, divisions[side] - step)
     corners, corner = np.unique(start, return_inverse=True)
     names, name = np.unique(edges, return_inverse=True)
     most = np.zeros(len(names), np.int64)
-    most[name] = parts
+    most[name] = divisions
     offset = len(corners) + np.concatenate(([0], np.cumsum(most - 1)[:-1]))
     vertex = np.where(step == 0, corner[side], offset[name[side]] + along - 1)
     low, high = np.where(start < end, (start, end), (end, start))
-    places = np.empty((len(corners) + int((most - 1).sum()), 3))
-    places[: len(corners)] = chart.mesh.vertices[corners]
+    points = np.empty((len(corners) + int((most - 1).sum()), 3))
+    points[: len(corners)] = chart.mesh.vertices[corners]
     between = step > 0
-    part = (along / parts[side])[between, np.newaxis]
+    fraction = (along / divisions[side])[between, np.newaxis]
     ends = chart.mesh.vertices[low[side[between]]], chart.mesh.vertices[high[side[between]]]
-    places[vertex[between]] = ends[0] * (1.0 - part) + ends[1] * part
+    points[vertex[between]] = ends[0] * (1.0 - fraction) + ends[1] * fraction
     # A side ends where another one starts at the same corner of the chart.
     following = _following(chart, sides)
-    last = step == parts[side] - 1
+    last = step == divisions[side] - 1
     ahead = np.where(last, first[following[side]], np.arange(len(side)) + 1)
-    return Seam(uv, ahead, vertex, edges[side], places)
+    return Seam(uv, ahead, vertex, edges[side], points)
 
 
 def _following(chart: Chart, sides: Ints) -> Ints:
@@ -141,9 +141,9 @@ def _following(chart: Chart, sides: Ints) -> Ints:
     parted = np.zeros(len(topology.edges), bool)
     parted[topology.side_edge[sides]] = True
     fans = topology.fans(~parted)
-    place = np.full(int(fans.max()) + 1, -1)
-    place[fans[sides]] = np.arange(len(sides))
-    return np.asarray(place[fans[sides - sides % 3 + (sides + 1) % 3]])
+    position = np.full(int(fans.max()) + 1, -1)
+    position[fans[sides]] = np.arange(len(sides))
+    return np.asarray(position[fans[sides - sides % 3 + (sides + 1) % 3]])
 
 
 def _inner(raster: Raster, seam: Seam) -> tuple[Ints, Flags]:
@@ -177,8 +177,8 @@ def _strip(pixels: Ints, quads: Flags, seam: Seam) -> tuple[Ints, Flags]:
     points = np.concatenate((pixels.astype(np.float64), seam.uv))
     faces = Delaunay(points).simplices.astype(np.int64)
     corners = points[faces]
-    one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    double = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    first, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    double = first[:, 0] * other[:, 1] - first[:, 1] * other[:, 0]
     faces = np.where((double < 0.0)[:, np.newaxis], faces[:, ::-1], faces)
     middle = corners.mean(axis=1)
     cell = np.clip(middle.astype(np.int64), 0, len(quads) - 1)
@@ -216,6 +216,6 @@ def _quad_faces(quads: Flags, numbers: Ints, positions: Floats) -> Ints:
     first = np.linalg.norm(positions[1:, 1:] - positions[:-1, :-1], axis=-1)[quads]
     second = np.linalg.norm(positions[1:, :-1] - positions[:-1, 1:], axis=-1)[quads]
     along = (first <= second)[:, np.newaxis]
-    one = np.where(along, np.column_stack((a, b, c)), np.column_stack((a, b, d)))
+    lower = np.where(along, np.column_stack((a, b, c)), np.column_stack((a, b, d)))
     other = np.where(along, np.column_stack((a, c, d)), np.column_stack((b, c, d)))
-    return np.concatenate((one, other))
+    return np.concatenate((lower, other))

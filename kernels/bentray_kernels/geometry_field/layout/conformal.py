@@ -39,8 +39,8 @@ class Disk:
     @classmethod
     def from_mesh(cls, vertices: Floats, opened: OpenMesh) -> Disk:
         """A mesh after its cut."""
-        places = vertices[opened.origin]
-        return cls(places, opened.faces, corner_angles(places[opened.faces]))
+        points = vertices[opened.origin]
+        return cls(points, opened.faces, corner_angles(points[opened.faces]))
 
     @cached_property
     def boundary(self) -> Ints:
@@ -69,8 +69,8 @@ class Disk:
     @cached_property
     def side_lengths(self) -> Floats:
         """(boundary,) from each vertex of the boundary to the next, in the unit of the vertices."""
-        places = self.vertices[self.boundary]
-        return np.asarray(np.linalg.norm(np.roll(places, -1, axis=0) - places, axis=1))
+        points = self.vertices[self.boundary]
+        return np.asarray(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))
 
     @cached_property
     def _dirichlet(self) -> tuple[SuperLU, csc_array]:
@@ -172,9 +172,9 @@ def stiffness(faces: Ints, angles: Floats, size: int) -> csc_array:
         size: number of vertices.
     """
     weight = (0.5 * np.cos(angles) / np.maximum(np.sin(angles), MIN_SINE)).ravel()
-    one, other = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, -2, axis=1).ravel()
-    rows = np.concatenate((one, other, one, other))
-    columns = np.concatenate((other, one, one, other))
+    first, other = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, -2, axis=1).ravel()
+    rows = np.concatenate((first, other, first, other))
+    columns = np.concatenate((other, first, first, other))
     values = np.concatenate((-weight, -weight, weight, weight))
     return csc_array((values, (rows, columns)), shape=(size, size))
 

@@ -56,8 +56,8 @@ class Cutter:
     def __init__(self, mesh: TriangleMesh, topology: Topology) -> None:
         self.topology = topology
         self.vertices = mesh.vertices
-        one, other = topology.edges.T
-        self.lengths: Floats = np.linalg.norm(self.vertices[one] - self.vertices[other], axis=1)
+        first, other = topology.edges.T
+        self.lengths: Floats = np.linalg.norm(self.vertices[first] - self.vertices[other], axis=1)
         self.graph = edge_graph(topology, self.lengths, len(self.vertices))
         self.angles = corner_angles(self.vertices[topology.faces])
 

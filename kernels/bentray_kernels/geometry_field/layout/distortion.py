@@ -12,8 +12,8 @@ from ...compiled import kernel
 
 def signed_areas(uv: Floats) -> Floats:
     """(faces,) of (faces, 3 corners, 2); negative for a flipped triangle."""
-    one, other = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    return np.asarray(0.5 * (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]))
+    first, other = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return np.asarray(0.5 * (first[:, 0] * other[:, 1] - first[:, 1] * other[:, 0]))
 
 
 def quasi_conformal_factors(corners: Floats, uv: Floats) -> Floats:
@@ -29,11 +29,11 @@ def quasi_conformal_factors(corners: Floats, uv: Floats) -> Floats:
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     length = np.linalg.norm(first, axis=1)
     double_area = np.linalg.norm(np.cross(first, second), axis=1)
-    one, other = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    along_u, other = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     # The derivatives along the first side and at right angles to it, within the triangle.
-    along = one / length[:, np.newaxis]
-    part = ((first * second).sum(axis=1) / length**2)[:, np.newaxis]
-    across = (other - part * one) * (length / double_area)[:, np.newaxis]
+    along = along_u / length[:, np.newaxis]
+    projection = ((first * second).sum(axis=1) / length**2)[:, np.newaxis]
+    across = (other - projection * along_u) * (length / double_area)[:, np.newaxis]
     squares = (along**2 + across**2).sum(axis=1)
     area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -64,9 +64,9 @@ def relaxed(plane: Floats, faces: Ints, moving: Ints) -> Floats:
     plane = plane.copy()
     if len(moving) == 0:
         return plane
-    one, other = np.roll(faces, -1, axis=1).ravel(), faces.ravel()
+    first, other = np.roll(faces, -1, axis=1).ravel(), faces.ravel()
     # Each inner edge comes once in either direction.
-    links = csc_array((np.ones(len(one)), (one, other)), shape=(len(plane), len(plane)))
+    links = csc_array((np.ones(len(first)), (first, other)), shape=(len(plane), len(plane)))
     degree = np.asarray(links.sum(axis=1)).ravel()
     rows = links[moving]
     staying = np.ones(len(plane), bool)

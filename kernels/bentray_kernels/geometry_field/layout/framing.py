@@ -11,16 +11,16 @@ from ...arrays import Floats
 TURNS = 90
 
 
-def in_unit_square(places: Floats) -> Floats:
+def in_unit_square(points: Floats) -> Floats:
     """This shape within [0, 1]²: turned to where its smallest upright square is smallest.
 
     Args:
-        places: (vertices, 2), not all on one line.
+        points: (vertices, 2), not all on one line.
 
     Returns:
         (vertices, 2); angles, orientation and ratios of lengths stay.
     """
-    hull = places[ConvexHull(places).vertices]
+    hull = points[ConvexHull(points).vertices]
     angles = np.linspace(0.0, 0.5 * np.pi, TURNS, endpoint=False)
     axes = (
         np.stack((np.cos(angles), -np.sin(angles)), axis=-1),
@@ -28,7 +28,7 @@ def in_unit_square(places: Floats) -> Floats:
     )
     spans = [np.ptp(hull @ axis.T, axis=0) for axis in axes]
     best = int(np.argmin(np.maximum(*spans)))
-    turned = places @ np.column_stack([axis[best] for axis in axes])
+    turned = points @ np.column_stack([axis[best] for axis in axes])
     low, high = turned.min(axis=0), turned.max(axis=0)
     # Rounding must not carry a corner out of the square.
     return np.asarray(np.clip((turned - 0.5 * (low + high)) / (high - low).max() + 0.5, 0.0, 1.0))

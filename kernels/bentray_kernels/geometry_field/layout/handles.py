@@ -46,16 +46,16 @@ def handle_cut(topology: Topology, lengths: Floats) -> Flags:
 
 def edge_graph(topology: Topology, lengths: Floats, size: int) -> csr_array:
     """The symmetric (size, size) matrix of the edges' lengths."""
-    one, other = topology.edges.T
-    both = (np.concatenate((one, other)), np.concatenate((other, one)))
+    first, other = topology.edges.T
+    both = (np.concatenate((first, other)), np.concatenate((other, first)))
     return csr_array((np.concatenate((lengths, lengths)), both), shape=(size, size))
 
 
-def edges_between(topology: Topology, one: Ints, other: Ints) -> Ints:
+def edges_between(topology: Topology, first: Ints, other: Ints) -> Ints:
     """The edges between pairs of neighbouring vertices."""
     span = int(topology.edges.max()) + 1
     keys = topology.edges[:, 0] * span + topology.edges[:, 1]
-    return np.searchsorted(keys, np.minimum(one, other) * span + np.maximum(one, other))
+    return np.searchsorted(keys, np.minimum(first, other) * span + np.maximum(first, other))
 
 
 def _loops(topology: Topology, lengths: Floats, distance: Floats, parent: Ints) -> Flags:
@@ -107,9 +107,9 @@ def _in_one_piece(topology: Topology, cut: Flags) -> Flags:
     piece = components(len(topology.faces), whole[:, 0], whole[:, 1])
     number = int(piece.max()) + 1
     across = np.flatnonzero(cut & inner)
-    one, other = np.sort(piece[faces[across]], axis=1).T
-    apart = np.flatnonzero(one != other)
-    keys, first = np.unique(one[apart] * number + other[apart], return_index=True)
+    low, other = np.sort(piece[faces[across]], axis=1).T
+    apart = np.flatnonzero(low != other)
+    keys, first = np.unique(low[apart] * number + other[apart], return_index=True)
     links = csr_array((np.ones(len(keys)), (keys // number, keys % number)), shape=(number, number))
     tree = minimum_spanning_tree(links).tocoo()
     in_tree = np.searchsorted(keys, tree.row.astype(np.int64) * number + tree.col)

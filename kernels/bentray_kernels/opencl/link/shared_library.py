@@ -63,8 +63,8 @@ def read(data: bytes) -> tuple[dict[int, Section], list[Symbol]]:
     symbols: list[Symbol] = []
     for number, (name, kind, flags, _, offset, size, link, _, align, _) in enumerate(rows):
         if kind == SYMTAB:
-            for place in range(offset, offset + size, 24):
-                at, info, _, section, value, length = struct.unpack_from(SYMBOL, data, place)
+            for at_symbol in range(offset, offset + size, 24):
+                at, info, _, section, value, length = struct.unpack_from(SYMBOL, data, at_symbol)
                 symbols.append(Symbol(_text(data, rows[link][4] + at), info, section, value, length))
         elif flags & ALLOC and not _text(data, names[4] + name).startswith((".eh_frame", ".note")):
             content = b"" if kind == NOBITS else data[offset : offset + size]
@@ -99,31 +99,31 @@ def link(data: bytes) -> bytes:
     texts = b"\0" + b"".join(symbols[k].name.encode() + b"\0" for k in shown)
     image = bytearray(64 + 4 * 56)
 
-    def place(size: int, align: int = 8) -> int:
+    def allocate(size: int, align: int = 8) -> int:
         image.extend(b"\0" * (-len(image) % align))
         start = len(image)
         image.extend(b"\0" * size)
         return start
 
-    table = place(4 * (3 + len(row) + 1))
-    listed = place(24 * (len(row) + 1))
-    strings = place(len(texts))
-    rela = place(24 * (len(slots) + absolute))
-    stubs = place(6 * len(called), 16)
+    table = allocate(4 * (3 + len(row) + 1))
+    listed = allocate(24 * (len(row) + 1))
+    strings = allocate(len(texts))
+    rela = allocate(24 * (len(slots) + absolute))
+    stubs = allocate(6 * len(called), 16)
     for section in sections.values():
         if not section.flags & WRITE:
-            section.address = place(section.size, section.align)
+            section.address = allocate(section.size, section.align)
     read_bytes = len(image)
-    written = place(0, PAGE)
-    got = place(8 * len(slots))
-    dynamic = place(16 * 9)
+    written = allocate(0, PAGE)
+    got = allocate(8 * len(slots))
+    dynamic = allocate(16 * 9)
     for section in sections.values():
         if section.flags & WRITE:
-            section.address = place(section.size, section.align)
+            section.address = allocate(section.size, section.align)
     commons = {}
     for k, symbol in enumerate(symbols):
         if symbol.section == COMMON:
-            commons[k] = place(symbol.size, max(1, symbol.value))
+            commons[k] = allocate(symbol.size, max(1, symbol.value))
     stub_of = {k: stubs + 6 * n for n, k in enumerate(sorted(called))}
 
     def address(k: int) -> int | None:
