@@ -112,12 +112,7 @@ def test_a_file_that_exists_is_kept_without_force(
     [
         (("--iso", 7), "iso"),
         (("--iso", 0.6, "--index", 1.1, "--index", 1.2), "index"),
-        (("--mode", "shaded", "--fresnel"), "fresnel"),
-        (("--index", 0), "index"),
-        (("--camera", "fisheye"), "camera"),
-        (("--filter", "box"), "filter"),
         (("--backdrop", "absent.jpg"), "backdrop"),
-        (("--width", 0), "width"),
         (("--phantom", "sphere"), "file"),
         (("--shape", 2, 2, 2), "dtype"),
         (("--dtype", "uint8"), "shape"),

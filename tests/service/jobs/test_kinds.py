@@ -155,12 +155,7 @@ def test_worker_rejection_fails_the_job_with_a_message(serving, until, monkeypat
     [
         ({"iso": [7.0]}, "iso"),
         ({"iso": 0.5}, "settings.iso"),
-        ({"index": [-1.0]}, "settings.index"),
-        ({"frames": 0}, "settings.frames"),
         ({"frames": 720, "width": 2048, "height": 2048}, "settings.frames"),
-        ({"format": "gif"}, "settings.format"),
-        ({"speed": 3}, "settings.speed"),
-        ({"width": "wide"}, "settings.width"),
     ],
 )
 def test_wrong_settings(start, settings, field):
@@ -296,23 +291,6 @@ def test_cancelled_fields_leave_no_files(start, kind):
     kinds.KINDS[kind].discard(files, written)
     assert not written.exists()
     assert Checksums(parts.database).all() == []
-
-
-@pytest.mark.parametrize(
-    ("settings", "field"),
-    [
-        ({"samples": 3}, "settings.samples"),
-        ({"samples": 49}, "settings.samples"),
-        ({"image_size": "large"}, "settings.image_size"),
-        ({"image_threshold": -1}, "settings.image_threshold"),
-        ({"iso": 1}, "settings.iso"),
-    ],
-)
-def test_wrong_settings_of_a_field(start, settings, field):
-    http = start()
-    body = ask_field(http, put_mesh(http), **settings).json()
-    assert (body["status"], body["field"]) == (422, field), body
-    assert http.get("/v1/jobs").json()["jobs"] == []
 
 
 def test_other_refusals_of_a_field(start, monkeypatch):

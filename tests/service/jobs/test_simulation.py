@@ -174,12 +174,6 @@ def test_stopped_service_resumes(serving, until, held):
 @pytest.mark.parametrize(
     ("settings", "field"),
     [
-        ({"phantom": "table9"}, "settings.phantom"),
-        ({"nodes": 4}, "settings.nodes"),
-        ({"nodes": "many"}, "settings.nodes"),
-        ({"waveform": True, "refinement": 4}, "settings.refinement"),
-        ({"phantom": "table7", "waveform": True, "slices": 4}, "settings.slices"),
-        ({"wavform": True}, "settings.wavform"),
         ({"refinement": 64}, "nodes"),
         ({"elements": 4096, "attenuation": True}, "elements"),
     ],

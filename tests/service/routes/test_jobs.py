@@ -120,20 +120,10 @@ def test_unknown_setting_lists_the_known_ones(http, dataset):
 @pytest.mark.parametrize(
     ("settings", "field"),
     [
-        ({"nodes": 1}, "settings.nodes"),
-        ({"nodes": "many"}, "settings.nodes"),
-        ({"rays": "wavy"}, "settings.rays"),
-        ({"sart": {"relaxation": 2}}, "settings.sart.relaxation"),
-        ({"sart": {"relaxed": 2}}, "settings.sart.relaxed"),
         ({"sart": 2}, "settings.sart"),
-        ({"gauss_newton": {"penalty_strength": "much"}}, "settings.gauss_newton.penalty_strength"),
         ({"speed_bounds_mps": [-1, 1500]}, "settings.speed_bounds_mps"),
         ({"speed_bounds_mps": [0, 1500]}, "settings.speed_bounds_mps"),
         ({"method": "auto", "sart": {"speed_range_mps": [1400, 1600]}}, "settings.sart.speed_range_mps"),
-        ({"method": "sart", "minutes": 3}, "settings.minutes"),
-        ({"rays": "straight", "eikonal": "fmm"}, "settings.eikonal"),
-        ({"gauss_newton": {"penalty": "laplacian", "edge_mps": 7}}, "settings.gauss_newton.edge_mps"),
-        ({"reflection": {"gain": "spreading"}}, "settings.reflection.gain"),
         ([], "settings"),
     ],
 )

@@ -19,25 +19,6 @@ def test_every_setting_and_the_mesh_name_the_field():
     assert FieldSettings().content("a") == plain.content("a")
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("samples", 3),
-        ("samples", 49),
-        ("inner_samples", 0),
-        ("divisions", 65),
-        ("image_size", 32),
-        ("image_size", 1026),
-        ("image_threshold", float("nan")),
-        ("image_threshold", -1.0),
-    ],
-)
-def test_rejects_invalid_input(name, value):
-    with pytest.raises(InvalidInput) as caught:
-        FieldSettings(**{name: value})
-    assert caught.value.field == name
-
-
 def test_a_mesh_that_is_too_large():
     check_faces(MAX_FACES)
     with pytest.raises(InvalidInput, match="mesh"):

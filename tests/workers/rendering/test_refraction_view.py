@@ -10,13 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import ranges_of
-from bentray_kernels.request_fields import choices_of
 from bentray_workers.rendering.refraction_view import SMOOTHING_8_BIT, RefractionView, check_even
-
-CHOICES = choices_of(RefractionView)
-
-WITHIN = {name: (within.least, within.most) for name, within in ranges_of(RefractionView).items()}
 
 
 def test_every_field_has_a_description():
@@ -26,30 +20,6 @@ def test_every_field_has_a_description():
 def test_the_default_is_one_surface_of_glass():
     view = RefractionView(smoothing=0.0).within(0.0, 3.0)
     assert (view.layers().isos, view.layers().indices) == ((1.5,), (1.0, 1.5))
-
-
-@pytest.mark.parametrize("name", CHOICES)
-def test_a_word_that_is_no_choice(name):
-    with pytest.raises(InvalidInput) as caught:
-        RefractionView(**{name: "magic"})
-    assert caught.value.field == name
-    assert all(choice in caught.value.accepted for choice in CHOICES[name])
-
-
-@pytest.mark.parametrize("name", WITHIN)
-@pytest.mark.parametrize("end", [0, 1])
-def test_a_number_out_of_its_range(name, end):
-    limit = WITHIN[name][end]
-    with pytest.raises(InvalidInput) as caught:
-        RefractionView(**{name: limit + (1 if end else -1)})
-    assert caught.value.field == name
-    RefractionView(**{name: limit, **({"height": 1} if name == "width" else {})})
-
-
-@pytest.mark.parametrize("name", [name for name in WITHIN if isinstance(WITHIN[name][0], float)])
-def test_nan_is_out_of_every_range(name):
-    with pytest.raises(InvalidInput, match=name):
-        RefractionView(**{name: math.nan})
 
 
 @pytest.mark.parametrize(

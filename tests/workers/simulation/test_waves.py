@@ -82,14 +82,9 @@ def test_the_dispersion_is_within_its_budget():
 @pytest.mark.parametrize(
     ("words", "field"),
     [
-        ({"frequency_hz": 0.0}, "frequency_hz"),
         ({"frequency_hz": 9e6, "side_m": 1.0}, "frequency_hz"),
         ({"side_m": 5.0}, "side_m"),
-        ({"elements": 4}, "elements"),
         ({"emissions": 200}, "emissions"),
-        ({"nodes": 4}, "nodes"),
-        ({"snr": 0.0}, "snr"),
-        ({"seed": -1}, "seed"),
     ],
 )
 def test_bad_settings_are_rejected(words, field):

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from bentray_kernels.errors import InvalidInput
 from bentray_kernels.request_fields import choices_of
 from bentray_kernels.splines import FILTERS
 from bentray_service.cli.options.field_options import SETTINGS, VIEW, FieldOptions
@@ -52,14 +51,3 @@ def test_a_backdrop_may_be_a_file() -> None:
 
 def test_the_names_of_filters_are_those_of_the_splines() -> None:
     assert choices_of(RefractionView)["filter"] == tuple(FILTERS)
-
-
-def test_a_wrong_value_is_named() -> None:
-    for options, field in (
-        (ViewOptions({"camera": "fisheye"}), "camera"),
-        (FieldOptions({"scene": "moon"}), "scene"),
-    ):
-        with pytest.raises(InvalidInput, match=field):
-            options.view()
-    with pytest.raises(InvalidInput, match="samples"):
-        FieldOptions({"samples": 99}).settings()
