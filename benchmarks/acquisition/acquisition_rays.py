@@ -11,7 +11,7 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import finite_frequency_candidates
-from bentray_kernels.tomography.model_selection.selection import explain_trials
+from bentray_kernels.tomography.model_selection.selection import explain_candidates
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import STRAIGHT_RAYS, Row
 from bentray_workers.files.dataset import read_dataset
@@ -93,7 +93,7 @@ def scan_rows(name: str, dataset: Dataset) -> Iterable[Row]:
         yield compared["Gauss-Newton"].row(target, ratio, 1.15, "<=", "", detail)
     default = images.default().result
     figures = images.compared(default, error_on)
-    why = explain_trials(default.trials)
+    why = explain_candidates(default.trials)
     straight = {
         way: other.baselines[STRAIGHT_RAYS] for way, other in (compared | {"default": figures}).items()
     }
@@ -122,7 +122,7 @@ def measured(quick: bool) -> Iterable[Row]:
     error_on = registered_error(truth, dataset.truth, RADIUS_M)
     compared = images.compared(result, error_on)
     x, y = (1e3 * shift for shift in truth.shift_m)
-    detail = f"truth shifted by {x:.1f}, {y:.1f} mm; {explain_trials(result.trials)}"
+    detail = f"truth shifted by {x:.1f}, {y:.1f} mm; {explain_candidates(result.trials)}"
     yield compared.row(labels[0], truth.rms_mps, 12.0, "<=", "m/s", detail)
     yield compared.row(labels[1], seconds, 20.0, "<=", "s", "one process, trials included")
     bent = images.compared(images.made(Settings.of(method="sart", attenuation=False)).result, error_on)

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.model_selection.selection import explain_trials
+from bentray_kernels.tomography.model_selection.selection import explain_candidates
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.simulation.plane import SimulationSettings
@@ -63,7 +63,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         detail = f"truth blurred by 1 mm {blurred:.1f}, "
         detail += ", ".join(f"{way} {made.rms:.1f} in {made.seconds:.1f} s" for way, made in images.items())
         nodes = default.result.settings.nodes
-        detail += f" (m/s); {nodes} nodes; {explain_trials(default.result.trials)}"
+        detail += f" (m/s); {nodes} nodes; {explain_candidates(default.result.trials)}"
         detail += f"; load at the end {os.getloadavg()[0]:.1f}"
         name = f"A2 detailed breast, {asked.elements} elements, noise {1e9 * noise:.0f} ns"
         yield compared.row(f"{name}: error", default.rms, ERROR_MPS, "<=", "m/s", detail)

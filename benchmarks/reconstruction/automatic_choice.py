@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
-from bentray_kernels.tomography.model_selection.selection import explain_trials
+from bentray_kernels.tomography.model_selection.selection import explain_candidates
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.simulation.plane import SimulationSettings
@@ -52,7 +52,7 @@ def choice_row(name: str, dataset: Dataset, error_on: ErrorOn, unit: str, contex
     compared = images.compared(default, error_on)
     detail = (
         f"{compared.error:.2f} {unit}, SART straight {errors['straight']:.2f}, bent {errors['curved']:.2f}; "
-        f"{explain_trials(default.trials)}; {default.speed.shape[0]}² nodes, {seconds:.0f} s at load "
+        f"{explain_candidates(default.trials)}; {default.speed.shape[0]}² nodes, {seconds:.0f} s at load "
         f"{os.getloadavg()[0]:.0f}"
     )
     target = f"N1 {name}: error of the automatic choice over the better SART"

@@ -18,7 +18,7 @@ import pytest
 import uvicorn
 
 from bentray_kernels.task_graph import Cancelled
-from bentray_kernels.tomography.result import Iteration, Progress, Reconstruction, Trial
+from bentray_kernels.tomography.result import Candidate, Iteration, Progress, Reconstruction
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
 from bentray_service.ingest import canonical
@@ -133,7 +133,7 @@ class FakeWork:
         # Of one node, in place of its speed.
         self.spoil: float | None = None
         self.stages = 1
-        self.trials: tuple[Trial, ...] = ()
+        self.trials: tuple[Candidate, ...] = ()
 
     def __call__(
         self,

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from .problem import Problem
     from .reconstruction import reconstruct
     from .regions import RegionStatistics, RoundRegion, region_statistics, round_nodes
-    from .result import RESIDUAL_EDGES_S, Caution, Iteration, Progress, Reconstruction, Trial
+    from .result import RESIDUAL_EDGES_S, Candidate, Caution, Iteration, Progress, Reconstruction
 else:
     MODULES = {
         "comparison": ("correlation", "mean_absolute_error", "rmse", "structural_similarity"),
         "problem": ("Problem",),
         "regions": ("RegionStatistics", "RoundRegion", "region_statistics", "round_nodes"),
         "reconstruction": ("reconstruct",),
-        "result": ("RESIDUAL_EDGES_S", "Caution", "Progress", "Reconstruction", "Iteration", "Trial"),
+        "result": ("RESIDUAL_EDGES_S", "Caution", "Progress", "Reconstruction", "Iteration", "Candidate"),
     }
 
     def __getattr__(name: str) -> object:
@@ -42,6 +42,7 @@ else:
 __all__ = [
     "RESIDUAL_EDGES_S",
     "AttenuationSettings",
+    "Candidate",
     "Caution",
     "GaussNewtonSettings",
     "Iteration",
@@ -53,7 +54,6 @@ __all__ = [
     "RoundRegion",
     "SartSettings",
     "Settings",
-    "Trial",
     "correlation",
     "mean_absolute_error",
     "reconstruct",

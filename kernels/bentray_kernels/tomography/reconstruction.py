@@ -45,7 +45,7 @@ from .reconstruction_graph import (
 from .reflection.memory_echoes import MemoryEchoScan
 from .reflection.reflection_plan import Echoes, check_reflection
 from .reflection.with_reflection import with_reflection
-from .result import Caution, Progress, Reconstruction, Trial
+from .result import Candidate, Caution, Progress, Reconstruction
 from .sart.sart_step import State
 from .settings import Settings
 from .stage_graphs import Scan
@@ -189,7 +189,7 @@ def _speed_of(
     requested = settings
     settings = with_nodes(dataset, with_decomposition(dataset.element_position_m, settings))
     count = pairs.count(dataset, settings)
-    trials: tuple[Trial, ...] = ()
+    trials: tuple[Candidate, ...] = ()
     before = 0
     waves = _refinement(dataset, settings, samples, wave_scan_of)
     allowed = waves is not None and (settings.method == "waveform" or waves.within_budget)
@@ -278,7 +278,7 @@ def _assembled(
     settings: Settings,
     first: Problem,
     graphs: Sequence[FinishedGraph],
-    trials: tuple[Trial, ...],
+    trials: tuple[Candidate, ...],
 ) -> Reconstruction:
     """The result of finished graphs: (nx, ny) for one slice, (nx, ny, nz) for several and for a volume."""
     spacing: tuple[float, ...] = (first.spacing,) * first.region.ndim

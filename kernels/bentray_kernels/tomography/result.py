@@ -111,7 +111,7 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class Trial:
+class Candidate:
     """A candidate model, reconstructed from the training pairs.
 
     Attributes:
@@ -189,7 +189,7 @@ class Reconstruction:
     resolution_width_m: tuple[float, ...] = ()
     reflection: Reflection | None = None
     residuals: NDArray[np.int64] | None = None
-    trials: tuple[Trial, ...] = ()
+    trials: tuple[Candidate, ...] = ()
     cautions: tuple[Caution, ...] = ()
     provenance: dict[str, str] = field(default_factory=dict)
 

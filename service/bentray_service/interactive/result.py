@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition import Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import (
+    Candidate,
     Caution,
     Iteration,
     Reconstruction,
     RegionStatistics,
     Settings,
-    Trial,
     region_statistics,
     round_nodes,
 )
@@ -142,7 +142,7 @@ class Result:
         return self._reconstruction().cautions
 
     @property
-    def trials(self) -> tuple[Trial, ...]:
+    def trials(self) -> tuple[Candidate, ...]:
         """The candidate models of method auto, the best first; raises InvalidInput for an uploaded volume."""
         return self._reconstruction().trials
 

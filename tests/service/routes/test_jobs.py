@@ -6,7 +6,7 @@ from dataclasses import fields
 import pytest
 
 from bentray_kernels.eikonal import methods
-from bentray_kernels.tomography.result import Trial
+from bentray_kernels.tomography.result import Candidate
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.rows.tenants import LOCAL
 
@@ -91,8 +91,8 @@ def test_jobs_are_taken_while_no_worker_is_connected(http, dataset, cluster):
 
 def test_automatic_choices_are_returned(http, dataset, work, until):
     work.trials = (
-        Trial({"rays": "straight", "method": "sart"}, 2e-8, 1e-8),
-        Trial({"rays": "curved", "method": "sart"}, 3e-8, 1e-8),
+        Candidate({"rays": "straight", "method": "sart"}, 2e-8, 1e-8),
+        Candidate({"rays": "curved", "method": "sart"}, 3e-8, 1e-8),
     )
     job = ask(http, dataset, {"nodes": 16, "method": "auto"}).json()
     assert job["advice"] is None

@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pytest
 
-from bentray_kernels.tomography.result import Trial
+from bentray_kernels.tomography.result import Candidate
 
 STREAM = {"Content-Type": "application/octet-stream"}
 RAMP = 1500.0 + np.arange(60.0)[:, None] + np.zeros(60)
@@ -20,7 +20,7 @@ def http(start):
 def result(http, scan, work, submitted, until):
     """The volume of a reconstruction of a scan with a truth, whose nodes 0 to 9 mm are those of the image."""
     straight, bent = ({"rays": rays, "method": "sart"} for rays in ("straight", "curved"))
-    work.trials = (Trial(bent, 2e-7, 1e-7, 1.5e-7), Trial(straight, 4e-7, 3e-7))
+    work.trials = (Candidate(bent, 2e-7, 1e-7, 1.5e-7), Candidate(straight, 4e-7, 3e-7))
 
     def with_truth(file):
         file["truth/sound_speed_mps"] = RAMP

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bentray_kernels.acquisition import Truth
-from bentray_kernels.tomography import Iteration, Reconstruction, Settings, Trial
+from bentray_kernels.tomography import Candidate, Iteration, Reconstruction, Settings
 from bentray_kernels.tomography.result import residual_counts
 
 WATER_MPS = 1500.0
@@ -40,7 +40,7 @@ def made(
         history=tuple(Iteration(k, n, 1e-7 / n / 3, 64) for n in (1, 2, 3) for k in range(slices or 1)),
         recovery=random.uniform(0.0, 1.0, shape),
         residuals=residual_counts(random.normal(0.0, 1e-7, 4000)),
-        trials=(Trial({"rays": "straight", "relaxation": 0.03}, 2e-7 / 3, 1e-7 / 3),),
+        trials=(Candidate({"rays": "straight", "relaxation": 0.03}, 2e-7 / 3, 1e-7 / 3),),
         provenance={"bentray": "0.1.0", "odd": "naïve «quotes» \"'\\"},
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.tomography import Iteration, Settings, Trial
+from bentray_kernels.tomography import Candidate, Iteration, Settings
 from bentray_kernels.tomography.grid_schedule import stages
 from bentray_workers.images.captions import facts, stage_names
 
@@ -66,7 +66,7 @@ def test_waveforms_are_named_after_the_rays_that_they_began_with():
         Iteration(0, 1, 5e-8, 36, 3, band_hz=(1e5, 4.5e5), misfit=0.1),
         Iteration(0, 1, 5e-8, 24, 4, band_hz=(3e5, 4.5e5), misfit=0.1, of_attenuation=True),
     )
-    rays = Trial({"rays": "straight", "method": "sart"}, 1e-7, 1e-7)
+    rays = Candidate({"rays": "straight", "method": "sart"}, 1e-7, 1e-7)
     result = replace(
         made(),
         settings=Settings(method="waveform", nodes=128),
@@ -80,6 +80,6 @@ def test_waveforms_are_named_after_the_rays_that_they_began_with():
 
 
 def test_a_refined_image_names_the_rays_of_the_chosen_candidate():
-    trial = Trial({"method": "gauss-newton", "rays": "curved", "ray_width_m": 0.003}, 1e-7, 1e-7)
+    trial = Candidate({"method": "gauss-newton", "rays": "curved", "ray_width_m": 0.003}, 1e-7, 1e-7)
     refined = replace(made(), settings=Settings(method="waveform"), trials=(trial,))
     assert "Gauss-Newton  ·  then waveforms" in facts(refined)

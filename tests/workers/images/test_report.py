@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Truth
-from bentray_kernels.tomography import Iteration, Reconstruction, Trial
+from bentray_kernels.tomography import Candidate, Iteration, Reconstruction
 from bentray_kernels.tomography.comparison import compare
-from bentray_kernels.tomography.model_selection.selection import explain_trials
+from bentray_kernels.tomography.model_selection.selection import explain_candidates
 from bentray_workers.images.report import report_png
 
 from ..files.reconstructions import SPACING_M, made, truth
@@ -85,14 +85,14 @@ def test_report_names_stages_and_automatic_choices(undrawn):
     history = (*(Iteration(0, n, 1e-7, 4, 0) for n in (1, 2)), Iteration(0, 1, 9e-8, 4, 1))
     plan = made().settings.changed(nodes=64, coarser_grids=1)
     trials = (
-        Trial({"rays": "curved", "method": "sart"}, 4e-8, 3e-8),
-        Trial({"rays": "straight", "method": "sart"}, 9e-8, 8e-8),
+        Candidate({"rays": "curved", "method": "sart"}, 4e-8, 3e-8),
+        Candidate({"rays": "straight", "method": "sart"}, 9e-8, 8e-8),
     )
     report_png(replace(made(), history=history, settings=plan, trials=trials))
     assert {"32 nodes", "64 nodes"} <= set(undrawn.words())
     under = " ".join(undrawn[-1].get_supxlabel().split())
     assert "3 iterations in 2 stages" in under
-    assert under.endswith(explain_trials(trials))
+    assert under.endswith(explain_candidates(trials))
 
 
 def test_the_errors_in_the_title_are_those_of_compare_with_their_region(undrawn):

@@ -12,7 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import RESIDUAL_EDGES_S, Caution, Iteration, Reconstruction, Settings, Trial
+from bentray_kernels.tomography import (
+    RESIDUAL_EDGES_S,
+    Candidate,
+    Caution,
+    Iteration,
+    Reconstruction,
+    Settings,
+)
 from bentray_kernels.tomography.result import Reflection
 from bentray_kernels.tomography.stored_settings import from_stored
 
@@ -56,7 +63,7 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
         file.attrs["origin_m"] = reconstruction.origin_m
         file.attrs["water_speed_mps"] = reconstruction.water_speed_mps
         file.attrs["settings"] = json.dumps(reconstruction.settings.to_dict())
-        file.attrs["trials"] = json.dumps([asdict(trial) for trial in reconstruction.trials])
+        file.attrs["trials"] = json.dumps([asdict(candidate) for candidate in reconstruction.trials])
         file.attrs["cautions"] = json.dumps([asdict(caution) for caution in reconstruction.cautions])
         file.attrs["provenance"] = json.dumps(reconstruction.provenance)
         for name, array_path in IMAGES.items():
@@ -228,11 +235,11 @@ def _residuals(reader: Reader) -> NDArray[np.int64] | None:
     return np.asarray(counts, dtype=np.int64)
 
 
-def _trials(reader: Reader) -> tuple[Trial, ...]:
+def _trials(reader: Reader) -> tuple[Candidate, ...]:
     try:
         trials = json.loads(reader.text("", "trials") or "[]")
         return tuple(
-            Trial(
+            Candidate(
                 dict(trial["settings"]),
                 float(trial["held_out_rms_s"]),
                 float(trial["shown_rms_s"]),

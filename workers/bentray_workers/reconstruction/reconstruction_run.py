@@ -17,7 +17,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED, replaced_water, water_summary
 from bentray_kernels.acquisition.water import describe_assumption
 from bentray_kernels.task_graph import Pool, run, run_resumable
-from bentray_kernels.tomography import Progress, Reconstruction, Settings, Trial
+from bentray_kernels.tomography import Candidate, Progress, Reconstruction, Settings
 from bentray_kernels.tomography.cautions import with_settings_caution
 from bentray_kernels.tomography.guided_picking import same_picks
 from bentray_kernels.tomography.reconstruction import run_reconstruction
@@ -154,7 +154,7 @@ class _Job(NamedTuple):
 
 def _pick_with_guides(
     job: _Job, settings: Settings, progress: _JobProgress
-) -> tuple[Path, ScanFindings, Settings, tuple[Trial, ...]]:
+) -> tuple[Path, ScanFindings, Settings, tuple[Candidate, ...]]:
     """A file with travel times, and the findings in the scan: picked, and again guided by images.
 
     Also the settings to continue with: what ``auto`` chose for the first image holds for all, so that the
@@ -182,7 +182,7 @@ def _pick_with_guides(
         reflection=False,
         minutes=None,
     )
-    trials: tuple[Trial, ...] = ()
+    trials: tuple[Candidate, ...] = ()
     for number in range(1, rounds + 1):
         progress.following = 1 + rounds - number
         image = job.folder / f"{number}-image.h5"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...acquisition import Dataset
-from ..result import Trial
+from ..result import Candidate
 from ..settings import Settings
 
 # Finite-frequency rays, straight and bent by the same method, so that they differ in refraction alone; and
@@ -50,23 +50,23 @@ def finite_frequency_candidates(dataset: Dataset, settings: Settings) -> list[di
     return [*({**changes, **more} for changes in WIDE), THIN]
 
 
-def choose_finite_frequency(trials: Sequence[Trial], mean_time_s: float) -> Trial | None:
-    """The better trial with finite-frequency rays; None without any, and if thin rays are far better still.
+def choose_finite_frequency(candidates: Sequence[Candidate], mean_time_s: float) -> Candidate | None:
+    """The better candidate with finite-frequency rays; None without any, or if thin rays are far better.
 
     By the mean absolute misfit, because picks of weak first arrivals are wrong by whole periods. Where both
     explain the times, straight rays must be clearly better than bent ones.
 
     Args:
-        trials: of ``finite_frequency_candidates``, of all or only of straight rays.
+        candidates: of ``finite_frequency_candidates``, of all or only of straight rays.
         mean_time_s: mean absolute travel time difference, s.
     """
-    fat = {t.settings["rays"]: t for t in trials if "ray_width_m" in t.settings}
+    fat = {t.settings["rays"]: t for t in candidates if "ray_width_m" in t.settings}
     if len(fat) < len(WIDE):
         return next(iter(fat.values()), None)
     straight, bent = fat["straight"], fat["curved"]
     factor = STRAIGHT if mean_misfit(bent) < EXPLAINED_PART * mean_time_s else 1.0
     best = straight if mean_misfit(straight) < factor * mean_misfit(bent) else bent
-    thin = min((t for t in trials if "ray_width_m" not in t.settings), key=mean_misfit)
+    thin = min((t for t in candidates if "ray_width_m" not in t.settings), key=mean_misfit)
     return None if mean_misfit(thin) < EXACT * mean_misfit(best) else best
 
 
@@ -80,6 +80,6 @@ def mean_time(dataset: Dataset) -> float:
     return float(np.nanmean(np.abs(dataset.differential_tof())))
 
 
-def mean_misfit(trial: Trial) -> float:
+def mean_misfit(candidate: Candidate) -> float:
     """Mean absolute misfit of the held-out pairs, s; infinite where it is not known."""
-    return math.inf if trial.held_out_mean_s is None else trial.held_out_mean_s
+    return math.inf if candidate.held_out_mean_s is None else candidate.held_out_mean_s

@@ -10,7 +10,7 @@ from ...errors import InvalidInput
 from .. import pairs
 from ..grid_schedule import stages
 from ..reconstruction_graph import Run
-from ..result import Reconstruction, Trial
+from ..result import Candidate, Reconstruction
 from ..settings import Settings
 from ..stage_graphs import Scan
 from ..stopping import stop_at_noise
@@ -41,7 +41,7 @@ CANDIDATES: tuple[dict[str, Any], ...] = (
 )
 
 # Candidates are reconstructed on half the nodes, but not fewer than this.
-TRIAL_NODES = 48
+CANDIDATE_NODES = 48
 
 # Thin bent rays start on coarser grids, each of half the nodes of the next, down to this many nodes.
 COARSEST_NODES = 32
@@ -57,7 +57,7 @@ def candidate_settings(
     settings: Settings, candidates: Sequence[dict[str, Any]] = CANDIDATES
 ) -> list[Settings]:
     """The settings of each candidate, on a coarser grid."""
-    nodes = min(settings.grid_nodes, max(TRIAL_NODES, -(-settings.grid_nodes // 2)))
+    nodes = min(settings.grid_nodes, max(CANDIDATE_NODES, -(-settings.grid_nodes // 2)))
     coarser = nodes / settings.grid_nodes
     plans = []
     for changes in candidates:
@@ -95,7 +95,7 @@ def select_model(
     scan_of: Callable[[Settings, Part], Scan],
     run_graphs: Run,
     after: int = 0,
-) -> tuple[Settings, tuple[Trial, ...], int]:
+) -> tuple[Settings, tuple[Candidate, ...], int]:
     """The settings that predict held-out pairs of one slice best, and the results of all candidates.
 
     Where the frequency is known, finite-frequency rays are tried first, straight and bent, on held-out views,
@@ -114,8 +114,8 @@ def select_model(
         after: emitter passes that come after the reconstruction, at most.
 
     Returns:
-        The settings; the trials, the chosen one first and the others by their misfit, none with too few pairs
-        to hold some out; and the emitter passes that they took.
+        The settings; the candidates, the chosen one first and the others by their misfit, none with too few
+        pairs to hold some out; and the emitter passes that they took.
 
     Raises:
         InvalidInput: for a slice without pairs.
@@ -137,13 +137,13 @@ def select_model(
             for changes, plan in plans
         ]
 
-    def run(tried: Graphs, later: int = 0) -> list[Trial]:
+    def run(tried: Graphs, later: int = 0) -> list[Candidate]:
         nonlocal before
         graphs = [graph for _, graph in tried]
         run_graphs(graphs, before, later + rest)
         before += sum(graph.total for graph in graphs)
         return [
-            Trial(changes, graph.held_out_rms_s, graph.history[-1].residual_rms_s, graph.held_out_mean_s)
+            Candidate(changes, graph.held_out_rms_s, graph.history[-1].residual_rms_s, graph.held_out_mean_s)
             for changes, graph in tried
         ]
 
@@ -151,14 +151,14 @@ def select_model(
     chosen = None
     wide = finite_frequency_candidates(dataset, settings)
     if wide and (tried := graphs_of(wide, SPARSE_PARTS)):
-        trials = run(tried, sum(graph.total for _, graph in thin))
-        chosen = choose_finite_frequency(trials, mean_time(dataset))
+        candidates = run(tried, sum(graph.total for _, graph in thin))
+        chosen = choose_finite_frequency(candidates, mean_time(dataset))
     if chosen is None:
         if not thin:
             return final_settings(settings, {**UNVALIDATED, "rays": settings.rays}), (), before
-        tried, trials = thin, run(thin)
-        chosen = min(trials, key=lambda trial: trial.held_out_rms_s)
-    others = sorted((t for t in trials if t is not chosen), key=lambda trial: trial.held_out_rms_s)
+        tried, candidates = thin, run(thin)
+        chosen = min(candidates, key=lambda candidate: candidate.held_out_rms_s)
+    others = sorted((t for t in candidates if t is not chosen), key=lambda t: t.held_out_rms_s)
     selected = final_settings(settings, chosen.settings)
     # Scattered pairs, if there are any: errors of the model are larger in views.
     misfit = next(graph.first_part_rms_s for changes, graph in tried if changes is chosen.settings)
@@ -184,14 +184,14 @@ def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     return each * sum(len(pairs.of(dataset, settings, index).emitters) for index in problems)
 
 
-def explain_trials(trials: Sequence[Trial]) -> str:
-    """One sentence: the chosen candidate, and why; empty without trials."""
-    if not trials:
+def explain_candidates(candidates: Sequence[Candidate]) -> str:
+    """One sentence: the chosen candidate, and why; empty without candidates."""
+    if not candidates:
         return ""
-    chosen, misfit = trials[0], _misfit_of(trials)
-    wide = [trial for trial in trials if "ray_width_m" in trial.settings]
+    chosen, misfit = candidates[0], _misfit_of(candidates)
+    wide = [candidate for candidate in candidates if "ray_width_m" in candidate.settings]
     what = "held-out views" if wide else "held-out pairs"
-    others = [t for t in wide or trials if t.settings["rays"] != chosen.settings["rays"]]
+    others = [t for t in wide or candidates if t.settings["rays"] != chosen.settings["rays"]]
     if not others:
         return f"auto chose {label(chosen.settings)}: the only candidate"
     gain = 1.0 - misfit(chosen) / min(map(misfit, others))
@@ -205,42 +205,42 @@ def explain_trials(trials: Sequence[Trial]) -> str:
     return f"auto chose {label(chosen.settings)}: {reason}"
 
 
-def trial_table(trials: Sequence[Trial]) -> list[tuple[str, str, str]]:
+def candidate_table(candidates: Sequence[Candidate]) -> list[tuple[str, str, str]]:
     """Rows of a table of candidates: label, misfit of held-out pairs, and ``chosen`` or ``rejection``."""
-    misfit = _misfit_of(trials)
+    misfit = _misfit_of(candidates)
     return [
         (
-            label(trial.settings),
-            f"{1e9 * misfit(trial):.0f} ns",
-            "chosen" if k == 0 else rejection(trial, trials),
+            label(candidate.settings),
+            f"{1e9 * misfit(candidate):.0f} ns",
+            "chosen" if k == 0 else rejection(candidate, candidates),
         )
-        for k, trial in enumerate(trials)
+        for k, candidate in enumerate(candidates)
     ]
 
 
-def rejection(trial: Trial, trials: Sequence[Trial]) -> str:
+def rejection(candidate: Candidate, candidates: Sequence[Candidate]) -> str:
     """Why a candidate with a lower misfit than the chosen one, the first, was not chosen; else empty.
 
     It is among finite-frequency rays alone: of thin rays the lowest misfit is chosen.
     """
-    chosen, misfit = trials[0], _misfit_of(trials)
-    if trial is chosen or misfit(trial) >= misfit(chosen) or "ray_width_m" not in chosen.settings:
+    chosen, misfit = candidates[0], _misfit_of(candidates)
+    if candidate is chosen or misfit(candidate) >= misfit(chosen) or "ray_width_m" not in chosen.settings:
         return ""
     factor, why = STRAIGHT, "straight rays fit smooth times with a wrong image"
-    if "ray_width_m" not in trial.settings:
+    if "ray_width_m" not in candidate.settings:
         factor, why = EXACT, "thin rays fit wrong picks too"
     return f"must be below {1e9 * factor * misfit(chosen):.0f} ns: {why}"
 
 
-def _misfit_of(trials: Sequence[Trial]) -> Callable[[Trial], float]:
+def _misfit_of(candidates: Sequence[Candidate]) -> Callable[[Candidate], float]:
     """The misfit that decides: the mean one where finite-frequency rays were tried, else the rms."""
-    wide = any("ray_width_m" in trial.settings for trial in trials)
-    return mean_misfit if wide else lambda trial: trial.held_out_rms_s
+    wide = any("ray_width_m" in candidate.settings for candidate in candidates)
+    return mean_misfit if wide else lambda candidate: candidate.held_out_rms_s
 
 
 def advice_of(result: Reconstruction) -> str:
     """How the model of a result was chosen, and what a full-waveform refinement gave or would give."""
-    advice = explain_trials(result.trials), result.provenance.get("waveform", "")
+    advice = explain_candidates(result.trials), result.provenance.get("waveform", "")
     return "; ".join(sentence for sentence in advice if sentence)
 
 

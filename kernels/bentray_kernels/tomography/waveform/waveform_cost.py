@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..result import Trial
+from ..result import Candidate
 from .band_grid import Extent
 from .validation import Validation
 from .waveform_settings import Band, WaveSettings
@@ -36,12 +36,12 @@ def core_seconds(plan: Sequence[Band], width_m: float, record_s: float, fastest_
     return seconds
 
 
-def advice(validation: Validation, rays: Trial, noise_s: float, minutes: float) -> str:
+def advice(validation: Validation, rays: Candidate, noise_s: float, minutes: float) -> str:
     """One sentence: whether full-waveform refinement is advised, and its CPU time.
 
     Args:
         validation: of the image from rays.
-        rays: the best trial, used where the validation has no result.
+        rays: the best candidate, used where the validation has no result.
         noise_s: standard deviation of the travel times, s.
         minutes: CPU time of the refinement, minutes.
     """

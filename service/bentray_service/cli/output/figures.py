@@ -13,7 +13,7 @@ from bentray_kernels.acquisition.dataset import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import NOTHING_FOUND
 from bentray_kernels.tomography import Reconstruction
 from bentray_kernels.tomography.comparison import NotComparable, compare
-from bentray_kernels.tomography.model_selection.selection import advice_of, trial_table
+from bentray_kernels.tomography.model_selection.selection import advice_of, candidate_table
 from bentray_kernels.tomography.result import residual_within
 
 # Percentages for the quantiles of the residuals.
@@ -58,7 +58,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         "uncertainty_rms_mps": _uncertainty_rms(result),
         "resolution_width_m": list(result.resolution_width_m),
         "reason": advice_of(result),
-        "candidates": trial_table(result.trials),
+        "candidates": candidate_table(result.trials),
         "trials": [asdict(trial) for trial in result.trials],
         "truth": None if dataset.truth is None else errors(result, dataset.truth, dataset.roi),
         "settings": result.settings.to_dict(),

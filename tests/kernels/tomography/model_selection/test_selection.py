@@ -10,7 +10,7 @@ from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
-from bentray_kernels.tomography import Settings, Trial, reconstruct
+from bentray_kernels.tomography import Candidate, Settings, reconstruct
 from bentray_kernels.tomography.gauss_newton.gauss_newton_step import trace_rays
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import (
     choose_finite_frequency,
@@ -21,10 +21,10 @@ from bentray_kernels.tomography.model_selection.selection import (
     CANDIDATES,
     advice_of,
     candidate_settings,
-    explain_trials,
+    candidate_table,
+    explain_candidates,
     final_settings,
     rejection,
-    trial_table,
 )
 from bentray_kernels.tomography.reconstruction import MemoryScan
 from bentray_kernels.tomography.stopping import stop_at_noise, travel_time_noise
@@ -73,13 +73,13 @@ def test_eikonal_times_select_bent_rays(scan):
     misfits = [trial.held_out_rms_s for trial in result.trials]
     assert misfits == sorted(misfits)
     assert len(misfits) == len(CANDIDATES)
-    assert explain_trials(result.trials).startswith("auto chose bent rays, ")
-    assert [row[2] for row in trial_table(result.trials)] == ["chosen"] + [""] * (len(result.trials) - 1)
+    assert explain_candidates(result.trials).startswith("auto chose bent rays, ")
+    assert [row[2] for row in candidate_table(result.trials)] == ["chosen"] + [""] * (len(result.trials) - 1)
     # What was chosen gives the same bits when asked for by itself.
     again = reconstruct(scan, result.settings)
     assert np.array_equal(again.speed, result.speed)
     assert again.trials == ()
-    assert explain_trials(again.trials) == ""
+    assert explain_candidates(again.trials) == ""
 
 
 @pytest.mark.parametrize(("count", "part"), [(1, "held-out"), (None, "shown")])
@@ -169,7 +169,7 @@ def test_finite_frequency_rays_are_as_wide_as_the_fresnel_zone_but_at_most_a_wav
 
 def test_of_wide_rays_those_that_predict_views_better_are_chosen_unless_thin_ones_are_exact():
     def of(held_out, **changes):
-        return Trial({"method": "gauss-newton", **changes}, 9.0 * held_out, held_out, held_out)
+        return Candidate({"method": "gauss-newton", **changes}, 9.0 * held_out, held_out, held_out)
 
     straight = of(80e-9, rays="straight", ray_width_m=0.003)
     bent = of(75e-9, rays="curved", ray_width_m=0.003)
@@ -180,13 +180,13 @@ def test_of_wide_rays_those_that_predict_views_better_are_chosen_unless_thin_one
     # Both explain the times.
     assert choose_finite_frequency([straight, worse, thin], 1e-6) is worse
     assert choose_finite_frequency([straight, replace(bent, held_out_mean_s=101e-9), thin], 2e-6) is straight
-    assert explain_trials([worse, straight, thin]) == (
+    assert explain_candidates([worse, straight, thin]) == (
         "auto chose bent finite-frequency rays, Gauss-Newton: "
         "straight rays must predict held-out views 20 % better"
     )
     exact = replace(thin, held_out_mean_s=20e-9)
     assert choose_finite_frequency([straight, bent, exact], 3e-7) is None
-    assert explain_trials([bent, straight, thin]) == (
+    assert explain_candidates([bent, straight, thin]) == (
         "auto chose bent finite-frequency rays, Gauss-Newton: "
         "6 % better than straight rays at predicting held-out views"
     )
@@ -207,7 +207,7 @@ def test_where_no_view_can_be_held_out_pairs_are(scan):
 
 
 def trial(rays, held_out):
-    return Trial({"rays": rays}, held_out, held_out)
+    return Candidate({"rays": rays}, held_out, held_out)
 
 
 @pytest.mark.parametrize(
@@ -252,27 +252,27 @@ def test_the_advice_combines_rays_and_waves(scan):
     result = reconstruct(scan, replace(PLAN, method="sart", iterations=1))
     assert advice_of(result) == ""
     chosen = replace(result, trials=(trial("straight", 1e-7), trial("curved", 2e-7)))
-    assert advice_of(chosen) == explain_trials(chosen.trials)
+    assert advice_of(chosen) == explain_candidates(chosen.trials)
     both = replace(chosen, provenance={**result.provenance, "waveform": "method waveform is advised"})
-    assert advice_of(both) == f"{explain_trials(chosen.trials)}; method waveform is advised"
+    assert advice_of(both) == f"{explain_candidates(chosen.trials)}; method waveform is advised"
 
 
 def test_the_reason_is_one_and_the_table_names_what_differs():
     plain, more = trial("straight", 100e-9), trial("curved", 120e-9)
     edges = replace(more, settings={**more.settings, "edge_mps": 7.0})
     reason = "auto chose straight rays: bent rays do not predict held-out pairs better"
-    assert explain_trials([plain, edges]) == reason
-    assert explain_trials([replace(more, held_out_rms_s=73e-9), plain]) == (
+    assert explain_candidates([plain, edges]) == reason
+    assert explain_candidates([replace(more, held_out_rms_s=73e-9), plain]) == (
         "auto chose bent rays: 27 % better than straight rays at predicting held-out pairs"
     )
-    assert explain_trials([plain]) == "auto chose straight rays: the only candidate"
-    assert trial_table([plain, edges]) == [
+    assert explain_candidates([plain]) == "auto chose straight rays: the only candidate"
+    assert candidate_table([plain, edges]) == [
         ("straight rays", "100 ns", "chosen"),
         ("bent rays, sharp edges", "120 ns", ""),
     ]
     # A result of an earlier version, which asked bent rays for more than the lowest misfit.
     earlier = [plain, replace(more, held_out_rms_s=95e-9)]
-    assert explain_trials(earlier) == (
+    assert explain_candidates(earlier) == (
         "auto chose straight rays: bent rays do not predict held-out pairs clearly better"
     )
     assert rejection(earlier[1], earlier) == ""
@@ -280,7 +280,7 @@ def test_the_reason_is_one_and_the_table_names_what_differs():
 
 def test_the_table_says_why_a_lower_misfit_of_finite_frequency_rays_was_not_chosen():
     def of(mean_s, **settings):
-        return Trial({"method": "gauss-newton", **settings}, mean_s, mean_s, mean_s)
+        return Candidate({"method": "gauss-newton", **settings}, mean_s, mean_s, mean_s)
 
     bent = of(100e-9, rays="curved", ray_width_m=0.003)
     straight, thin = of(90e-9, rays="straight", ray_width_m=0.003), of(70e-9, rays="curved")

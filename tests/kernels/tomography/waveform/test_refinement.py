@@ -8,7 +8,7 @@ import pytest
 
 from bentray_kernels.acquisition import pick
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import Settings, Trial, reconstruct
+from bentray_kernels.tomography import Candidate, Settings, reconstruct
 from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.inversion_state import BandEnd, Image
 from bentray_kernels.tomography.waveform.refinement import _band_note, predicts_better
@@ -70,7 +70,7 @@ def test_waves_are_advised_where_the_image_explains_less_than_water_does(rays):
 
 
 def test_advice_without_waveform_inversion_uses_times():
-    missed = Trial({}, held_out_rms_s=100e-9, shown_rms_s=50e-9)
+    missed = Candidate({}, held_out_rms_s=100e-9, shown_rms_s=50e-9)
     assert advice(Validation(), missed, 10e-9, 3.4) == (
         "method waveform is advised, for rays miss held-out times by 100 ns, whose noise is 10 ns; "
         "it takes about 3 minutes of a core"

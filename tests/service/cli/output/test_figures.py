@@ -12,7 +12,7 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import words
-from bentray_kernels.tomography import Caution, Iteration, Settings, Trial
+from bentray_kernels.tomography import Candidate, Caution, Iteration, Settings
 from bentray_kernels.tomography.result import residual_counts
 from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_service.cli.output.figures import errors, figures, summary
@@ -145,7 +145,7 @@ def test_summary_shows_residuals_resolution_and_candidates() -> None:
     recovery = np.zeros_like(speed)
     recovery[:, :5] = 0.5
     recovery[:, 3] = -0.75
-    trials = (Trial({"rays": "straight"}, 4e-8, 3e-8), Trial({"rays": "curved"}, 6e-8, 5e-8))
+    trials = (Candidate({"rays": "straight"}, 4e-8, 3e-8), Candidate({"rays": "curved"}, 6e-8, 5e-8))
     residuals = residual_counts(np.random.default_rng(0).normal(0.0, 1e-7, 10_000))
     result = replace(image(speed), recovery=recovery, trials=trials, residuals=residuals)
     found = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
