@@ -14,15 +14,15 @@ ELEMENTS, NODES, SIDE_M = 24, 32, 0.2
 def dataset() -> Dataset:
     """The disc lies in the middle; chords of it give the differences."""
     angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
-    place = 0.085 * np.column_stack((np.cos(angle), np.sin(angle)))
-    a, b = place[:, None], place[None]
+    position = 0.085 * np.column_stack((np.cos(angle), np.sin(angle)))
+    a, b = position[:, None], position[None]
     length = np.linalg.norm(a - b, axis=-1) + np.eye(ELEMENTS)
     distance = np.abs(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]) / length
     chord = 2.0 * np.sqrt(np.maximum(DISC_M**2 - distance**2, 0.0))
     delta = chord * (1.0 / DISC_MPS - 1.0 / WATER_MPS)
     np.fill_diagonal(delta, np.nan)
     return Dataset(
-        element_position_m=place,
+        element_position_m=position,
         tx=np.arange(ELEMENTS),
         rx=np.arange(ELEMENTS),
         water_speed_mps=WATER_MPS,

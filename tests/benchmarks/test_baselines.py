@@ -77,4 +77,4 @@ def test_all_four_baselines_stand_beside_an_image_and_each_is_made_once() -> Non
     assert compared.baselines["best constant"] == pytest.approx(TRUE.std())
     assert compared.baselines["water alone"] == pytest.approx(np.sqrt(((TRUE - WATER_MPS) ** 2).mean()))
     assert compared.baselines["straight rays"] == pytest.approx(np.sqrt(((TRUE - 1495.0) ** 2).mean()))
-    assert [one.method for one in spy.asked] == ["sart", "sart", "auto"]
+    assert [request.method for request in spy.asked] == ["sart", "sart", "auto"]

@@ -16,17 +16,17 @@ def image(size):
     return Reflection(20.0 * np.log10(values / values.max()), (STEP, STEP), FIRST)
 
 
-def spot(x, y, place, sigma):
-    return np.exp(-((x - place[0]) ** 2 + (y - place[1]) ** 2) / (2.0 * sigma**2))
+def spot(x, y, position, sigma):
+    return np.exp(-((x - position[0]) ** 2 + (y - position[1]) ** 2) / (2.0 * sigma**2))
 
 
 def test_place_and_width_of_a_spot_between_pixels():
-    place, sigma = (0.00313, -0.00252), 6e-4
-    found = echo_near(
-        image(lambda x, y: spot(x, y, place, sigma) + 2.0 * spot(x, y, (-0.006, 0.0), 3e-4)), place, 3e-3
+    point, sigma = (0.00313, -0.00252), 6e-4
+    echo = echo_near(
+        image(lambda x, y: spot(x, y, point, sigma) + 2.0 * spot(x, y, (-0.006, 0.0), 3e-4)), point, 3e-3
     )
-    assert found.away_m < 0.1 * STEP
-    assert found.width_m == pytest.approx(2.0 * sigma * np.sqrt(2.0 * np.log(2.0)), rel=0.04)
+    assert echo.away_m < 0.1 * STEP
+    assert echo.width_m == pytest.approx(2.0 * sigma * np.sqrt(2.0 * np.log(2.0)), rel=0.04)
 
 
 def test_error_of_place_is_the_distance_of_the_brightest_echo():

@@ -25,7 +25,7 @@ def test_ideal_times_match_the_phantom(nodes, radius_m):
         phantom.speed(nodes, TABLE6_SIDE_M), (spacing, spacing), (-0.5 * TABLE6_SIDE_M, -0.5 * TABLE6_SIDE_M)
     )
     dataset = Dataset(ring.positions(), everyone, everyone, 1375.0, delta_tof_s=expected, truth=truth)
-    found = ideal(dataset)
+    computed = ideal(dataset)
     far = dataset.distance_m() > 0.05
-    assert np.abs(found - expected)[far].max() < 1e-7
+    assert np.abs(computed - expected)[far].max() < 1e-7
     assert np.abs(expected[far]).max() > 1e-6

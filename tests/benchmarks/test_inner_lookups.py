@@ -45,9 +45,9 @@ def test_published_points_are_coarse_and_ours_are_those_of_exact_rays(dent, insi
     assert both.sum() > (0.99 if inside else 0.6) * hit.sum()
     assert np.median(np.linalg.norm(walked - exact, axis=1)[both]) < 1e-6
     for way in PUBLISHED:
-        found = found_points(dent, way, inside, rays)
-        met = np.isfinite(found[:, 0])
-        off = np.linalg.norm(found - exact, axis=1)[met & hit]
+        result = found_points(dent, way, inside, rays)
+        met = np.isfinite(result[:, 0])
+        off = np.linalg.norm(result - exact, axis=1)[met & hit]
         # A point stands for its part of the surface, an exit for a square of the cube; there is no walk.
         assert 1e-3 < np.median(off) < 0.1
         assert (met != hit).mean() < 0.2

@@ -18,19 +18,19 @@ SHOT = Shot("water", 4.5, 0.012, receivers=7)
 
 def programs() -> list[Path]:
     """What lies where k-Wave keeps the programs that it downloads."""
-    found = importlib.util.find_spec("kwave")
-    places = found.submodule_search_locations if found is not None else None
-    return [path for place in places or () for path in Path(place, "bin").rglob("*")]
+    spec = importlib.util.find_spec("kwave")
+    points = spec.submodule_search_locations if spec is not None else None
+    return [path for place in points or () for path in Path(place, "bin").rglob("*")]
 
 
 def test_its_source_is_the_integral_of_ours() -> None:
     step, speed, spacing = 2.5e-8, 1500.0, 5e-4
     time = step * np.arange(-280, 400)
-    found = np.zeros(time.size)
+    result = np.zeros(time.size)
     sent = mass(pulse(time), step, speed, spacing)
-    found[: sent.size] = sent
+    result[: sent.size] = sent
     # In the middle between two time steps, so that the difference is the rate at the later one.
-    rate = np.diff(found, prepend=0.0) / step
+    rate = np.diff(result, prepend=0.0) / step
     assert np.abs(rate - 0.5 * speed / spacing * pulse(time)).max() < 2e-3 * rate.max()
     assert sent.size < 0.85 * time.size
 
@@ -38,8 +38,8 @@ def test_its_source_is_the_integral_of_ours() -> None:
 @pytest.mark.parametrize("late", [-3.3, 0.4, 5.25])
 def test_delays_are_those_that_were_planted(late: float) -> None:
     time = 1e-7 * np.arange(400)
-    one, other = (pulse(time - 1.5e-5 - shift)[None] for shift in (1e-7 * late, 0.0))
-    assert delays(one, other, 1e-7)[0] == pytest.approx(1e-7 * late, abs=2e-10)
+    first, other = (pulse(time - 1.5e-5 - shift)[None] for shift in (1e-7 * late, 0.0))
+    assert delays(first, other, 1e-7)[0] == pytest.approx(1e-7 * late, abs=2e-10)
 
 
 def test_the_budget_is_what_the_step_of_time_does_to_ours() -> None:
@@ -60,11 +60,11 @@ def test_kwave_gives_our_traces_but_for_the_stated_dispersion(
     monkeypatch.setattr(urllib.request, "urlretrieve", refused)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a peer's own are its own affair
-        found, missing = installed()
+        peers, missing = installed()
         if missing:
             pytest.skip(missing["k-Wave"])
         shot = replace(SHOT, name=name)
-        theirs = shot.theirs(found["k-Wave"])
+        theirs = shot.theirs(peers["k-Wave"])
     stated, _ = shot.budget(theirs)
     assert misfit(shot.ours(), theirs) == pytest.approx(stated, rel=0.1)
     assert misfit(*shot.as_a_refinement(theirs)) < 0.01

@@ -14,13 +14,13 @@ def test_the_octree_leaves_few_evaluations_and_nodes():
     ball = subjects()[0]
     scene = Scene.build(Spline(ball.volume), Layers((ball.iso,), (1.0, 1.5)))
     compiled = crossing.leave_interval
-    found = {one: operations(scene, ball, one, 6) for one in ("steps", "dda", "octree")}
+    result = {one: operations(scene, ball, one, 6) for one in ("steps", "dda", "octree")}
     assert crossing.leave_interval is compiled
     # About 64 nodes along each ray, in steps of a tenth.
-    assert 600 < found["steps"][0] < 700
-    assert 60 < found["dda"][1] < 90
-    assert found["octree"][1] < 0.3 * found["dda"][1]
-    assert 0 < found["octree"][0] <= found["dda"][0] < 0.02 * found["steps"][0]
+    assert 600 < result["steps"][0] < 700
+    assert 60 < result["dda"][1] < 90
+    assert result["octree"][1] < 0.3 * result["dda"][1]
+    assert 0 < result["octree"][0] <= result["dda"][0] < 0.02 * result["steps"][0]
 
 
 def test_counting_changes_no_ray():
@@ -29,6 +29,6 @@ def test_counting_changes_no_ray():
     settings = RenderSettings(6, 6, supersampling="none")
     expected = render(scene, ball.camera, ball.backdrop, settings)
     with counted() as counts:
-        found = render(scene, ball.camera, ball.backdrop, settings)
+        computed = render(scene, ball.camera, ball.backdrop, settings)
     assert counts["_trace_ray"] == 36
-    np.testing.assert_allclose(found.position_m, expected.position_m, rtol=1e-9)
+    np.testing.assert_allclose(computed.position_m, expected.position_m, rtol=1e-9)

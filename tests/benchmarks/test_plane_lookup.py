@@ -24,9 +24,9 @@ def test_the_samples_own_rays_end_where_their_entries_do():
     # Triangles in all directions: every octant of the packed normals.
     n, surface = 6, surface_of(random_triangles(1, 40))
     field = field_of(surface, n)
-    places = samples(n)
+    points = samples(n)
     i, j = np.nonzero(field.faces >= 0)
-    distances = found(plane_table(surface, field), places[i], places[j] - places[i])
+    distances = found(plane_table(surface, field), points[i], points[j] - points[i])
     # Packing turns planes by up to 1 in 20,000; that counts where a ray nearly runs along one.
     assert np.quantile(np.abs(distances - field.fractions[i, j]), 0.99) < 1e-4
 

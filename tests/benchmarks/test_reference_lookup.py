@@ -33,23 +33,23 @@ def looked_up(table, origins, directions, how):
 
 def test_the_table_holds_where_its_own_rays_end():
     surface, table = flat_table(2)
-    places = samples(N)
+    points = samples(N)
     i, j = np.nonzero(np.isfinite(table[..., 0]))
-    faces, distances, _, _ = first_faces(surface, places[i], places[j] - places[i])
+    faces, distances, _, _ = first_faces(surface, points[i], points[j] - points[i])
     assert (faces >= 0).mean() > 0.999
     met = faces >= 0
-    ends = places[i[met]] + distances[met, None] * (places[j[met]] - places[i[met]])
+    ends = points[i[met]] + distances[met, None] * (points[j[met]] - points[i[met]])
     np.testing.assert_allclose(table[i[met], j[met]], ends[:, :2], atol=1e-5)
 
 
 @pytest.mark.nightly
 def test_the_samples_own_rays_are_looked_up_exactly():
     _, table = flat_table(3)
-    places = samples(N)
+    points = samples(N)
     i, j = np.nonzero(np.isfinite(table[..., 0]))
     for how in (nearest_uv, linear_uv):
-        found = looked_up(table, places[i], places[j] - places[i], how)
-        np.testing.assert_allclose(found, table[i, j], atol=2e-5)
+        uv = looked_up(table, points[i], points[j] - points[i], how)
+        np.testing.assert_allclose(uv, table[i, j], atol=2e-5)
 
 
 def test_linear_errs_less_than_nearest_where_there_is_no_seam():
@@ -79,5 +79,5 @@ def test_linear_averages_across_a_seam_as_published():
 def test_rays_that_miss_the_cube_have_no_uv():
     _, table = flat_table(1)
     for how in (nearest_uv, linear_uv):
-        found = looked_up(table, np.array([[2.0, 2.0, 2.0]]), np.array([[1.0, 0.0, 0.0]]), how)
-        assert np.isnan(found).all()
+        uv = looked_up(table, np.array([[2.0, 2.0, 2.0]]), np.array([[1.0, 0.0, 0.0]]), how)
+        assert np.isnan(uv).all()

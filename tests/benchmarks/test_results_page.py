@@ -68,7 +68,7 @@ def test_recorded_rows_are_met_by_the_rule_of_today(file: str) -> None:
         kept = {name: value for name, value in row.items() if name not in ("met", "measured")}
         value = float("nan") if row["value"] is None else row["value"]
         kept["baselines"] = {
-            name: float("nan") if one is None else one for name, one in row.get("baselines", {}).items()
+            name: float("nan") if value is None else value for name, value in row.get("baselines", {}).items()
         }
         assert Row(**(kept | {"value": value})).met is row["met"], row["target"]
 
@@ -99,7 +99,7 @@ def test_the_errors_in_readme_agree_with_the_recorded_rows() -> None:
             unit = fastest - slowest if row["unit"] == "of range" else 1.0
             errors = {column: row["error"]}
             if number == 0:
-                errors |= {name: row["baselines"][one] for name, one in README_BASELINES.items()}
+                errors |= {name: row["baselines"][value] for name, value in README_BASELINES.items()}
             for name, error in errors.items():
                 assert agrees(scans[scan][name].strip("*"), unit * error, ""), (scan, name, unit * error)
 

@@ -22,8 +22,8 @@ def test_costs_are_found_again(task: float, beat: float, idle: float, driver: fl
         for length, tasks in ((0.0, 0), (0.08, 60 * workers), (0.02, 150 * workers))
     ]
     model = Model.fitted(WORK, runs)
-    found = (model.scheduler_task, model.scheduler_beat, model.scheduler_idle, model.driver_task)
-    assert found == pytest.approx((task, beat, idle, driver), rel=1e-6, abs=1e-9)
+    result = (model.scheduler_task, model.scheduler_beat, model.scheduler_idle, model.driver_task)
+    assert result == pytest.approx((task, beat, idle, driver), rel=1e-6, abs=1e-9)
 
 
 @given(task=costs, driver=costs, length=st.floats(0.01, 10.0))

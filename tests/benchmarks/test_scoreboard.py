@@ -63,7 +63,7 @@ def write_nbp(path: Path, **changes: np.ndarray) -> None:
 def test_maps_of_openbreastus_are_its_four_cases(tmp_path: Path, last: bool) -> None:
     write_openbreastus(tmp_path / OPENBREASTUS, last=last)
     cases = list(read_cases(tmp_path))
-    assert [one.name.split()[1] for one in cases] == ["HET", "FIB", "FAT", "EXD"]
+    assert [case.name.split()[1] for case in cases] == ["HET", "FIB", "FAT", "EXD"]
     for case, speed in zip(cases, (1440.0, 1450.0, 1460.0, 1470.0), strict=True):
         np.testing.assert_allclose(case.speed_mps, disc(24, speed))
     truth = cases[0].truth()
@@ -77,8 +77,8 @@ def test_slices_of_nbp_are_centred_in_water_in_metres_per_second(tmp_path: Path)
     inside = fatty.speed_mps != WATER_MPS
     assert set(np.round(fatty.speed_mps[inside], 6).tolist()) == {1450.0, 1570.0}
     assert not np.isclose(fatty.speed_mps, 1480.0).any(), "outside the label is water"
-    places = np.argwhere(inside)
-    assert np.abs(places.min(0) + places.max(0) + 1 - inside.shape).max() <= 2
+    points = np.argwhere(inside)
+    assert np.abs(points.min(0) + points.max(0) + 1 - inside.shape).max() <= 2
     assert (fatty.at(101, SIDE_M)[0] == WATER_MPS).all()
 
 
@@ -99,11 +99,11 @@ def test_errors_are_those_of_the_tissue_on_the_grid_of_the_benchmark() -> None:
     assert scores(WATER_MPS, case).rmse == pytest.approx(50.0, abs=3.0)
     assert scores(mean_speed(case), case).rmse < scores(WATER_MPS, case).rmse
     shifted = image(disc(nodes, 1450.0) + 4.0, (-0.12, -0.12))
-    found = scores(shifted, case)
-    assert found.rmse == pytest.approx(4.0, abs=1e-6)
-    assert found.figures["MAE"] == pytest.approx(4.0, abs=1e-6)
-    assert found.figures["PCC"] == pytest.approx(1.0)
-    assert 0.9 < found.figures["SSIM"] < 1.0
+    errors = scores(shifted, case)
+    assert errors.rmse == pytest.approx(4.0, abs=1e-6)
+    assert errors.figures["MAE"] == pytest.approx(4.0, abs=1e-6)
+    assert errors.figures["PCC"] == pytest.approx(1.0)
+    assert 0.9 < errors.figures["SSIM"] < 1.0
 
 
 def test_our_scans_have_a_finer_grid_than_any_inversion_and_their_waves_arrive_on_time() -> None:

@@ -22,14 +22,14 @@ def test_values_of_a_region_are_stretched_to_a_range():
 def test_readings_differ_in_where_and_when_they_stretch():
     slowness = 1.0 / np.array([1000.0, 1200.0, 1400.0, 1500.0])
     inside, region = np.array([False, True, True, False]), np.array([True, True, True, False])
-    found = readings(inside, 1300.0, 1700.0)
-    for name, reading in found.items():
+    images = readings(inside, 1300.0, 1700.0)
+    for name, reading in images.items():
         first, later = (reading(slowness, region, warm) for warm in (False, True))
         assert later[3] == pytest.approx(1500.0)
         assert np.allclose(first, 1.0 / slowness) == (name != "from the first emitter")
         ends = {"fixed": (1000.0, 1400.0), "range of the object alone": (1000.0, 1700.0)}
         np.testing.assert_allclose(later[[0, 2]], ends.get(name, (1300.0, 1700.0)))
-    assert found["range of slowness"](slowness, region, True)[1] != pytest.approx(1500.0)
+    assert images["range of slowness"](slowness, region, True)[1] != pytest.approx(1500.0)
 
 
 def test_the_page_states_the_recorded_errors():

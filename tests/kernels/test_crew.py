@@ -11,13 +11,13 @@ from bentray_kernels.eikonal.diagonals import Diagonals
 
 @pytest.mark.parametrize(("planes", "least", "groups"), [(9, 3, 3), (8, 3, 2), (2, 3, 1), (40, 1, 4)])
 def test_each_plane_is_in_one_group(planes, least, groups):
-    found = []
+    results = []
     with crew_of(4) as crew:
-        crew.share(lambda first, end: found.append((first, end)), planes, least)
-    found.sort()
-    assert len(found) == groups
-    assert [plane for first, end in found for plane in range(first, end)] == list(range(planes))
-    assert planes < least or all(end - first >= least for first, end in found)
+        crew.share(lambda first, end: results.append((first, end)), planes, least)
+    results.sort()
+    assert len(results) == groups
+    assert [plane for first, end in results for plane in range(first, end)] == list(range(planes))
+    assert planes < least or all(end - first >= least for first, end in results)
 
 
 def test_threads_work_at_the_same_time_and_end():
@@ -54,8 +54,8 @@ def test_grids_are_copied_as_by_one_thread(shape):
 
     alone = copies(ALONE)
     with crew_of(3) as crew:
-        for one, several in zip(alone, copies(crew), strict=True):
-            assert np.array_equal(one, several)
+        for first, several in zip(alone, copies(crew), strict=True):
+            assert np.array_equal(first, several)
     # Some were copied, not all.
     assert 0 < np.count_nonzero(alone[3] >= 0.0) < padded.size
     assert np.array_equal(alone[-4], padded)

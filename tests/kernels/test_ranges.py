@@ -46,7 +46,7 @@ def test_the_first_wrong_field_is_named_by_its_place():
 
 KINDS = (Settings, SartSettings, GaussNewtonSettings, Numerics)
 NUMBERS = [
-    (kind, one.name) for kind in KINDS for one in fields(kind) if one.type.split()[0] in ("int", "float")
+    (kind, item.name) for kind in KINDS for item in fields(kind) if item.type.split()[0] in ("int", "float")
 ]
 
 

@@ -57,9 +57,9 @@ def test_images_are_averaged_over_the_cells_of_the_phantom():
 def test_errors_of_slices_are_rms_over_the_range(whole):
     phantoms = CENTRE, table7(WATER_MPS).at(0.02)
     slices = Slices(phantoms, whole)
-    truths = [one.speed(NODES, TABLE7_SIDE_M) for one in phantoms]
+    truths = [phantom.speed(NODES, TABLE7_SIDE_M) for phantom in phantoms]
     assert slices.error(truths) == 0.0
-    assert slices.error([one + 27.5 for one in truths]) == pytest.approx(0.1)
+    assert slices.error([truth + 27.5 for truth in truths]) == pytest.approx(0.1)
     beside = slices.constants()
     assert 0.0 < beside[BEST_CONSTANT] <= beside[WATER_ALONE]
     assert (beside[WATER_ALONE] < 0.25) is whole
@@ -67,9 +67,9 @@ def test_errors_of_slices_are_rms_over_the_range(whole):
 
 def test_lesions_of_the_truth_have_all_their_contrast():
     true = CENTRE.speed(NODES, TABLE7_SIDE_M)
-    found = contrasts(CENTRE, true)
-    assert sum(name.startswith("2 voxels") for name in found) == 2
-    np.testing.assert_allclose(list(found.values()), 1.0)
+    contrast = contrasts(CENTRE, true)
+    assert sum(name.startswith("2 voxels") for name in contrast) == 2
+    np.testing.assert_allclose(list(contrast.values()), 1.0)
     half = contrasts(CENTRE, 0.5 * (true + 1475.0))
     assert least_contrast(half, 2) == pytest.approx(0.5)
-    assert np.isnan(least_contrast(found, 7))
+    assert np.isnan(least_contrast(contrast, 7))

@@ -15,11 +15,11 @@ from .._small_ring import DISC_MPS, WATER_MPS, disc, ring
 def test_a_peer_finds_a_disc(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a peer's own are its own affair
-        found, missing = installed()
+        peers, missing = installed()
         if name in missing:
             pytest.skip(missing[name])
         times = ring()
-        speed = found[name](times)
+        speed = peers[name](times)
     assert speed.shape == times.region.shape
     assert np.isfinite(speed).all()
     assert speed[disc(times, 0.5)].mean() == pytest.approx(DISC_MPS, abs=12.0)

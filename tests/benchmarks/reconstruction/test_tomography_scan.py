@@ -22,11 +22,11 @@ def in_water(speed: np.ndarray, spacing: float, node: tuple[int, ...]) -> np.nda
 
 
 def test_elements_are_nodes_of_the_fine_grid_near_the_circle() -> None:
-    place, spacing = positions(64, 64), fine_spacing(64)
-    cells = place / spacing
+    position, spacing = positions(64, 64), fine_spacing(64)
+    cells = position / spacing
     assert cells == pytest.approx(np.rint(cells))
-    assert np.ptp(np.linalg.norm(place, axis=1)) < 1.5 * spacing
-    assert len(np.unique(place, axis=0)) == 64
+    assert np.ptp(np.linalg.norm(position, axis=1)) < 1.5 * spacing
+    assert len(np.unique(position, axis=0)) == 64
 
 
 def test_times_are_read_at_the_elements_and_less_those_of_water() -> None:

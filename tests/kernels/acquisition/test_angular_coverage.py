@@ -16,10 +16,10 @@ def coverage(position, used=None):
 
 @pytest.mark.parametrize("elements", [8, 16, 32, 64, 256])
 def test_a_ring_is_complete_whatever_its_number_of_elements(elements):
-    found = coverage(arc(elements, 0.1).position_m)
-    assert not found.limited
-    assert found.turn_deg is None
-    assert str(found) == "Paths cross the object in every direction."
+    angular = coverage(arc(elements, 0.1).position_m)
+    assert not angular.limited
+    assert angular.turn_deg is None
+    assert str(angular) == "Paths cross the object in every direction."
 
 
 def test_half_of_the_pairs_of_a_ring_are_complete():
@@ -30,28 +30,28 @@ def test_half_of_the_pairs_of_a_ring_are_complete():
 def test_facing_lines_have_no_paths_along_them():
     used = np.zeros((64, 64), dtype=bool)
     used[:32, 32:] = True
-    found = coverage(facing_lines(32, 0.1, 0.06).position_m, used)
-    assert found.limited
-    assert found.missing_deg == (60.0, 120.0)
-    assert 0.4 < found.visible < 0.65
+    angular = coverage(facing_lines(32, 0.1, 0.06).position_m, used)
+    assert angular.limited
+    assert angular.missing_deg == (60.0, 120.0)
+    assert 0.4 < angular.visible < 0.65
 
 
 def test_an_arc_states_its_part_of_the_turn():
-    found = coverage(arc(72, 0.1, 200.0).position_m)
-    assert found.turn_deg == pytest.approx(200.0, abs=3.0)
-    low, high = found.missing_deg
+    angular = coverage(arc(72, 0.1, 200.0).position_m)
+    assert angular.turn_deg == pytest.approx(200.0, abs=3.0)
+    low, high = angular.missing_deg
     # The opening of the arc is at 280°: paths along 100° are missing.
     assert 0.5 * (low + high) == pytest.approx(100.0, abs=10.0)
 
 
 def test_receivers_opposite_the_emitter_alone_limit_the_angle_near_the_edge():
-    place = np.arange(64)
-    apart = np.abs((place[:, None] - place + 32) % 64 - 32)
-    found = coverage(arc(64, 0.1).position_m, apart >= 26)
-    assert found.limited
-    assert found.turn_deg is None
-    assert "elements cover" not in str(found)
-    assert found.least < found.visible
+    position = np.arange(64)
+    apart = np.abs((position[:, None] - position + 32) % 64 - 32)
+    angular = coverage(arc(64, 0.1).position_m, apart >= 26)
+    assert angular.limited
+    assert angular.turn_deg is None
+    assert "elements cover" not in str(angular)
+    assert angular.least < angular.visible
 
 
 def test_a_bowl_is_complete_and_facing_planes_are_not():
@@ -61,9 +61,9 @@ def test_a_bowl_is_complete_and_facing_planes_are_not():
     planes = np.concatenate([np.insert(flat, 1, y, axis=1) for y in (-0.05, 0.05)])
     used = np.zeros((128, 128), dtype=bool)
     used[:64, 64:] = True
-    found = coverage(planes, used)
-    assert found.limited
-    assert found.missing_deg is None
+    angular = coverage(planes, used)
+    assert angular.limited
+    assert angular.missing_deg is None
 
 
 def test_too_few_paths_have_no_coverage():

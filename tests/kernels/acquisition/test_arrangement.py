@@ -200,7 +200,7 @@ def spoilt(dataset_name, of):
     anywhere = random.uniform(0.0, 2.0 * base.tof_s.max(), shape)
     upper = np.triu(np.ones(shape, dtype=bool), 1)
     noise = {f"noise {part}": part * rms * random.normal(size=shape) for part in (0.03, 0.1, 1.0)}
-    found = {
+    results = {
         "right": base,
         "outliers": replace(
             base,
@@ -211,9 +211,9 @@ def spoilt(dataset_name, of):
         "half": changed(base, lambda t: np.where(upper, t, np.nan)),
         "water alone": replace(base, tof_s=base.distance_m() / WATER, delta_tof_s=np.zeros(shape)),
     }
-    found |= {name: changed(base, lambda t, part=part: t + part) for name, part in noise.items()}
-    found |= {f"offset {s}": changed(base, lambda t, s=s: t + s) for s in (-3e-6, 2e-5)}
-    return found
+    results |= {name: changed(base, lambda t, part=part: t + part) for name, part in noise.items()}
+    results |= {f"offset {s}": changed(base, lambda t, s=s: t + s) for s in (-3e-6, 2e-5)}
+    return results
 
 
 @pytest.mark.parametrize("number", range(len(ARRAYS)), ids=list(ARRAYS))
@@ -235,8 +235,8 @@ def radar():
     times = stored["d_obs"].ravel() * 1e-9 * 0.1 * 1.4e8 / 1500.0
     sides = [np.unique(stored[name], axis=0, return_inverse=True) for name in "SR"]
     (sent, e), (heard, r) = sides
-    found = np.full((len(sent), len(heard)), np.nan)
-    found[e.ravel(), r.ravel()] = times
+    result = np.full((len(sent), len(heard)), np.nan)
+    result[e.ravel(), r.ravel()] = times
     position = 0.1 * np.concatenate((sent, heard))
     every = np.arange(len(position))
     return Dataset(
@@ -244,7 +244,7 @@ def radar():
         tx=every[: len(sent)],
         rx=every[len(sent) :],
         water_speed_mps=1500.0,
-        tof_s=found,
+        tof_s=result,
     )
 
 

@@ -53,19 +53,19 @@ def test_a_missing_quarter_is_cut_off_along_its_chord():
 def test_stacked_rings_keep_the_nodes_above_and_below_them():
     ring, heights = Ring(32, 0.04).positions(), (-0.01, 0.0, 0.01)
     stack = np.concatenate([np.column_stack((ring, np.full(32, z))) for z in heights])
-    found = inside_array(stack, (NODES, NODES, 18), SPACING, (*ORIGIN, -0.017), RIM_NODES)
-    assert np.array_equal(found, np.repeat(region(ring)[:, :, None], 18, axis=2))
+    result = inside_array(stack, (NODES, NODES, 18), SPACING, (*ORIGIN, -0.017), RIM_NODES)
+    assert np.array_equal(result, np.repeat(region(ring)[:, :, None], 18, axis=2))
 
 
 def test_planes_of_elements_above_each_other_are_limits():
     grid = np.stack(np.meshgrid(*[np.linspace(-0.03, 0.03, 9)] * 2), axis=-1).reshape(-1, 2)
     planes = np.concatenate([np.column_stack((grid, np.full(81, z))) for z in (-0.02, 0.02)])
     z = -0.026 + SPACING * np.arange(27)
-    found = inside_array(planes, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.026), RIM_NODES)
-    kept = z[found.any(axis=(0, 1))]
+    result = inside_array(planes, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.026), RIM_NODES)
+    kept = z[result.any(axis=(0, 1))]
     assert kept.min() == pytest.approx(-0.016)
     assert kept.max() == pytest.approx(0.016)
-    assert np.abs(X[found.any(axis=2)]).max() <= 0.03 - RIM_NODES * SPACING + 1e-9
+    assert np.abs(X[result.any(axis=2)]).max() <= 0.03 - RIM_NODES * SPACING + 1e-9
 
 
 def test_a_bowl_holds_what_lies_between_its_elements():
@@ -74,11 +74,11 @@ def test_a_bowl_holds_what_lies_between_its_elements():
     bowl = np.concatenate(
         [np.column_stack((r * np.cos(turn), r * np.sin(turn), 0 * turn + z)) for r, z in rings]
     )
-    found = inside_array(bowl, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.046), RIM_NODES)
+    result = inside_array(bowl, (NODES, NODES, 27), SPACING, (*ORIGIN, -0.046), RIM_NODES)
     z = -0.046 + SPACING * np.arange(27)
     radius = np.sqrt(X[..., None] ** 2 + Y[..., None] ** 2 + np.minimum(z, 0.0) ** 2)
-    assert radius[found & (z <= 0.0)].max() <= 0.04 - RIM_NODES * SPACING
-    assert found[(radius < 0.04 - 1.5 * RIM_NODES * SPACING - 0.002) & (z <= 0.0)].all()
+    assert radius[result & (z <= 0.0)].max() <= 0.04 - RIM_NODES * SPACING
+    assert result[(radius < 0.04 - 1.5 * RIM_NODES * SPACING - 0.002) & (z <= 0.0)].all()
 
 
 @pytest.mark.parametrize(
@@ -97,8 +97,8 @@ def test_elements_without_extent_are_refused(position, words):
 
 
 def test_depth_is_the_distance_from_the_nearest_face():
-    places = np.array([[0.0, 0.0], [0.02, 0.01], [0.0, 0.03]])
-    assert depth_inside(lines(), places) == pytest.approx([0.025, 0.01, -0.005])
+    points = np.array([[0.0, 0.0], [0.02, 0.01], [0.0, 0.03]])
+    assert depth_inside(lines(), points) == pytest.approx([0.025, 0.01, -0.005])
 
 
 @pytest.mark.parametrize("highest", [1, 2, 3, 6])

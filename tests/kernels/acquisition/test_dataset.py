@@ -58,11 +58,11 @@ def test_a_slice_is_a_plain_dataset():
         waveform=Waveform(traces, object_scale=np.ones((2, 8, 8))),
         sampling_rate_hz=1e6,
     )
-    one = volume.slice(1)
-    assert (volume.slices, one.slices) == (2, 1)
-    np.testing.assert_array_equal(one.delta_tof_s, delta[1])
-    np.testing.assert_array_equal(one.waveform.object, traces[1])
-    assert one.waveform.object_scale.shape == (8, 8)
+    slice_data = volume.slice(1)
+    assert (volume.slices, slice_data.slices) == (2, 1)
+    np.testing.assert_array_equal(slice_data.delta_tof_s, delta[1])
+    np.testing.assert_array_equal(slice_data.waveform.object, traces[1])
+    assert slice_data.waveform.object_scale.shape == (8, 8)
     with pytest.raises(InvalidInput, match="0 to 1"):
         volume.slice(2)
 

@@ -16,9 +16,9 @@ def test_a_gap_does_not_change_it():
     assert element_pitch(ring[:40]) == pytest.approx(element_pitch(ring))
 
 
-@pytest.mark.parametrize("place", [np.zeros((1, 2)), np.zeros((5, 3)), np.full((4, 2), np.nan)])
-def test_no_distance_is_no_pitch(place):
-    assert element_pitch(place) == 0.0
+@pytest.mark.parametrize("position", [np.zeros((1, 2)), np.zeros((5, 3)), np.full((4, 2), np.nan)])
+def test_no_distance_is_no_pitch(position):
+    assert element_pitch(position) == 0.0
 
 
 def test_two_elements_have_their_distance():

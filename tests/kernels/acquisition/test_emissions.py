@@ -44,8 +44,8 @@ def test_they_read_as_the_array_that_went_through_the_same(traces, done):
     assert (lazily.shape, lazily.ndim, lazily.dtype, len(lazily)) == (SHAPE, 3, traces.dtype, SHAPE[0])
     np.testing.assert_array_equal(np.asarray(lazily), whole)
     np.testing.assert_array_equal(lazily[2], whole[2])
-    for mine, theirs in zip(lazily, whole, strict=True):
-        np.testing.assert_array_equal(mine, theirs)
+    for own, theirs in zip(lazily, whole, strict=True):
+        np.testing.assert_array_equal(own, theirs)
 
 
 def test_the_lowest_whole_number_turns_into_the_highest():

@@ -37,19 +37,19 @@ def with_times(name, times):
 def test_what_stands_for_a_missing_time_is_missing_and_counted(name, value):
     right = getattr(RIGHT, name)
     dataset = with_times(name, np.where(FAILED, value, right))
-    found = getattr(dataset, name)
+    times = getattr(dataset, name)
     counted = sum(dataset.impossible_times.values())
     if name == "delta_tof_s" and value == 0.0:
         # Where the other direction is missing as well, or no object was crossed, nothing contradicts 0.
         contradicted = FAILED & ~FAILED.T & (right != 0.0)
-        np.testing.assert_array_equal(np.isnan(found), contradicted)
+        np.testing.assert_array_equal(np.isnan(times), contradicted)
         assert counted == contradicted.sum()
         return
     if name == "delta_tof_s" and value == -1e-6:
         # A difference as any other.
         return
-    np.testing.assert_array_equal(np.isnan(found), FAILED)
-    np.testing.assert_array_equal(found[~FAILED], right[~FAILED])
+    np.testing.assert_array_equal(np.isnan(times), FAILED)
+    np.testing.assert_array_equal(times[~FAILED], right[~FAILED])
     assert counted == (0 if np.isnan(value) else FAILED.sum())
     check_plausible(dataset)
     # Nothing more is found in what is left.
@@ -61,10 +61,10 @@ def test_what_stands_for_a_missing_time_is_missing_and_counted(name, value):
 def test_zeros_of_half_a_matrix_are_missing(name, half):
     dataset = with_times(name, half(getattr(RIGHT, name)))
     given = half(np.ones((32, 32), dtype=bool), 1 if half is np.triu else -1)
-    found = getattr(dataset, name)
+    times = getattr(dataset, name)
     empty = OTHER & ~given & (getattr(RIGHT, name) != 0.0)
-    assert np.isnan(found[empty]).all()
-    np.testing.assert_array_equal(found[given], getattr(RIGHT, name)[given])
+    assert np.isnan(times[empty]).all()
+    np.testing.assert_array_equal(times[given], getattr(RIGHT, name)[given])
     assert dataset.impossible_times == {"zero where the other direction is not": empty.sum()}
     check_plausible(dataset)
     assert examine(dataset).report.verdict == "usable"

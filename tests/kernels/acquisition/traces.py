@@ -72,11 +72,11 @@ def smooth_delay(elements: int, largest_s: float, seed: int = 0) -> np.ndarray:
 
 def blob_delay(elements: int) -> np.ndarray:
     """(elements, elements) straight-ray delays of a slow disc of 20 mm about the centre, s."""
-    place = ring(elements)
+    position = ring(elements)
     along = np.linspace(0.0, 1.0, 401)[:, None, None, None]
-    path = place[None, :, None] * (1.0 - along) + place[None, None, :] * along
+    path = position[None, :, None] * (1.0 - along) + position[None, None, :] * along
     inside = np.exp(-((np.linalg.norm(path, axis=-1) / 0.02) ** 4)).mean(axis=0)
-    distance = np.linalg.norm(place[:, None] - place[None], axis=-1)
+    distance = np.linalg.norm(position[:, None] - position[None], axis=-1)
     return np.asarray(inside * distance * (1.0 / 1450.0 - 1.0 / WATER_MPS))
 
 

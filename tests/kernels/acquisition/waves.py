@@ -25,20 +25,20 @@ def wave_scan() -> Dataset:
     water = np.full_like(x, WATER_MPS)
     blobs = water - 50.0 * np.exp(-(((x**2 + (y + 0.003) ** 2) / 0.008**2) ** 2))
     blobs += 60.0 * np.exp(-(((x - 0.003) ** 2 + (y - 0.006) ** 2) / 0.003**2))
-    place = Ring(ELEMENTS, RADIUS_M).positions()
+    position = Ring(ELEMENTS, RADIUS_M).positions()
     late = (START_S + STEP_S * np.arange(STEPS)) * FREQUENCY_HZ
     pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
     random = np.random.default_rng(5)
 
     def traces(speed: np.ndarray) -> np.ndarray:
-        medium, at = Medium.from_speed(speed, SPACING_M, STEP_S, edge_nodes=20), place + SPACING_M * HALF
+        medium, at = Medium.from_speed(speed, SPACING_M, STEP_S, edge_nodes=20), position + SPACING_M * HALF
         clean = np.stack([simulate(medium, one, at, pulse)[:, ::SKIP] for one in at])
         usual = float(np.median(np.abs(clean).max(axis=-1)))
         return (clean / usual + NOISE * random.standard_normal(clean.shape)).astype(np.float32)
 
     every = np.arange(ELEMENTS)
     return Dataset(
-        place,
+        position,
         every,
         every,
         WATER_MPS,

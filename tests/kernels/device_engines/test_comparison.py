@@ -37,24 +37,24 @@ pytestmark = pytest.mark.opencl
     ids=["eikonal", "traces", "space", "wave", "sart", "refraction", "field"],
 )
 def test_the_device_agrees_with_compiled_code_within_the_bound(engine):
-    found = measured(engine(), 1e9, 1)
-    assert found.compiled_s > 0.0
-    assert found.device_s > 0.0
-    assert 0.0 <= found.difference <= found.engine.bound
-    assert found.right
-    bounded = found.engine.least_bytes is not None
-    assert (found.bandwidth_share is not None) is bounded
+    errors = measured(engine(), 1e9, 1)
+    assert errors.compiled_s > 0.0
+    assert errors.device_s > 0.0
+    assert 0.0 <= errors.difference <= errors.engine.bound
+    assert errors.right
+    bounded = errors.engine.least_bytes is not None
+    assert (errors.bandwidth_share is not None) is bounded
     if bounded:
-        assert found.bandwidth_share == pytest.approx(found.engine.least_bytes / found.device_s / 1e9)
+        assert errors.bandwidth_share == pytest.approx(errors.engine.least_bytes / errors.device_s / 1e9)
 
 
 def test_a_wrong_result_is_seen():
     engine = traces(40, 60, 1)
     there = engine.there
-    found = measured(replace(engine, there=lambda: 1.01 * there()), None, 1)
-    assert found.difference == pytest.approx(0.01, rel=0.01)
-    assert not found.right
-    assert found.bandwidth_share is None
+    comparison = measured(replace(engine, there=lambda: 1.01 * there()), None, 1)
+    assert comparison.difference == pytest.approx(0.01, rel=0.01)
+    assert not comparison.right
+    assert comparison.bandwidth_share is None
     unable = measured(replace(engine, there=None), 1e9, 1)
     assert (unable.device_s, unable.difference, unable.right) == (None, None, False)
 

@@ -34,8 +34,8 @@ def recomputed(problem, times):
     again = times.copy()
     seeds = set(problem.seeds()[0].tolist())
     tau = np.ones_like(times)
-    known = np.isfinite(times) & (squares > 0.0)
-    tau[known] = times[known] / np.sqrt(squares[known])
+    finite = np.isfinite(times) & (squares > 0.0)
+    tau[finite] = times[finite] / np.sqrt(squares[finite])
     for node in np.flatnonzero(np.isfinite(times)):
         if node not in seeds:
             settled = np.where(times < times[node] * (1.0 - 1e-12), times, np.inf)

@@ -28,12 +28,12 @@ def rough_problem(seed, contrast, ndim):
     shape = rng.integers(2, 13 if ndim == 2 else 8, ndim)
     decades = (rng.uniform(-0.5, 0.5, shape), rng.integers(0, 2, shape) - 0.5)[rng.integers(2)]
     last = shape - 1
-    place = rng.random(ndim) * last
+    position = rng.random(ndim) * last
     axis = rng.integers(ndim)
-    on_face = np.where(np.arange(ndim) == axis, last * rng.integers(0, 2), place)
-    in_the_middle = np.minimum(np.floor(place) + 0.5, last)
+    on_face = np.where(np.arange(ndim) == axis, last * rng.integers(0, 2), position)
+    in_the_middle = np.minimum(np.floor(position) + 0.5, last)
     corner = last * rng.integers(0, 2, ndim)
-    return contrast**decades, (place, on_face, in_the_middle, np.round(place), corner)[rng.integers(5)]
+    return contrast**decades, (position, on_face, in_the_middle, np.round(position), corner)[rng.integers(5)]
 
 
 def assert_causal(speed, source, method):

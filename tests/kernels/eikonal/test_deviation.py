@@ -64,10 +64,10 @@ def test_as_accurate_as_the_accurate_solver_in_tissue(seed, part):
     source = place(speed.shape, (part, 0.02))
     truth = solve(speed, SPACING, source, supersample=4)
     crossing = SPACING / WATER
-    found = factored_sweeping(PointSource.checked(speed, SPACING, source))
+    times = factored_sweeping(PointSource.checked(speed, SPACING, source))
     error, accurate, plain = (
         np.abs(tof - truth).mean() / crossing
-        for tof in (found, solve(speed, SPACING, source), solve(speed, SPACING, source, "fsm"))
+        for tof in (times, solve(speed, SPACING, source), solve(speed, SPACING, source, "fsm"))
     )
     assert error < 2.0 * accurate + 2e-3
     assert error < 0.05 * plain

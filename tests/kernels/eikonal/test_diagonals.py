@@ -117,7 +117,7 @@ def members(grid, low, high):
 def test_neighbours_of_a_node_are_those_of_the_grid(shape):
     grid = Diagonals.of(shape)
     padded = tuple(n + 2 for n in shape)
-    found = grid.no_columns()
+    computed = grid.no_columns()
     for node in np.ndindex(padded):
         expected = set()
         for axis in range(len(shape)):
@@ -126,9 +126,9 @@ def test_neighbours_of_a_node_are_those_of_the_grid(shape):
                 near[axis] += step
                 if all(1 <= i <= n for i, n in zip(near, shape, strict=True)):
                     expected.add(int(np.ravel_multi_index(near, padded)))
-        found.clear()
-        grid.include_neighbours(np.array([np.ravel_multi_index(node, padded)]), found)
-        assert members(grid, *found) == expected
+        computed.clear()
+        grid.include_neighbours(np.array([np.ravel_multi_index(node, padded)]), computed)
+        assert members(grid, *computed) == expected
 
 
 @given(shape=SHAPES, seed=st.integers(0, 99))

@@ -29,9 +29,9 @@ def rough_problems(seed, shape, batch):
 def test_equals_fim_and_a_batch_equals_one_by_one(seed, shape, batch):
     speeds, sources = rough_problems(seed, shape, batch)
     many = eikonal.solve_many(speeds, 1.0, sources, "fim-opencl")
-    for speed, source, found in zip(speeds, sources, many, strict=True):
-        assert np.allclose(found, eikonal.solve(speed, 1.0, source, "fim"), rtol=1e-11, atol=1e-15)
-        assert np.array_equal(found, eikonal.solve(speed, 1.0, source, "fim-opencl"))
+    for speed, source, computed in zip(speeds, sources, many, strict=True):
+        assert np.allclose(computed, eikonal.solve(speed, 1.0, source, "fim"), rtol=1e-11, atol=1e-15)
+        assert np.array_equal(computed, eikonal.solve(speed, 1.0, source, "fim-opencl"))
 
 
 @pytest.mark.opencl
@@ -48,8 +48,8 @@ def test_threads_share_the_device_without_mixing_problems():
     speeds, sources = rough_problems(7, (33, 30), 12)
     alone = eikonal.solve_many(speeds, 1.0, sources, "fim-opencl")
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(lambda s, x: eikonal.solve(s, 1.0, x, "fim-opencl"), speeds, sources))
-    assert np.array_equal(np.stack(found), alone)
+        listed = list(pool.map(lambda s, x: eikonal.solve(s, 1.0, x, "fim-opencl"), speeds, sources))
+    assert np.array_equal(np.stack(listed), alone)
 
 
 @pytest.mark.opencl
@@ -77,7 +77,7 @@ def test_without_a_device_fim_runs_with_a_warning(monkeypatch):
     with pytest.warns(
         OpenCLFallbackWarning, match="fim takes over: Fast Platform:GPU 9000 was refused"
     ) as caught:
-        found = eikonal.solve_many(speeds, 1.0, sources, "fim-opencl")
+        computed = eikonal.solve_many(speeds, 1.0, sources, "fim-opencl")
     assert len(caught) == 1
-    assert np.array_equal(found, expected)
+    assert np.array_equal(computed, expected)
     device_selection._warn_once.cache_clear()

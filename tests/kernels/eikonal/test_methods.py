@@ -26,10 +26,10 @@ def four_decade_problem(seed, longest, ndim):
     decades = rng.uniform(-2.0, 2.0, shape)
     if rng.random() < 0.3:
         decades = np.where(decades > 0.0, 2.0, -2.0)
-    place = rng.random(ndim) * (shape - 1)
+    position = rng.random(ndim) * (shape - 1)
     corner = (shape - 1) * rng.integers(0, 2, ndim)
-    middle = np.minimum(np.floor(place) + 0.5, shape - 1)
-    return 10.0**decades, (place, corner, np.round(place), middle)[rng.integers(4)]
+    middle = np.minimum(np.floor(position) + 0.5, shape - 1)
+    return 10.0**decades, (position, corner, np.round(position), middle)[rng.integers(4)]
 
 
 def smooth_speed(seed, shape):
@@ -43,13 +43,13 @@ def smooth_speed(seed, shape):
     return 1.5 + 0.16 * waves
 
 
-def gradient_problem(shape, place):
-    """Speed 1 + 4x on the unit cube and the exact travel time from ``place``."""
+def gradient_problem(shape, position):
+    """Speed 1 + 4x on the unit cube and the exact travel time from ``position``."""
     spacing = 1.0 / (shape[0] - 1)
     grids = np.meshgrid(*[np.arange(n) * spacing for n in shape], indexing="ij")
     speed = 1.0 + 4.0 * grids[0]
-    squared = sum((x - p) ** 2 for x, p in zip(grids, place, strict=True))
-    exact = np.arccosh(1.0 + 16.0 * squared / (2.0 * speed * (1.0 + 4.0 * place[0]))) / 4.0
+    squared = sum((x - p) ** 2 for x, p in zip(grids, position, strict=True))
+    exact = np.arccosh(1.0 + 16.0 * squared / (2.0 * speed * (1.0 + 4.0 * position[0]))) / 4.0
     return speed, spacing, exact
 
 

@@ -37,8 +37,8 @@ def test_parabolas_of_any_direction_are_exact_in_second_order_and_planes_in_firs
         settled = np.where(times < times[middle], times, np.inf)
         # The slowness is the length of the gradient at the node.
         rhs = float(np.linalg.norm(slopes[:ndim]))
-        found = plain_update(middle, strides, rhs, settled, second_order)
-        assert found == pytest.approx(50.0, abs=1e-9)
+        result = plain_update(middle, strides, rhs, settled, second_order)
+        assert result == pytest.approx(50.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("second_order", [False, True])

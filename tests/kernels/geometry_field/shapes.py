@@ -21,9 +21,9 @@ def octahedron(levels: int) -> TriangleMesh:
     faces = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
     for _ in range(levels):
         pairs = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges, place = np.unique(pairs, axis=0, return_inverse=True)
+        edges, position = np.unique(pairs, axis=0, return_inverse=True)
         middles = vertices[edges].sum(axis=1)
-        a, b, c = (len(vertices) + place.reshape(-1, 3)).T
+        a, b, c = (len(vertices) + position.reshape(-1, 3)).T
         p, q, r = faces.T
         faces = np.concatenate([np.stack(t, axis=1) for t in ((p, a, c), (a, q, b), (c, b, r), (a, b, c))])
         vertices = np.concatenate([vertices, middles / np.linalg.norm(middles, axis=1, keepdims=True)])

@@ -27,12 +27,12 @@ def test_the_range_classifies_as_equation_18_does(name):
     weights = cell_weights(FILTERS[name])
     least, most = product_ranges(weights, 1)
 
-    @given(seed=st.integers(0, 2**32 - 1), place=st.floats(-0.2, 1.2))
+    @given(seed=st.integers(0, 2**32 - 1), position=st.floats(-0.2, 1.2))
     @settings(max_examples=effort(20, 200), deadline=None)
-    def same(seed, place):
+    def same(seed, position):
         nodes = np.random.default_rng(seed).normal(0.0, 1.0, weights.nodes**3)
         low, high = weighted_range(nodes, least, most)
-        iso = nodes.min() + place * np.ptp(nodes)
+        iso = nodes.min() + position * np.ptp(nodes)
         lower, upper = equation_18(nodes, iso, least[0], most[0])
         if min(abs(upper - iso), abs(iso - lower)) > 1e-9:
             assert (low <= iso <= high) == (lower <= iso <= upper)

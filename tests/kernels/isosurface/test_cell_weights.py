@@ -10,11 +10,11 @@ from bentray_kernels.isosurface.cell_weights import CellWeights, cell_weights
 from bentray_kernels.splines.filters import FILTERS
 
 
-def dense(weights: CellWeights, places: np.ndarray) -> np.ndarray:
+def dense(weights: CellWeights, points: np.ndarray) -> np.ndarray:
     """(nodes, places) weights at places of the cell."""
     pieces = len(weights.powers)
-    number = np.minimum((places * pieces).astype(int), pieces - 1)
-    values = [polynomial.polyval(places * pieces - k, weights.powers[k].T) for k in range(pieces)]
+    number = np.minimum((points * pieces).astype(int), pieces - 1)
+    values = [polynomial.polyval(points * pieces - k, weights.powers[k].T) for k in range(pieces)]
     return np.choose(number, values)
 
 

@@ -33,15 +33,15 @@ def flat_patch(nx=7, ny=5, height=lambda x, y: 0.0 * x):
 
 def two_handles():
     """Two rings joined by a tube of triangles between two triangular holes: genus 2."""
-    one, other = torus(12, 8), torus(12, 8)
-    count = len(one.vertices)
-    vertices = np.concatenate((one.vertices, other.vertices + np.array((2.9, 0.0, 0.0))))
+    first, other = torus(12, 8), torus(12, 8)
+    count = len(first.vertices)
+    vertices = np.concatenate((first.vertices, other.vertices + np.array((2.9, 0.0, 0.0))))
     # The outermost face of the first ring and the one that faces it on the second.
-    middle = vertices[one.faces].mean(axis=1)
+    middle = vertices[first.faces].mean(axis=1)
     right = int(np.argmax(middle[:, 0]))
     left = int(np.argmin(vertices[other.faces + count].mean(axis=1)[:, 0]))
-    hole, opposite = one.faces[right], other.faces[left] + count
-    faces = [np.delete(one.faces, right, 0), np.delete(other.faces, left, 0) + count]
+    hole, opposite = first.faces[right], other.faces[left] + count
+    faces = [np.delete(first.faces, right, 0), np.delete(other.faces, left, 0) + count]
     # The corners of the one run against those of the other.
     pairs = min(
         (np.roll(opposite[::-1], k) for k in range(3)),
@@ -71,5 +71,5 @@ def bunny():
     words = BUNNY.read_text().split()
     vertices, faces = int(words[1]), int(words[2])
     numbers = np.array(words[4:], np.float64)
-    places, rows = numbers[: 3 * vertices], numbers[3 * vertices :]
-    return mesh(places.reshape(-1, 3), rows.reshape(faces, 4)[:, 1:])
+    points, rows = numbers[: 3 * vertices], numbers[3 * vertices :]
+    return mesh(points.reshape(-1, 3), rows.reshape(faces, 4)[:, 1:])

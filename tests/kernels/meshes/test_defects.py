@@ -30,10 +30,10 @@ def volume_of(surface):
     ],
 )
 def test_sound_meshes_stay_as_they_are(surface, holes, genus):
-    found = sound(surface.vertices, surface.faces)
-    assert (found.merged, found.turned, found.holes, found.genus) == (0, 0, holes, genus)
-    np.testing.assert_array_equal(found.mesh.corners, surface.corners)
-    np.testing.assert_array_equal(found.mesh.vertices, surface.vertices[found.origin])
+    repaired = sound(surface.vertices, surface.faces)
+    assert (repaired.merged, repaired.turned, repaired.holes, repaired.genus) == (0, 0, holes, genus)
+    np.testing.assert_array_equal(repaired.mesh.corners, surface.corners)
+    np.testing.assert_array_equal(repaired.mesh.vertices, surface.vertices[repaired.origin])
 
 
 @given(st.lists(st.booleans(), min_size=60, max_size=60))
@@ -41,9 +41,9 @@ def test_faces_are_turned_outward(turned):
     """Whichever faces of a closed surface run the wrong way, the result encloses the same volume."""
     surface = torus(6, 5)
     faces = np.where(np.array(turned)[:, np.newaxis], surface.faces[:, ::-1], surface.faces)
-    found = sound(surface.vertices, faces)
-    assert found.turned == sum(turned)
-    assert volume_of(found.mesh) == pytest.approx(volume_of(surface))
+    repaired = sound(surface.vertices, faces)
+    assert repaired.turned == sum(turned)
+    assert volume_of(repaired.mesh) == pytest.approx(volume_of(surface))
 
 
 @given(st.sets(st.integers(0, 47), max_size=20))
@@ -51,18 +51,18 @@ def test_of_an_open_surface_the_fewest_are_turned(turned):
     surface = flat_patch(7, 5)
     faces = surface.faces.copy()
     faces[sorted(turned)] = faces[sorted(turned)][:, ::-1]
-    found = sound(surface.vertices, faces)
-    assert found.turned == len(turned)
-    assert (found.mesh.face_normals[:, 2] > 0.0).all()
+    repaired = sound(surface.vertices, faces)
+    assert repaired.turned == len(turned)
+    assert (repaired.mesh.face_normals[:, 2] > 0.0).all()
 
 
 def test_vertices_in_one_place_are_merged_and_those_of_no_face_left_out():
     surface = tetrahedron()
     apart = surface.corners.reshape(-1, 3)
     spare = np.full((2, 3), 9.0)
-    found = sound(np.concatenate((apart, spare)), np.arange(12).reshape(-1, 3))
-    assert (found.merged, found.unused, len(found.mesh.vertices)) == (8, 2, 4)
-    np.testing.assert_array_equal(found.mesh.corners, surface.corners)
+    repaired = sound(np.concatenate((apart, spare)), np.arange(12).reshape(-1, 3))
+    assert (repaired.merged, repaired.unused, len(repaired.mesh.vertices)) == (8, 2, 4)
+    np.testing.assert_array_equal(repaired.mesh.corners, surface.corners)
 
 
 def test_fans_that_touch_are_parted():
@@ -72,11 +72,11 @@ def test_fans_that_touch_are_parted():
     about = np.flatnonzero((patch.faces == 12).any(axis=1))
     opposite = np.linalg.norm(middle - (4.0 - middle[about[0]]), axis=1).argmin()
     faces = np.delete(patch.faces, [about[0], opposite], axis=0)
-    found = sound(patch.vertices, faces)
-    assert (found.parted, found.holes, found.genus, len(found.mesh.vertices)) == (1, 2, 0, 26)
-    np.testing.assert_array_equal(found.mesh.corners, patch.vertices[faces])
-    np.testing.assert_array_equal(found.mesh.vertices, patch.vertices[found.origin])
-    assert [len(loop) for loop in topology_of(found.mesh.faces).boundary_loops] == [16, 6]
+    repaired = sound(patch.vertices, faces)
+    assert (repaired.parted, repaired.holes, repaired.genus, len(repaired.mesh.vertices)) == (1, 2, 0, 26)
+    np.testing.assert_array_equal(repaired.mesh.corners, patch.vertices[faces])
+    np.testing.assert_array_equal(repaired.mesh.vertices, patch.vertices[repaired.origin])
+    assert [len(loop) for loop in topology_of(repaired.mesh.faces).boundary_loops] == [16, 6]
 
 
 def test_zeros_of_either_sign_are_one_place():
@@ -116,14 +116,14 @@ def with_junctions(surface, divided, parts):
 @pytest.mark.parametrize("parts", [2, 3, 7])
 def test_faces_on_a_line_are_given_to_their_neighbours(parts):
     """Without a gap: the neighbour across the longest side is divided."""
-    found = sound(*with_junctions(BALL, (3, 20, 41), parts))
-    assert found.flat == 3 * (parts - 1)
-    same_surface(found, BALL)
+    repaired = sound(*with_junctions(BALL, (3, 20, 41), parts))
+    assert repaired.flat == 3 * (parts - 1)
+    same_surface(repaired, BALL)
 
 
 def test_a_face_on_a_line_beside_an_open_side_is_left_out():
-    found = sound(np.array(PLACES), np.array([(0, 1, 2), (1, 0, 6)]))
-    assert (found.flat, len(found.mesh.faces), found.holes) == (1, 1, 1)
+    repaired = sound(np.array(PLACES), np.array([(0, 1, 2), (1, 0, 6)]))
+    assert (repaired.flat, len(repaired.mesh.faces), repaired.holes) == (1, 1, 1)
 
 
 def rounded(scale, digits=None, noise=0.0):
@@ -147,9 +147,9 @@ def rounded(scale, digits=None, noise=0.0):
     ],
 )
 def test_corners_that_agree_to_the_digits_of_a_file_are_merged(scale, digits, noise):
-    found = sound(*rounded(scale, digits, noise))
-    assert found.merged == 3 * len(BALL.faces) - len(BALL.vertices)
-    same_surface(found, TriangleMesh(scale * BALL.vertices, BALL.faces))
+    repaired = sound(*rounded(scale, digits, noise))
+    assert repaired.merged == 3 * len(BALL.faces) - len(BALL.vertices)
+    same_surface(repaired, TriangleMesh(scale * BALL.vertices, BALL.faces))
 
 
 def test_corners_farther_apart_are_named_with_their_distance():
@@ -166,8 +166,8 @@ def test_a_slit_stays_open(gap):
     right = patch.corners.mean(axis=1)[:, 0] > patch.vertices[12, 0]
     moved = patch.vertices + np.outer(np.arange(25) == 12, [gap, 0.0, 0.0])
     faces = np.where(right[:, np.newaxis], patch.faces + 25, patch.faces)
-    found = sound(np.concatenate((patch.vertices, moved)), faces)
-    assert (found.holes, found.merged, found.genus) == (2, 4, 0)
+    repaired = sound(np.concatenate((patch.vertices, moved)), faces)
+    assert (repaired.holes, repaired.merged, repaired.genus) == (2, 4, 0)
 
 
 DEFECTS = {
@@ -202,13 +202,13 @@ DEFECTS = {
 def test_defects_with_one_repair_are_repaired_and_counted(defect):
     spoil, repairs = DEFECTS[defect]
     vertices, faces = (np.asarray(one) for one in spoil(BALL.vertices, BALL.faces))
-    found = sound(vertices, faces)
+    repaired = sound(vertices, faces)
     names = ("merged", "unused", "flat", "repeated", "turned", "parted")
-    assert {name: getattr(found, name) for name in names} == dict.fromkeys(names, 0) | repairs
-    assert (len(found.mesh.faces), len(found.mesh.vertices)) == (len(BALL.faces), len(BALL.vertices))
-    np.testing.assert_array_equal(found.mesh.vertices, vertices[found.origin])
-    scale = np.ptp(found.mesh.vertices) / np.ptp(BALL.vertices)
-    same_surface(found, TriangleMesh(scale * BALL.vertices, BALL.faces))
+    assert {name: getattr(repaired, name) for name in names} == dict.fromkeys(names, 0) | repairs
+    assert (len(repaired.mesh.faces), len(repaired.mesh.vertices)) == (len(BALL.faces), len(BALL.vertices))
+    np.testing.assert_array_equal(repaired.mesh.vertices, vertices[repaired.origin])
+    scale = np.ptp(repaired.mesh.vertices) / np.ptp(BALL.vertices)
+    same_surface(repaired, TriangleMesh(scale * BALL.vertices, BALL.faces))
 
 
 STRIP = [(np.cos(a), np.sin(a), 0.0) for a in 2 * np.pi * np.arange(9) / 9] + [

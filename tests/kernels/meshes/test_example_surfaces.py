@@ -22,17 +22,17 @@ def test_the_counts_of_table_5():
 
 @given(st.integers(2, 12), st.integers(3, 12))
 def test_spheres(rings, around):
-    found = sphere(rings, around)
-    assert len(found.faces) == 2 * around * (rings - 1)
-    assert np.linalg.norm(found.vertices, axis=1) == pytest.approx(1.0)
-    checked = sound(found.vertices, found.faces)
+    surface = sphere(rings, around)
+    assert len(surface.faces) == 2 * around * (rings - 1)
+    assert np.linalg.norm(surface.vertices, axis=1) == pytest.approx(1.0)
+    checked = sound(surface.vertices, surface.faces)
     assert (checked.genus, checked.holes, checked.turned, checked.merged, checked.unused) == (0, 0, 0, 0, 0)
 
 
 @given(st.integers(3, 12), st.integers(3, 12), st.floats(0.05, 0.9))
 def test_tori(along, around, thickness):
-    found = torus(along, around, thickness)
-    checked = sound(found.vertices, found.faces)
+    surface = torus(along, around, thickness)
+    checked = sound(surface.vertices, surface.faces)
     assert (checked.genus, checked.holes, checked.turned, checked.merged) == (1, 0, 0, 0)
 
 
@@ -43,9 +43,9 @@ def test_volumes_come_near_the_true_ones():
 
 @pytest.mark.parametrize(("wanted", "made"), [(20, 20), (100, 80), (5000, 5120), (100_000, 100_820)])
 def test_balls_have_about_as_many_faces_as_wanted(wanted, made):
-    found = bumpy_ball(wanted)
-    assert len(found.faces) == made
-    checked = sound(found.vertices, found.faces)
+    surface = bumpy_ball(wanted)
+    assert len(surface.faces) == made
+    checked = sound(surface.vertices, surface.faces)
     assert (checked.genus, checked.holes, checked.turned, checked.merged) == (0, 0, 0, 0)
 
 

@@ -25,9 +25,9 @@ def test_distance_and_weights_solve_the_linear_system(seed):
         if abs(np.linalg.det(system)) < 0.1:
             continue
         away, second, third = np.linalg.solve(system, a - point)
-        found = meet_plane(triangles, face, *point, *direction)
-        assert found[:4] == pytest.approx((away, 1.0 - second - third, second, third), abs=1e-4, rel=1e-4)
-        assert found[4] == pytest.approx(-direction @ np.cross(b - a, c - a), abs=1e-4)
+        met = meet_plane(triangles, face, *point, *direction)
+        assert met[:4] == pytest.approx((away, 1.0 - second - third, second, third), abs=1e-4, rel=1e-4)
+        assert met[4] == pytest.approx(-direction @ np.cross(b - a, c - a), abs=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ def test_a_surface_is_no_distance_from_itself():
 
 
 def test_balls_in_each_other():
-    one, other = sphere(100, 200), sphere(100, 200)
-    error = geometric_error(one, mesh(other.vertices * 1.1, other.faces), 5000)
+    first, other = sphere(100, 200), sphere(100, 200)
+    error = geometric_error(first, mesh(other.vertices * 1.1, other.faces), 5000)
     assert error.rms == pytest.approx(0.1, rel=0.01)
     assert error.greatest == pytest.approx(0.1, rel=0.02)
 

@@ -33,9 +33,9 @@ def by_brute_force(surface: Surface, origin: np.ndarray, direction: np.ndarray) 
     a, b, c = surface.triangles[:, :9].astype(float).reshape(-1, 3, 3).transpose(1, 0, 2)
     matrices = np.stack([b - a, c - a, np.broadcast_to(-direction, a.shape)], axis=-1)
     regular = np.abs(np.linalg.det(matrices)) > 1e-14
-    found = np.full((len(a), 3), np.nan)
-    found[regular] = np.linalg.solve(matrices[regular], (origin - a)[regular][..., None])[..., 0]
-    u, v, s = found.T
+    result = np.full((len(a), 3), np.nan)
+    result[regular] = np.linalg.solve(matrices[regular], (origin - a)[regular][..., None])[..., 0]
+    u, v, s = result.T
     hit = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (s > 0.0)
     if not hit.any():
         return -1, np.inf
@@ -57,8 +57,8 @@ def test_the_first_face_is_that_of_brute_force(seed, count):
         assert distances[k] == pytest.approx(distance, rel=1e-9)
         if face >= 0:
             corners = surface.triangles[face, :9].astype(float).reshape(3, 3)
-            place = np.array([*weights[k], 1.0 - weights[k].sum()]) @ corners
-            np.testing.assert_allclose(place, origins[k] + distance * directions[k], atol=1e-9)
+            position = np.array([*weights[k], 1.0 - weights[k].sum()]) @ corners
+            np.testing.assert_allclose(position, origins[k] + distance * directions[k], atol=1e-9)
             normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
             assert outside[k] == (normal @ directions[k] < 0.0)
 

@@ -37,11 +37,11 @@ def test_a_ball():
 def test_a_plane_has_no_error():
     x, y, z = grid(8)
     surface = isosurface_mesh(1.3 * x + 0.4 * y - 0.2 * z, np.array([1.0, 2.0, 3.0]), 0.123)
-    place = surface.vertices / (1.0, 2.0, 3.0) - 3.5
-    inner = (np.abs(place) < 3.4).all(axis=1)
+    position = surface.vertices / (1.0, 2.0, 3.0) - 3.5
+    inner = (np.abs(position) < 3.4).all(axis=1)
     assert inner.sum() > 50
-    np.testing.assert_allclose(place[inner] @ (1.3, 0.4, -0.2), 0.123, atol=0.02 * 2)
-    assert np.median(np.abs(place[inner] @ (1.3, 0.4, -0.2) - 0.123)) < 1e-12
+    np.testing.assert_allclose(position[inner] @ (1.3, 0.4, -0.2), 0.123, atol=0.02 * 2)
+    assert np.median(np.abs(position[inner] @ (1.3, 0.4, -0.2) - 0.123)) < 1e-12
 
 
 @given(arrays.arrays(np.int8, st.tuples(*(st.integers(2, 5),) * 3), elements=st.integers(0, 2)))

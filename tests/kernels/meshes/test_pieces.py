@@ -15,8 +15,8 @@ def test_pieces_come_apart_the_largest_first():
         np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.faces + first for part, first in zip(parts, count, strict=False)]),
     )
-    found = pieces_of(whole)
-    for piece, part in zip(found, [parts[1], parts[2], parts[0]], strict=True):
+    pieces = pieces_of(whole)
+    for piece, part in zip(pieces, [parts[1], parts[2], parts[0]], strict=True):
         np.testing.assert_array_equal(piece.vertices, part.vertices)
         np.testing.assert_array_equal(piece.faces, part.faces)
 

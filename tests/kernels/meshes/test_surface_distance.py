@@ -29,11 +29,11 @@ def test_random_triangles(seed):
     number = random.integers(1, 8)
     surface = mesh(random.normal(size=(3 * number, 3)), np.arange(3 * number).reshape(-1, 3))
     points = 2.0 * random.normal(size=(6, 3))
-    found, sampled = SurfaceGrid(surface).distance(points), by_sampling(surface, points)
-    assert (found <= sampled + 1e-12).all()
+    distances, sampled = SurfaceGrid(surface).distance(points), by_sampling(surface, points)
+    assert (distances <= sampled + 1e-12).all()
     # Samples lie within a step of the nearest point.
     longest = np.linalg.norm(surface.corners - np.roll(surface.corners, 1, axis=1), axis=-1).max()
-    assert (found >= sampled - longest / 60).all()
+    assert (distances >= sampled - longest / 60).all()
 
 
 def test_places_that_are_known():

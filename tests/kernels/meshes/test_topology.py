@@ -40,8 +40,8 @@ def test_a_hole_for_each_face_taken_out(rings, around, data):
     topology = topology_of(np.delete(whole.faces, gone, axis=0)) if len(gone) < len(whole.faces) else None
     assert topology is not None
     assert (topology.genus, len(topology.boundary_loops)) == (0, len(gone))
-    found = {frozenset(topology.faces.ravel()[loop].tolist()) for loop in topology.boundary_loops}
-    assert found == {frozenset(whole.faces[face].tolist()) for face in gone}
+    result = {frozenset(topology.faces.ravel()[loop].tolist()) for loop in topology.boundary_loops}
+    assert result == {frozenset(whole.faces[face].tolist()) for face in gone}
 
 
 def test_sides_and_edges_refer_to_each_other():
@@ -50,9 +50,9 @@ def test_sides_and_edges_refer_to_each_other():
     np.testing.assert_array_equal(
         topology.edges[topology.side_edge], np.sort(np.column_stack((start, end)), axis=1)
     )
-    one, other = topology.edge_sides.T
-    np.testing.assert_array_equal(start[one], end[other])
-    np.testing.assert_array_equal(topology.side_edge[one], np.arange(len(topology.edges)))
+    first, other = topology.edge_sides.T
+    np.testing.assert_array_equal(start[first], end[other])
+    np.testing.assert_array_equal(topology.side_edge[first], np.arange(len(topology.edges)))
 
 
 def test_boundary_loops_follow_the_faces_and_the_longest_is_first():

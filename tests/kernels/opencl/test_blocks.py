@@ -29,8 +29,8 @@ def test_points_of_a_block_lie_together():
 
 def test_around_gives_the_home_first_and_only_blocks_of_the_grid():
     blocks = Blocks((20, 9))
-    places = list(blocks.around(np.array([np.ravel_multi_index((19, 8), (20, 9))])))
-    assert places == [(2, 1), (1, 1), (2, 0)]
+    points = list(blocks.around(np.array([np.ravel_multi_index((19, 8), (20, 9))])))
+    assert points == [(2, 1), (1, 1), (2, 0)]
 
 
 @pytest.mark.parametrize("shape", [(8, 8), (9, 7), (1, 30), (30, 1), (1, 1), (17, 24), (5, 4, 3), (1, 1, 9)])
@@ -39,9 +39,9 @@ def test_times_are_those_of_the_reference(session, shape):
     last = tuple(n - 1 for n in shape)
     for source in ((0,) * len(shape), last):
         seeds = [(np.array([np.ravel_multi_index(source, shape)]), np.zeros(1))]
-        found = travel_times(session, crossings, seeds)
-        assert found.shape == (1, *shape)
-        assert np.allclose(found[0], reference(crossings[0], source), rtol=1e-11, atol=0.0)
+        times = travel_times(session, crossings, seeds)
+        assert times.shape == (1, *shape)
+        assert np.allclose(times[0], reference(crossings[0], source), rtol=1e-11, atol=0.0)
 
 
 def test_result_does_not_depend_on_the_batch(session, monkeypatch):
@@ -63,5 +63,5 @@ def test_result_does_not_depend_on_the_batch(session, monkeypatch):
 def test_seed_between_blocks_activates_both(session):
     crossings = np.ones((1, 4, 16))
     seeds = [(np.array([7, 8]), np.array([0.5, 0.5]))]
-    found = travel_times(session, crossings, seeds)[0, 0]
-    assert np.allclose(found, np.abs(np.arange(16) - 7.5))
+    times = travel_times(session, crossings, seeds)[0, 0]
+    assert np.allclose(times, np.abs(np.arange(16) - 7.5))

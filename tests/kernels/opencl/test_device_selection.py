@@ -25,9 +25,9 @@ def verdicts(monkeypatch, three, fresh):
 def test_the_first_gpu_that_passes_is_chosen(verdicts):
     assert device_selection.select_device().device.index == 1
     verdicts[1] = "solve: ended by signal 11"
-    found = device_selection.select_device()
-    assert found.device.index == 2
-    assert found.refusals == ("Fast Platform:GPU 9000 was refused: solve: ended by signal 11",)
+    device = device_selection.select_device()
+    assert device.device.index == 2
+    assert device.refusals == ("Fast Platform:GPU 9000 was refused: solve: ended by signal 11",)
 
 
 def test_requested_device_is_not_replaced(verdicts, monkeypatch):

@@ -31,8 +31,8 @@ def test_a_library_of_the_system_has_no_package():
 
 
 def test_the_package_is_the_one_whose_record_names_the_file():
-    found = list(files_of("pocl-binary-distribution", "libpocl-21062cec.so"))
-    for file in found:
+    listed = list(files_of("pocl-binary-distribution", "libpocl-21062cec.so"))
+    for file in listed:
         assert (
             package_of(str(file))
             == f"pocl-binary-distribution {metadata.version('pocl-binary-distribution')}"

@@ -55,10 +55,10 @@ def test_the_cpu_computes_it_again_once(lost):
         runs.append(cpu_only())
         return solve()
 
-    found, why = computed(work)
+    result, why = computed(work)
     assert runs == [False, True]
     assert why == lost.lost != ""
-    np.testing.assert_array_equal(found, eikonal.solve(SPEED, 1e-3, (0.0, 0.0), "fim"))
+    np.testing.assert_array_equal(result, eikonal.solve(SPEED, 1e-3, (0.0, 0.0), "fim"))
 
 
 def test_errors_of_the_work_itself_are_not_those_of_the_device(lost):

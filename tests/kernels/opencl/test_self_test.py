@@ -46,10 +46,10 @@ def test_the_wrong_minimum_of_one_lane_is_found(session, monkeypatch, lane):
 @pytest.mark.parametrize(("ndim", "bad"), [(2, 1e-8), (3, np.nan)])
 def test_wrong_times_are_found(session, monkeypatch, ndim, bad):
     def wrong(session, crossings, seeds):
-        found = np.stack([self_test.reference(c, (4,) * c.ndim) for c in crossings])
-        if found[0].ndim == ndim:
-            found[-1].flat[-1] += bad
-        return found
+        result = np.stack([self_test.reference(c, (4,) * c.ndim) for c in crossings])
+        if result[0].ndim == ndim:
+            result[-1].flat[-1] += bad
+        return result
 
     monkeypatch.setattr(self_test, "travel_times", wrong)
     assert self_test.fault_of(session, "solve") == f"wrong travel times in {ndim}-D"

@@ -36,10 +36,10 @@ def test_a_right_device_is_tried_once(gpu):
 def test_the_faults_of_pocl_cost_only_the_widths(gpu):
     """PoCL 3.0-rc2: double8 aborts and double16 is silently wrong; our kernels use neither."""
     child = child_of({"double8": None, "double16": "wrong fmin"})
-    found = examine(gpu, child)
-    assert found.usable
-    assert found.widths == (1, 2, 4)
-    assert found.faults == {"double8": "ended by signal 6", "double16": "wrong fmin"}
+    answer = examine(gpu, child)
+    assert answer.usable
+    assert answer.widths == (1, 2, 4)
+    assert answer.faults == {"double8": "ended by signal 6", "double16": "wrong fmin"}
     assert child.calls == [STAGES, ("double16",)]
 
 
@@ -47,9 +47,9 @@ def test_the_faults_of_pocl_cost_only_the_widths(gpu):
 @pytest.mark.parametrize(("fault", "said"), [(None, "ended by signal 6"), ("wrong sqrt", "wrong sqrt")])
 def test_fault_in_a_required_feature_rejects_the_device(gpu, stage, fault, said):
     child = child_of({stage: fault, "double4": None})
-    found = examine(gpu, child)
-    assert not found.usable
-    assert found.reason == f"{stage}: {said}"
+    answer = examine(gpu, child)
+    assert not answer.usable
+    assert answer.reason == f"{stage}: {said}"
     assert len(child.calls) <= 2, "what cannot be used is not tried any further"
 
 
@@ -57,8 +57,8 @@ def test_an_answer_of_a_child_to_another_question_is_ignored(gpu):
     def child(device, stages, time_out_s):
         return {"double32": ""}, "ended with exit code 0"
 
-    found = examine(gpu, child)
-    assert found.reason == "double1: ended with exit code 0"
+    answer = examine(gpu, child)
+    assert answer.reason == "double1: ended with exit code 0"
 
 
 def test_a_hanging_child_is_stopped(gpu):
@@ -103,9 +103,9 @@ def test_an_aborting_child_is_survived(gpu, monkeypatch, tmp_path):
 
 def test_device_without_double_precision_is_not_tested(gpu, monkeypatch, fresh):
     monkeypatch.setattr(self_test_results, "in_a_child", None)
-    found = self_test_result(replace(gpu, double_precision=False))
-    assert found.reason == "it has no double precision"
-    assert found.widths == ()
+    answer = self_test_result(replace(gpu, double_precision=False))
+    assert answer.reason == "it has no double precision"
+    assert answer.widths == ()
 
 
 def test_a_pass_is_remembered_on_disk_until_the_driver_or_the_processor_changes(gpu, monkeypatch, fresh):

@@ -56,9 +56,9 @@ def test_shortcut_equals_the_mean_over_all_points():
     x = (axis[:, None] + fine * (axis[1] - axis[0])).ravel()
     points = phantom.speed_at(x[:, None, None], x[None, :, None], z + fine * height)
     expected = points.reshape(nodes, 6, nodes, 6, 6).mean(axis=(1, 3, 4))
-    found = plane_means([p.solid for p in parts], nodes, 2.0, z, height, phantom.speeds_mps)
-    assert found == pytest.approx(expected, abs=1e-12)
-    assert len(np.unique(found)) > 20
+    computed = plane_means([p.solid for p in parts], nodes, 2.0, z, height, phantom.speeds_mps)
+    assert computed == pytest.approx(expected, abs=1e-12)
+    assert len(np.unique(computed)) > 20
 
 
 @pytest.mark.parametrize(

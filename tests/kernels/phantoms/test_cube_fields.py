@@ -13,9 +13,9 @@ def test_nodes_hold_the_field_at_their_places():
     assert volume.shape == (n, n, n)
     rng = np.random.default_rng(1)
     for node in rng.integers(0, n, (20, 3)):
-        place = -1.0 + 2.0 * node / (n - 1)
-        assert volume[tuple(node)] == pytest.approx(float(field.value(place)), abs=1e-14)
-        assert in_nodes(place, n) == pytest.approx(node)
+        position = -1.0 + 2.0 * node / (n - 1)
+        assert volume[tuple(node)] == pytest.approx(float(field.value(position)), abs=1e-14)
+        assert in_nodes(position, n) == pytest.approx(node)
 
 
 def test_eight_bits_are_rounded_and_clipped():

@@ -57,8 +57,8 @@ def test_the_vertical_slice_hangs_from_its_cut():
         radius = max(lesion.semi_axes_m)
         around = lesion.centre_m[0] + radius * np.cos(angle), lesion.centre_m[1] + radius * np.sin(angle)
         assert tissue.contains(*around).all()
-    place = (np.arange(128) / 127.0 - 0.5) * TABLE6_SIDE_M
-    assert np.hypot(place[x], place[y]).max() < 0.09
+    position = (np.arange(128) / 127.0 - 0.5) * TABLE6_SIDE_M
+    assert np.hypot(position[x], position[y]).max() < 0.09
     assert phantom.speed_range() == table6().speed_range()
 
 

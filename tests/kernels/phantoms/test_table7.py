@@ -14,8 +14,8 @@ def part_at(phantom, name):
 
 
 def test_values_are_those_of_the_table():
-    found = {part.name: (part.speed_mps, part.attenuation_np_m) for part in table7().parts[:3]}
-    assert found == {"skin": (1650.0, 58.0), "fat": (1375.0, 15.0), "tissue": (1475.0, 50.0)}
+    result = {part.name: (part.speed_mps, part.attenuation_np_m) for part in table7().parts[:3]}
+    assert result == {"skin": (1650.0, 58.0), "fat": (1375.0, 15.0), "tissue": (1475.0, 50.0)}
     lesions = {(part.speed_mps, part.attenuation_np_m) for part in table7().parts[3:]}
     assert lesions == {(1560.0, 60.0), (1560.0, 30.0), (1530.0, 70.0)}
 
@@ -26,8 +26,8 @@ def test_parts_are_nested_as_in_the_table(nodes, slices):
     z = table7_slices(nodes, slices)
     random = np.random.default_rng(7)
     x, y = random.uniform(-0.1, 0.1, (2, 200_000))
-    place = random.uniform(z[0], z[-1], x.size)
-    skin, fat, tissue, *lesions = (part.solid.level(x, y, place) <= 1.0 for part in phantom.parts)
+    position = random.uniform(z[0], z[-1], x.size)
+    skin, fat, tissue, *lesions = (part.solid.level(x, y, position) <= 1.0 for part in phantom.parts)
     assert fat[tissue].all()
     assert skin[fat].all()
     for k, lesion in enumerate(lesions):

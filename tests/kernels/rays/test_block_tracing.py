@@ -22,30 +22,30 @@ SHAPE, SPACING = (40, 11, 9), 2e-3
 def one_ray(tof, slowness, bounds, source, receiver):
     """Length of a ray in each node, m, its predicted time, s, and the blocks that it passed."""
     weights, predicted, passed = np.zeros(SHAPE), 0.0, []
-    place, count, by_nodes = receiver, 1, False
+    position, count, by_nodes = receiver, 1, False
     end = LEFT
     while end != ARRIVED:
-        block = int(np.searchsorted(bounds, place[0], side="right")) - 1
+        block = int(np.searchsorted(bounds, position[0], side="right")) - 1
         block = min(block, len(bounds) - 2)
         planes = BlockPlanes.from_range(bounds[block], bounds[block + 1], SHAPE[0])
         own = slice(planes.low, planes.high)
-        rays = WaitingRays(place[None], np.array([count]), np.array([by_nodes]))
-        parts = trace_block(tof[own], slowness[own], SPACING, planes, source, rays)
-        end = parts.ends[0]
+        rays = WaitingRays(position[None], np.array([count]), np.array([by_nodes]))
+        paths = trace_block(tof[own], slowness[own], SPACING, planes, source, rays)
+        end = paths.ends[0]
         if end == CAUGHT:
             assert not by_nodes, "from node to node every ray arrives"
             weights[:], predicted, passed = 0.0, 0.0, []
-            place, count, by_nodes = receiver, 1, True
+            position, count, by_nodes = receiver, 1, True
             continue
-        assert np.array_equal(parts.starts, [0, len(parts.points)])
+        assert np.array_equal(paths.starts, [0, len(paths.points)])
         sums = np.zeros(tof[own].shape)
-        back_project_block(sums.shape, parts.points, parts.starts, np.zeros(1), sums, weights[own])
-        assert weights[own].sum() >= 0.999 * parts.lengths[0]
+        back_project_block(sums.shape, paths.points, paths.starts, np.zeros(1), sums, weights[own])
+        assert weights[own].sum() >= 0.999 * paths.lengths[0]
         low, high = planes.limits(GUARD)
-        inside = parts.places[0, 0]
+        inside = paths.places[0, 0]
         assert (end == LEFT) == (not low <= inside < high) or end == ARRIVED
-        place, count = parts.places[0], count + len(parts.points) - 1
-        predicted += parts.predicted[0]
+        position, count = paths.places[0], count + len(paths.points) - 1
+        predicted += paths.predicted[0]
         passed.append(block)
     return weights * SPACING, predicted, passed, by_nodes
 
@@ -66,10 +66,10 @@ def test_rays_are_those_of_the_whole_grid(rough):
         cuts = np.sort(rng.choice(np.arange(1, SHAPE[0]), 3, replace=False))
         bounds = [0, *cuts.tolist(), SHAPE[0]]
         for k, receiver in enumerate(receivers):
-            found, predicted, passed, by_nodes = one_ray(tof, 1.0 / speed, bounds, source, receiver)
+            computed, predicted, passed, by_nodes = one_ray(tof, 1.0 / speed, bounds, source, receiver)
             whole = expected[[k]].toarray()[0]
-            differences.append(np.abs(found.ravel() - whole).max() / SPACING)
-            assert predicted == pytest.approx(float((found / speed).sum()), rel=1e-12)
+            differences.append(np.abs(computed.ravel() - whole).max() / SPACING)
+            assert predicted == pytest.approx(float((computed / speed).sum()), rel=1e-12)
             assert len(passed) <= 2 * len(bounds), "no block many times"
             nodes_alone += by_nodes
     assert nodes_alone or not rough
@@ -92,9 +92,9 @@ def test_straight_parts_of_all_blocks_are_the_whole_ray():
         planes = BlockPlanes.from_range(start, stop, SHAPE[0])
         own = slice(planes.low, planes.high)
         rays = WaitingRays(receivers, np.ones(4, np.int64), np.zeros(4, np.bool_))
-        parts = trace_block(None, slowness[own], SPACING, planes, source, rays)
-        predicted += parts.predicted
-        back_project_block(total[0, own].shape, parts.points, parts.starts, corrections, *total[:, own])
+        paths = trace_block(None, slowness[own], SPACING, planes, source, rays)
+        predicted += paths.predicted
+        back_project_block(total[0, own].shape, paths.points, paths.starts, corrections, *total[:, own])
     assert np.allclose(predicted, expected @ slowness.ravel(), rtol=1e-12, atol=0.0)
     sums, weights = SPACING * total
     assert np.allclose(sums.ravel(), np.nan_to_num(corrections) @ expected, rtol=0.0, atol=1e-15)

@@ -64,8 +64,8 @@ def zigzag(rng, count, ndim, size=0.15):
     """A path along a random direction through the middle of the grid, with so large random steps aside."""
     along = rng.normal(size=ndim)
     along /= np.linalg.norm(along)
-    places = np.cumsum(rng.uniform(0.8, 1.6, count))
-    points = 0.5 * SIDE + (places - places.mean())[:, None] * along
+    positions = np.cumsum(rng.uniform(0.8, 1.6, count))
+    points = 0.5 * SIDE + (positions - positions.mean())[:, None] * along
     return points + size * rng.normal(size=(count, ndim))
 
 

@@ -49,9 +49,9 @@ def test_constant_gradient(ndim, n, error):
     assert exact.max() > 1.5
 
 
-def curved_space(curvature, places, ndim):
+def curved_space(curvature, points, ndim):
     """1 + K/4·ρ² about the centre, of which ds/v makes a space of constant curvature K (stereographic)."""
-    return 1.0 + 0.25 * curvature * ((places - CENTRE[:ndim]) ** 2).sum(axis=-1)
+    return 1.0 + 0.25 * curvature * ((points - CENTRE[:ndim]) ** 2).sum(axis=-1)
 
 
 @pytest.mark.parametrize("curvature", [8.0, -3.2])
@@ -80,11 +80,11 @@ class Waves:
         self.phase = rng.uniform(0.0, 2.0 * np.pi, 8)
         self.height = height
 
-    def speed(self, places):
-        return np.exp(-self.height * np.sin(places @ self.wave.T + self.phase).sum(axis=-1))
+    def speed(self, points):
+        return np.exp(-self.height * np.sin(points @ self.wave.T + self.phase).sum(axis=-1))
 
-    def slope(self, place):
-        return self.height * np.cos(self.wave @ place + self.phase) @ self.wave
+    def slope(self, position):
+        return self.height * np.cos(self.wave @ position + self.phase) @ self.wave
 
     def shoot(self, source, direction, length):
         """End of a ray of that length (d(x)/ds = t, d(t)/ds = ∇u − (∇u·t)·t), and its direction there."""
@@ -185,9 +185,9 @@ def test_rough_models_give_positive_numbers_or_none(seed, flat):
 
 def test_neither_units_nor_spacing_matter():
     speed, receivers = Waves(8, 2).speed(nodes(40, 2)), places(5, 8, 2)
-    one = spread(speed, 1.0 / 39.0, receivers, SOURCE[:2])
+    spreading = spread(speed, 1.0 / 39.0, receivers, SOURCE[:2])
     other = spread(1500.0 * speed, 0.01 / 39.0, 0.01 * receivers, 0.01 * SOURCE[:2])
-    assert np.allclose(one, other, rtol=1e-6)
+    assert np.allclose(spreading, other, rtol=1e-6)
 
 
 def test_a_receiver_on_the_source_has_1():

@@ -26,16 +26,16 @@ def test_slopes_of_a_paraboloid_are_exact_up_to_the_faces(shape):
     times = np.sqrt(np.tensordot(metric, away**2, 1) + 4.0)
     points = np.random.default_rng(0).random((50, len(shape))) * (np.array(shape) - 1)
     points[:8] = np.round(points[:8] / (np.array(shape) - 1)) * (np.array(shape) - 1)
-    found = np.empty_like(points)
-    slopes_at(squared_time_spline(times), shape, points, found)
-    np.testing.assert_allclose(found, 2.0 * metric * (points - source), atol=1e-6)
+    result = np.empty_like(points)
+    slopes_at(squared_time_spline(times), shape, points, result)
+    np.testing.assert_allclose(result, 2.0 * metric * (points - source), atol=1e-6)
 
 
 def test_one_layer_of_nodes_has_no_slope_across():
     times = np.sqrt(np.indices((9, 8, 1))[0] ** 2 + 1.0)
-    found = np.empty((1, 3))
-    slopes_at(squared_time_spline(times), times.shape, np.array([[4.5, 3.0, 0.0]]), found)
-    np.testing.assert_allclose(found, [[9.0, 0.0, 0.0]], atol=1e-6)
+    result = np.empty((1, 3))
+    slopes_at(squared_time_spline(times), times.shape, np.array([[4.5, 3.0, 0.0]]), result)
+    np.testing.assert_allclose(result, [[9.0, 0.0, 0.0]], atol=1e-6)
 
 
 @pytest.mark.parametrize("ndim", [2, 3])

@@ -69,8 +69,8 @@ def test_gradient_of_a_parabola_is_exact_on_the_rim_too(factors, flat):
     terms = [factors[k] * x + factors[k + 3] * x**2 for k, x in enumerate(axes)]
     tof = np.sqrt(sum(terms) + 200.0)
     slope = [factors[k] + 2.0 * factors[k + 3] * x for k, x in enumerate(axes)]
-    found = squared_gradient(tof.ravel(), shape, strides)
-    assert np.allclose(found, np.stack([x.ravel() for x in slope], axis=1), atol=1e-9)
+    gradient = squared_gradient(tof.ravel(), shape, strides)
+    assert np.allclose(gradient, np.stack([x.ravel() for x in slope], axis=1), atol=1e-9)
 
 
 def test_slowness_along_the_ray_is_the_travel_time():

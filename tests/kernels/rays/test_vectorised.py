@@ -101,10 +101,10 @@ def test_rays_through_tissue_are_those_of_the_tracer():
     assert (straight.time - rays.time).max() > 0.05
     correction = np.linspace(-1.0, 1.0, len(receivers))
     worth_passed, passed = (sums.reshape(SHAPE) for sums in back_projected(correction, steps, rays))
-    for found, truth in ((worth_passed, rows.T @ correction), (passed, rows.sum(axis=0))):
+    for computed, truth in ((worth_passed, rows.T @ correction), (passed, rows.sum(axis=0))):
         # Longer steps give single nodes more or less; the neighbourhood has the same.
         wanted = gaussian_filter(truth.reshape(SHAPE), 1.5)
-        assert np.abs(gaussian_filter(found, 1.5) - wanted).mean() < 0.03 * np.abs(wanted).mean()
+        assert np.abs(gaussian_filter(computed, 1.5) - wanted).mean() < 0.03 * np.abs(wanted).mean()
 
 
 def test_spreading_adds():

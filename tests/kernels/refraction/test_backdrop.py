@@ -21,9 +21,9 @@ def colour(backdrop: Backdrop, plane: int, u: float, v: float) -> tuple[float, f
 
 def located(backdrop: Backdrop, points, directions) -> tuple[np.ndarray, np.ndarray]:
     points, directions = np.array(points, dtype=float), np.array(directions, dtype=float)
-    planes, places = np.empty(len(points), dtype=np.int8), np.empty((len(points), 2))
-    locate(backdrop, points, directions, planes, places)
-    return planes, places
+    planes, positions = np.empty(len(points), dtype=np.int8), np.empty((len(points), 2))
+    locate(backdrop, points, directions, planes, positions)
+    return planes, positions
 
 
 def wall(z: float, size: float = 2.0, **options) -> Plane:
@@ -34,14 +34,14 @@ def test_a_ray_ends_on_the_nearest_plane_that_it_meets():
     backdrop = backdrop_of(
         [wall(3.0, 8.0), wall(2.0, 2.0), checkerboard((0, 0, -5), (1, 0, 0), (0, 1, 0), 2)]
     )
-    planes, places = located(
+    planes, points = located(
         backdrop,
         [[0.5, -0.25, 0.0], [1.5, 0.0, 0.0], [9.0, 9.0, 0.0], [0, 0, 0], [7.0, 0.0, 0.0], [0, 0, 0]],
         [[0, 0, 1], [0, 0, 1], [0, 0, -2.0], [1, 0, 0], [0, 0, 1], [0.1, 0.0, 1.0]],
     )
     assert planes.tolist() == [1, 0, 2, -1, -1, 1]
-    np.testing.assert_allclose(places[[0, 1, 2, 5]], [[0.25, -0.125], [0.1875, 0.0], [9.0, 9.0], [0.1, 0.0]])
-    assert np.isnan(places[[3, 4]]).all()
+    np.testing.assert_allclose(points[[0, 1, 2, 5]], [[0.25, -0.125], [0.1875, 0.0], [9.0, 9.0], [0.1, 0.0]])
+    assert np.isnan(points[[3, 4]]).all()
 
 
 def test_pixels_are_squares_or_run_into_each_other():

@@ -10,9 +10,9 @@ from bentray_kernels.refraction import Camera, orthographic, perspective
 
 
 def ray(camera: Camera, u: float, v: float) -> tuple[np.ndarray, np.ndarray]:
-    place = np.array([1.0, u, v])
-    direction = place @ camera.direction
-    return place @ camera.origin, direction / np.linalg.norm(direction)
+    position = np.array([1.0, u, v])
+    direction = position @ camera.direction
+    return position @ camera.origin, direction / np.linalg.norm(direction)
 
 
 def test_parallel_rays_start_on_the_rectangle():

@@ -57,8 +57,8 @@ def screen_error(scene: Scene, volume_radius: float, index: float, reach: float,
     exact, _ = through_ball(offset, volume_radius, index, 1.0)
     assert (traced.crossed == 2).all()
     s = (1.0 - traced.point[:, 2]) / traced.direction[:, 2]
-    found = traced.point[:, :2] + s[:, None] * traced.direction[:, :2]
-    return np.linalg.norm(found - exact[:, None] * across, axis=1) / volume_radius
+    result = traced.point[:, :2] + s[:, None] * traced.direction[:, :2]
+    return np.linalg.norm(result - exact[:, None] * across, axis=1) / volume_radius
 
 
 @pytest.mark.parametrize("structure", ["octree", "dda", "steps"])
@@ -121,9 +121,9 @@ def test_paths_are_reversible():
 
 
 def test_nested_layers_of_one_index_are_one_ball():
-    one, two = ball(), scene(-squared(24), Layers((-(RADIUS**2), -0.04), (1.0, 1.5, 1.5)))
+    first, two = ball(), scene(-squared(24), Layers((-(RADIUS**2), -0.04), (1.0, 1.5, 1.5)))
     starts = [[0.02 * k, 0.01 * k, -2.0] for k in range(13)]
-    plain, nested = (trace(made, starts, [[0, 0, 1]] * 13) for made in (one, two))
+    plain, nested = (trace(made, starts, [[0, 0, 1]] * 13) for made in (first, two))
     np.testing.assert_allclose(nested.direction, plain.direction, atol=1e-9)
     assert nested.crossed[0] == 4
     assert plain.crossed[0] == 2

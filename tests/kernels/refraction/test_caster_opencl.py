@@ -98,26 +98,26 @@ def both(
     random = np.random.default_rng(seed)
     eye = 3.0 * np.linalg.norm(scene.spacing * scene.grid[1]) * _unit(random.normal(size=3))
     camera = perspective(eye, (0.0, 0.0, 0.0), random.normal(size=3), 14.0)
-    places = random.uniform(-0.5, 0.5, (300, 2))
+    points = random.uniform(-0.5, 0.5, (300, 2))
     medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.1)
-    found, expected = (allocate_results(300, depth, paths) for _ in range(2))
+    computed, expected = (allocate_results(300, depth, paths) for _ in range(2))
     views = camera.origin, camera.direction
-    caster_of(scene, precision).follow(medium, search, views, places, depth, found)
+    caster_of(scene, precision).follow(medium, search, views, points, depth, computed)
     if compiled is not None:
         medium, search = medium_of(compiled, structure), compiled.search(structure, roots, 0.1)
-    cast(medium, search, views, places, depth, expected)
-    return found, expected
+    cast(medium, search, views, points, depth, expected)
+    return computed, expected
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def strays(found: Traced, expected: Traced, far: float) -> int:
+def strays(computed: Traced, expected: Traced, far: float) -> int:
     """Rays that became something else, or are farther off than so much."""
-    same = (found.fate == expected.fate) & (found.crossed == expected.crossed)
+    same = (computed.fate == expected.fate) & (computed.crossed == expected.crossed)
     for name in ("point", "direction", "weight"):
-        off = np.abs(getattr(found, name) - getattr(expected, name)).reshape(len(same), -1).max(axis=1)
+        off = np.abs(getattr(computed, name) - getattr(expected, name)).reshape(len(same), -1).max(axis=1)
         same &= off <= far
     return int((~same).sum())
 
@@ -142,11 +142,11 @@ def test_every_filter_and_root_finder_sees_the_ball(name, roots, structure):
 
 @pytest.mark.parametrize("roots", ["certain", "brent"])
 def test_rays_through_nested_surfaces_are_those_of_the_compiled_caster(roots):
-    found, expected = both(nested(), roots=roots)
+    computed, expected = both(nested(), roots=roots)
     assert (expected.fate == REFRACTED).sum() > 50
     assert len(set(expected.crossed)) >= 4
-    assert strays(found, expected, 1e-9) == 0
-    np.testing.assert_allclose(found.vertices, expected.vertices, atol=1e-9)
+    assert strays(computed, expected, 1e-9) == 0
+    np.testing.assert_allclose(computed.vertices, expected.vertices, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -164,36 +164,36 @@ def test_rays_through_rough_volumes_too(name):
         scene = rough(seed, name)
         kinds = [("octree", "certain"), ("dda", "brent"), ("steps", "brent")]
         for structure, roots in [*kinds, ("octree", "analytic")] if scene.linear else kinds:
-            found, expected = both(scene, structure=structure, roots=roots, depth=3, seed=seed)
+            computed, expected = both(scene, structure=structure, roots=roots, depth=3, seed=seed)
             # What grazes a surface may go either way. Central differences are not the slopes of the values: a
             # ray may go on in a layer that the values deny, and rounding decides what it meets next.
-            assert strays(found, expected, 1e-6) <= (30 if name == "central" else 3)
+            assert strays(computed, expected, 1e-6) <= (30 if name == "central" else 3)
 
     holds()
 
 
 def test_volumes_in_float32_are_summed_in_float32():
     # The caster takes ten seconds to compile for float32.
-    found, expected = both(nested(dtype=np.float32), compiled=nested())
-    assert strays(found, expected, 1e-9) > 0
-    assert strays(found, expected, 1e-4) <= 3
+    computed, expected = both(nested(dtype=np.float32), compiled=nested())
+    assert strays(computed, expected, 1e-9) > 0
+    assert strays(computed, expected, 1e-4) <= 3
 
 
 def test_float32_finds_directions_to_a_thousandth():
     for scene in (nested(), rough(1, "bspline3"), rough(3, "trilinear")):
-        found, expected = both(scene, "float32", depth=3, paths=False)
-        assert strays(found, expected, 1e-9) > 0
-        assert strays(found, expected, 1e-3) <= 6
+        computed, expected = both(scene, "float32", depth=3, paths=False)
+        assert strays(computed, expected, 1e-9) > 0
+        assert strays(computed, expected, 1e-3) <= 6
 
 
 def test_rays_that_run_along_a_surface_for_long_are_lost():
     """In place of the case above: with the most interfaces there, rounding decides what those rays meet."""
     mask = (distance(24) < 0.3).astype(np.uint8)
     scene = Scene.build(Spline.from_volume(mask, "bspline6"), Layers((1.0,), (1.0, 1.5)), 1.0 / 23)
-    found, expected = both(scene, depth=200)
+    computed, expected = both(scene, depth=200)
     given_up = (expected.fate == LOST) & (expected.crossed < 200)
     assert given_up.sum() >= 10
-    assert strays(found, expected, 1e-6) <= 3
+    assert strays(computed, expected, 1e-6) <= 3
     # Where hardly any ray is sure, the device is not believed.
     rippled = Scene.build(Spline(mask), Layers((0.0,), (1.0, 1.5)), 1.0 / 23)
     with pytest.warns(OpenCLFallbackWarning, match="caster.cast takes over"):
@@ -234,8 +234,8 @@ def test_pictures_differ_by_a_level_but_at_discontinuities(precision, most, came
     for scene in (nested(), Scene.build(Spline(RADIUS - distance(32)), Layers((0.0,), (1.0, 1.5)), 1.0 / 31)):
         expected = render(scene, CAMERAS[camera], BACKDROP, how)
         plain = render(scene, CAMERAS[camera], BACKDROP, RenderSettings(96, 96, supersampling="none"))
-        found = render(scene, CAMERAS[camera], BACKDROP, how, caster_of(scene, precision))
-        off = np.abs(found.image.astype(int) - expected.image).max(axis=2) > 1
+        computed = render(scene, CAMERAS[camera], BACKDROP, how, caster_of(scene, precision))
+        off = np.abs(computed.image.astype(int) - expected.image).max(axis=2) > 1
         assert (expected.image != 255).any()
         assert off.sum() <= most
         assert at_discontinuities(plain)[off].all()
@@ -262,8 +262,8 @@ def test_a_device_that_casts_wrong_is_left_with_a_warning(monkeypatch):
     scene = nested()
     caster, right, seen = caster_of(scene), OpenCLCaster.follow, CAMERAS["perspective"]
 
-    def wrong(there, medium, search, camera, places, depth, traced):
-        right(there, medium, search, camera, places, depth, traced)
+    def wrong(there, medium, search, camera, points, depth, traced):
+        right(there, medium, search, camera, points, depth, traced)
         traced.direction[:, 0] += 1e-3
 
     monkeypatch.setattr(OpenCLCaster, "follow", wrong)
@@ -272,9 +272,9 @@ def test_a_device_that_casts_wrong_is_left_with_a_warning(monkeypatch):
     with pytest.warns(
         OpenCLFallbackWarning, match=r"\(certain\), caster.cast takes over: 100% of its"
     ) as caught:
-        found = [render(scene, seen, BACKDROP, how, caster) for _ in range(2)]
+        computed = [render(scene, seen, BACKDROP, how, caster) for _ in range(2)]
     assert len(caught) == 1
-    for picture in found:
+    for picture in computed:
         np.testing.assert_array_equal(picture.image, expected.image)
     # Each way to look for crossings is a program of its own, and has its own trial.
     monkeypatch.setattr(OpenCLCaster, "follow", right)
@@ -288,9 +288,9 @@ def test_a_device_that_cannot_build_the_program_is_left_too(monkeypatch):
     monkeypatch.setattr(caster_opencl, "_program", lambda *_: nonsense)
     caster, how = caster_of(scene), RenderSettings(16, 16)
     with pytest.warns(OpenCLFallbackWarning, match="caster.cast takes over: it ends with "):
-        found = render(scene, CAMERAS["perspective"], BACKDROP, how, caster)
+        computed = render(scene, CAMERAS["perspective"], BACKDROP, how, caster)
     expected = render(scene, CAMERAS["perspective"], BACKDROP, how)
-    np.testing.assert_array_equal(found.image, expected.image)
+    np.testing.assert_array_equal(computed.image, expected.image)
 
 
 def test_a_scene_that_the_device_cannot_hold_is_left_to_the_cpu(monkeypatch):
@@ -305,10 +305,10 @@ def test_a_scene_that_the_device_cannot_hold_is_left_to_the_cpu(monkeypatch):
 
 
 def test_rejects_objects_of_another_scene():
-    one, other = nested(), nested(12)
+    first, other = nested(), nested(12)
     with pytest.raises(InvalidInput) as refusal:
-        render(other, CAMERAS["perspective"], BACKDROP, RenderSettings(8, 8), caster_of(one))
+        render(other, CAMERAS["perspective"], BACKDROP, RenderSettings(8, 8), caster_of(first))
     assert refusal.value.field == "medium"
     with pytest.raises(InvalidInput) as refusal:
-        on_the_device(one, "float16")
+        on_the_device(first, "float16")
     assert refusal.value.field == "precision"

@@ -52,7 +52,7 @@ def test_the_first_crossing_is_found(endless, seed):
     plane = hilly(random.uniform(-0.4, 0.4, (4, 6)), endless=endless)
     points = random.uniform(-1.5, 1.5, (20, 3))
     directions = random.normal((0.0, 0.0, 0.8), 1.0, (20, 3))
-    planes, places = located(backdrop_of([plane]), points, directions)
+    planes, positions = located(backdrop_of([plane]), points, directions)
     s = np.linspace(0.0, 12.0, 24_001)
     u, v, off = above(plane, points[:, None] + s[:, None] * directions[:, None])
     inside = np.ones(u.shape, bool) if endless else (np.abs(u) < 0.5) & (np.abs(v) < 0.5)
@@ -64,7 +64,7 @@ def test_the_first_crossing_is_found(endless, seed):
     )
     axis = np.abs(per_step).argmax(axis=1)
     rays = np.arange(len(points))
-    step = (places[rays, axis] - start[rays, axis]) / per_step[rays, axis]
+    step = (positions[rays, axis] - start[rays, axis]) / per_step[rays, axis]
     for k in rays:
         earlier = crossed[k] if planes[k] < 0 else crossed[k, : max(int(step[k] - 0.01), 0)]
         assert not earlier.any()
@@ -81,16 +81,14 @@ def test_flat_and_tilted_reliefs_are_planes():
     np.testing.assert_array_equal(flat[0], expected[0])
     np.testing.assert_allclose(flat[1], expected[1], atol=1e-12)
     tilted = hilly(np.tile(np.linspace(-0.3, 0.5, 4), (2, 1)))
-    planes, places = located(backdrop_of([tilted]), points, directions)
+    planes, where = located(backdrop_of([tilted]), points, directions)
     hit = planes == 0
     assert hit.sum() > 20
     # On the plane z = 3.1 + 0.8·u, and on the ray.
-    z = 3.1 + 0.8 * places[hit, 0]
+    z = 3.1 + 0.8 * where[hit, 0]
     s = (z - points[hit, 2]) / directions[hit, 2]
-    np.testing.assert_allclose(points[hit, 0] + s * directions[hit, 0], 0.1 + 2.0 * places[hit, 0], atol=1e-9)
-    np.testing.assert_allclose(
-        points[hit, 1] + s * directions[hit, 1], -0.2 + 1.4 * places[hit, 1], atol=1e-9
-    )
+    np.testing.assert_allclose(points[hit, 0] + s * directions[hit, 0], 0.1 + 2.0 * where[hit, 0], atol=1e-9)
+    np.testing.assert_allclose(points[hit, 1] + s * directions[hit, 1], -0.2 + 1.4 * where[hit, 1], atol=1e-9)
 
 
 def test_the_nearer_of_a_hill_and_a_plane_is_seen():
@@ -98,18 +96,18 @@ def test_the_nearer_of_a_hill_and_a_plane_is_seen():
     hill[1, 1] = -1.0
     behind = checkerboard((0.0, 0.0, 2.5), (9.0, 0.0, 0.0), (0.0, 9.0, 0.0), 4)
     for planes in ([hilly(hill), behind], [behind, hilly(hill)]):
-        found, _ = located(backdrop_of(planes), [[0.1, -0.2, 0.0], [0.9, 0.3, 0.0]], [[0, 0, 1], [0, 0, 1]])
+        plane, _ = located(backdrop_of(planes), [[0.1, -0.2, 0.0], [0.9, 0.3, 0.0]], [[0, 0, 1], [0, 0, 1]])
         mountain = planes.index(behind) ^ 1
-        assert found.tolist() == [mountain, 1 - mountain]
+        assert plane.tolist() == [mountain, 1 - mountain]
 
 
 def test_rays_along_an_endless_surface_end_nowhere():
     plane = hilly(np.array([[0.0, 0.1], [0.1, 0.0]]), endless=True)
-    planes, places = located(
+    planes, points = located(
         backdrop_of([plane]), [[0.0, 0.0, 3.05], [0.0, 0.0, 9.0]], [[0, 0, 0.0], [1, 0, 0.0]]
     )
     assert planes.tolist() == [-1, -1]
-    assert np.isnan(places).all()
+    assert np.isnan(points).all()
 
 
 @pytest.mark.parametrize("relief", [np.zeros(4), np.zeros((1, 5)), np.full((3, 3), np.nan)])

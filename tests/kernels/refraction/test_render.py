@@ -68,9 +68,9 @@ def test_supersampling_comes_nearer_to_the_picture_of_64_samples(scene):
 
 
 def test_result_does_not_depend_on_threads_and_tiles(scene):
-    one, two = picture(scene), picture(scene, threads=2)
+    first, two = picture(scene), picture(scene, threads=2)
     for name in ("image", "position_m", "plane", "fate", "crossed", "weight"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+        np.testing.assert_array_equal(getattr(first, name), getattr(two, name))
 
 
 def test_jitter_is_drawn_from_its_seed(scene):

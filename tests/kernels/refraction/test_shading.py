@@ -23,8 +23,8 @@ def ball(sign: float) -> Scene:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_ball_is_seen_where_it_is(sign):
     shaded = shade(ball(sign), CAMERA, Light((0.0, 0.0, -1.0), 0.0, 1.0, 0.0, colour=(200, 100, 50)), 41, 41)
-    place = (np.arange(41) + 0.5) / 41 - 0.5
-    radius = np.hypot(place[:, None], place)
+    position = (np.arange(41) + 0.5) / 41 - 0.5
+    radius = np.hypot(position[:, None], position)
     seen = radius < RADIUS
     np.testing.assert_array_equal(np.isfinite(shaded.distance_m), seen)
     depth = np.sqrt(np.maximum(RADIUS**2 - radius**2, 0.0))

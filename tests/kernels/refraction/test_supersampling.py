@@ -14,53 +14,53 @@ BOARD = backdrop_of([checkerboard((0, 0, 1), (8, 0, 0), (0, 8, 0), 8, ((200,) * 
 
 def regular(n: int, across: float, shift: float = 0.0) -> tuple[np.ndarray, ...]:
     """Planes, places and interfaces of n × n pixels that look straight at the board."""
-    place = (np.arange(n) + 0.5) / n * across + shift
-    places = np.stack(np.meshgrid(place, place), axis=-1)
-    return np.zeros((n, n), dtype=np.int8), places, np.zeros((n, n), dtype=np.int16)
+    position = (np.arange(n) + 0.5) / n * across + shift
+    positions = np.stack(np.meshgrid(position, position), axis=-1)
+    return np.zeros((n, n), dtype=np.int8), positions, np.zeros((n, n), dtype=np.int16)
 
 
-def post(backdrop: Backdrop, planes, places, crossed, degree=1, weights=None) -> np.ndarray:
+def post(backdrop: Backdrop, planes, positions, crossed, degree=1, weights=None) -> np.ndarray:
     image = np.empty((*planes.shape, 3), dtype=np.uint8)
     light = np.ones(planes.shape) if weights is None else weights
-    post_refraction_colours(backdrop, planes, places, crossed, light, degree, image)
+    post_refraction_colours(backdrop, planes, positions, crossed, light, degree, image)
     return image
 
 
-def points(backdrop: Backdrop, planes, places, weights=None) -> np.ndarray:
+def points(backdrop: Backdrop, planes, positions, weights=None) -> np.ndarray:
     image = np.empty((*planes.shape, 3), dtype=np.uint8)
-    point_colours(backdrop, planes, places, np.ones(planes.shape) if weights is None else weights, image)
+    point_colours(backdrop, planes, positions, np.ones(planes.shape) if weights is None else weights, image)
     return image
 
 
 def test_the_samples_lie_a_third_of_the_way_to_the_neighbours():
-    planes, places, crossed = regular(4, 4 / 64)
-    places[..., 1] = 1.0 / 32
+    planes, positions, crossed = regular(4, 4 / 64)
+    positions[..., 1] = 1.0 / 32
     # The edge of a square lies at 0: a quarter of the way from column 2 to column 1.
-    places[..., 0] = np.array([-1.25, -0.75, 0.25, 1.25]) / 64
-    image, plain = post(BOARD, planes, places, crossed), points(BOARD, planes, places)
+    positions[..., 0] = np.array([-1.25, -0.75, 0.25, 1.25]) / 64
+    image, plain = post(BOARD, planes, positions, crossed), points(BOARD, planes, positions)
     assert plain[1].tolist() == [[0] * 3, [0] * 3, [200] * 3, [200] * 3]
     assert image[1, :, 0] == pytest.approx([0, 0, 200 * 2 / 3, 200], abs=1)
     # A fifth and two fifths of the way.
-    finer = post(BOARD, planes, places, crossed, 2)
+    finer = post(BOARD, planes, positions, crossed, 2)
     assert finer[1, :, 0] == pytest.approx([0, 0, 200 * 4 / 5, 200], abs=1)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4])
 def test_pixels_within_one_square_stay_as_they_are(degree):
-    planes, places, crossed = regular(32, 1.0)
-    plain, smooth = points(BOARD, planes, places), post(BOARD, planes, places, crossed, degree)
-    inner = (np.abs(places * 8 - np.round(places * 8)) > 0.3).all(axis=-1)
+    planes, positions, crossed = regular(32, 1.0)
+    plain, smooth = points(BOARD, planes, positions), post(BOARD, planes, positions, crossed, degree)
+    inner = (np.abs(positions * 8 - np.round(positions * 8)) > 0.3).all(axis=-1)
     np.testing.assert_array_equal(smooth[inner], plain[inner])
 
 
 def test_a_higher_degree_comes_closer_to_the_mean_over_the_pixel():
     # Pixels as large as squares: the mean over each is known from many samples.
-    planes, places, crossed = regular(40, 0.9 * 5.0, shift=0.013)
+    planes, positions, crossed = regular(40, 0.9 * 5.0, shift=0.013)
     fine = regular(40 * 32, 0.9 * 5.0, shift=0.013)
     truth = points(BOARD, *fine[:2])[..., 0].reshape(40, 32, 40, 32).mean(axis=(1, 3))
-    errors = [np.abs(points(BOARD, planes, places)[1:-1, 1:-1, 0] - truth[1:-1, 1:-1]).mean()]
+    errors = [np.abs(points(BOARD, planes, positions)[1:-1, 1:-1, 0] - truth[1:-1, 1:-1]).mean()]
     for degree in (1, 2, 4):
-        image = post(BOARD, planes, places, crossed, degree)[1:-1, 1:-1, 0]
+        image = post(BOARD, planes, positions, crossed, degree)[1:-1, 1:-1, 0]
         errors.append(np.abs(image - truth[1:-1, 1:-1]).mean())
     assert errors[0] > errors[1] > errors[2] > errors[3]
 
@@ -86,17 +86,17 @@ def test_samples_of_an_undistorted_view_are_those_of_real_supersampling(degree):
 
 
 def test_no_interpolation_between_different_hits():
-    planes, places, crossed = regular(8, 1.0)
+    planes, positions, crossed = regular(8, 1.0)
     crossed[:, 4:] = 2
-    places[:, 4:] += 0.37
+    positions[:, 4:] += 0.37
     planes[0] = -1
-    places[0] = np.nan
-    image, plain = post(BOARD, planes, places, crossed), points(BOARD, planes, places)
+    positions[0] = np.nan
+    image, plain = post(BOARD, planes, positions, crossed), points(BOARD, planes, positions)
     parts = [
         post(BOARD, p, q, c)
         for p, q, c in (
-            (planes[1:, :4].copy(), places[1:, :4].copy(), crossed[1:, :4].copy()),
-            (planes[1:, 4:].copy(), places[1:, 4:].copy(), crossed[1:, 4:].copy()),
+            (planes[1:, :4].copy(), positions[1:, :4].copy(), crossed[1:, :4].copy()),
+            (planes[1:, 4:].copy(), positions[1:, 4:].copy(), crossed[1:, 4:].copy()),
         )
     ]
     inner = np.s_[2:-1]
@@ -109,11 +109,11 @@ def test_smooth_pictures_are_filtered_as_well_and_light_is_weakened():
     picture = np.zeros((8, 8, 3), dtype=np.uint8)
     picture[:, ::2] = 240
     backdrop = backdrop_of([Plane((0, 0, 1), (1, 0, 0), (0, 1, 0), picture, 4.0)])
-    planes, places, crossed = regular(32, 1.0, -0.5)
+    planes, positions, crossed = regular(32, 1.0, -0.5)
     weights = np.full((32, 32), 0.5)
     plain, image = (
-        points(backdrop, planes, places, weights),
-        post(backdrop, planes, places, crossed, 1, weights),
+        points(backdrop, planes, positions, weights),
+        post(backdrop, planes, positions, crossed, 1, weights),
     )
     assert plain.max() == 120
     assert image[1:-1, 1:-1].std() < 0.8 * plain[1:-1, 1:-1].std()
@@ -138,20 +138,20 @@ def bilinear(plane: Plane, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return (1 - w) * above + w * below
 
 
-def sampled(plane: Plane, places: np.ndarray, pieces: np.ndarray, i: int, j: int, degree: int) -> np.ndarray:
+def sampled(plane: Plane, points: np.ndarray, pieces: np.ndarray, i: int, j: int, degree: int) -> np.ndarray:
     """Mean of the samples of one pixel, by the definition."""
     rows, columns = pieces.shape
     total = np.zeros(3)
     for a in range(-degree, degree + 1):
         for b in range(-degree, degree + 1):
             p, q = i + (1 if a >= 0 else -1), j + (1 if b >= 0 else -1)
-            place = places[i, j]
+            position = points[i, j]
             inside = 0 <= p < rows and 0 <= q < columns
             if inside and (pieces[[i, p, p], [q, j, q]] == pieces[i, j]).all():
                 t, w = abs(a) / (2 * degree + 1), abs(b) / (2 * degree + 1)
-                place = (1 - t) * ((1 - w) * place + w * places[i, q])
-                place = place + t * ((1 - w) * places[p, j] + w * places[p, q])
-            total += bilinear(plane, *place)
+                position = (1 - t) * ((1 - w) * position + w * points[i, q])
+                position = position + t * ((1 - w) * points[p, j] + w * points[p, q])
+            total += bilinear(plane, *position)
     return total / (2 * degree + 1) ** 2
 
 
@@ -163,21 +163,21 @@ def test_pixels_of_a_picture_are_means_of_samples_between_their_neighbours(repea
     plane = Plane((0, 0, 1), (1, 0, 0), (0, 1, 0), picture, repeats, endless=endless)
     squares = checkerboard((0, 0, 2), (1, 0, 0), (0, 1, 0), 8)
     backdrop = backdrop_of([squares, plane])
-    planes, places, crossed = regular(12, 0.9 if not endless else 2.6, -0.45)
-    places = (places + 0.01 * rng.standard_normal(places.shape)).clip(-0.5, None if endless else 0.5)
+    planes, points, crossed = regular(12, 0.9 if not endless else 2.6, -0.45)
+    points = (points + 0.01 * rng.standard_normal(points.shape)).clip(-0.5, None if endless else 0.5)
     planes[:], planes[:2], planes[10:, 5:] = 1, -1, 0
-    places[:2] = np.nan
+    points[:2] = np.nan
     crossed[6:, :4] = 2
     weights = rng.random(planes.shape)
-    image = post(backdrop, planes, places, crossed, degree, weights)
+    image = post(backdrop, planes, points, crossed, degree, weights)
     pieces = np.where(planes == 1, crossed, -9)
     seen = planes == 1
-    expected = np.array([sampled(plane, places, pieces, i, j, degree) for i, j in np.argwhere(seen)])
+    expected = np.array([sampled(plane, points, pieces, i, j, degree) for i, j in np.argwhere(seen)])
     np.testing.assert_allclose(image[seen], expected * weights[seen][:, None], atol=3.0)
     # A step is 1/64 of a texel: on average the colours differ by less than rounding does.
     assert np.abs(image[seen] - expected * weights[seen][:, None]).mean() < 0.6
     assert (image[planes < 0] == 0).all()
-    alone = post(backdrop_of([squares]), np.where(planes == 1, -1, planes).astype(np.int8), places, crossed)
+    alone = post(backdrop_of([squares]), np.where(planes == 1, -1, planes).astype(np.int8), points, crossed)
     np.testing.assert_array_equal(image[planes == 0] > 0, alone[planes == 0] > 0)
 
 

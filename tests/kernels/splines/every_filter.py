@@ -76,9 +76,9 @@ class EveryFilter:
         for power in range(REPEATS[name] + 1):
             spline = self.made(((nodes - middle) / scale) ** power, name)
             values, gradients = self.read(spline, points)
-            place = (points[:, 0] - middle) / scale
-            assert np.abs(values - place**power).max() < 100 * self.tolerance
-            slopes = power * place ** max(power - 1, 0) / scale
+            position = (points[:, 0] - middle) / scale
+            assert np.abs(values - position**power).max() < 100 * self.tolerance
+            slopes = power * position ** max(power - 1, 0) / scale
             assert np.abs(gradients[:, 0] - slopes).max() < 100 * self.tolerance
 
     def test_a_bspline_without_prefilter_repeats_lines(self, order):

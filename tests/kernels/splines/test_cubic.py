@@ -47,7 +47,7 @@ def test_jets_are_value_slope_and_second_derivative(seed, flat):
     def value(p):
         return jet(spline, p)[0]
 
-    found = jet(spline, point)
+    values = jet(spline, point)
     step, unit = 1e-4, np.eye(n)
     slopes = [(value(point + step * e) - value(point - step * e)) / (2.0 * step) for e in unit]
     seconds = [
@@ -61,8 +61,8 @@ def test_jets_are_value_slope_and_second_derivative(seed, flat):
         for a in range(n)
         for b in range(a, n)
     ]
-    assert np.allclose(found[1 : 1 + n], slopes, atol=1e-6)
-    assert np.allclose(found[1 + n : 1 + n + len(seconds)], seconds, atol=1e-5)
+    assert np.allclose(values[1 : 1 + n], slopes, atol=1e-6)
+    assert np.allclose(values[1 + n : 1 + n + len(seconds)], seconds, atol=1e-5)
 
 
 def test_spline_passes_through_the_nodes():

@@ -51,8 +51,8 @@ def test_taps_lie_about_the_point(name):
     """The weighted mean of the nodes' places is the place, but for the half node of a cell about a node."""
     read = filter_of(name)
     for t in (0.0, 0.3, 1.0):
-        places = np.arange(read.taps) - read.before + read.shift
-        mean = (read.value @ t ** np.arange(read.value.shape[1])) @ places
+        points = np.arange(read.taps) - read.before + read.shift
+        mean = (read.value @ t ** np.arange(read.value.shape[1])) @ points
         assert mean == pytest.approx(t, abs=1e-14)
 
 

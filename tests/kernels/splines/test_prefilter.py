@@ -41,13 +41,13 @@ def dense_minimum(values, order, smoothing):
     read = np.zeros((period, period))
     abscissae, weights = np.polynomial.legendre.leggauss(order + 1)
     halves = np.arange(0.0, period, 0.5)
-    places = (halves[:, np.newaxis] + 0.25 * (abscissae + 1.0)).ravel()
+    points = (halves[:, np.newaxis] + 0.25 * (abscissae + 1.0)).ravel()
     shares = np.tile(0.25 * weights, len(halves))
-    curved = np.zeros((len(places), period))
+    curved = np.zeros((len(points), period))
     for node in range(period):
         for turn in range(-3 - 8 // period, 4 + 8 // period):
             read[:, node] += basis(order)(np.arange(period) - node + turn * period)
-            curved[:, node] += basis(order, m)(places - node + turn * period)
+            curved[:, node] += basis(order, m)(points - node + turn * period)
     normal = read.T @ read + smoothing * curved.T @ (shares[:, np.newaxis] * curved)
     return np.linalg.solve(normal, read.T @ mirrored)[:n]
 
@@ -125,9 +125,9 @@ def test_unfiltered_values_are_unchanged():
 @pytest.mark.parametrize("order", range(1, 8))
 def test_sampled_bsplines_are_scipys(order):
     reach = order // 2
-    found = sampled_bspline(order)
-    assert len(found) == 2 * reach + 1
-    assert found == pytest.approx(basis(order)(np.arange(-reach, reach + 1.0)), abs=1e-15)
+    samples = sampled_bspline(order)
+    assert len(samples) == 2 * reach + 1
+    assert samples == pytest.approx(basis(order)(np.arange(-reach, reach + 1.0)), abs=1e-15)
 
 
 @pytest.mark.parametrize("order", [0, 7, 2.5, "3"])

@@ -28,11 +28,11 @@ def volume(seed=0, shape=(5, 7, 6)):
 
 @pytest.mark.parametrize("name", FILTERS)
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("place", [(1.3, 4.0, 2.81), (0.0, 6.0, 5.0), (-0.9, 6.6, 5.4)])
-def test_equals_the_sum_over_the_taps(name, dtype, place):
+@pytest.mark.parametrize("position", [(1.3, 4.0, 2.81), (0.0, 6.0, 5.0), (-0.9, 6.6, 5.4)])
+def test_equals_the_sum_over_the_taps(name, dtype, position):
     """Written out in numpy from the filter's own matrices; off the grid the outermost cell goes on."""
     spline = Spline.from_volume(volume(), name, dtype=dtype)
-    used, point = spline.filter, np.array(place)
+    used, point = spline.filter, np.array(position)
     last = np.array(spline.coefficients.shape) - used.taps
     cells = np.clip(np.floor(point + used.shift).astype(int), 0, last)
     part = spline.coefficients[tuple(slice(i, i + used.taps) for i in cells)].astype(float)
@@ -115,10 +115,10 @@ def inside(x, y, z, last_x, last_y, last_z):
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize(
-    ("place", "found"),
+    ("position", "found"),
     [(0.0, True), (-0.0, True), (4.0, True), (-1e-300, False), (4.000001, False), (np.nan, False)],
 )
-def test_the_outer_nodes_belong_to_the_grid(axis, place, found):
+def test_the_outer_nodes_belong_to_the_grid(axis, position, found):
     point = [1.0, 2.0, 3.0]
-    point[axis] = place
+    point[axis] = position
     assert inside(*point, 4.0, 4.0, 4.0) == (found, found or axis == 2)

@@ -53,8 +53,8 @@ def test_the_truth_comes_nearer(order):
     noisy = truth + 0.1 * np.random.default_rng(0).normal(size=truth.shape)
     nodes = np.argwhere(np.ones(truth.shape)).astype(float)
     smoothing = smoothing_for_noise(noisy, order, 0.1)
-    found = Spline(noisy, order, smoothing=smoothing).value(nodes).reshape(truth.shape)
-    assert np.sqrt(np.mean((found - truth)[2:-2, 2:-2, 2:-2] ** 2)) < 0.05
+    result = Spline(noisy, order, smoothing=smoothing).value(nodes).reshape(truth.shape)
+    assert np.sqrt(np.mean((result - truth)[2:-2, 2:-2, 2:-2] ** 2)) < 0.05
 
 
 def test_zero_noise_gives_no_smoothing_and_pure_noise_full_smoothing():
@@ -88,8 +88,8 @@ def test_the_response_is_the_fourier_transform():
     coefficients = Spline(line, 4, smoothing=0.5).coefficients[2:131]
     for frequency in (0.0, 0.7, 2.0, np.pi):
         waves = np.cos(frequency * (np.arange(129) - 64))
-        found = response(numerator, np.array([frequency])) / response(denominator, np.array([frequency]))
-        assert found[0] == pytest.approx(waves @ coefficients, abs=1e-12)
+        factor = response(numerator, np.array([frequency])) / response(denominator, np.array([frequency]))
+        assert factor[0] == pytest.approx(waves @ coefficients, abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -51,11 +51,11 @@ def test_sart_gives_it_back_too(scan):
     truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     sart = plan("sart", attenuation_solver="sart")
     result = reconstruct(scan, sart)
-    found = rmse(result.attenuation, truth, inside)
+    results = rmse(result.attenuation, truth, inside)
     constant = truth[inside].std()
     assert result.attenuation.min() >= 0.0
-    assert found < 0.6 * constant
-    assert rmse(reconstruct(scan, sart.changed(iterations=1)).attenuation, truth, inside) > found
+    assert results < 0.6 * constant
+    assert rmse(reconstruct(scan, sart.changed(iterations=1)).attenuation, truth, inside) > results
     # The order of the emitters alone depends on the seed.
     again, other = (reconstruct(scan, sart.changed(seed=seed)).attenuation for seed in (0, 1))
     np.testing.assert_array_equal(again, result.attenuation)
@@ -127,9 +127,9 @@ def test_a_slice_without_amplitudes_has_that_of_the_water(scan):
     times = np.stack([scan.delta_tof_s] * 2)
     both = replace(scan, delta_tof_s=times, log_ratio_np=ratios, slice_z_m=np.array([0.0, 0.01]))
     both = replace(both, water_attenuation_np_m=0.3)
-    found = reconstruct(both, plan("sart", iterations=1)).attenuation
-    assert np.allclose(found[..., 1], 0.3)
-    assert np.ptp(found[..., 0]) > 1.0
+    result = reconstruct(both, plan("sart", iterations=1)).attenuation
+    assert np.allclose(result[..., 1], 0.3)
+    assert np.ptp(result[..., 0]) > 1.0
 
 
 def test_along_straight_rays_it_is_worse(scan):

@@ -34,12 +34,12 @@ def crossing(rays, seed=0):
 def test_one_emitter_follows_equation_1(node):
     matrix, residual = node * crossing(4), node * np.array([1.0, 0.5, 2.0, 0.2])
     water = np.full(SHAPE, 0.3)
-    found = solve(
+    solution = solve(
         [rows_of(matrix, residual, [4])], water, EVERYWHERE, plan(iterations=1, relaxation=0.5), BOUNDS
     )
     corrections, sums = residual / matrix.sum(axis=1), matrix.sum(axis=0)
     update = np.where(sums > 0.0, corrections @ matrix / np.where(sums > 0.0, sums, 1.0), 0.0)
-    np.testing.assert_allclose(found.ravel(), 0.3 + 0.5 * update, atol=1e-6)
+    np.testing.assert_allclose(solution.ravel(), 0.3 + 0.5 * update, atol=1e-6)
 
 
 def test_emitters_follow_each_other_in_random_order():
@@ -61,17 +61,17 @@ def test_the_true_image_stays_and_is_found(smoothing):
     matrix = np.float32(crossing(200, 2)).astype(float)
     parts = [rows_of(matrix, matrix @ (truth - 0.5).ravel(), [50] * 4)]
     settings = plan(iterations=400, relaxation=1.0).changed(smoothing_nodes=smoothing)
-    found = solve(parts, np.full(SHAPE, 0.5), EVERYWHERE, settings, BOUNDS)
-    np.testing.assert_allclose(found, truth, atol=2e-3)
+    solution = solve(parts, np.full(SHAPE, 0.5), EVERYWHERE, settings, BOUNDS)
+    np.testing.assert_allclose(solution, truth, atol=2e-3)
 
 
 def test_region_and_bounds_hold():
     region = np.zeros(SHAPE, bool)
     region[2:4] = True
     parts = [rows_of(crossing(20), np.full(20, -50.0), [10, 10])]
-    found = solve(parts, np.full(SHAPE, 0.4), region, plan(iterations=20), BOUNDS)
-    assert (found[~region] == 0.4).all()
-    assert found[region].min() == 0.0
+    solution = solve(parts, np.full(SHAPE, 0.4), region, plan(iterations=20), BOUNDS)
+    assert (solution[~region] == 0.4).all()
+    assert solution[region].min() == 0.0
     parts = [rows_of(crossing(20), np.full(20, 500.0), [0, 10, 10, 0])]
-    found = solve(parts, np.full(SHAPE, 0.4), region, plan(iterations=20), BOUNDS)
-    assert found[region].max() == 9.0
+    solution = solve(parts, np.full(SHAPE, 0.4), region, plan(iterations=20), BOUNDS)
+    assert solution[region].max() == 9.0

@@ -20,14 +20,14 @@ ORDER = np.random.default_rng(3).permutation(ELEMENTS)
 
 def ring(speed: float = 1520.0, radius: float = 0.02) -> Dataset:
     """Times along straight rays through a disc off the centre."""
-    place = RADIUS * np.column_stack((np.cos(ANGLE), np.sin(ANGLE)))
-    way = place[None] - place[:, None]
-    towards = np.array([0.02, 0.01]) - place[:, None]
+    position = RADIUS * np.column_stack((np.cos(ANGLE), np.sin(ANGLE)))
+    way = position[None] - position[:, None]
+    towards = np.array([0.02, 0.01]) - position[:, None]
     length = np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
     beside = np.abs(towards[..., 0] * way[..., 1] - towards[..., 1] * way[..., 0]) / length
     chord = 2.0 * np.sqrt(np.maximum(radius**2 - beside**2, 0.0))
     everyone = np.arange(ELEMENTS)
-    return Dataset(place, everyone, everyone, WATER, delta_tof_s=chord * (1.0 / speed - 1.0 / WATER))
+    return Dataset(position, everyone, everyone, WATER, delta_tof_s=chord * (1.0 / speed - 1.0 / WATER))
 
 
 def noisy(scan: Dataset, snr: float, seed: int = 0) -> Dataset:
@@ -45,9 +45,9 @@ def image(scan: Dataset, method: str, **settings) -> Reconstruction:
 
 
 def codes(result: Reconstruction) -> list[str]:
-    assert bool(result.doubt) == any(one.doubtful for one in result.cautions)
+    assert bool(result.doubt) == any(caution.doubtful for caution in result.cautions)
     assert result.doubt.startswith("Doubtful result. ") or not result.doubt
-    return [one.code for one in result.cautions]
+    return [caution.code for caution in result.cautions]
 
 
 DISC = ring()
@@ -101,8 +101,8 @@ def test_a_good_image_is_not_doubted(name: str, method: str) -> None:
 @pytest.mark.parametrize("name", BAD)
 def test_an_image_of_impossible_times_is_doubted(name: str, method: str) -> None:
     scan, settings, expected = BAD[name]
-    found = codes(image(scan, method, **settings))
-    assert expected.intersection(found), found
+    computed = codes(image(scan, method, **settings))
+    assert expected.intersection(computed), computed
 
 
 def test_the_sentences_hold_the_numbers_and_what_to_do() -> None:
@@ -127,19 +127,19 @@ def test_the_measured_trunk_and_the_small_radar_profile_are_doubted() -> None:
     """Apparent speeds of 430 to 2,270 m/s, and radar scaled to a tenth, within bounds of tissue."""
     if not DATA.is_dir():
         pytest.skip(f"no measured scans: {DATA} is absent")
-    places = loadmat(DATA / "tree_markers.mat")["Markers"]
-    everyone = np.arange(len(places))
+    points = loadmat(DATA / "tree_markers.mat")["Markers"]
+    everyone = np.arange(len(points))
     times = 1e-6 * loadmat(DATA / "tree_runtimes.mat")["Runtimes"]
-    trunk = Dataset(places - places.mean(axis=0), everyone, everyone, 1500.0, tof_s=times)
+    trunk = Dataset(points - points.mean(axis=0), everyone, everyone, 1500.0, tof_s=times)
     assert codes(image(trunk, "gauss-newton", rays="straight", decomposition="volume", nodes=20))
 
     radar = loadmat(DATA / "arrenaes_am13.mat")
     ends = 0.1 * np.stack([radar["S"], radar["R"]])
-    places, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+    points, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     (tx, rows), (rx, columns) = (np.unique(one, return_inverse=True) for one in index.reshape(2, -1))
     times = np.full((tx.size, rx.size), np.nan)
     times[rows, columns] = 0.1 * 1e-9 * 1.4e8 / 1500.0 * radar["d_obs"].ravel()
-    profile = Dataset(places - places.mean(axis=0), tx, rx, 1500.0, tof_s=times)
+    profile = Dataset(points - points.mean(axis=0), tx, rx, 1500.0, tof_s=times)
     thin = {"penalty_strength": 0.1, "nodes": 48}
     assert codes(image(profile, "gauss-newton", **thin)) == ["bounds"]
     assert codes(image(profile, "gauss-newton", speed_bounds_mps=(1000.0, 2500.0), **thin)) == []

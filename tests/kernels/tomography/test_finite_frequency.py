@@ -36,10 +36,10 @@ def scan(delta=None):
 @settings(max_examples=20, deadline=None)
 def test_the_blur_is_linear_and_its_own_adjoint(seed, width):
     random = np.random.default_rng(seed)
-    one, two = random.normal(size=(2, 13, 17))
-    assert np.vdot(blurred(one, width), two) == pytest.approx(np.vdot(one, blurred(two, width)), abs=1e-9)
-    both = blurred(one + 2.0 * two, width)
-    assert np.allclose(both, blurred(one, width) + 2.0 * blurred(two, width), atol=1e-12)
+    first, two = random.normal(size=(2, 13, 17))
+    assert np.vdot(blurred(first, width), two) == pytest.approx(np.vdot(first, blurred(two, width)), abs=1e-9)
+    both = blurred(first + 2.0 * two, width)
+    assert np.allclose(both, blurred(first, width) + 2.0 * blurred(two, width), atol=1e-12)
 
 
 def test_thin_rays_see_the_image_itself_and_water_stays_water():

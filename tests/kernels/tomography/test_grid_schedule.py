@@ -28,13 +28,13 @@ def test_default_has_one_stage(scan):
 
 
 def test_coarse_before_fine_and_straight_before_bent(scan):
-    found = stages(scan, PLAN.changed(coarser_grids=1, straight_iterations=3))
-    assert [(plan.nodes, plan.rays, plan.iterations) for plan in found] == [
+    stage_plans = stages(scan, PLAN.changed(coarser_grids=1, straight_iterations=3))
+    assert [(plan.nodes, plan.rays, plan.iterations) for plan in stage_plans] == [
         (24, "straight", 3),
         (24, "curved", 2),
         (48, "curved", 2),
     ]
-    assert len({plan.side_m for plan in found}) == 1
+    assert len({plan.side_m for plan in stage_plans}) == 1
 
 
 @pytest.mark.parametrize("method", ["sart", "gauss-newton"])
@@ -54,11 +54,11 @@ def test_a_finer_grid_begins_with_the_same_image(scan):
     coarse, fine = (Problem.of(scan, replace(PLAN, nodes=n, side_m=0.2)) for n in (25, 49))
     x = np.linspace(-1.0, 1.0, 25)
     image = 1.0 / WATER * (1.0 + 0.02 * np.exp(-((x[:, None] - 0.2) ** 2 + x[None, :] ** 2) / 0.05))
-    found = initial_slowness(fine, image, coarse)
-    again = found[::2, ::2]
+    slowness = initial_slowness(fine, image, coarse)
+    again = slowness[::2, ::2]
     inside = coarse.region & fine.region[::2, ::2]
     assert np.allclose(again[inside], image[inside], rtol=0.0, atol=1e-12)
-    assert np.allclose(found[~fine.region], 1.0 / WATER)
+    assert np.allclose(slowness[~fine.region], 1.0 / WATER)
     assert np.array_equal(initial_slowness(fine, None), np.full((49, 49), 1.0 / WATER))
 
 
@@ -74,5 +74,5 @@ def test_a_finer_grid_of_a_volume_begins_with_the_same_image_at_the_same_heights
         z = problem.origin[2] + problem.spacing * np.arange(problem.region.shape[2])
         return np.broadcast_to((1.0 + z) / WATER, problem.region.shape)
 
-    found = initial_slowness(fine, tilted(coarse), coarse)
-    assert np.allclose(found[fine.region], tilted(fine)[fine.region], rtol=0.0, atol=1e-12)
+    slowness = initial_slowness(fine, tilted(coarse), coarse)
+    assert np.allclose(slowness[fine.region], tilted(fine)[fine.region], rtol=0.0, atol=1e-12)

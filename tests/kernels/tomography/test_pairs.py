@@ -79,17 +79,17 @@ def test_a_volume_has_every_emitter_at_its_height():
 def test_reverses_fill_gaps_ring_by_ring():
     gap = moved()
     gap.delta_tof_s[1, 2, 4] = np.nan
-    found = of(gap, VOLUME, 0)
-    assert found.delta_tof[6 + 2, 4] == gap.delta_tof_s[1, 4, 2]
+    result = of(gap, VOLUME, 0)
+    assert result.delta_tof[6 + 2, 4] == gap.delta_tof_s[1, 4, 2]
 
 
 def test_invalid_pairs_have_neither_time_nor_amplitude():
     valid = np.ones((3, 6, 6), bool)
     valid[0, 1, 2] = valid[0, 2, 1] = False
     loud = replace(moved(), valid=valid, log_ratio_np=np.ones((3, 6, 6)))
-    found = of(loud, SLICES, 0)
-    assert np.isnan(found.delta_tof[1, 2])
-    assert np.isnan(found.log_ratio[1, 2])
+    result = of(loud, SLICES, 0)
+    assert np.isnan(result.delta_tof[1, 2])
+    assert np.isnan(result.log_ratio[1, 2])
 
 
 def test_an_uneven_ring_is_one_ring():

@@ -19,14 +19,14 @@ def test_a_lesion_has_the_contrast_that_was_put_in() -> None:
     # Alternating nodes give the surroundings a known spread.
     values = np.where(away <= 0.0052, 1560.0, 1500.0 + 3.0 * (-1.0) ** np.add(*np.indices((41, 41))))
     inside, beside = RoundRegion((0.004, -0.002), 0.0052).nodes(*GRID)
-    found = region_statistics(values, inside, GRID[1], beside, np.full((41, 41), 2.5))
-    assert found.nodes == (away <= 0.0052).sum()
-    assert found.size == pytest.approx(found.nodes * 1e-6)
-    assert found.size == pytest.approx(math.pi * 0.0052**2, rel=0.1)
-    assert (found.mean, found.spread) == (pytest.approx(1560.0), 0.0)
-    assert found.contrast == pytest.approx(60.0, abs=0.5)
-    assert found.contrast_to_noise == pytest.approx(20.0, rel=0.02)
-    assert found.uncertainty == 2.5
+    statistics = region_statistics(values, inside, GRID[1], beside, np.full((41, 41), 2.5))
+    assert statistics.nodes == (away <= 0.0052).sum()
+    assert statistics.size == pytest.approx(statistics.nodes * 1e-6)
+    assert statistics.size == pytest.approx(math.pi * 0.0052**2, rel=0.1)
+    assert (statistics.mean, statistics.spread) == (pytest.approx(1560.0), 0.0)
+    assert statistics.contrast == pytest.approx(60.0, abs=0.5)
+    assert statistics.contrast_to_noise == pytest.approx(20.0, rel=0.02)
+    assert statistics.uncertainty == 2.5
 
 
 def test_the_gap_between_region_and_surroundings_does_not_count() -> None:
@@ -42,15 +42,15 @@ def test_a_ball_has_a_volume() -> None:
     inside, _ = RoundRegion((0.0, 0.0, 0.01), 0.006).nodes(
         (21, 21, 11), (1e-3, 1e-3, 2e-3), (-0.01, -0.01, 0.0)
     )
-    found = region_statistics(np.ones((21, 21, 11)), inside, (1e-3, 1e-3, 2e-3))
-    assert found.size == pytest.approx(4 / 3 * math.pi * 0.006**3, rel=0.1)
-    assert (found.contrast, found.contrast_to_noise, found.uncertainty) == (None, None, None)
+    statistics = region_statistics(np.ones((21, 21, 11)), inside, (1e-3, 1e-3, 2e-3))
+    assert statistics.size == pytest.approx(4 / 3 * math.pi * 0.006**3, rel=0.1)
+    assert (statistics.contrast, statistics.contrast_to_noise, statistics.uncertainty) == (None, None, None)
 
 
 def test_nodes_without_a_value_do_not_count() -> None:
     values = np.array([[1.0, np.nan, 3.0]])
-    found = region_statistics(values, np.ones((1, 3), bool), (1.0, 1.0))
-    assert (found.nodes, found.mean, found.spread) == (2, 2.0, 1.0)
+    statistics = region_statistics(values, np.ones((1, 3), bool), (1.0, 1.0))
+    assert (statistics.nodes, statistics.mean, statistics.spread) == (2, 2.0, 1.0)
     with pytest.raises(InvalidInput, match="overlaps"):
         region_statistics(values, np.isnan(values), (1.0, 1.0))
 

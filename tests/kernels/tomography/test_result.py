@@ -11,7 +11,7 @@ from bentray_kernels.tomography import Iteration, Reconstruction, Settings
 )
 def test_residual_of_slices_that_ended_at_different_sweeps(given, first):
     passes = ((0, 1, 4e-7), (1, 1, 1e-7), (0, 2, 2e-7), (0, 3, 3e-7))
-    history = tuple(Iteration(*one, 8, given=bool(flag)) for one, flag in zip(passes, given, strict=True))
+    history = tuple(Iteration(*first, 8, given=bool(flag)) for first, flag in zip(passes, given, strict=True))
     image = np.full((4, 4), 1500.0)
     result = Reconstruction(
         image, image, (1e-3, 1e-3), (0.0, 0.0), 1500.0, Settings(method="sart"), history=history

@@ -49,9 +49,9 @@ def test_a_region_without_a_node_in_the_image_is_rejected(way):
 def test_a_slice_above_the_region_stays_water(way):
     roi = np.zeros((11, 11, 11), bool)
     roi[3:8, 3:8, 5] = True
-    found = reconstruct(scan(roi, np.array([0.0, 0.02])), PLAN.changed(**way))
-    assert found.speed[..., 0].max() > WATER + 1.0
-    assert np.allclose(found.speed[..., 1], WATER)
-    assert np.array_equal(found.recovery[..., 1], np.zeros((24, 24)))
-    assert found.attenuation[..., 0].max() > 1.0
-    assert not found.attenuation[..., 1].any()
+    result = reconstruct(scan(roi, np.array([0.0, 0.02])), PLAN.changed(**way))
+    assert result.speed[..., 0].max() > WATER + 1.0
+    assert np.allclose(result.speed[..., 1], WATER)
+    assert np.array_equal(result.recovery[..., 1], np.zeros((24, 24)))
+    assert result.attenuation[..., 0].max() > 1.0
+    assert not result.attenuation[..., 1].any()

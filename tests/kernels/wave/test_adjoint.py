@@ -26,9 +26,9 @@ def speeds(seed=0, shape=(40, 42)):
 
 def change(seed, shape=(40, 42)):
     """A change of the image that leaves its rim, which the edges continue, as it is."""
-    found = np.random.default_rng(seed).standard_normal(shape)
-    found[[0, -1]] = found[:, [0, -1]] = 0.0
-    return found
+    result = np.random.default_rng(seed).standard_normal(shape)
+    result[[0, -1]] = result[:, [0, -1]] = 0.0
+    return result
 
 
 def windows():
@@ -49,12 +49,12 @@ def test_gradient_of_every_misfit_is_that_of_finite_differences(measure, windowe
         return misfit(simulate(medium(speed), EMITTER, RECEIVERS, WAVELET))[0]
 
     speed, way = speeds(0), change(2)
-    found = misfit_gradient(medium(speed), EMITTER, RECEIVERS, WAVELET, misfit)
+    gradients = misfit_gradient(medium(speed), EMITTER, RECEIVERS, WAVELET, misfit)
     small = 3e-2
     near = (value(speed + small * way) - value(speed - small * way)) / (2.0 * small)
     far = (value(speed + 2.0 * small * way) - value(speed - 2.0 * small * way)) / (4.0 * small)
-    assert (found.gradient * way).sum() == pytest.approx((4.0 * near - far) / 3.0, rel=1e-6)
-    assert found.misfit == value(speed) > 0.0
+    assert (gradients.gradient * way).sum() == pytest.approx((4.0 * near - far) / 3.0, rel=1e-6)
+    assert gradients.misfit == value(speed) > 0.0
 
 
 def test_gradient_holds_with_loss():
@@ -69,9 +69,9 @@ def test_gradient_holds_with_loss():
     def at(c):
         return medium(c, loss=loss * speed / c)
 
-    found = misfit_gradient(at(speed), EMITTER, RECEIVERS, WAVELET, misfit)
+    gradients = misfit_gradient(at(speed), EMITTER, RECEIVERS, WAVELET, misfit)
     values = [misfit(simulate(at(speed + s * way), EMITTER, RECEIVERS, WAVELET))[0] for s in (1e-2, -1e-2)]
-    assert (found.gradient * way).sum() == pytest.approx((values[0] - values[1]) / 2e-2, rel=1e-6)
+    assert (gradients.gradient * way).sum() == pytest.approx((values[0] - values[1]) / 2e-2, rel=1e-6)
 
 
 @pytest.mark.parametrize("measure", [misfits.correlation, misfits.least_squares])
@@ -86,12 +86,12 @@ def test_gradient_by_the_attenuation_is_that_of_finite_differences(measure):
     def value(alpha):
         return misfit(simulate(medium(speed, loss=alpha), EMITTER, RECEIVERS, WAVELET))[0]
 
-    found = misfit_gradient(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, misfit, by="attenuation")
+    shot = misfit_gradient(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, misfit, by="attenuation")
     small = 0.1
     near = (value(loss + small * way) - value(loss - small * way)) / (2.0 * small)
     far = (value(loss + 2.0 * small * way) - value(loss - 2.0 * small * way)) / (4.0 * small)
-    assert (found.gradient * way).sum() == pytest.approx((4.0 * near - far) / 3.0, rel=1e-6)
-    assert found.misfit == value(loss) > 0.0
+    assert (shot.gradient * way).sum() == pytest.approx((4.0 * near - far) / 3.0, rel=1e-6)
+    assert shot.misfit == value(loss) > 0.0
 
 
 def test_source_to_traces_and_back_are_transposes():
@@ -134,7 +134,7 @@ def test_born_modelling_of_loss_and_its_gradient_are_transposes():
     def lost(traces):
         return float((traces * residual).sum()), residual
 
-    found = misfit_gradient(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, lost, by="attenuation")
+    gradients = misfit_gradient(medium(speed, loss=loss), EMITTER, RECEIVERS, WAVELET, lost, by="attenuation")
     small = 0.5
 
     def traces(factor):
@@ -142,7 +142,7 @@ def test_born_modelling_of_loss_and_its_gradient_are_transposes():
         return simulate(host, EMITTER, RECEIVERS, WAVELET)
 
     born = (8.0 * (traces(1) - traces(-1)) - (traces(2) - traces(-2))) / (12.0 * small)
-    assert (born * residual).sum() == pytest.approx((found.gradient * way).sum(), rel=1e-7)
+    assert (born * residual).sum() == pytest.approx((gradients.gradient * way).sum(), rel=1e-7)
 
 
 @pytest.mark.parametrize("by", ["speed", "attenuation"])

@@ -36,8 +36,8 @@ def gradients(host, misfit, engine, every=1, by="speed", **options):
     return list(misfit_gradients(host, EMISSIONS, misfit, every, by, engine=engine, **options))
 
 
-def off(found, expected):
-    return np.abs(found - expected).max() / np.abs(expected).max()
+def off(computed, expected):
+    return np.abs(computed - expected).max() / np.abs(expected).max()
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +49,9 @@ def recorded():
 @pytest.mark.parametrize(("dtype", "bound"), [(np.float64, 1e-12), (np.float32, 1e-5)])
 def test_traces_are_those_of_the_compiled_engine(dtype, bound):
     host = medium(dtype)
-    found = list(simulate_emissions(host, EMISSIONS, engine="opencl"))
-    assert len(found) == len(EMITTERS)
-    for k, traces in enumerate(found):
+    computed = list(simulate_emissions(host, EMISSIONS, engine="opencl"))
+    assert len(computed) == len(EMITTERS)
+    for k, traces in enumerate(computed):
         expected = simulate(host, EMITTERS[k], RECEIVERS[VALID[k]], WAVELET)
         assert traces.dtype == dtype
         assert traces.shape == expected.shape
@@ -70,10 +70,10 @@ def test_compiled_engine_gives_the_traces_of_single_emissions():
 def test_gradients_are_those_of_the_compiled_engine(by, dtype, every, bound, recorded):
     host, misfit = medium(dtype), compare(recorded)
     both = [gradients(host, misfit, engine, every, by) for engine in ENGINES]
-    for expected, found in zip(*both, strict=True):
-        assert found.misfit == pytest.approx(expected.misfit, rel=bound)
-        assert off(found.gradient, expected.gradient) < bound
-        assert off(found.illumination, expected.illumination) < bound
+    for expected, computed in zip(*both, strict=True):
+        assert computed.misfit == pytest.approx(expected.misfit, rel=bound)
+        assert off(computed.gradient, expected.gradient) < bound
+        assert off(computed.illumination, expected.illumination) < bound
 
 
 @pytest.mark.opencl
@@ -85,11 +85,11 @@ def test_gradient_is_that_of_finite_differences(by, dtype, small, bound, recorde
     def value(factor):
         host = medium(dtype, by=(by, factor * small * way))
         traces = simulate_emissions(host, EMISSIONS, engine="opencl")
-        return sum(misfit(k, one)[0] for k, one in enumerate(traces))
+        return sum(misfit(k, trace)[0] for k, trace in enumerate(traces))
 
-    found = sum((one.gradient * way).sum() for one in gradients(medium(dtype), misfit, "opencl", by=by))
+    result = sum((shot.gradient * way).sum() for shot in gradients(medium(dtype), misfit, "opencl", by=by))
     near, far = ((value(k) - value(-k)) / (2.0 * k * small) for k in (1, 2))
-    assert found == pytest.approx((4.0 * near - far) / 3.0, rel=bound)
+    assert result == pytest.approx((4.0 * near - far) / 3.0, rel=bound)
 
 
 @pytest.mark.opencl
@@ -108,8 +108,8 @@ def test_scattering_and_the_gradient_are_transposes(dtype, bound):
         return list(simulate_emissions(medium(np.float64, by=("speed", factor * small * way)), EMISSIONS))
 
     runs = {factor: traces(factor) for factor in (-2, -1, 1, 2)}
-    found = gradients(medium(dtype), correlated, "opencl")
-    for k, one in enumerate(found):
+    result = gradients(medium(dtype), correlated, "opencl")
+    for k, one in enumerate(result):
         born = (8.0 * (runs[1][k] - runs[-1][k]) - (runs[2][k] - runs[-2][k])) / (12.0 * small)
         size = np.linalg.norm(born) * np.linalg.norm(residual[k])
         assert abs((born * residual[k]).sum() - (one.gradient * way).sum()) < max(bound, 1e-8) * size
@@ -120,7 +120,7 @@ def test_scattering_and_the_gradient_are_transposes(dtype, bound):
 @pytest.mark.parametrize("measure", [misfits.correlation, misfits.least_squares])
 def test_misfits_on_the_device_are_those_of_the_host(measure, dtype, recorded):
     bound = 1e-11 if dtype == np.float64 else 1e-4
-    traces = [one.astype(np.float64) for one in recorded]
+    traces = [trace.astype(np.float64) for trace in recorded]
     # A dead trace.
     traces[1][2] = 0.0
     weights = [windows(k) for k in range(len(VALID))]
@@ -129,18 +129,18 @@ def test_misfits_on_the_device_are_those_of_the_host(measure, dtype, recorded):
         return measure(simulated, traces[k], weights[k])
 
     def there(k):
-        found = np.zeros((2, STEPS, len(RECEIVERS)), dtype)
-        found[0][:, VALID[k]], found[1][:, VALID[k]] = traces[k].T, weights[k].T
-        return found[0], found[1]
+        result = np.zeros((2, STEPS, len(RECEIVERS)), dtype)
+        result[0][:, VALID[k]], result[1][:, VALID[k]] = traces[k].T, weights[k].T
+        return result[0], result[1]
 
     host, observed = medium(dtype), Observed(measure.__name__, there)
     expected = gradients(host, here, "opencl")
-    found = gradients(host, here, "opencl", observed=observed)
+    computed = gradients(host, here, "opencl", observed=observed)
     values = list(emission_misfits(host, EMISSIONS, here, engine="opencl", observed=observed))
-    for one, other, value in zip(found, expected, values, strict=True):
-        assert one.misfit == value == pytest.approx(other.misfit, rel=bound)
-        assert off(one.gradient, other.gradient) < bound
-        assert np.array_equal(one.illumination, other.illumination)
+    for first, other, value in zip(computed, expected, values, strict=True):
+        assert first.misfit == value == pytest.approx(other.misfit, rel=bound)
+        assert off(first.gradient, other.gradient) < bound
+        assert np.array_equal(first.illumination, other.illumination)
 
 
 @pytest.mark.opencl
@@ -167,13 +167,13 @@ def test_divided_time_loops_give_the_bits_of_whole_ones(every, segments):
     waves = DeviceWaves(
         session_or_warning(""), host, Scan(place_elements(host, RECEIVERS), STEPS, every, "attenuation")
     )
-    found = []
+    results = []
     for number in (1, segments):
         batch = ShotBatch(waves, place_elements(host, EMITTERS[:2]), WAVELET / 3e4, number, no_poll)
         # The traces are the residuals.
         batch.forward()
-        found.append((batch.traces(), *batch.backward()))
-    for whole, divided in zip(*found, strict=True):
+        results.append((batch.traces(), *batch.backward()))
+    for whole, divided in zip(*results, strict=True):
         assert np.array_equal(whole, divided)
 
 
@@ -183,25 +183,25 @@ def test_groups_of_a_processor_and_of_a_gpu_give_the_same_bits(by):
     session, host = session_or_warning(""), medium()
     scan = Scan(place_elements(host, RECEIVERS), STEPS, 3, by)
     sources = place_elements(host, EMITTERS)
-    found = []
+    computed = []
     for group, tile in itertools.product((PROCESSOR_GROUPS[0], OTHER_GROUP), (slice(0, 5), slice(0, 2))):
         waves = DeviceWaves(session, host, scan, group)
         some = Points(sources.first[tile], sources.weights[tile])
         batch = ShotBatch(waves, some, WAVELET / np.abs(WAVELET).max(), 1, no_poll)
         # The traces are the residuals.
         batch.forward()
-        found.append((batch.traces(), *batch.backward()))
-    for others in found[1:]:
-        for expected, other in zip(found[0], others, strict=True):
+        computed.append((batch.traces(), *batch.backward()))
+    for others in computed[1:]:
+        for expected, other in zip(computed[0], others, strict=True):
             assert other.any()
             assert np.array_equal(expected[: len(other)], other[: len(expected)])
 
 
 def test_tiles_hold_every_emitter_once():
     for emitters, most in ((0, 3), (1, 3), (7, 3), (7, 7), (7, 10)):
-        found = list(tiles(emitters, most))
-        assert [k for tile in found for k in range(emitters)[tile]] == list(range(emitters))
-        sizes = [tile.stop - tile.start for tile in found]
+        listed = list(tiles(emitters, most))
+        assert [k for tile in listed for k in range(emitters)[tile]] == list(range(emitters))
+        sizes = [tile.stop - tile.start for tile in listed]
         assert not sizes or max(sizes) <= min(most, min(sizes) + 1)
 
 
@@ -236,12 +236,12 @@ def test_without_a_device_compiled_code_computes_with_a_warning(monkeypatch, rec
     misfit = compare(recorded)
     try:
         with pytest.warns(OpenCLFallbackWarning, match="compiled code"):
-            found = gradients(medium(), misfit, "opencl")
+            result = gradients(medium(), misfit, "opencl")
     finally:
         device_selection._found.cache_clear()
         device_selection._warn_once.cache_clear()
-    for one, other in zip(found, gradients(medium(), misfit, "compiled"), strict=True):
-        assert np.array_equal(one.gradient, other.gradient)
+    for first, other in zip(result, gradients(medium(), misfit, "compiled"), strict=True):
+        assert np.array_equal(first.gradient, other.gradient)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

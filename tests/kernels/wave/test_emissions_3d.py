@@ -54,15 +54,15 @@ def test_gradient_is_that_of_finite_differences(by, small):
 
     def value(factor):
         traces = simulate_emissions(medium(np.float64, by, factor * small * way), EMISSIONS, engine="opencl")
-        return sum(energy(0, one)[0] for one in traces)
+        return sum(energy(0, trace)[0] for trace in traces)
 
     parts = list(misfit_gradients(medium(np.float64), EMISSIONS, energy, by=by, engine="opencl"))
     near, far = ((value(k) - value(-k)) / (2.0 * k * small) for k in (1, 2))
-    found = sum((part.gradient * way).sum() for part in parts)
-    assert found == pytest.approx((4.0 * near - far) / 3.0, rel=1e-6)
+    result = sum((part.gradient * way).sum() for part in parts)
+    assert result == pytest.approx((4.0 * near - far) / 3.0, rel=1e-6)
     cheap = list(misfit_gradients(medium(np.float32), EMISSIONS, energy, by=by, engine="opencl"))
-    for one, other in zip(cheap, parts, strict=True):
-        assert np.abs(one.gradient - other.gradient).max() < 1e-4 * np.abs(other.gradient).max()
+    for first, other in zip(cheap, parts, strict=True):
+        assert np.abs(first.gradient - other.gradient).max() < 1e-4 * np.abs(other.gradient).max()
 
 
 @pytest.mark.opencl
@@ -70,14 +70,14 @@ def test_gradient_is_that_of_finite_differences(by, small):
 def test_divided_time_loops_give_the_bits_of_whole_ones(segments):
     host = medium(np.float32)
     scan = Scan(place_elements(host, RECEIVERS), STEPS, 3)
-    found = []
+    results = []
     for group, number in ((None, 1), (OTHER_GROUP, segments)):
         waves = DeviceWaves(session_or_warning(""), host, scan, group)
         batch = ShotBatch(waves, place_elements(host, EMITTERS), WAVELET / 3e4, number, no_poll)
         # The traces are the residuals.
         batch.forward()
-        found.append((batch.traces(), *batch.backward()))
-    for whole, divided in zip(*found, strict=True):
+        results.append((batch.traces(), *batch.backward()))
+    for whole, divided in zip(*results, strict=True):
         assert whole.any()
         assert np.array_equal(whole, divided)
 

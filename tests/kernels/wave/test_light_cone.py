@@ -36,8 +36,8 @@ def shot(emitter):
     return receivers, window, window.shape[1] - (window[:, ::-1] > 0.0).argmax(axis=1)
 
 
-def off(found, expected):
-    return np.linalg.norm(found - expected) / np.linalg.norm(expected)
+def off(computed, expected):
+    return np.linalg.norm(computed - expected) / np.linalg.norm(expected)
 
 
 @pytest.mark.parametrize("by", ["speed", "attenuation"])
@@ -79,8 +79,8 @@ def test_half_of_the_nodes_is_left_out():
 def test_spans_lie_within_the_grid(shape, until, seed):
     rng = np.random.default_rng(seed)
     host = Medium.from_speed(np.full(shape, 1500.0), SPACING, STEP, edge_nodes=8, order=OPTIMISED)
-    places = rng.uniform(0.0, 1.0, (len(until) + 1, 2)) * (np.array(shape) - 1) * SPACING
-    source, detectors = place_scan(host, places[0], places[1:], WAVELET)
+    points = rng.uniform(0.0, 1.0, (len(until) + 1, 2)) * (np.array(shape) - 1) * SPACING
+    source, detectors = place_scan(host, points[0], points[1:], WAVELET)
     spans = light_cone(host, source, detectors, np.array(until))
     assert len(spans) == max(1, -(-max(until) // BLOCK_STEPS))
     assert spans.shape[1:] == everywhere(host).shape[1:]

@@ -28,7 +28,7 @@ def analytic(distance, time, wavelet, ahead=lambda frequency: 0.0):
     """
     padded = 4 * time.size
     frequency = np.fft.rfftfreq(padded, time[1] - time[0])[1:]
-    speed = WATER * np.array([1.0 + ahead(one) for one in frequency])
+    speed = WATER * np.array([1.0 + ahead(hertz) for hertz in frequency])
     green = np.zeros(frequency.size + 1, dtype=complex)
     green[1:] = -0.25j * hankel2(0, 2.0 * np.pi * frequency * distance / speed)
     return np.fft.irfft(green * np.fft.rfft(wavelet, padded), padded)[: time.size]
@@ -44,9 +44,9 @@ def against_green(spacing, step):
     time = np.arange(round(3.6e-5 / step)) * step
     wavelet = pulse(time)
     source, receiver = np.array([0.0081, 0.0077]), np.array([[0.0233, 0.0214]])
-    found = simulate(medium, source, receiver, wavelet)[0]
+    computed = simulate(medium, source, receiver, wavelet)[0]
     expected = analytic(float(np.linalg.norm(receiver[0] - source)), time, wavelet)
-    return np.sqrt(((found - expected) ** 2).sum() / (expected**2).sum())
+    return np.sqrt(((computed - expected) ** 2).sum() / (expected**2).sum())
 
 
 def test_traces_are_those_of_the_green_function():
@@ -69,10 +69,10 @@ def test_remaining_error_equals_the_stated_dispersion(order, step):
         points = WATER / (frequency * spacing)
         return phase_error(points, WATER * step / spacing, angle, order) if points > 2.2 else 0.0
 
-    found = simulate(medium, source, receiver, pulse(time, 2.1e5))[0]
+    traces = simulate(medium, source, receiver, pulse(time, 2.1e5))[0]
     exact, stated = (analytic(far, time, pulse(time, 2.1e5), error) for error in (lambda _: 0.0, ahead))
-    assert np.linalg.norm(found - stated) < 0.1 * np.linalg.norm(found - exact)
-    assert np.linalg.norm(found - stated) < 0.004 * np.linalg.norm(exact)
+    assert np.linalg.norm(traces - stated) < 0.1 * np.linalg.norm(traces - exact)
+    assert np.linalg.norm(traces - stated) < 0.004 * np.linalg.norm(exact)
 
 
 def test_error_falls_as_the_square_of_the_time_step():
@@ -107,9 +107,9 @@ def test_little_comes_back_from_the_edges():
     receivers = np.array([[0.035, 0.020], [0.030, 0.030], [0.020, 0.005]])
     small = Medium.from_speed(np.full((41, 41), WATER), 1e-3, 3e-7)
     large = Medium.from_speed(np.full((241, 241), WATER), 1e-3, 3e-7)
-    found = simulate(small, source, receivers, wavelet)
+    traces = simulate(small, source, receivers, wavelet)
     open_space = simulate(large, source + 0.1, receivers + 0.1, wavelet)
-    assert np.abs(found - open_space).max() < 6e-3 * np.abs(open_space).max()
+    assert np.abs(traces - open_space).max() < 6e-3 * np.abs(open_space).max()
 
 
 def test_energy_leaves_through_the_edges():

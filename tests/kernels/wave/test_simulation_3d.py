@@ -52,9 +52,9 @@ def water(shape, step=STEP, edge_nodes=16, loss=0.0, order=8):
     )
 
 
-def off(found, expected):
+def off(computed, expected):
     """Relative rms error."""
-    return np.linalg.norm(found - expected) / np.linalg.norm(expected)
+    return np.linalg.norm(computed - expected) / np.linalg.norm(expected)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -62,12 +62,12 @@ def off(found, expected):
 def test_traces_are_those_of_the_green_function(seed):
     """Waves of 5.4 nodes and more between elements between nodes, at the speed that the grid has."""
     nodes = np.array([24, 18, 18])
-    places = np.random.default_rng(seed).uniform(4.0, nodes - 5.0, (2, 3)) * SPACING
-    across = places[1] - places[0]
+    points = np.random.default_rng(seed).uniform(4.0, nodes - 5.0, (2, 3)) * SPACING
+    across = points[1] - points[0]
     assume(np.linalg.norm(across) > 5.0 * SPACING)
     time = np.arange(130) * STEP
-    found = simulate(water(nodes, edge_nodes=20), places[0], places[1:], pulse(time, 1.8e5))[0]
-    assert off(found, green(across, time, pulse(time, 1.8e5), 8)) < 0.015
+    traces = simulate(water(nodes, edge_nodes=20), points[0], points[1:], pulse(time, 1.8e5))[0]
+    assert off(traces, green(across, time, pulse(time, 1.8e5), 8)) < 0.015
 
 
 @pytest.mark.parametrize(("order", "other"), [(8, 6), (6, 8), (OPTIMISED, 6)])
@@ -76,9 +76,9 @@ def test_the_order_in_space_is_the_requested_one(order, other):
     source, receiver = np.array([6e-3, 12e-3, 12e-3]), np.array([30e-3, 12e-3, 12e-3])
     time = np.arange(148) * STEP
     wavelet = pulse(time, 2.8e5)
-    found = simulate(water((37, 25, 25), edge_nodes=20, order=order), source, receiver[None], wavelet)[0]
-    assert off(found, green(receiver - source, time, wavelet, order)) < 0.009
-    assert off(found, green(receiver - source, time, wavelet, other)) > 0.05
+    traces = simulate(water((37, 25, 25), edge_nodes=20, order=order), source, receiver[None], wavelet)[0]
+    assert off(traces, green(receiver - source, time, wavelet, order)) < 0.009
+    assert off(traces, green(receiver - source, time, wavelet, other)) > 0.05
 
 
 def test_error_falls_as_the_square_of_the_time_step():
@@ -86,8 +86,8 @@ def test_error_falls_as_the_square_of_the_time_step():
     traces = []
     for finer in (1, 2, 4):
         time = STEP / finer * np.arange(110 * finer)
-        found = simulate(water((16, 13, 13), STEP / finer), source, receiver[None], pulse(time, 1.8e5))
-        traces.append(found[0, ::finer])
+        result = simulate(water((16, 13, 13), STEP / finer), source, receiver[None], pulse(time, 1.8e5))
+        traces.append(result[0, ::finer])
     ratio = np.linalg.norm(traces[0] - traces[1]) / np.linalg.norm(traces[1] - traces[2])
     assert np.log2(ratio) == pytest.approx(2.0, abs=0.2)
 

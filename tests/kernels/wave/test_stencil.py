@@ -52,7 +52,7 @@ def test_optimised_weights_have_the_least_largest_error():
     angle = np.linspace(0.0, 2.0 * math.pi / OPTIMISED_NODES, 2001)[1:, None]
     distance = np.arange(1, HALO + 1)
     each, bound = 2.0 * (1.0 - np.cos(angle * distance)) / angle**2, -np.ones_like(angle)
-    found = linprog(
+    optimum = linprog(
         [0.0] * HALO + [1.0],
         np.block([[each, bound], [-each, bound]]),
         np.concatenate((np.ones(angle.size), -np.ones(angle.size))),
@@ -60,9 +60,9 @@ def test_optimised_weights_have_the_least_largest_error():
         [1.0],
         bounds=(None, None),
     )
-    assert weights(OPTIMISED)[1:] == pytest.approx(found.x[:HALO], abs=2e-6)
+    assert weights(OPTIMISED)[1:] == pytest.approx(optimum.x[:HALO], abs=2e-6)
     errors = [phase_error(points, order=OPTIMISED) for points in np.linspace(OPTIMISED_NODES, 30.0, 400)]
-    assert np.abs(errors).max() == pytest.approx(0.5 * found.x[HALO], rel=0.01)
+    assert np.abs(errors).max() == pytest.approx(0.5 * optimum.x[HALO], rel=0.01)
     assert np.abs(errors).max() < 0.04 * abs(phase_error(OPTIMISED_NODES))
 
 
@@ -148,8 +148,8 @@ def measured_lag(points):
     spacing, speed = 1e-3, 1500.0
     frequency = speed / (points * spacing)
     number = np.linspace(0.5, 1.5, 4001) * 2.0 * np.pi * frequency / speed
-    found = np.interp(2.0 * np.pi * frequency, speed * np.sqrt(symbol(number * spacing)) / spacing, number)
-    return found * speed / (2.0 * np.pi * frequency) - 1.0
+    wave = np.interp(2.0 * np.pi * frequency, speed * np.sqrt(symbol(number * spacing)) / spacing, number)
+    return wave * speed / (2.0 * np.pi * frequency) - 1.0
 
 
 @pytest.mark.parametrize(("points", "least", "most"), [(3, 2.0e-2, 2.5e-2), (4, 3e-3, 4e-3), (5, 6e-4, 8e-4)])

@@ -24,11 +24,11 @@ class Unheard(Exception):
 @given(steps=st.integers(0, 5000), nodes=st.integers(1, 10**9))
 def test_every_step_is_in_exactly_one_block(steps, nodes):
     polled = []
-    found = list(cut.split_steps(steps, nodes, lambda: polled.append(None)))
-    assert [n for first, end in found for n in range(first, end)] == list(range(steps))
-    assert all((end - first) % 2 == 0 for first, end in found[:-1])
-    assert all((end - first - 2) * nodes <= cut.BLOCK for first, end in found)
-    assert len(polled) == len(found)
+    listed = list(cut.split_steps(steps, nodes, lambda: polled.append(None)))
+    assert [n for first, end in listed for n in range(first, end)] == list(range(steps))
+    assert all((end - first) % 2 == 0 for first, end in listed[:-1])
+    assert all((end - first - 2) * nodes <= cut.BLOCK for first, end in listed)
+    assert len(polled) == len(listed)
 
 
 @pytest.mark.parametrize("by", ["speed", "attenuation"])

@@ -31,8 +31,8 @@ def test_a_gradient_does_not_depend_on_the_one_before_it():
     def gradient(emitter, misfit):
         # Each emitter has its own cone: where it stores nothing, the fields of the other one are left.
         until = np.full(len(RECEIVERS), 120)
-        found = adjoint.misfit_gradient(medium(), emitter, RECEIVERS, WAVELET, misfit, 4, until=until)
-        return found.gradient.tobytes(), found.illumination.tobytes()
+        gradients = adjoint.misfit_gradient(medium(), emitter, RECEIVERS, WAVELET, misfit, 4, until=until)
+        return gradients.gradient.tobytes(), gradients.illumination.tobytes()
 
     def energy(traces):
         return float((traces**2).sum()), traces

@@ -27,10 +27,10 @@ def lanes(client):
 
 
 def test_memory_and_resources_are_reported(cluster):
-    found = capacities.capacities_of(cluster.client)
-    assert len(found) == 2
-    assert {"recon", "render"} <= set(found[0].resources)
-    assert found[0].memory_bytes >= 0
+    workers = capacities.capacities_of(cluster.client)
+    assert len(workers) == 2
+    assert {"recon", "render"} <= set(workers[0].resources)
+    assert workers[0].memory_bytes >= 0
 
 
 def test_devices_are_tested_only_on_request(fresh, monkeypatch):
@@ -71,14 +71,14 @@ def test_external_cluster_is_not_queried(fresh, monkeypatch):
 @pytest.mark.opencl
 def test_the_memory_of_a_device_is_known_to_plans(fresh, opencl_session):
     capacities.resources_for(fresh, WITH_DEVICE)
-    (found,) = capacities.capacities_of(fresh)
-    assert set(found.resources) == {*OPENCL, "recon", "render", "short"}
-    assert found.device_bytes == opencl_session.device.memory_bytes // MIB * MIB > 0
+    (workers,) = capacities.capacities_of(fresh)
+    assert set(workers.resources) == {*OPENCL, "recon", "render", "short"}
+    assert workers.device_bytes == opencl_session.device.memory_bytes // MIB * MIB > 0
 
 
 @pytest.mark.opencl
 def test_a_reconstruction_runs_on_the_device_lane(fresh, scan, tmp_path):
     path = tmp_path / "scan.h5"
     write_dataset(path, scan)
-    found = reconstruction_run.reconstruct(fresh, path, WITH_DEVICE)
-    assert (found.speed == reconstruct_here(scan, WITH_DEVICE).speed).all()
+    result = reconstruction_run.reconstruct(fresh, path, WITH_DEVICE)
+    assert (result.speed == reconstruct_here(scan, WITH_DEVICE).speed).all()

@@ -94,9 +94,9 @@ def test_restarted_scheduler_is_reconnected():
     offered = iter([clients[0], InvalidInput("scheduler_address", "gone", "there"), clients[1]])
 
     def connect():
-        if isinstance(found := next(offered), InvalidInput):
-            raise found
-        return found
+        if isinstance(result := next(offered), InvalidInput):
+            raise result
+        return result
 
     cluster = Cluster(connect)
     with pytest.raises(ConnectionError, match="gone"):

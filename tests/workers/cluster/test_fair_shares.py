@@ -65,7 +65,7 @@ def run(workers: int, jobs: Sequence[Job], until_s: float = 1e4) -> None:
                 _, _, job = heapq.heappop(queues[w])
                 busy[w] = now[0] + job.task_s, w, job
         ends = [one for one in busy if one is not None]
-        later = [now[0] + TURN_S, *(one[0] for one in ends), *(j.begins_s for j in jobs if j.share is None)]
+        later = [now[0] + TURN_S, *(end[0] for end in ends), *(j.begins_s for j in jobs if j.share is None)]
         now[0] = min(time for time in later if time >= now[0])
         for end, w, job in sorted(ends, key=lambda one: one[:2]):
             if end <= now[0]:
@@ -118,11 +118,11 @@ def test_many_small_jobs_of_as_many_tenants(workers: int) -> None:
 @pytest.mark.parametrize("workers", [1, 2, 3, 8])
 def test_tenants_get_equal_time_whatever_their_number_of_jobs_and_length_of_tasks(workers: int) -> None:
     many = [Job("many", 10**6, 0.5) for _ in range(4)]
-    one = Job("one", 10**6, 2.0)
-    run(workers, [*many, one], until_s=400.0)
+    alone = Job("one", 10**6, 2.0)
+    run(workers, [*many, alone], until_s=400.0)
     had = sum(job.worked_s for job in many)
-    assert 0.7 <= one.worked_s / had <= 1.4
-    assert one.worked_s + had >= 0.85 * 400.0 * workers
+    assert 0.7 <= alone.worked_s / had <= 1.4
+    assert alone.worked_s + had >= 0.85 * 400.0 * workers
     assert max(job.worked_s for job in many) <= 1.2 * min(job.worked_s for job in many)
 
 

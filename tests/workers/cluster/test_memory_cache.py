@@ -18,13 +18,13 @@ def worker(monkeypatch):
 
 
 def test_new_entries_evict_old_ones_in_every_cache(worker):
-    one, two = MemoryCache(1000 * MIB), MemoryCache(1000 * MIB)
-    one.get("a", 30 * MIB, str)
+    first, two = MemoryCache(1000 * MIB), MemoryCache(1000 * MIB)
+    first.get("a", 30 * MIB, str)
     two.get("b", 30 * MIB, str)
-    one.get("a", 30 * MIB, str)
+    first.get("a", 30 * MIB, str)
     # 60 MiB are needed at once; what was used longest ago goes.
     two.get("c", 10 * MIB, str, 60 * MIB)
-    assert (one.held(), two.held()) == (30 * MIB, 10 * MIB)
+    assert (first.held(), two.held()) == (30 * MIB, 10 * MIB)
 
 
 def test_a_job_finds_little_kept(worker, tmp_path):

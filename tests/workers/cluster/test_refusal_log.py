@@ -22,7 +22,7 @@ def fail():
 def test_the_log_of_a_task_that_raises(cluster, caplog, task, error, traced):
     with caplog.at_level(logging.INFO, "distributed.worker"), pytest.raises(error):
         cluster.client.submit(task, pure=False).result()
-    (said,) = (one.getMessage() for one in caplog.records if error.__name__ in one.getMessage())
+    (said,) = (record.getMessage() for record in caplog.records if error.__name__ in record.getMessage())
     assert ("\n" in said, "Traceback" in said) == (traced, traced)
 
 

@@ -41,16 +41,16 @@ def run_tasks(cluster: Cluster) -> None:
 def alive(kind: type[Any]) -> list[Any]:
     """The objects of a class that something refers to."""
     gc.collect()
-    return [one for one in gc.get_objects() if type(one) is kind]
+    return [item for item in gc.get_objects() if type(item) is kind]
 
 
 def test_no_group_of_tasks_is_kept(cluster: Cluster) -> None:
     # Other tests of this process may have clusters of their own.
-    before = {id(one) for one in alive(TaskGroup)}
+    before = {id(left) for left in alive(TaskGroup)}
     run_tasks(cluster)
     # The event loop may still handle the last message. A list of the groups themselves would keep them.
     deadline = time.monotonic() + FORGET_S
-    while kept := [repr(one) for one in alive(TaskGroup) if id(one) not in before]:
+    while kept := [repr(left) for left in alive(TaskGroup) if id(left) not in before]:
         assert time.monotonic() < deadline, kept
         time.sleep(0.01)
 

@@ -34,14 +34,14 @@ def wait_until(so: Callable[[], object]) -> None:
 
 def worker_pids() -> set[int]:
     """The worker processes of this process."""
-    found = set()
+    listed = set()
     for child in psutil.Process().children():
         try:
             if "spawn_main" in " ".join(child.cmdline()):
-                found.add(child.pid)
+                listed.add(child.pid)
         except psutil.Error:
             continue
-    return found
+    return listed
 
 
 @pytest.fixture

@@ -39,17 +39,17 @@ def plans():
 
 
 def test_every_task_of_a_plan_has_words():
-    names = {name for one in plans() for name in one.call_bytes}
+    names = {name for planned in plans() for name in planned.call_bytes}
     names |= set(plan_simulation(PhantomScan(), ()).call_bytes)
     names |= set(plan_turntable((8, 8, 8), Turntable(), ()).call_bytes)
     assert names == set(TASK_WORDS)
 
 
 def test_sentences_name_no_function():
-    said = [one.why for one in plans()] + [plan_simulation(PhantomScan(), ()).why]
+    said = [planned.why for planned in plans()] + [plan_simulation(PhantomScan(), ()).why]
     said.append(plan_turntable((8, 8, 8), Turntable(), ()).why)
-    assert all("_" not in one for one in said)
-    assert all(any(f"({words})" in one for words in TASK_WORDS.values()) for one in said)
+    assert all("_" not in sentence for sentence in said)
+    assert all(any(f"({words})" in sentence for words in TASK_WORDS.values()) for sentence in said)
 
 
 @pytest.mark.parametrize("name", ["draw_picture", "trace_rays"])

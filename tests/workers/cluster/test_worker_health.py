@@ -25,9 +25,9 @@ def of(**workers):
 
 
 def test_embedded_workers_report_themselves(cluster):
-    found = health_of(cluster.client)
-    assert len(found) == 2
-    assert all(one.threads >= 1 and one.memory_bytes > 0 and not one.paused for one in found)
+    workers = health_of(cluster.client)
+    assert len(workers) == 2
+    assert all(one.threads >= 1 and one.memory_bytes > 0 and not one.paused for one in workers)
 
 
 def test_the_scheduler_reports_its_load(cluster):
@@ -44,8 +44,8 @@ def test_a_worker_in_full():
     metrics = {"memory": 5, "cpu": 180.0, "task_counts": {"executing": 2, "ready": 7}}
     metrics["compiling"] = True
     worker = {"nthreads": 2, "memory_limit": 9, "resources": {"opencl": 1.0}, "metrics": metrics}
-    (one,) = of(here={**worker, "status": "paused"})
-    assert asdict(one) == {
+    (first,) = of(here={**worker, "status": "paused"})
+    assert asdict(first) == {
         "threads": 2,
         "memory_bytes": 5,
         "memory_limit_bytes": 9,
@@ -64,7 +64,7 @@ def test_a_worker_before_its_first_heartbeat():
 
 
 def test_the_order_is_that_of_the_addresses():
-    assert [one.threads for one in of(b={"nthreads": 2}, a={"nthreads": 1})] == [1, 2]
+    assert [worker.threads for worker in of(b={"nthreads": 2}, a={"nthreads": 1})] == [1, 2]
 
 
 def test_without_a_scheduler():

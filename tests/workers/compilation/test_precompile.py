@@ -42,10 +42,10 @@ print(*kernels, sep="\\n")
 def test_a_digitised_scan_holds_the_same_traces() -> None:
     scan = simulate(WAVES)
     assert scan.waveform is not None
-    found = digitised(scan).waveform
-    assert found is not None
-    assert found.object.dtype == "int16"
-    assert abs(found.scale * found.object - scan.waveform.object).max() <= 0.5001 * found.scale
+    waveform = digitised(scan).waveform
+    assert waveform is not None
+    assert waveform.object.dtype == "int16"
+    assert abs(waveform.scale * waveform.object - scan.waveform.object).max() <= 0.5001 * waveform.scale
 
 
 def test_a_kernel_that_is_compiled_is_noted_and_announced_once(caplog: pytest.LogCaptureFixture) -> None:

@@ -222,8 +222,8 @@ def test_flipped_bits_give_a_refusal_or_a_dataset_that_holds_its_rules(whole, fl
     content = bytearray(whole)
     for place, mask in flips:
         content[int(place * len(content))] ^= mask
-    found = read_bytes(bytes(content))
-    assert found is None or found.picked or found.waveform is not None
+    result = read_bytes(bytes(content))
+    assert result is None or result.picked or result.waveform is not None
 
 
 @pytest.mark.real

@@ -37,9 +37,9 @@ def test_a_round_trip_changes_nothing(found, tmp_path_factory):
     again = read_findings(path)
     assert again[1:] == found[1:]
     assert len(again.findings) == len(found.findings)
-    for one, other in zip(again.findings, found.findings, strict=True):
+    for finding, other in zip(again.findings, found.findings, strict=True):
         for name in (field.name for field in fields(Finding)):
-            np.testing.assert_equal(getattr(one, name), getattr(other, name))
+            np.testing.assert_equal(getattr(finding, name), getattr(other, name))
 
 
 @pytest.mark.parametrize("content", ["", "{}", '{"findings": [{}], "examined": true, "changed": true}'])
@@ -61,9 +61,9 @@ def test_a_million_pairs_take_a_bit_each(tmp_path):
 def test_damage_of_either_file_is_found(tmp_path, spoiled, how):
     path, picked = tmp_path / "findings.json", tmp_path / "picked.h5"
     picked.write_bytes(bytes(range(256)))
-    found = ScanFindings((), True, True)
-    write_findings(path, found, picked)
-    assert read_findings(path, picked) == found
+    result = ScanFindings((), True, True)
+    write_findings(path, result, picked)
+    assert read_findings(path, picked) == result
     file = tmp_path / spoiled
     content = file.read_bytes()
     if how == "missing":

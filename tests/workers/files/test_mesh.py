@@ -17,11 +17,11 @@ COLOURS = np.linspace(0.0, 1.0, 120).reshape(40, 3)
 @pytest.mark.parametrize("colours", [None, COLOURS])
 def test_read_back_exactly(tmp_path, colours):
     write_mesh(tmp_path / "m.h5", StoredMesh(RING, colours))
-    found = load_mesh(tmp_path / "m.h5")
-    np.testing.assert_array_equal(found.mesh.vertices, RING.vertices)
-    np.testing.assert_array_equal(found.mesh.faces, RING.faces)
-    assert (found.colours is None) == (colours is None)
-    assert found.content() == StoredMesh(RING, colours).content()
+    stored = load_mesh(tmp_path / "m.h5")
+    np.testing.assert_array_equal(stored.mesh.vertices, RING.vertices)
+    np.testing.assert_array_equal(stored.mesh.faces, RING.faces)
+    assert (stored.colours is None) == (colours is None)
+    assert stored.content() == StoredMesh(RING, colours).content()
 
 
 def test_every_part_is_in_the_content():
@@ -36,10 +36,10 @@ def test_summary_lists_repairs():
     faces = RING.faces.copy()
     faces[3] = faces[3, ::-1]
     surface = sound(np.concatenate((RING.vertices, [[9.0, 9.0, 9.0]])), faces)
-    found = summary_of(StoredMesh(surface.mesh), surface, "ply", pieces=3)
-    assert (found["format"], found["vertices"], found["faces"]) == ("ply", 40, 80)
-    assert (found["genus"], found["holes"], found["coloured"]) == (1, 0, False)
-    assert found["repairs"] == {
+    summary = summary_of(StoredMesh(surface.mesh), surface, "ply", pieces=3)
+    assert (summary["format"], summary["vertices"], summary["faces"]) == ("ply", 40, 80)
+    assert (summary["genus"], summary["holes"], summary["coloured"]) == (1, 0, False)
+    assert summary["repairs"] == {
         "merged_vertices": 0,
         "unused_vertices": 1,
         "flat_faces": 0,

@@ -40,11 +40,11 @@ def spike(length):
 )
 def test_it_is_laid_out_or_refused(shape, thin):
     try:
-        found = parameterise(sound(*shape(thin)).mesh)
+        layout = parameterise(sound(*shape(thin)).mesh)
     except InvalidInput as refusal:
         name = refusal.field
     else:
         name = ""
-        assert math.isfinite(found.area_stretch)
+        assert math.isfinite(layout.area_stretch)
     assert name in ("", "faces", "mesh")
     assert thin < 1e-2 or not name

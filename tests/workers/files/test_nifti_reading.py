@@ -156,8 +156,8 @@ def test_packed_values_without_the_whole_check_sum_are_rejected(tmp_path, missin
 @given(st.dictionaries(st.integers(0, 347), st.integers(0, 255), min_size=1, max_size=6))
 def test_a_damaged_header_is_read_or_refused_and_nothing_else(tmp_path, changes):
     content = bytearray(image().to_bytes())
-    for place, value in changes.items():
-        content[place] = value
+    for path, value in changes.items():
+        content[path] = value
     (tmp_path / "v").write_bytes(content)
     with suppress(InvalidInput):
         assert import_volume(tmp_path / "v").values.ndim == 3

@@ -87,8 +87,8 @@ def test_a_flipped_bit_in_packed_values_their_check_sum_or_length_is_rejected(tm
 
 @settings(max_examples=effort(20, 150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(st.characters(max_codepoint=126), max_size=60), st.integers(0, 60))
-def test_a_damaged_header_is_read_or_refused_and_nothing_else(tmp_path, text, place):
-    fields = PLAIN[:place] + text + PLAIN[place:]
+def test_a_damaged_header_is_read_or_refused_and_nothing_else(tmp_path, text, position):
+    fields = PLAIN[:position] + text + PLAIN[position:]
     with suppress(InvalidInput):
         assert import_volume(write(tmp_path / "v", fields)).values.ndim == 3
 
@@ -101,7 +101,7 @@ def test_axes_in_any_order_and_sense_are_the_same_volume(tmp_path, order, sense)
     last = (np.array(plain.shape) - 1) * steps
     directions = np.diag(np.array(sense) * steps)[list(order)]
     start = origin + np.where(np.array(sense) < 0, last, 0.0)
-    stored = plain[tuple(slice(None, None, one) for one in sense)].transpose(order)
+    stored = plain[tuple(slice(None, None, step) for step in sense)].transpose(order)
     own = {"space directions": directions, "space origin": start, "space": "right-anterior-superior"}
     path = tmp_path / "turned.nrrd"
     nrrd.write(str(path), np.ascontiguousarray(stored), own)

@@ -19,7 +19,7 @@ PAGE = Path(__file__).resolve().parents[3] / "service" / "bentray_service" / "we
 
 def test_names_are_those_of_requests_and_results() -> None:
     assert get_args(QuantityName) == tuple(QUANTITIES)
-    assert set(QUANTITIES) <= {one.name for one in fields(Reconstruction)}
+    assert set(QUANTITIES) <= {field.name for field in fields(Reconstruction)}
     assert set(QUANTITIES) <= set(dir(Result))
 
 

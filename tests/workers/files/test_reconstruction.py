@@ -25,10 +25,10 @@ def test_written_file_round_trips_bit_for_bit(tmp_path, slices, with_attenuation
     if not with_attenuation:
         result = replace(result, attenuation=None)
     write_reconstruction(tmp_path / "r.h5", result)
-    found = read_reconstruction(tmp_path / "r.h5")
+    restored = read_reconstruction(tmp_path / "r.h5")
     # NaN, which says that slices are not evenly spaced, equals itself here.
-    np.testing.assert_array_equal(found.spacing_m, result.spacing_m)
-    assert_same(replace(found, spacing_m=()), replace(result, spacing_m=()))
+    np.testing.assert_array_equal(restored.spacing_m, result.spacing_m)
+    assert_same(replace(restored, spacing_m=()), replace(result, spacing_m=()))
 
 
 @pytest.mark.parametrize("slices", [None, 3])
@@ -37,10 +37,10 @@ def test_the_uncertainty_comes_back_with_its_resolution_widths(tmp_path, slices)
     spread = np.random.default_rng(1).uniform(0.0, 9.0, made(slices=slices).speed.shape)
     result = replace(made(slices=slices), uncertainty=spread, resolution_width_m=widths)
     write_reconstruction(tmp_path / "r.h5", result)
-    found = read_reconstruction(tmp_path / "r.h5")
-    assert np.array_equal(found.uncertainty, spread)
-    assert found.resolution_width_m == widths
-    assert found.image("uncertainty").spacing_m == found.spacing_m
+    restored = read_reconstruction(tmp_path / "r.h5")
+    assert np.array_equal(restored.uncertainty, spread)
+    assert restored.resolution_width_m == widths
+    assert restored.image("uncertainty").spacing_m == restored.spacing_m
     for wrong in (-1e-3, np.nan):
         with h5py.File(tmp_path / "r.h5", "r+") as file:
             file["uncertainty_mps"].attrs["resolution_width_m"] = [wrong]

@@ -29,10 +29,10 @@ def test_an_exported_image_is_its_own_truth(tmp_path: Path, name: str, slices: i
     file = tmp_path / name
     kind = {"npy": "npy", "nrrd": "nrrd"}.get(name.rpartition(".")[2], "nifti")
     export_image(image, target=file, name=kind, selection=Selection())
-    found = read_truth(file, image).truth
-    np.testing.assert_allclose(found.spacing_m, image.spacing_m, rtol=1e-6)
-    np.testing.assert_allclose(found.origin_m, image.origin_m, rtol=1e-6)
-    assert compare(image, found).rms < 1e-3
+    result = read_truth(file, image).truth
+    np.testing.assert_allclose(result.spacing_m, image.spacing_m, rtol=1e-6)
+    np.testing.assert_allclose(result.origin_m, image.origin_m, rtol=1e-6)
+    assert compare(image, result).rms < 1e-3
 
 
 def test_a_dataset_has_truth_and_region(tmp_path: Path) -> None:
@@ -40,9 +40,9 @@ def test_a_dataset_has_truth_and_region(tmp_path: Path) -> None:
     roi = truth(12).sound_speed_mps > 1510.0
     dataset = Dataset(ring, np.arange(3), np.arange(3), 1500.0, delta_tof_s=np.zeros((3, 3)), roi=roi)
     write_dataset(tmp_path / "scan.h5", replace(dataset, truth=truth(12)))
-    known = read_truth(tmp_path / "scan.h5", made(12))
-    np.testing.assert_array_equal(known.truth.sound_speed_mps, truth(12).sound_speed_mps)
-    np.testing.assert_array_equal(known.roi, roi)
+    true_image = read_truth(tmp_path / "scan.h5", made(12))
+    np.testing.assert_array_equal(true_image.truth.sound_speed_mps, truth(12).sound_speed_mps)
+    np.testing.assert_array_equal(true_image.roi, roi)
     write_dataset(tmp_path / "real.h5", dataset)
     with pytest.raises(InvalidInput, match="a dataset without truth"):
         read_truth(tmp_path / "real.h5", made(12))
@@ -50,9 +50,9 @@ def test_a_dataset_has_truth_and_region(tmp_path: Path) -> None:
 
 def test_a_result_or_a_volume_is_taken_as_true(tmp_path: Path) -> None:
     write_reconstruction(tmp_path / "reconstruction.h5", SOLID)
-    known = read_truth(tmp_path / "reconstruction.h5", SOLID).truth
-    np.testing.assert_array_equal(known.sound_speed_mps, SOLID.speed)
-    np.testing.assert_array_equal(known.attenuation_np_m, SOLID.attenuation)
+    true_image = read_truth(tmp_path / "reconstruction.h5", SOLID).truth
+    np.testing.assert_array_equal(true_image.sound_speed_mps, SOLID.speed)
+    np.testing.assert_array_equal(true_image.attenuation_np_m, SOLID.attenuation)
     write_volume(tmp_path / "volume.h5", Volume.from_values(SOLID.speed, SOLID.spacing_m, SOLID.origin_m))
     assert compare(SOLID, read_truth(tmp_path / "volume.h5", SOLID).truth).rms < 1e-3
 
@@ -60,8 +60,8 @@ def test_a_result_or_a_volume_is_taken_as_true(tmp_path: Path) -> None:
 def test_a_numpy_file_is_centred_or_on_the_nodes_of_the_image(tmp_path: Path) -> None:
     file, image = tmp_path / "true.npy", made(nodes=10)
     np.save(file, np.full((21, 11), 1540.0))
-    found = read_truth(file, image, [1e-3]).truth
-    assert (found.spacing_m, found.origin_m) == ((1e-3, 1e-3), (-0.01, -0.005))
+    result = read_truth(file, image, [1e-3]).truth
+    assert (result.spacing_m, result.origin_m) == ((1e-3, 1e-3), (-0.01, -0.005))
     with pytest.raises(InvalidInput) as refused:
         read_truth(file, image)
     assert refused.value.field == "spacing"

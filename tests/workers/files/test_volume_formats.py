@@ -36,8 +36,8 @@ def test_numpy(tmp_path, dtype, order):
 
 def test_explicit_grid_takes_precedence(tmp_path):
     np.save(tmp_path / "v.npy", ramp())
-    one = import_volume(tmp_path / "v.npy", VolumeMetadata("A head", (2e-3,)))
-    assert (one.title, one.spacing_m) == ("A head", (2e-3,) * 3)
+    volume = import_volume(tmp_path / "v.npy", VolumeMetadata("A head", (2e-3,)))
+    assert (volume.title, volume.spacing_m) == ("A head", (2e-3,) * 3)
     assert import_volume(tmp_path / "v.npy", VolumeMetadata(spacing_m=(1e-3, 2e-3, 3e-3))).spacing_m == (
         1e-3,
         2e-3,

@@ -37,7 +37,7 @@ def zea_fields(**changes: Any) -> dict[str, Any]:
         "scan/polar_angles": np.zeros(count, np.float32),
         "scan/sound_speed": np.float32(1490.0),
     }
-    return {place: value for place, value in (fields | changes).items() if value is not None}
+    return {path: value for path, value in (fields | changes).items() if value is not None}
 
 
 def openusct_fields(**changes: Any) -> dict[str, Any]:
@@ -57,7 +57,7 @@ def openusct_fields(**changes: Any) -> dict[str, Any]:
         "acquisition/tx_elements": np.array(EMITTERS),
         "ground_truth/c": np.full((4, 4), 1500.0),
     }
-    return {place: value for place, value in (fields | changes).items() if value is not None}
+    return {path: value for path, value in (fields | changes).items() if value is not None}
 
 
 def write_fields(path: Path, fields: dict[str, Any]) -> Path:

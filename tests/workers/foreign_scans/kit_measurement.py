@@ -20,8 +20,8 @@ def elements() -> np.ndarray:
     turn = 2.0 * np.pi * np.arange(ARRAYS * OF_ARRAY) * 0.381966
     height = np.linspace(0.1, 0.8, ARRAYS * OF_ARRAY)
     flat = np.sqrt(1.0 - height**2)
-    place = 0.01 * np.column_stack((flat * np.cos(turn), flat * np.sin(turn), height))
-    return place.reshape(ARRAYS, OF_ARRAY, 3)
+    position = 0.01 * np.column_stack((flat * np.cos(turn), flat * np.sin(turn), height))
+    return position.reshape(ARRAYS, OF_ARRAY, 3)
 
 
 def encode_float16(values: np.ndarray) -> np.ndarray:
@@ -58,12 +58,12 @@ def write_measurement(folder: Path, delay: float = 0.0, *, second: bool = False,
     is not recorded.
     """
     folder.mkdir(parents=True)
-    place = elements()
+    position = elements()
     names = ("receiverPositions", "emitterPositions") if second else ("transducerPositions",)
     made = np.empty((1, ARRAYS), dtype=[(name, "O") for name in names])
     for k in range(ARRAYS):
         for name in names:
-            made[name][0, k] = place[k] * (-1.0 if name == "emitterPositions" else 1.0)
+            made[name][0, k] = position[k] * (-1.0 if name == "emitterPositions" else 1.0)
     savemat(folder / "geometry.mat", {"TASElements": made})
     info = {"Hardware": "USCT3dv2" if second else "USCT3dv3", "AScanDatatype": "float16"}
     savemat(folder / "info.mat", info | {"Bandpassundersampling": 0.0})
@@ -71,9 +71,9 @@ def write_measurement(folder: Path, delay: float = 0.0, *, second: bool = False,
     savemat(folder / "TASTemp.mat", {"TASTemperature": np.full((1, ARRAYS, 2), 25.0)})
     savemat(folder / "Movements.mat", {"MovementsListreal": np.array([[90.0, 0.02], [0.0, 0.0]])})
     tas, receiver = (k.ravel() + 1 for k in np.indices((ARRAYS, OF_ARRAY)))
-    sources = place * (-1.0 if second else 1.0)
+    sources = position * (-1.0 if second else 1.0)
     for number, (array, one) in enumerate(EMITTERS):
-        distance = np.linalg.norm(place.reshape(-1, 3) - sources[array - 1, one - 1], axis=1)
+        distance = np.linalg.norm(position.reshape(-1, 3) - sources[array - 1, one - 1], axis=1)
         at = np.rint(RATE_HZ * distance / SPEED_MPS + delay).astype(int)
         gain = np.linspace(1.0, 2.0, len(tas))
         traces = np.zeros((SAMPLES, len(tas)))

@@ -15,7 +15,7 @@ from .scans import ELEMENTS, RATE_HZ, T0_S, positions
 
 def in_track(fields: dict) -> dict:
     """As newer files of zea: in a track, with the positions in the group ``probe``."""
-    moved = {f"tracks/track_0/{place}": value for place, value in fields.items()}
+    moved = {f"tracks/track_0/{path}": value for path, value in fields.items()}
     moved["probe/probe_geometry"] = moved.pop("tracks/track_0/scan/probe_geometry")
     return moved | {"probe/name": np.bytes_("ring")}
 
@@ -43,9 +43,9 @@ def test_synthetic_aperture_scans_are_converted(tmp_path, fields, t0_s):
 
 
 def test_an_array_in_space_keeps_its_heights_and_integers_stay_integers(tmp_path):
-    place = np.column_stack((positions(), np.linspace(0.0, 0.01, ELEMENTS)))
+    position = np.column_stack((positions(), np.linspace(0.0, 0.01, ELEMENTS)))
     counts = (1000 * zea_fields()["data/raw_data"]).astype(np.int16)
-    fields = zea_fields(**{"scan/probe_geometry": place.astype(np.float32), "data/raw_data": counts})
+    fields = zea_fields(**{"scan/probe_geometry": position.astype(np.float32), "data/raw_data": counts})
     dataset = convert_dataset(write_fields(tmp_path / "scan", fields), tmp_path / "canonical.h5")
     assert dataset.element_position_m.shape == (ELEMENTS, 3)
     assert dataset.waveform.object.dtype == np.int16

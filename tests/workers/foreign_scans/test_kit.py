@@ -47,9 +47,9 @@ def test_the_float_format_holds_twelve_bits_of_every_size():
 def test_undersampled_traces_are_reconstructed():
     time = np.arange(SAMPLES) / RATE_HZ
     pulse = np.exp(-(((time - 1.2e-5) / 2e-6) ** 2)) * np.cos(2 * np.pi * 2.5e6 * (time - 1.2e-5))
-    found = reconstruct_undersampled(np.vstack((pulse[::3], 0 * pulse[::3])))
-    np.testing.assert_allclose(found[0], pulse, atol=1e-3)
-    assert not found[1].any()
+    result = reconstruct_undersampled(np.vstack((pulse[::3], 0 * pulse[::3])))
+    np.testing.assert_allclose(result[0], pulse, atol=1e-3)
+    assert not result[1].any()
     assert reconstruct_undersampled(np.zeros((1, 99))).shape == (1, 300)
 
 
@@ -85,8 +85,8 @@ def test_a_measurement_is_converted(tmp_path, packed, second):
     traces = dataset.waveform.object
     assert not traces[0, 0].any()
     expected = np.rint(RATE_HZ * dataset.distance_m() / 1480.0)
-    found = np.argmax(np.abs(traces), axis=-1)
-    np.testing.assert_array_equal(found[dataset.valid], expected[dataset.valid])
+    computed = np.argmax(np.abs(traces), axis=-1)
+    np.testing.assert_array_equal(computed[dataset.valid], expected[dataset.valid])
     # Each was divided by its amplification.
     peaks = np.abs(traces).max(axis=-1)[dataset.valid]
     np.testing.assert_allclose(peaks, peaks[0], rtol=2e-2)

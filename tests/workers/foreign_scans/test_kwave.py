@@ -51,11 +51,11 @@ def geometry(**changes: object) -> bytes:
 
 
 def members() -> dict[str, bytes]:
-    found = {"geometry.npz": geometry()}
+    results = {"geometry.npz": geometry()}
     for k in range(len(EMITTERS)):
-        found[f"object/{k:03}.h5"] = output(pressures(0)[k : k + 1])
-        found[f"water/{k:03}.h5"] = output(pressures(1)[k : k + 1])
-    return found
+        results[f"object/{k:03}.h5"] = output(pressures(0)[k : k + 1])
+        results[f"water/{k:03}.h5"] = output(pressures(1)[k : k + 1])
+    return results
 
 
 def written(tmp_path: Path, found: dict[str, bytes]) -> Path:
@@ -81,8 +81,8 @@ def test_outputs_become_a_scan_in_the_order_of_their_names(tmp_path):
 
 
 def test_the_water_may_be_left_out(tmp_path):
-    found = {name: content for name, content in members().items() if not name.startswith("water")}
-    told = convert_dataset(written(tmp_path, found), tmp_path / "canonical.h5")
+    result = {name: content for name, content in members().items() if not name.startswith("water")}
+    told = convert_dataset(written(tmp_path, result), tmp_path / "canonical.h5")
     assert told.waveform.water is None
 
 
@@ -104,8 +104,8 @@ def test_the_water_may_be_left_out(tmp_path):
     ],
 )
 def test_names_missing_or_invalid_input(tmp_path, change, field):
-    found = {name: content for name, content in (members() | change).items() if content is not None}
+    result = {name: content for name, content in (members() | change).items() if content is not None}
     with pytest.raises(InvalidInput) as refused:
-        convert_dataset(written(tmp_path, found), tmp_path / "canonical.h5")
+        convert_dataset(written(tmp_path, result), tmp_path / "canonical.h5")
     assert refused.value.field == field
     assert [path.name for path in tmp_path.iterdir()] == ["scan.zip"]

@@ -28,10 +28,10 @@ def test_every_reader_is_documented(monkeypatch):
     text = import_module("from_code.scan_readers").scan_readers()
     for reader in READERS:
         assert f"### {reader.title}\n" in text
-        for one in reader.variables:
-            assert f"| `{one.name}` | {one.shape} | {one.unit} | {one.meaning} | {one.required} |" in text
-            assert one.shape
-        assert any(one.required == "yes" for one in reader.variables)
+        for row in reader.variables:
+            assert f"| `{row.name}` | {row.shape} | {row.unit} | {row.meaning} | {row.required} |" in text
+            assert row.shape
+        assert any(variable.required == "yes" for variable in reader.variables)
     assert len({reader.title for reader in READERS}) == len(READERS)
 
 
@@ -48,13 +48,13 @@ def test_arrays_with_names_of_groups_of_other_formats_are_no_such_formats(tmp_pa
 
 @pytest.mark.parametrize("fields", [zea_fields(), openusct_fields()], ids=["zea", "openusct"])
 def test_links_of_hdf5_are_not_followed(tmp_path, fields):
-    place = next(name for name in fields if name.endswith(("raw_data", "/data")))
-    write_fields(tmp_path / "other.h5", {place: fields[place]})
-    write_fields(tmp_path / "scan", {name: value for name, value in fields.items() if name != place})
-    for link in (h5py.ExternalLink(str(tmp_path / "other.h5"), place), h5py.SoftLink("/scan")):
+    position = next(name for name in fields if name.endswith(("raw_data", "/data")))
+    write_fields(tmp_path / "other.h5", {position: fields[position]})
+    write_fields(tmp_path / "scan", {name: value for name, value in fields.items() if name != position})
+    for link in (h5py.ExternalLink(str(tmp_path / "other.h5"), position), h5py.SoftLink("/scan")):
         with h5py.File(tmp_path / "scan", "a") as file:
-            file.pop(place, None)
-            file[place] = link
+            file.pop(position, None)
+            file[position] = link
         with pytest.raises(InvalidInput):
             convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5")
     assert not (tmp_path / "canonical.h5").exists()

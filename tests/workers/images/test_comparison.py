@@ -19,20 +19,20 @@ def two():
 
 
 def test_it_has_a_column_a_result():
-    one, both = pixels(comparison_png(truth(), {"bent": made()})), pixels(comparison_png(truth(), two()))
-    assert abs(both.shape[0] - one.shape[0]) < 0.05 * one.shape[0]
-    assert 1.3 * one.shape[1] < both.shape[1] < 1.7 * one.shape[1]
+    first, both = pixels(comparison_png(truth(), {"bent": made()})), pixels(comparison_png(truth(), two()))
+    assert abs(both.shape[0] - first.shape[0]) < 0.05 * first.shape[0]
+    assert 1.3 * first.shape[1] < both.shape[1] < 1.7 * first.shape[1]
 
 
 def test_titles_show_the_errors_of_compare(undrawn):
-    known = truth()
-    roi = np.zeros(known.sound_speed_mps.shape, bool)
+    true_image = truth()
+    roi = np.zeros(true_image.sound_speed_mps.shape, bool)
     roi[4:22, 4:20] = True
     for given in (None, roi):
-        comparison_png(known, two(), given)
+        comparison_png(true_image, two(), given)
         for name, result in two().items():
-            assert f"{name.capitalize()}: {compare(result, known, given).caption()}" in undrawn.words()
-        choice = compare(made(), known, given).region_choice
+            assert f"{name.capitalize()}: {compare(result, true_image, given).caption()}" in undrawn.words()
+        choice = compare(made(), true_image, given).region_choice
         assert f"Errors in: {choice}" in undrawn.words()
 
 

@@ -59,10 +59,10 @@ def test_the_bare_image_has_a_pixel_a_node_to_scale():
 def test_bare_image_contains_only_values():
     picture = pixels(drawn_with(frame=False, size=400, colormap="gray"))
     middles = [int(400 * (k + 0.5) / 5) for k in range(5)], [int(160 * (k + 0.5) / 4) for k in range(4)]
-    found = picture[np.ix_(*middles)][..., 0].astype(float)
+    computed = picture[np.ix_(*middles)][..., 0].astype(float)
     # Rows run down, z runs up.
     expected = 255.0 * (RAMP[1].T[::-1] - 20.0) / 19.0
-    np.testing.assert_allclose(found, expected, atol=2.0)
+    np.testing.assert_allclose(computed, expected, atol=2.0)
 
 
 def test_the_scale_bar_is_as_long_as_it_says():

@@ -53,8 +53,8 @@ def test_report_without_a_truth(undrawn, change, shown):
 def test_with_a_truth_it_also_shows_difference_and_profile(undrawn, change):
     result = replace(made(), **change)
     report_png(result, truth())
-    known = f"Difference: {compare(result, truth()).caption()}"
-    assert panels(undrawn)[:4] == ["Reconstruction", "Truth", known, "Along y = 1.0 mm"]
+    caption = f"Difference: {compare(result, truth()).caption()}"
+    assert panels(undrawn)[:4] == ["Reconstruction", "Truth", caption, "Along y = 1.0 mm"]
     report_png(result)
     plain = panels(undrawn)
     report_png(result, truth())
@@ -96,15 +96,15 @@ def test_report_names_stages_and_automatic_choices(undrawn):
 
 
 def test_the_errors_in_the_title_are_those_of_compare_with_their_region(undrawn):
-    result, known = made(height_mps=20.0), truth()
-    corner = np.zeros(known.sound_speed_mps.shape, bool)
+    result, true_image = made(height_mps=20.0), truth()
+    corner = np.zeros(true_image.sound_speed_mps.shape, bool)
     corner[8:20, 4:12] = True
     for roi in (None, corner):
-        report_png(result, known, roi)
-        found = compare(result, known, roi)
-        assert f"Difference: {found.caption()}" in panels(undrawn)
-        assert any(found.region_choice in words for words in undrawn.words())
-    assert compare(result, known, corner).caption() != compare(result, known).caption()
+        report_png(result, true_image, roi)
+        comparison = compare(result, true_image, roi)
+        assert f"Difference: {comparison.caption()}" in panels(undrawn)
+        assert any(comparison.region_choice in words for words in undrawn.words())
+    assert compare(result, true_image, corner).caption() != compare(result, true_image).caption()
 
 
 def test_reconstruction_and_truth_share_a_colour_bar(undrawn):

@@ -144,10 +144,10 @@ def test_every_dataset_within_the_limits_has_a_plan(way, **counts):
         with pytest.raises(InvalidInput, match=r"for (a scan without traces|elements in space)"):
             planned(known, settings)
         return
-    found = planned(known, settings)
-    assert found.tasks > 0
-    assert all(size > 0 for size in found.call_bytes.values())
-    assert len(found.why) < 1000
+    result = planned(known, settings)
+    assert result.tasks > 0
+    assert all(size > 0 for size in result.call_bytes.values())
+    assert len(result.why) < 1000
 
 
 @pytest.mark.parametrize("width_m", [0.0, 1e-300, 1e300, float("inf"), float("nan")])

@@ -127,7 +127,7 @@ def test_a_running_reconstruction_sharpens(scan, tmp_path):
     )
     middle = result.speed[..., result.speed.shape[2] // 2]
     np.testing.assert_allclose(shown(seen[-1]), middle, rtol=1e-6)
-    of_it = {one["iteration"]: np.abs(shown(one) - middle).max() for one in seen if one["part"] == 2}
+    of_it = {step["iteration"]: np.abs(shown(step) - middle).max() for step in seen if step["part"] == 2}
     assert of_it[1] > of_it[2] > of_it[3]
     assert tuple(seen[-1]["spacing_m"]) == result.spacing_m[:2]
     assert tuple(seen[-1]["origin_m"]) == result.origin_m[:2]

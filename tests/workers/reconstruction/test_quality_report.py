@@ -20,19 +20,19 @@ from ...kernels.acquisition.traces import blob_delay, scan
 
 def test_report_and_page_are_of_one_examination(tmp_path):
     write_dataset(tmp_path / "scan.h5", scan(blob_delay(12), elements=12))
-    found = quality.examine_file(tmp_path / "scan.h5", "correlation")
-    assert found.report == quality.quality_report(tmp_path / "scan.h5", "correlation")
-    assert found.page == quality.quality_page(tmp_path / "scan.h5", "correlation")
-    assert found.report["picker"] == found.picked.picker == "correlation"
+    result = quality.examine_file(tmp_path / "scan.h5", "correlation")
+    assert result.report == quality.quality_report(tmp_path / "scan.h5", "correlation")
+    assert result.page == quality.quality_page(tmp_path / "scan.h5", "correlation")
+    assert result.report["picker"] == result.picked.picker == "correlation"
 
 
 def test_the_page_is_about_the_slice_with_most_findings(tmp_path, undrawn):
-    one = scan(blob_delay(16), elements=16)
-    both = [np.stack([t, t]) for t in (one.waveform.object, one.waveform.water)]
+    dataset = scan(blob_delay(16), elements=16)
+    both = [np.stack([t, t]) for t in (dataset.waveform.object, dataset.waveform.water)]
     for traces in both:
         traces[1, :, 3] = 0.0
     write_dataset(
-        tmp_path / "scan.h5", replace(one, slice_z_m=np.array([0.0, 0.01]), waveform=Waveform(*both))
+        tmp_path / "scan.h5", replace(dataset, slice_z_m=np.array([0.0, 0.01]), waveform=Waveform(*both))
     )
     assert quality.quality_page(tmp_path / "scan.h5", "aic").startswith(b"\x89PNG")
     assert "Quality of Scan, slice 1: usable" in undrawn.words()
@@ -51,12 +51,12 @@ def test_one_emission_is_in_memory_and_all_are_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(Emissions, "__array__", all_at_once)
     monkeypatch.setattr(read, "_traces", all_at_once)
     told = []
-    found, fitted = quality.calibrate_file(
+    computed, fitted = quality.calibrate_file(
         tmp_path / "scan.h5", "aic", lambda *step: told.append(step), fit_speed=False
     )
     expected = examine(several)
-    assert found.report == expected.report.to_dict()
-    np.testing.assert_array_equal(found.picked.delta_tof_s, expected.picked.delta_tof_s)
+    assert computed.report == expected.report.to_dict()
+    np.testing.assert_array_equal(computed.picked.delta_tof_s, expected.picked.delta_tof_s)
     np.testing.assert_array_equal(fitted.emission_delay_s, calibrate(one, water_times(one)).emission_delay_s)
     # Of two slices: object, water, and the times picked from both.
     assert told == [(k, 72) for k in range(1, 73)]

@@ -49,7 +49,7 @@ def test_saved_job_is_resumed_to_the_same_bits(path, result, tmp_path):
         result.reflection.db,
     )
     assert saved
-    names = sorted({one.stem.rpartition("-")[0] for one in (tmp_path / "checkpoints").glob("*.npz")})
+    names = sorted({path.stem.rpartition("-")[0] for path in (tmp_path / "checkpoints").glob("*.npz")})
     state = Checkpoints(tmp_path / "checkpoints").load(names[-1]).state
     assert state.batches == 1
     assert state.echo.shape == result.reflection.db.shape
@@ -102,10 +102,10 @@ def test_plan_counts_its_tasks_and_memory(scan):
 def test_plan_rejects_more_pixels_than_a_worker_holds(scan):
     fine = SETTINGS.changed(pixel_m=3e-5)
     summary = DatasetCounts.from_dataset(scan).summary(fine)
-    found = plan(summary, fine, []).call_bytes["sum_emissions"]
+    planned = plan(summary, fine, []).call_bytes["sum_emissions"]
     # Sums and their parts, 33 bytes for each of the pixels.
-    assert found > 33 * (2.0 * scan.radius_m / 3e-5) ** 2
-    worker = WorkerCapacity(int((0.9 * found + WARM_BYTES) / USABLE), ("recon",))
+    assert planned > 33 * (2.0 * scan.radius_m / 3e-5) ** 2
+    worker = WorkerCapacity(int((0.9 * planned + WARM_BYTES) / USABLE), ("recon",))
     with pytest.raises(InvalidInput) as refused:
         plan(summary, fine, [worker])
     assert refused.value.field == "reflection.pixel_m"

@@ -69,9 +69,9 @@ def test_traces_are_those_of_the_dataset_divided_by_their_peak(tmp_path, quantit
 
 
 def test_a_slice_is_read_by_its_index(tmp_path):
-    one = scan(elements=8)
-    late = [np.stack([t, np.roll(t, 9, axis=-1)]) for t in (one.waveform.object, one.waveform.water)]
-    path = stored(tmp_path, replace(one, slice_z_m=np.array([0.0, 0.01]), waveform=Waveform(*late)))
+    dataset = scan(elements=8)
+    late = [np.stack([t, np.roll(t, 9, axis=-1)]) for t in (dataset.waveform.object, dataset.waveform.water)]
+    path = stored(tmp_path, replace(dataset, slice_z_m=np.array([0.0, 0.01]), waveform=Waveform(*late)))
     first, second = (decoded(emission_traces(path, emission=1, index=k, what="object")) for k in (0, 1))
     np.testing.assert_allclose(second[:, 9:], first[:, :-9], atol=1e-6)
     assert not np.array_equal(first, second)
@@ -100,11 +100,11 @@ def test_picks_are_those_of_the_picker(tmp_path):
     made = scan(blob_delay(16), elements=16, noise=0.01)
     view = emission_traces(stored(tmp_path, made), emission=3, index=0, what="object")
     assert view["picker"] == "aic"
-    found = np.array([np.nan if one is None else one for one in view["pick_s"]])
+    computed = np.array([np.nan if one is None else one for one in view["pick_s"]])
     expected = np.asarray(view["straight_s"]) + pick(made, "aic").delta_tof_s[3]
-    both = np.isfinite(found) & np.isfinite(expected)
+    both = np.isfinite(computed) & np.isfinite(expected)
     assert both.sum() >= 12
-    np.testing.assert_allclose(found[both], expected[both], atol=1e-12)
+    np.testing.assert_allclose(computed[both], expected[both], atol=1e-12)
     assert view["pick_s"][3] is None
 
 
@@ -136,8 +136,8 @@ def test_slices_without_a_frequency_have_picks(tmp_path):
     made = replace(one, slice_z_m=np.array([0.0, 0.01]), waveform=Waveform(*both), center_frequency_hz=None)
     path = stored(tmp_path, made)
     assert scan_geometry(path)["frequency_estimated"]
-    found = emission_traces(path, emission=3, index=1, what="object")["pick_s"]
-    assert sum(one is not None for one in found) >= 12
+    traces = emission_traces(path, emission=3, index=1, what="object")["pick_s"]
+    assert sum(one is not None for one in traces) >= 12
 
 
 def test_silent_traces_have_no_frequency_and_no_picks(tmp_path):

@@ -31,10 +31,10 @@ def test_blocks_equal_the_whole_domain(cluster, grid, seed, on_node):
     speed, spacing = rng.uniform(300.0, 5000.0, shape), 1.5e-3
     source = rng.uniform(0.0, 1.0, len(shape)) * (np.array(shape) - 1)
     source = spacing * (np.round(source) if on_node else source)
-    found = subdomains.solve(cluster.client, speed, spacing, source, blocks)
-    assert np.allclose(found, eikonal.solve(speed, spacing, source, "fsm"), rtol=1e-12, atol=0.0)
+    field = subdomains.solve(cluster.client, speed, spacing, source, blocks)
+    assert np.allclose(field, eikonal.solve(speed, spacing, source, "fsm"), rtol=1e-12, atol=0.0)
     same = solve_by_blocks(PointSource.checked(speed, spacing, source), blocks)
-    assert np.array_equal(found, same)
+    assert np.array_equal(field, same)
 
 
 def test_a_file_serves_and_blocks_can_be_had_one_by_one(cluster, tmp_path):
@@ -51,10 +51,10 @@ def test_a_file_serves_and_blocks_can_be_had_one_by_one(cluster, tmp_path):
 def test_source_at_a_block_corner_activates_all_blocks(cluster):
     """Seeds that no sweep can improve must still reach the neighbours."""
     speed = np.ones((4, 4))
-    found = subdomains.solve(cluster.client, speed, 1.0, (1.5, 1.5), (2, 2))
-    assert np.isfinite(found).all()
-    assert np.allclose(found, found.T)
-    assert found[1, 1] == pytest.approx(0.5**0.5)
+    field = subdomains.solve(cluster.client, speed, 1.0, (1.5, 1.5), (2, 2))
+    assert np.isfinite(field).all()
+    assert np.allclose(field, field.T)
+    assert field[1, 1] == pytest.approx(0.5**0.5)
 
 
 def test_blocks_of_a_lost_worker_are_recomputed(tmp_path):
@@ -73,8 +73,8 @@ def test_blocks_of_a_lost_worker_are_recomputed(tmp_path):
 def test_fields_of_several_sources_come_in_their_order(cluster, at_once):
     speed = np.random.default_rng(4).uniform(1.0, 2.0, (9, 8, 7))
     sources = [(1.0, 2.0, 3.0), (8.0, 7.0, 0.0), (4.2, 0.1, 5.0), (0.0, 0.0, 6.0), (3.0, 3.3, 3.6)]
-    found = subdomains.solve_many_in_blocks(cluster.client, speed, 1.0, sources, (2, 1, 2), at_once=at_once)
-    for source, field in zip(sources, found, strict=True):
+    fields = subdomains.solve_many_in_blocks(cluster.client, speed, 1.0, sources, (2, 1, 2), at_once=at_once)
+    for source, field in zip(sources, fields, strict=True):
         alone = subdomains.solve(cluster.client, speed, 1.0, source, (2, 1, 2))
         assert np.array_equal(field.whole(), alone)
 

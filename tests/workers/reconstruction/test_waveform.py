@@ -55,10 +55,10 @@ def same(result, expected):
 def test_waves_of_a_device_make_the_image_of_compiled_code(path, tmp_path):
     expected = reconstruct_here(replace(pick(scan()), waveform=scan().waveform), SHORT)
     with open_cluster(workers=1, local_directory=tmp_path, processes=False) as cluster:
-        found = reconstruction_run.reconstruct(cluster.client, path, replace(SHORT, device="opencl"))
-    assert 0.0 < np.abs(found.speed - expected.speed).max() < 0.01
-    assert found.settings == replace(expected.settings, device="opencl")
-    assert "on OpenCL devices" in found.provenance["waveform"]
+        computed = reconstruction_run.reconstruct(cluster.client, path, replace(SHORT, device="opencl"))
+    assert 0.0 < np.abs(computed.speed - expected.speed).max() < 0.01
+    assert computed.settings == replace(expected.settings, device="opencl")
+    assert "on OpenCL devices" in computed.provenance["waveform"]
     assert "on OpenCL devices" not in expected.provenance["waveform"]
 
 

@@ -49,9 +49,9 @@ def device_of(png: bytes) -> str:
     return str(Image.open(io.BytesIO(png)).info["Device"])
 
 
-def odd(found: bytes, expected: bytes) -> float:
+def odd(computed: bytes, expected: bytes) -> float:
     """Share of pixels that differ by more than one level."""
-    return float((np.abs(pixels_of(found).astype(int) - pixels_of(expected)).max(axis=2) > 1).mean())
+    return float((np.abs(pixels_of(computed).astype(int) - pixels_of(expected)).max(axis=2) > 1).mean())
 
 
 @pytest.fixture
@@ -80,24 +80,24 @@ def failing(opencl_session, monkeypatch):
 def test_glass_by_the_device_is_that_of_compiled_code(volume, opencl_session):
     expected = refraction.picture_png(volume, replace(GLASS, device="cpu"))
     assert device_of(expected) == PROCESSOR
-    found = refraction.picture_png(volume, replace(GLASS, device="opencl"))
+    computed = refraction.picture_png(volume, replace(GLASS, device="opencl"))
     device = opencl_session.device
-    assert device_of(found) == f"{device.label}, driver {device.driver}"
-    assert odd(found, expected) <= ODD_GLASS
+    assert device_of(computed) == f"{device.label}, driver {device.driver}"
+    assert odd(computed, expected) <= ODD_GLASS
     # Other indices of the same scene, from the copy on the device.
     other = replace(GLASS, index=(1.2,))
     pictures = [refraction.picture_png(volume, replace(other, device=word)) for word in ("opencl", "cpu")]
     assert odd(*pictures) <= ODD_GLASS
-    assert odd(pictures[0], found) > ODD_GLASS
+    assert odd(pictures[0], computed) > ODD_GLASS
 
 
 @pytest.mark.opencl
 def test_a_geometry_field_by_the_device_is_that_of_compiled_code(field, opencl_session):
     expected = field_picture.picture_png(field, replace(MIRROR, device="cpu"))
     assert device_of(expected) == PROCESSOR
-    found = field_picture.picture_png(field, replace(MIRROR, device="opencl"))
-    assert device_of(found).startswith(opencl_session.device.label)
-    assert odd(found, expected) <= ODD_FIELD
+    computed = field_picture.picture_png(field, replace(MIRROR, device="opencl"))
+    assert device_of(computed).startswith(opencl_session.device.label)
+    assert odd(computed, expected) <= ODD_FIELD
 
 
 @pytest.mark.opencl
@@ -118,11 +118,11 @@ def test_the_processor_draws_once_more_what_a_lost_device_left(volume, field, fa
     expected = refraction.picture_png(volume, replace(GLASS, device="cpu"))
     # The first launch is that of the self-test of the scene.
     session = failing(at=2)
-    found = refraction.picture_png(volume, replace(GLASS, device="opencl"))
+    computed = refraction.picture_png(volume, replace(GLASS, device="opencl"))
     assert session.lost
     assert [record.getMessage() for record in caplog.records] == [session.lost]
-    assert device_of(found) == f"{PROCESSOR}: {session.lost}"
-    np.testing.assert_array_equal(pixels_of(found), pixels_of(expected))
+    assert device_of(computed) == f"{PROCESSOR}: {session.lost}"
+    np.testing.assert_array_equal(pixels_of(computed), pixels_of(expected))
     again = field_picture.picture_png(field, replace(MIRROR, device="opencl"))
     assert device_of(again) == f"{PROCESSOR}: {session.lost}"
     assert len(caplog.records) == 1, "it is not tried again"

@@ -62,8 +62,8 @@ def test_every_field_changes_the_picture(folder, name):
 @pytest.mark.parametrize("scene", ["mirror-ball", "two-mirrors"])
 def test_moved_objects_share_the_tables_and_are_where_they_were_put(folder, scene):
     still = FieldView(scene=scene)
-    places = tuple(0.5 + place for pair in PLACES[scene] for place in pair)
-    before, after = world_at(folder, still), world_at(folder, replace(still, positions_m=places))
+    points = tuple(0.5 + place for pair in PLACES[scene] for place in pair)
+    before, after = world_at(folder, still), world_at(folder, replace(still, positions_m=points))
     assert after.faces is before.faces
     assert after.known is before.known
     # All of them by half a metre along x and y, on the same ground; the inverse follows.
@@ -76,7 +76,7 @@ def test_moved_objects_share_the_tables_and_are_where_they_were_put(folder, scen
     np.testing.assert_array_equal(world_at(folder, still).to_world, before.to_world)
     same = tuple(place for pair in PLACES[scene] for place in pair)
     np.testing.assert_array_equal(drawn(folder, scene=scene), drawn(folder, scene=scene, positions_m=same))
-    assert (drawn(folder, scene=scene) != drawn(folder, scene=scene, positions_m=places)).any()
+    assert (drawn(folder, scene=scene) != drawn(folder, scene=scene, positions_m=points)).any()
 
 
 def test_the_picture_has_its_size(folder):
@@ -93,8 +93,8 @@ def test_the_accurate_lookup_is_nearly_exact(folder, scene, mode):
 
 def test_threads_draw_the_same_picture(folder):
     view = FieldView(**SIZE, scene="mirror-ball", mode="self")
-    one, three = (tile_image(folder, view, 0, 40, threads=threads) for threads in (1, 3))
-    np.testing.assert_array_equal(three.image, one.image)
+    first, three = (tile_image(folder, view, 0, 40, threads=threads) for threads in (1, 3))
+    np.testing.assert_array_equal(three.image, first.image)
 
 
 def test_tiles_equal_parts_of_the_whole(folder, cluster, monkeypatch):
@@ -160,14 +160,14 @@ def test_published_tables_are_made_where_a_view_reads_them(folder, monkeypatch):
     plain = world_at(folder, FieldView(scene="two-mirrors"))
     assert plain.uv.size == plain.images.size == plain.inner_uv.size == 1
     before = field_cache._SHAPES.held()
-    one, other = (
+    first, other = (
         world_at(folder, FieldView(scene=scene, eye="uv-linear")) for scene in ("two-mirrors", "object")
     )
-    assert one.uv.size == 2 * (6 * 100) ** 2
-    assert one.images.size == 6 * 65**2
-    assert one.inner_uv.size == 2 * one.inner_faces.size
-    assert np.shares_memory(one.uv, other.uv)
-    made = one.uv.nbytes + one.images.nbytes + one.inner_uv.nbytes
+    assert first.uv.size == 2 * (6 * 100) ** 2
+    assert first.images.size == 6 * 65**2
+    assert first.inner_uv.size == 2 * first.inner_faces.size
+    assert np.shares_memory(first.uv, other.uv)
+    made = first.uv.nbytes + first.images.nbytes + first.inner_uv.nbytes
     assert field_cache._SHAPES.held() == before + made
 
 
@@ -181,7 +181,7 @@ def test_published_lookups_of_a_mesh_are_nearly_exact(folder):
 @pytest.mark.parametrize("mode", ["refract", "self"])
 def test_published_lookups_serve_rays_that_leave_the_mesh(folder, mode):
     pictures = {name: drawn(folder, mode=mode, lookup=name) for name in ("exact", "uv-nearest", "uv-linear")}
-    off = {name: np.abs(one - pictures["exact"]).max(axis=2) > 16 for name, one in pictures.items()}
+    off = {name: np.abs(picture - pictures["exact"]).max(axis=2) > 16 for name, picture in pictures.items()}
     for name in ("uv-nearest", "uv-linear"):
         assert 0.0 < off[name].mean() < 0.5
 

@@ -19,17 +19,17 @@ from ..files.reconstructions import made
 def test_the_numbers_are_those_of_numpy(tmp_path, kind):
     values = (np.random.default_rng(3).gamma(2.0, 20.0, (9, 8, 7)) % 250).astype(kind)
     write_volume(tmp_path / "v.h5", Volume.from_values(values, (1e-3,) * 3))
-    found = volume_histogram(tmp_path / "v.h5", "value", 37)
+    histogram = volume_histogram(tmp_path / "v.h5", "value", 37)
     counts, edges = np.histogram(values, 37)
-    assert found["counts"] == counts.tolist()
-    assert sum(found["counts"]) == values.size
-    np.testing.assert_allclose(found["edges"], edges)
+    assert histogram["counts"] == counts.tolist()
+    assert sum(histogram["counts"]) == values.size
+    np.testing.assert_allclose(histogram["edges"], edges)
     given = values.astype(np.float64)
-    assert [found["minimum"], found["maximum"]] == [given.min(), given.max()]
-    assert (found["mean"], found["deviation"]) == pytest.approx((given.mean(), given.std()))
+    assert [histogram["minimum"], histogram["maximum"]] == [given.min(), given.max()]
+    assert (histogram["mean"], histogram["deviation"]) == pytest.approx((given.mean(), given.std()))
     scene = scene_at(tmp_path / "v.h5", RefractionView())
-    assert found["iso"] == pytest.approx(scene.layers.isos[0])
-    assert found["smoothing"] == (SMOOTHING_8_BIT if kind is np.uint8 else 0.0)
+    assert histogram["iso"] == pytest.approx(scene.layers.isos[0])
+    assert histogram["smoothing"] == (SMOOTHING_8_BIT if kind is np.uint8 else 0.0)
 
 
 def test_quantities_of_a_reconstruction(tmp_path):

@@ -12,26 +12,26 @@ from bentray_workers.rendering.isosurface_mesh import mesh_volume
 
 def balls(tmp_path, *middles, nodes=24):
     """A volume with a ball of radius 5 nodes about each middle; 1 in its middle, 0 on its surface."""
-    places = np.stack(np.meshgrid(*[np.arange(nodes)] * 3, indexing="ij"), axis=-1)
-    away = np.min([np.linalg.norm(places - middle, axis=-1) for middle in middles], axis=0)
+    points = np.stack(np.meshgrid(*[np.arange(nodes)] * 3, indexing="ij"), axis=-1)
+    away = np.min([np.linalg.norm(points - middle, axis=-1) for middle in middles], axis=0)
     write_volume(tmp_path / "v.h5", Volume.from_values(1.0 - away / 5.0, (1e-3, 1e-3, 2e-3)))
     return tmp_path / "v.h5"
 
 
 def test_a_ball_in_metres(tmp_path):
-    found = mesh_volume(balls(tmp_path, (11, 11, 11)), 0.0, 1, tmp_path / "m.h5")
+    result = mesh_volume(balls(tmp_path, (11, 11, 11)), 0.0, 1, tmp_path / "m.h5")
     mesh = load_mesh(tmp_path / "m.h5").mesh
-    assert (found["format"], found["genus"], found["holes"], found["iso"]) == ("isosurface", 0, 0, 0.0)
-    assert found["faces"] == len(mesh.faces) > 200
+    assert (result["format"], result["genus"], result["holes"], result["iso"]) == ("isosurface", 0, 0, 0.0)
+    assert result["faces"] == len(mesh.faces) > 200
     size = np.ptp(mesh.vertices, axis=0)
     np.testing.assert_allclose(size, (0.010, 0.010, 0.020), rtol=0.03)
 
 
 def test_the_largest_piece_is_taken(tmp_path):
     path = balls(tmp_path, (8, 8, 8), (19, 19, 19))
-    found = mesh_volume(path, 0.2, 1, tmp_path / "m.h5")
-    assert found["repairs"]["dropped_pieces"] == 1
-    assert found["genus"] == 0
+    mesh = mesh_volume(path, 0.2, 1, tmp_path / "m.h5")
+    assert mesh["repairs"]["dropped_pieces"] == 1
+    assert mesh["genus"] == 0
 
 
 def test_coarser_steps_have_fewer_faces(tmp_path):
@@ -42,8 +42,8 @@ def test_coarser_steps_have_fewer_faces(tmp_path):
 
 def test_without_an_iso_value_the_middle_of_the_range(tmp_path):
     path = balls(tmp_path, (11, 11, 11))
-    found = mesh_volume(path, None, 1, tmp_path / "m.h5")
-    assert found["content"] == mesh_volume(path, found["iso"], 1, tmp_path / "m.h5")["content"]
+    mesh = mesh_volume(path, None, 1, tmp_path / "m.h5")
+    assert mesh["content"] == mesh_volume(path, mesh["iso"], 1, tmp_path / "m.h5")["content"]
 
 
 @pytest.mark.parametrize(

@@ -43,14 +43,14 @@ def whole(path, view, card=None):
 @pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (200, -35), (10, 90), (10, -90)])
 def test_without_refraction_the_backdrop_is_seen_straight(path, camera, azimuth, elevation):
     view = replace(SMALL, index=(1.0,), camera=camera, azimuth_deg=azimuth, elevation_deg=elevation)
-    found = whole(path, replace(view, supersampling="none")).position_m
+    result = whole(path, replace(view, supersampling="none")).position_m
     # The shorter side shows 1.25 times the longest side of the volume; a perspective shows more farther away.
     side = 1.25 * 0.023
     if camera == "perspective":
         side *= 1.0 + view.backdrop_distance / refraction.EYE_DISTANCE
     pixel = side / 32
-    np.testing.assert_allclose(found[..., 0], np.tile((np.arange(48) - 23.5) * pixel, (32, 1)), atol=1e-9)
-    np.testing.assert_allclose(found[..., 1], np.tile((np.arange(32) - 15.5) * pixel, (48, 1)).T, atol=1e-9)
+    np.testing.assert_allclose(result[..., 0], np.tile((np.arange(48) - 23.5) * pixel, (32, 1)), atol=1e-9)
+    np.testing.assert_allclose(result[..., 1], np.tile((np.arange(32) - 15.5) * pixel, (48, 1)).T, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["checkerboard", "picture"])
@@ -59,13 +59,13 @@ def test_a_warped_backdrop_is_met_at_its_heights(path, kind):
     warped = replace(view, backdrop=f"warped-{kind}")
     # Parallel rays meet the surface above the same place of the rectangle.
     np.testing.assert_allclose(whole(path, warped).position_m, whole(path, view).position_m, atol=1e-9)
-    flat, found = (whole(path, replace(one, camera="perspective")).position_m for one in (view, warped))
+    flat, result = (whole(path, replace(one, camera="perspective")).position_m for one in (view, warped))
     # Rays of an eye meet it where both are as far behind the eye.
     away = (refraction.EYE_DISTANCE + view.backdrop_distance) * 0.023 * np.sqrt(3.0)
-    rise = away * (found / flat - 1.0).mean(axis=2)
+    rise = away * (result / flat - 1.0).mean(axis=2)
     side = 1.25 * 0.023 * (1.0 + view.backdrop_distance / refraction.EYE_DISTANCE)
     wide = side * (backdrop_card().shape[1] / backdrop_card().shape[0] if kind == "picture" else 1.0)
-    u, v = found[..., 0] / wide, found[..., 1] / side
+    u, v = result[..., 0] / wide, result[..., 1] / side
     height = 0.1 * side * (1.0 - np.cos(4.0 * np.pi * u) * np.cos(4.0 * np.pi * v))
     np.testing.assert_allclose(rise, height, atol=2e-3 * side)
     assert np.ptp(rise) > 0.15 * side
@@ -78,7 +78,7 @@ def test_a_ball_of_glass_bends_as_snell_says(tmp_path):
     ball, index, edge = FringeSphere(0.4, 0.3), 1.5, 0.5 * 0.031
     write_volume(tmp_path / "v.h5", Volume.from_values(sampled(ball, 32), (1e-3,) * 3))
     view = replace(SMALL, height=48, index=(index,), supersampling="none", backdrop_distance=0.7)
-    found = whole(tmp_path / "v.h5", view).position_m[23, :, 0]
+    computed = whole(tmp_path / "v.h5", view).position_m[23, :, 0]
     radius, screen = ball.iso_radius(0.5) * edge, 0.7 * 2.0 * edge * np.sqrt(3.0)
     offset = (np.arange(48) - 23.5) / 48 * 1.25 * 2.0 * edge
     # The row lies half a pixel beside the axis.
@@ -88,9 +88,9 @@ def test_a_ball_of_glass_bends_as_snell_says(tmp_path):
     leaves = incidence + np.pi - 2.0 * within
     behind = screen + radius * np.cos(leaves)
     expected = radius * np.sin(leaves) - behind * np.tan(2.0 * (incidence - within))
-    np.testing.assert_allclose(found[near], expected * offset[near] / apart[near], atol=0.005 * edge)
+    np.testing.assert_allclose(computed[near], expected * offset[near] / apart[near], atol=0.005 * edge)
     assert near.sum() > 8
-    assert np.sign(found[near]).tolist() == (-np.sign(offset[near])).tolist()
+    assert np.sign(computed[near]).tolist() == (-np.sign(offset[near])).tolist()
 
 
 def test_rays_that_meet_more_surfaces_than_allowed_show_dark_grey(path):

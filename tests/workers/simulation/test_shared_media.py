@@ -25,9 +25,9 @@ def test_each_is_made_once_and_none_waits_for_another() -> None:
         large = [pool.submit(medium, "large") for _ in range(2)]
         assert begun.wait(PATIENCE_S)
         assert pool.submit(medium, "small").result(PATIENCE_S) == "SMALL"
-        assert not any(one.done() for one in large)
+        assert not any(future.done() for future in large)
         leave.set()
-        assert [one.result(PATIENCE_S) for one in large] == ["LARGE", "LARGE"]
+        assert [future.result(PATIENCE_S) for future in large] == ["LARGE", "LARGE"]
     assert made == ["large", "small"]
     assert [medium(name) for name in ("third", "small", "large")] == ["THIRD", "SMALL", "LARGE"]
     assert made == ["large", "small", "third", "large"]

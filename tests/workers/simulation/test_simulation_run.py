@@ -44,7 +44,7 @@ def test_the_record_is_that_of_the_file(run, tmp_path):
     assert record.pop("bytes") == len(content)
     assert record == record_of(read_dataset(tmp_path / "scan.h5"))
     total = len(parts_of(TIMES.chosen())) + 1
-    assert [(one.done, one.total) for one in seen] == [(done, total) for done in range(total + 1)]
+    assert [(step.done, step.total) for step in seen] == [(done, total) for done in range(total + 1)]
 
 
 def test_finished_parts_are_not_recomputed(run, tmp_path):

@@ -30,8 +30,8 @@ def test_the_pulse_in_water_comes_when_it_should_and_falls_with_the_distance(sca
     sent = np.arange(SMALL.samples) / SAMPLES_A_PERIOD - BEFORE
     late = (sent - far / SMALL.coupling_mps * SMALL.frequency_hz)[sent < 0.3]
     expected = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late) / (4.0 * np.pi * far)
-    found = scan.waveform.water[0, 1, sent < 0.3]
-    assert np.linalg.norm(found - expected) < 0.08 * np.linalg.norm(expected)
+    computed = scan.waveform.water[0, 1, sent < 0.3]
+    assert np.linalg.norm(computed - expected) < 0.08 * np.linalg.norm(expected)
 
 
 def test_object_delays_are_recorded(scan):
@@ -49,19 +49,19 @@ def test_the_truth_is_the_plane_of_the_ring(scan):
 
 def test_the_whole_breast_is_on_the_grid_and_the_ring_about_its_middle():
     settings = VolumeWaveSettings(frequency_hz=1.5e5, side_m=0.03)
-    speed, place = settings.speed(), settings.places_m() / settings.spacing_m
+    speed, position = settings.speed(), settings.places_m() / settings.spacing_m
     assert speed.shape == settings.grid
     # The breast leaves it at the chest wall alone.
     for axis, face in ((0, 0), (0, -1), (1, 0), (1, -1), (2, -1)):
         assert (speed.take(face, axis) == settings.coupling_mps).all()
     assert (speed[..., 0] != settings.coupling_mps).mean() > 0.3
-    ring = round(place[0, 2])
-    assert np.allclose(place[:, 2], ring, atol=1e-9)
+    ring = round(position[0, 2])
+    assert np.allclose(position[:, 2], ring, atol=1e-9)
     # A cell of the volume is as high as wide, one of a plane has no height.
     plane = settings.phantom.speed(settings.fine_nodes, TABLE7_SIDE_M)
     assert np.abs(speed[..., ring] - plane).mean() < 0.2 * np.abs(plane - settings.coupling_mps).mean()
     middle = 0.5 * (settings.fine_nodes - 1)
-    assert np.allclose(np.hypot(*(place[:, :2] - middle).T), np.hypot(*(place[0, :2] - middle)))
+    assert np.allclose(np.hypot(*(position[:, :2] - middle).T), np.hypot(*(position[0, :2] - middle)))
 
 
 @pytest.mark.parametrize("words", [{"frequency_hz": 2e6}, {"frequency_hz": 3e5, "side_m": 0.6}])

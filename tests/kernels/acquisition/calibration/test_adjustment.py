@@ -27,11 +27,11 @@ def drawn(speed: float = WATER_MPS) -> Dataset:
 
 def without_gauge(change: np.ndarray, *, size: bool = False) -> np.ndarray:
     """A displacement less its shift and turn, which no water shot tells."""
-    place = ring(ELEMENTS) - ring(ELEMENTS).mean(axis=0)
-    turn = np.column_stack((-place[:, 1], place[:, 0]))
+    position = ring(ELEMENTS) - ring(ELEMENTS).mean(axis=0)
+    turn = np.column_stack((-position[:, 1], position[:, 0]))
     modes = [np.tile([1.0, 0.0], (ELEMENTS, 1)), np.tile([0.0, 1.0], (ELEMENTS, 1)), turn]
     if size:
-        modes.append(place)
+        modes.append(position)
     for mode in modes:
         change = change - mode * (change * mode).sum() / (mode * mode).sum()
     return change
@@ -45,8 +45,8 @@ class Planted:
         self.change = without_gauge(off_m * random.standard_normal((ELEMENTS, 2)), size=size)
         emission, reception = delay_s * random.standard_normal((2, ELEMENTS))
         self.emission, self.reception = emission - emission.mean(), reception - reception.mean()
-        place = ring(ELEMENTS) + self.change
-        distance = np.linalg.norm(place[:, None] - place[None], axis=-1)
+        position = ring(ELEMENTS) + self.change
+        distance = np.linalg.norm(position[:, None] - position[None], axis=-1)
         self.times = COMMON_S + self.emission[:, None] + self.reception[None] + distance / speed
         self.times += noise_s * random.standard_normal(self.times.shape)
         np.fill_diagonal(self.times, np.nan)
@@ -56,14 +56,14 @@ class Planted:
 @settings(max_examples=8, deadline=None)
 def test_positions_and_delays_come_back_exactly_without_noise(seed):
     planted = Planted(seed)
-    found = calibrate(drawn(), planted.times)
+    calibrated = calibrate(drawn(), planted.times)
     # Conventions hold for small changes; a turn by the square of a change remains.
-    off = without_gauge(found.element_position_m - ring(ELEMENTS) - planted.change)
+    off = without_gauge(calibrated.element_position_m - ring(ELEMENTS) - planted.change)
     assert np.abs(off).max() < 2e-8
-    np.testing.assert_allclose(found.emission_delay_s, planted.emission, atol=2e-11)
-    np.testing.assert_allclose(found.reception_delay_s, planted.reception, atol=2e-11)
-    assert found.common_delay_s == pytest.approx(COMMON_S, abs=1e-10)
-    assert found.residual_rms_s < 1e-11
+    np.testing.assert_allclose(calibrated.emission_delay_s, planted.emission, atol=2e-11)
+    np.testing.assert_allclose(calibrated.reception_delay_s, planted.reception, atol=2e-11)
+    assert calibrated.common_delay_s == pytest.approx(COMMON_S, abs=1e-10)
+    assert calibrated.residual_rms_s < 1e-11
 
 
 def test_an_eccentricity_of_a_millimetre_comes_back():
@@ -71,31 +71,31 @@ def test_an_eccentricity_of_a_millimetre_comes_back():
     planted = Planted(off_m=0.0, delay_s=0.0)
     angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
     change = 1e-3 * np.column_stack((np.cos(angle), -np.sin(angle)))
-    place = ring(ELEMENTS) + change
-    planted.times = COMMON_S + np.linalg.norm(place[:, None] - place[None], axis=-1) / WATER_MPS
-    found = calibrate(drawn(), planted.times)
-    assert np.abs(without_gauge(found.element_position_m - place)).max() < 1e-7
+    position = ring(ELEMENTS) + change
+    planted.times = COMMON_S + np.linalg.norm(position[:, None] - position[None], axis=-1) / WATER_MPS
+    calibrated = calibrate(drawn(), planted.times)
+    assert np.abs(without_gauge(calibrated.element_position_m - position)).max() < 1e-7
 
 
 def test_shift_and_rotation_of_the_whole_array_are_unobservable():
-    place = ring(ELEMENTS) @ np.array([[0.8, -0.6], [0.6, 0.8]]) + [1e-3, 0.0]
-    times = np.linalg.norm(place[:, None] - place[None], axis=-1) / WATER_MPS
-    found = calibrate(drawn(), times)
-    np.testing.assert_allclose(found.element_position_m, ring(ELEMENTS), atol=1e-8)
+    position = ring(ELEMENTS) @ np.array([[0.8, -0.6], [0.6, 0.8]]) + [1e-3, 0.0]
+    times = np.linalg.norm(position[:, None] - position[None], axis=-1) / WATER_MPS
+    calibrated = calibrate(drawn(), times)
+    np.testing.assert_allclose(calibrated.element_position_m, ring(ELEMENTS), atol=1e-8)
 
 
 def test_estimated_deviations_match_the_errors():
     normalised: dict[str, list[np.ndarray]] = {"position": [], "emission": [], "reception": []}
     for seed in range(8):
         planted = Planted(seed, noise_s=2e-8)
-        found = calibrate(drawn(), planted.times)
-        off = found.element_position_m - ring(ELEMENTS) - planted.change
-        normalised["position"].append((off / found.position_sigma_m).ravel())
-        normalised["emission"].append((found.emission_delay_s - planted.emission) / found.emission_sigma_s)
+        fitted = calibrate(drawn(), planted.times)
+        off = fitted.element_position_m - ring(ELEMENTS) - planted.change
+        normalised["position"].append((off / fitted.position_sigma_m).ravel())
+        normalised["emission"].append((fitted.emission_delay_s - planted.emission) / fitted.emission_sigma_s)
         normalised["reception"].append(
-            (found.reception_delay_s - planted.reception) / found.reception_sigma_s
+            (fitted.reception_delay_s - planted.reception) / fitted.reception_sigma_s
         )
-        assert found.residual_rms_s == pytest.approx(2e-8, rel=0.15)
+        assert fitted.residual_rms_s == pytest.approx(2e-8, rel=0.15)
     for name, values in normalised.items():
         assert 0.85 < np.concatenate(values).std() < 1.2, name
 
@@ -105,9 +105,9 @@ def test_the_speed_is_fitted_where_the_size_is_trusted(speed):
     errors = []
     for seed in range(4):
         planted = Planted(seed, speed=speed, noise_s=1e-8, size=True)
-        found = calibrate(drawn(), planted.times, fit_speed=True)
-        errors.append((found.water_speed_mps - speed) / found.water_speed_sigma_mps)
-        assert abs(found.water_speed_mps - speed) < 2.0
+        calibrated = calibrate(drawn(), planted.times, fit_speed=True)
+        errors.append((calibrated.water_speed_mps - speed) / calibrated.water_speed_sigma_mps)
+        assert abs(calibrated.water_speed_mps - speed) < 2.0
     assert np.sqrt(np.mean(np.square(errors))) < 2.5
     given_speed = calibrate(drawn(), planted.times)
     assert given_speed.water_speed_mps == pytest.approx(WATER_MPS)
@@ -120,25 +120,25 @@ def test_wrong_times_are_left_out_and_dead_elements_stay_where_they_are():
     wrong = random.random(planted.times.shape) < 0.05
     planted.times[wrong] += random.choice([-1e-6, 1e-6], int(wrong.sum()))
     planted.times[7] = planted.times[:, 7] = np.nan
-    found = calibrate(drawn(), planted.times)
+    calibrated = calibrate(drawn(), planted.times)
     others = np.arange(ELEMENTS) != 7
-    np.testing.assert_array_equal(found.element_position_m[7], ring(ELEMENTS)[7])
-    assert np.isnan(found.position_sigma_m[7]).all()
-    assert np.isnan(found.emission_sigma_s[7])
-    assert found.left_out >= 0.9 * (wrong & np.isfinite(planted.times)).sum()
-    off = (found.element_position_m - ring(ELEMENTS) - planted.change)[others]
+    np.testing.assert_array_equal(calibrated.element_position_m[7], ring(ELEMENTS)[7])
+    assert np.isnan(calibrated.position_sigma_m[7]).all()
+    assert np.isnan(calibrated.emission_sigma_s[7])
+    assert calibrated.left_out >= 0.9 * (wrong & np.isfinite(planted.times)).sum()
+    off = (calibrated.element_position_m - ring(ELEMENTS) - planted.change)[others]
     off -= off.mean(axis=0)
     assert np.sqrt((off**2).mean()) < 5e-5
-    told = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    told = json.loads(json.dumps(calibrated.to_dict(), allow_nan=False))
     assert told["position_sigma_m"][7] == [None, None]
 
 
 def test_a_calibrated_dataset_has_the_positions_and_the_speed():
     planted = Planted(5, speed=1500.0, size=True)
-    found = calibrate(drawn(), planted.times, fit_speed=True)
-    applied = found.applied(replace(drawn(), water_temperature_c=20.0))
-    np.testing.assert_array_equal(applied.element_position_m, found.element_position_m)
-    assert applied.water_speed_mps == found.water_speed_mps
+    calibrated = calibrate(drawn(), planted.times, fit_speed=True)
+    applied = calibrated.applied(replace(drawn(), water_temperature_c=20.0))
+    np.testing.assert_array_equal(applied.element_position_m, calibrated.element_position_m)
+    assert applied.water_speed_mps == calibrated.water_speed_mps
     assert applied.water_temperature_c is None
 
 

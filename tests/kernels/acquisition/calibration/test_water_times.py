@@ -19,8 +19,8 @@ def displaced(noise: float = 0.0):
     random = np.random.default_rng(1)
     true = scan(elements=24)
     change = 3e-4 * random.standard_normal((24, 2))
-    place = true.element_position_m + change
-    distance = np.linalg.norm(place[:, None] - place[None], axis=-1)
+    position = true.element_position_m + change
+    distance = np.linalg.norm(position[:, None] - position[None], axis=-1)
     late = (distance - true.distance_m()) / WATER_MPS
     # The object's traces of ``scan`` are the water's, later by as much as asked.
     moved = scan(late, elements=24, noise=noise)
@@ -39,14 +39,14 @@ def test_times_are_subsample_exact_up_to_a_common_offset():
 
 def test_traces_calibrate_the_array():
     dataset, _, change = displaced(noise=0.02)
-    found = calibrate(dataset, water_times(dataset))
+    calibrated = calibrate(dataset, water_times(dataset))
     before = np.sqrt((change**2).mean())
-    off = found.element_position_m - dataset.element_position_m - change
+    off = calibrated.element_position_m - dataset.element_position_m - change
     off -= off.mean(axis=0)
     turn = np.column_stack((-dataset.element_position_m[:, 1], dataset.element_position_m[:, 0]))
     off -= turn * (off * turn).sum() / (turn * turn).sum()
     assert np.sqrt((off**2).mean()) < 0.15 * before
-    assert np.abs(found.element_position_m).max() < RADIUS_M + 2e-3
+    assert np.abs(calibrated.element_position_m).max() < RADIUS_M + 2e-3
 
 
 def test_silent_broken_and_masked_traces_have_no_time():

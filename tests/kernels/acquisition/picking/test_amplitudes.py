@@ -54,9 +54,9 @@ def heard(loss_np, way, *, height=1.0, noise=0.0, seed=0, **changes):
 def test_the_spectral_ratio_gives_the_loss_at_any_height(way, loss, height, seed):
     """Each pair of another height, as if focused, or as if its transducers were unlike."""
     heights = height * np.exp(np.random.default_rng(seed).normal(0.0, 0.7, APART.shape))[..., None]
-    found = heard(loss, way, height=heights)
+    computed = heard(loss, way, height=heights)
     # What the gate cuts off the pulse blurs its spectrum, and takes a part.
-    assert found[APART] == pytest.approx(loss, rel=0.1, abs=0.005)
+    assert computed[APART] == pytest.approx(loss, rel=0.1, abs=0.005)
     ratios = heard(loss, "ratio", height=heights)
     expected = np.broadcast_to(loss - np.log(heights[..., 0]), APART.shape)
     assert np.abs(ratios - expected)[APART].max() < 0.15 * loss + 0.01
@@ -66,13 +66,13 @@ def test_the_spectral_ratio_gives_the_loss_at_any_height(way, loss, height, seed
 @given(loss=st.floats(0.0, 1.5), noise=st.floats(1e-3, 0.02), seed=st.integers(0, 2**31))
 @pytest.mark.parametrize("way", WAYS)
 def test_noise_spreads_the_values_and_moves_their_mean_little(way, loss, noise, seed):
-    found = heard(loss, way, noise=noise, seed=seed)[APART]
-    known = found[np.isfinite(found)]
-    assert known.size > 0.95 * found.size
+    ratios = heard(loss, way, noise=noise, seed=seed)[APART]
+    finite = ratios[np.isfinite(ratios)]
+    assert finite.size > 0.95 * ratios.size
     # At a loss of a neper the object's SNR is a third of the water's.
     spread = (10.0 if way in SPECTRA else 2.0) * noise * np.exp(loss)
-    assert known.std() < spread
-    assert abs(known.mean() - loss) < 0.13 * loss + 0.01 + 0.4 * spread
+    assert finite.std() < spread
+    assert abs(finite.mean() - loss) < 0.13 * loss + 0.01 + 0.4 * spread
 
 
 @pytest.mark.parametrize("way", SPECTRA)
@@ -85,11 +85,11 @@ def test_frequency_independent_loss_does_not_change_the_spectral_ratio(way):
 def test_strong_noise_drops_pairs_and_does_not_bias_them(way):
     counts = []
     for noise in (0.0, 0.05, 0.2, 1.0):
-        found = heard(1.0, way, noise=noise)[APART]
-        known = found[np.isfinite(found)]
-        counts.append(known.size)
-        if known.size:
-            assert abs(np.median(known) - 1.0) < 2.0 * MAX_UNCERTAINTY_NP
+        ratios = heard(1.0, way, noise=noise)[APART]
+        finite = ratios[np.isfinite(ratios)]
+        counts.append(finite.size)
+        if finite.size:
+            assert abs(np.median(finite) - 1.0) < 2.0 * MAX_UNCERTAINTY_NP
     assert counts[0] == APART.sum()
     assert counts[-1] < 0.05 * APART.sum()
     assert sorted(counts, reverse=True) == counts
@@ -134,12 +134,12 @@ def test_pairs_without_a_time_and_slices_of_their_own():
         delta_tof_s=delta,
         waveform=Waveform(np.stack([traces.object, lossy]), np.stack([traces.water] * 2)),
     )
-    found = with_log_ratios(both, "spectrum")
-    assert found.amplitude_frequency_hz == FREQUENCY_HZ
-    assert np.isnan(found.log_ratio_np[0, 2, 7])
-    assert np.isnan(np.diagonal(found.log_ratio_np, axis1=1, axis2=2)).all()
-    assert np.abs(found.log_ratio_np[0][APART & np.isfinite(delta[0])]).max() < 1e-3
-    assert found.log_ratio_np[1][APART] == pytest.approx(0.8, rel=0.1)
+    dataset = with_log_ratios(both, "spectrum")
+    assert dataset.amplitude_frequency_hz == FREQUENCY_HZ
+    assert np.isnan(dataset.log_ratio_np[0, 2, 7])
+    assert np.isnan(np.diagonal(dataset.log_ratio_np, axis1=1, axis2=2)).all()
+    assert np.abs(dataset.log_ratio_np[0][APART & np.isfinite(delta[0])]).max() < 1e-3
+    assert dataset.log_ratio_np[1][APART] == pytest.approx(0.8, rel=0.1)
 
 
 @pytest.mark.parametrize(

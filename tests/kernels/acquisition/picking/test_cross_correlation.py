@@ -14,16 +14,16 @@ from ..traces import ricker
 PERIOD = 8.0
 
 
-def trace(place: float, length: int = 240) -> np.ndarray:
-    return ricker((np.arange(length) - place) / PERIOD, 1.0)
+def trace(position: float, length: int = 240) -> np.ndarray:
+    return ricker((np.arange(length) - position) / PERIOD, 1.0)
 
 
 @given(shift=st.floats(-28.0, 28.0), gain=st.floats(0.01, 100.0), seed=st.integers(0, 99))
 @settings(max_examples=effort(20, 40), deadline=None)
 def test_the_pulse_is_found_anywhere_in_noise(shift, gain, seed):
     noise = 0.1 * np.random.default_rng(seed).standard_normal(240)
-    found = find_delay(trace(100.0), gain * (trace(100.0 + shift) + noise), 90, 110, -30.0, 30.0, 0.1 * gain)
-    assert abs(found - shift) <= 1.5
+    delay = find_delay(trace(100.0), gain * (trace(100.0 + shift) + noise), 90, 110, -30.0, 30.0, 0.1 * gain)
+    assert abs(delay - shift) <= 1.5
 
 
 def test_silence_and_window_edges_give_no_delay():

@@ -14,8 +14,8 @@ from ..traces import ricker
 PERIOD = 8.0
 
 
-def trace(place: float) -> np.ndarray:
-    return ricker((np.arange(200) - place) / PERIOD, 1.0)
+def trace(position: float) -> np.ndarray:
+    return ricker((np.arange(200) - position) / PERIOD, 1.0)
 
 
 @pytest.mark.parametrize("onset", [energy_ratio, sta_lta])

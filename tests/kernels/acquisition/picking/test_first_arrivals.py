@@ -143,19 +143,19 @@ def test_the_emitter_its_neighbours_and_masked_pairs_are_missing():
 
 
 def test_slices_are_picked_one_by_one_and_progress_counts_emissions():
-    one, two = scan(1.0e-7, elements=8), scan(-3.0e-7, elements=8)
+    first, two = scan(1.0e-7, elements=8), scan(-3.0e-7, elements=8)
     both_slices = replace(
-        one,
+        first,
         slice_z_m=np.array([0.0, 0.01]),
         waveform=Waveform(
-            np.stack([one.waveform.object, two.waveform.object]),
-            np.stack([one.waveform.water, two.waveform.water]),
+            np.stack([first.waveform.object, two.waveform.object]),
+            np.stack([first.waveform.water, two.waveform.water]),
         ),
     )
     seen = []
     picked = pick(both_slices, "threshold", lambda done, total: seen.append((done, total)))
     assert seen == [(k, 16) for k in range(1, 17)]
-    np.testing.assert_array_equal(picked.delta_tof_s[0], pick(one, "threshold").delta_tof_s)
+    np.testing.assert_array_equal(picked.delta_tof_s[0], pick(first, "threshold").delta_tof_s)
     np.testing.assert_array_equal(picked.delta_tof_s[1], pick(two, "threshold").delta_tof_s)
     assert picked.picker == "threshold"
     assert picked.waveform is None
@@ -252,11 +252,11 @@ def by_another_team():
         1.0 / gaussian_filter(1.0 / truth.sound_speed_mps, sigma),
         np.full_like(truth.sound_speed_mps, 1500.0),
     ]
-    place = (dataset.element_position_m - np.array(truth.origin_m)) / spacing
+    point = (dataset.element_position_m - np.array(truth.origin_m)) / spacing
     delays = {}
     for e in range(0, 128, 16):
         seen, water = (
-            map_coordinates(solve(m, spacing, place[dataset.tx[e]] * spacing), place[dataset.rx].T, order=1)
+            map_coordinates(solve(m, spacing, point[dataset.tx[e]] * spacing), point[dataset.rx].T, order=1)
             for m in maps
         )
         delays[e] = seen - water

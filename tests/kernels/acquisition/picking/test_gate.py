@@ -55,19 +55,19 @@ def test_the_noise_is_the_mean_power_of_noise_alone_and_its_likeness_along_frequ
     power, noise = gate.powers(traces, middle, 0.0)
     assert noise.mean() == pytest.approx(power.mean(), rel=0.06)
     # Powers of a Gaussian value are noise_correlation as the square of the values.
-    found = np.corrcoef(power.T)
+    likeness = np.corrcoef(power.T)
     far = gate.noise_correlation < 0.2
-    assert np.abs(found[far]).max() < 0.4
-    assert np.abs(found - gate.noise_correlation**2)[~far].max() < 0.25
+    assert np.abs(likeness[far]).max() < 0.4
+    assert np.abs(likeness - gate.noise_correlation**2)[~far].max() < 0.25
 
 
 def test_pulses_that_are_not_whole_have_no_power():
     dataset = water()
     gate, traces = Gate.from_dataset(dataset), dataset.waveform.water[0].copy()
     traces[3, 5] = np.nan
-    places = arrival(dataset)
-    places[5], places[6], places[7] = np.nan, gate.half - gate.late - 1.0, traces.shape[1] - gate.half
-    power, noise = gate.powers(traces, places, 0.0)
+    points = arrival(dataset)
+    points[5], points[6], points[7] = np.nan, gate.half - gate.late - 1.0, traces.shape[1] - gate.half
+    power, noise = gate.powers(traces, points, 0.0)
     broken = [3, 5, 6, 7]
     assert np.isnan(power[broken]).all()
     assert np.isnan(noise[broken]).all()

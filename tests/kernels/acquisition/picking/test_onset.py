@@ -18,15 +18,15 @@ from ..traces import ricker
 PERIOD = 8.0
 
 
-def trace(place: float, length: int = 200) -> np.ndarray:
-    return ricker((np.arange(length) - place) / PERIOD, 1.0)
+def trace(position: float, length: int = 200) -> np.ndarray:
+    return ricker((np.arange(length) - position) / PERIOD, 1.0)
 
 
 @given(shift=st.floats(-12.0, 12.0))
 @settings(max_examples=effort(20, 30), deadline=None)
 def test_the_match_finds_a_shift_to_a_hundredth_of_a_sample(shift):
-    found, correlation = match_pulse(trace(90.0), 0.3 * trace(90.0 + shift), 82, 98, shift + 2.0, 4.0)
-    assert found == pytest.approx(shift, abs=0.01)
+    delay, correlation = match_pulse(trace(90.0), 0.3 * trace(90.0 + shift), 82, 98, shift + 2.0, 4.0)
+    assert delay == pytest.approx(shift, abs=0.01)
     assert correlation > 0.99
 
 
@@ -56,8 +56,8 @@ def test_a_later_stronger_pulse_does_not_hide_the_first(picker):
 
 @pytest.mark.parametrize("picker", [AIC, THRESHOLD, ENERGY_RATIO, STA_LTA])
 def test_silence_has_no_onset(picker):
-    found, strong = onset(np.zeros(100), 10, 90, PERIOD, 0.0, picker)
-    assert np.isnan(found)
+    sample, strong = onset(np.zeros(100), 10, 90, PERIOD, 0.0, picker)
+    assert np.isnan(sample)
     assert strong == -1
     faint, _ = onset(trace(50.0, 100), 10, 90, PERIOD, 0.5, picker)
     assert np.isnan(faint)
@@ -68,12 +68,12 @@ def test_an_onset_at_the_rim_of_the_window_is_none():
     assert np.isnan(aic(trace(50.0), 50, 54))
 
 
-@given(seed=st.integers(0, 2**32 - 1), offset=st.floats(-5.0, 5.0), place=st.floats(70.0, 130.0))
+@given(seed=st.integers(0, 2**32 - 1), offset=st.floats(-5.0, 5.0), position=st.floats(70.0, 130.0))
 @settings(deadline=None)
-def test_aic_is_the_split_of_the_lowest_criterion_whatever_the_offset(seed, offset, place):
+def test_aic_is_the_split_of_the_lowest_criterion_whatever_the_offset(seed, offset, position):
     """Maeda's criterion by NumPy's variances, which do not contain the mean."""
     begin, end = 20, 180
-    noisy = trace(place) + offset + 0.05 * np.random.default_rng(seed).standard_normal(200)
+    noisy = trace(position) + offset + 0.05 * np.random.default_rng(seed).standard_normal(200)
     part, n = noisy[begin:end], end - begin
     floor = (AIC_FLOOR * np.abs(part).max()) ** 2
     ks = np.arange(2, n - 1)

@@ -27,11 +27,11 @@ def test_deconvolution_leaves_a_crest_without_phase_at_the_largest_swing():
     dataset = scan(elements=24)
     time = np.arange(48) - 20.0
     wavelet = ricker(time / RATE_HZ, FREQUENCY_HZ) + 0.6 * ricker((time - 6.0) / RATE_HZ, FREQUENCY_HZ)
-    place = 100
+    position = 100
     trace = np.zeros((1, dataset.waveform.water.shape[-1]))
-    trace[0, place : place + 48] = wavelet
+    trace[0, position : position + 48] = wavelet
     filtered = Inverse.from_dataset(replace(dataset, wavelet=wavelet))(trace)[0]
-    loudest = place + int(np.argmax(np.abs(wavelet)))
+    loudest = position + int(np.argmax(np.abs(wavelet)))
     assert int(np.argmax(filtered)) == loudest
     around = filtered[loudest - 60 : loudest + 61]
     np.testing.assert_allclose(around, around[::-1], atol=1e-3 * around.max())

@@ -22,8 +22,8 @@ def finding(role, *elements):
     ("role", "axis", "order"), [("emission", 0, [3, 1, 2, 0]), ("reception", 1, [0, 3, 2, 1, 4])]
 )
 def test_two_channels_are_exchanged_where_they_are(role, axis, order):
-    found, along = exchange_order(SCAN, finding(role, 2, 4))
-    assert (found.tolist(), along) == (order, axis)
+    result, along = exchange_order(SCAN, finding(role, 2, 4))
+    assert (result.tolist(), along) == (order, axis)
 
 
 def test_pairs_of_an_element_are_its_row_or_its_column():

@@ -25,9 +25,9 @@ def clean() -> Dataset:
 @cache
 def sought() -> np.ndarray:
     """What the clean scan gives: what every survivor must give too."""
-    found = examine(clean()).picked
-    assert found is not None
-    return found.differential_tof()
+    picked = examine(clean()).picked
+    assert picked is not None
+    return picked.differential_tof()
 
 
 def with_traces(change) -> Dataset:
@@ -70,16 +70,16 @@ def test_noise_alone_is_no_fault(noise):
 
 def test_a_recording_that_starts_at_the_wrong_time_is_moved():
     examined = examine(replace(clean(), t0_s=clean().t0_s + 8.0e-6))
-    (found,) = (f for f in examined.report.findings if f.check == "time zero of the recording")
-    assert found.value == pytest.approx(8.0e-6, abs=2e-8)
+    (result,) = (f for f in examined.report.findings if f.check == "time zero of the recording")
+    assert result.value == pytest.approx(8.0e-6, abs=2e-8)
     assert_survived(examined, atol=4e-9)
 
 
 def test_outliers_and_cycle_jumps_are_distinguished_and_left_out():
     random = np.random.default_rng(2)
     delta = np.array(sought())
-    known = np.argwhere(np.isfinite(delta))
-    wrong = known[random.permutation(len(known))[: len(known) // 20]]
+    pairs = np.argwhere(np.isfinite(delta))
+    wrong = pairs[random.permutation(len(pairs))[: len(pairs) // 20]]
     half = len(wrong) // 2
     planted = np.zeros_like(delta, dtype=bool)
     planted[tuple(wrong.T)] = True
@@ -92,10 +92,10 @@ def test_outliers_and_cycle_jumps_are_distinguished_and_left_out():
     jumps, outliers = by_name["cycle jumps"].pairs, by_name["outliers"].pairs
     assert jumps[tuple(wrong[:half].T)].mean() > 0.9
     assert outliers[tuple(wrong[half:].T)].mean() > 0.9
-    found = np.isnan(examined.picked.differential_tof()) & np.isfinite(delta)
-    assert found[planted].mean() > 0.98
+    result = np.isnan(examined.picked.differential_tof()) & np.isfinite(delta)
+    assert result[planted].mean() > 0.98
     # The reverse of an outlier is not at fault.
-    assert found[~planted].mean() < 0.01
+    assert result[~planted].mean() < 0.01
 
 
 def test_a_whole_region_that_contradicts_its_reverse_is_left_out():

@@ -66,12 +66,12 @@ def test_no_fault_is_found_where_none_is_planted(water):
 
 def test_an_element_off_among_receivers_alone():
     """Every fourth element emits; element 17 only receives."""
-    place = recorded().element_position_m.copy()
-    place[17] += 4e-4
+    position = recorded().element_position_m.copy()
+    position[17] += 4e-4
     some = np.arange(0, ELEMENTS, 4)
     traces = recorded().waveform
     emitted = Waveform(traces.object[some], traces.water[some])
-    (finding,) = found(replace(recorded(), tx=some, waveform=emitted, element_position_m=place))
+    (finding,) = found(replace(recorded(), tx=some, waveform=emitted, element_position_m=position))
     assert (finding.check, finding.elements) == ("displaced elements", (17,))
 
 
@@ -139,20 +139,20 @@ def test_times_are_right_in_spite_of_it():
 @both
 @pytest.mark.parametrize("off_m", [(5e-4, 0.0), pytest.param((0.0, 5e-4), marks=pytest.mark.nightly)])
 def test_an_element_half_a_millimetre_off(water, off_m):
-    place = recorded().element_position_m.copy()
-    place[17] += off_m
-    (finding,) = found(replace(with_traces(lambda traces: traces, water=water), element_position_m=place))
+    position = recorded().element_position_m.copy()
+    position[17] += off_m
+    (finding,) = found(replace(with_traces(lambda traces: traces, water=water), element_position_m=position))
     assert (finding.check, finding.elements) == ("displaced elements", (17,))
     assert finding.value == pytest.approx(5e-4, rel=0.25)
 
 
 @both
 def test_a_bubble(water):
-    place, radius = np.array([0.012, -0.004]), 0.002
+    position, radius = np.array([0.012, -0.004]), 0.002
     start = recorded().element_position_m[:, None]
     along = recorded().element_position_m[None] - start
-    part = ((place - start) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), 1e-30)
-    nearest = start + np.clip(part, 0.0, 1.0)[..., None] * along - place
+    part = ((position - start) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), 1e-30)
+    nearest = start + np.clip(part, 0.0, 1.0)[..., None] * along - position
     left = 1.0 - 0.8 * np.exp(-((np.linalg.norm(nearest, axis=-1) / radius) ** 2))
     shadowed = (recorded().waveform.object * left[..., None]).astype(np.float32)
     dataset = replace(recorded(), waveform=Waveform(shadowed, recorded().waveform.water))
@@ -181,8 +181,8 @@ def test_an_element_is_dead_where_the_water_shot_has_no_pulse_of_it():
     water[7], hidden[9] = 0.0, 0.0
     scans = (Waveform(traces.object, water), Waveform(hidden, traces.water))
     dead, none = (
-        [finding for finding in found(replace(recorded(), waveform=one)) if "dead" in finding.check]
-        for one in scans
+        [finding for finding in found(replace(recorded(), waveform=waveform)) if "dead" in finding.check]
+        for waveform in scans
     )
     assert [(finding.elements, finding.role) for finding in dead] == [((7,), "emission")]
     assert none == []

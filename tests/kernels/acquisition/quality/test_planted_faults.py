@@ -128,8 +128,8 @@ def test_truncated_pulses_do_not_bias_the_water_speed():
     clipped = (np.clip(t, -0.7, 0.7) for t in (wave_scan().waveform.object, wave_scan().waveform.water))
     angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
     off = 4e-4 * np.column_stack((np.cos(2.0 * angle), np.zeros(ELEMENTS)))
-    place = wave_scan().element_position_m + off
-    examined = examine(replace(wave_scan(), waveform=Waveform(*clipped), element_position_m=place))
+    position = wave_scan().element_position_m + off
+    examined = examine(replace(wave_scan(), waveform=Waveform(*clipped), element_position_m=position))
     assert [f.check for f in examined.report.findings] == ["clipping", "clipping", "element positions"]
 
 

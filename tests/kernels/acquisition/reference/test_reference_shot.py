@@ -32,8 +32,8 @@ def test_estimate_matches_the_omitted_water_shot(start_s):
     assert reference.delay_s == pytest.approx(start_s, abs=0.02 / FREQUENCY_HZ)
     assert np.abs(reference.emission_delay_s).max() < 0.02 / FREQUENCY_HZ
     # Pulses of the scan do not spread with distance; the model's do, by a factor that all elements share.
-    for found, true in ((reference.emission_gain, emission), (reference.reception_gain, reception)):
-        assert np.std((found - true) - (found - true).mean()) < 0.03
+    for computed, true in ((reference.emission_gain, emission), (reference.reception_gain, reception)):
+        assert np.std((computed - true) - (computed - true).mean()) < 0.03
     shown = replace(reference, noise=0.0).applied(dataset).waveform.water
     clean, _, _ = with_elements(scan(DELAY_S, elements=ELEMENTS), 3, start_s, 0.3)
     true = clean.waveform.water

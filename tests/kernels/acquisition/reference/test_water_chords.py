@@ -20,17 +20,17 @@ BARE = replace(scan(elements=ELEMENTS), waveform=None)
 
 @given(
     radius_m=st.floats(0.1, 0.7).map(lambda part: part * RADIUS_M),
-    place=st.floats(0.0, 2.0 * np.pi),
+    position=st.floats(0.0, 2.0 * np.pi),
     off=st.floats(0.0, 1.0),
     speed_mps=st.sampled_from([1380.0, 1450.0, 1520.0, 1600.0]),
     water_mps=st.floats(1400.0, 1580.0),
     delay_s=st.floats(-5e-6, 5e-6),
     seed=st.integers(0, 2**16),
 )
-def test_speed_and_delay_are_those_of_the_water(radius_m, place, off, speed_mps, water_mps, delay_s, seed):
+def test_speed_and_delay_are_those_of_the_water(radius_m, position, off, speed_mps, water_mps, delay_s, seed):
     """The disc may lie anywhere within four fifths of the ring."""
     reach = off * (0.8 * RADIUS_M - radius_m) if radius_m < 0.8 * RADIUS_M else 0.0
-    centre = (reach * np.cos(place), reach * np.sin(place))
+    centre = (reach * np.cos(position), reach * np.sin(position))
     inside = in_disc_m(BARE, radius_m, centre)
     arrival = delay_s + BARE.distance_m() / water_mps + inside * (1.0 / speed_mps - 1.0 / water_mps)
     arrival += 0.01 * PERIOD_S * np.random.default_rng(seed).standard_normal(arrival.shape)

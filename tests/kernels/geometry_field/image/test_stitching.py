@@ -32,23 +32,23 @@ def volume_of(surface):
 def test_topology_comes_back(name, size):
     surface = SURFACES[name]
     chart = parameterise(surface).chart
-    before, found = topology_of(surface.faces), geometry_image(chart, size).mesh()
-    after = topology_of(found.faces)
+    before, mesh = topology_of(surface.faces), geometry_image(chart, size).mesh()
+    after = topology_of(mesh.faces)
     assert (after.genus, len(after.boundary_loops), after.pieces.max()) == (
         before.genus,
         len(before.boundary_loops),
         0,
     )
     # No two fans touch.
-    assert after.fans(~after.on_boundary).max() + 1 == len(found.vertices)
+    assert after.fans(~after.on_boundary).max() + 1 == len(mesh.vertices)
     if not before.on_boundary.any():
-        assert volume_of(found) == pytest.approx(volume_of(chart.mesh), rel=0.05)
+        assert volume_of(mesh) == pytest.approx(volume_of(chart.mesh), rel=0.05)
 
 
 def test_the_boundary_of_a_patch_is_kept_whole():
     patch = flat_patch(9, 9, lambda x, y: np.sin(0.4 * x) * np.cos(0.3 * y))
     chart = parameterise(patch).chart
-    found = geometry_image(chart, 64).mesh()
+    mesh = geometry_image(chart, 64).mesh()
 
     def rim(surface):
         topology = topology_of(surface.faces)
@@ -56,11 +56,11 @@ def test_the_boundary_of_a_patch_is_kept_whole():
             np.diff(surface.vertices[topology.edges[topology.on_boundary]], axis=1), axis=-1
         ).sum()
 
-    assert rim(found) == pytest.approx(rim(chart.mesh), rel=1e-9)
+    assert rim(mesh) == pytest.approx(rim(chart.mesh), rel=1e-9)
 
 
 def test_a_flat_square_comes_back_as_a_square():
     chart = parameterise(flat_patch(5, 5)).chart
-    found = geometry_image(chart, 16).mesh()
-    assert np.linalg.norm(found.face_normals, axis=1).sum() == pytest.approx(1.0, rel=1e-9)
-    assert geometric_error(chart.mesh, found, 1000).greatest < 1e-12
+    mesh = geometry_image(chart, 16).mesh()
+    assert np.linalg.norm(mesh.face_normals, axis=1).sum() == pytest.approx(1.0, rel=1e-9)
+    assert geometric_error(chart.mesh, mesh, 1000).greatest < 1e-12

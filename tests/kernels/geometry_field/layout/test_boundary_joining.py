@@ -15,8 +15,8 @@ from ...meshes.examples import ball_with_holes, flat_patch, without
 
 
 def lengths_of(surface, topology):
-    one, other = topology.edges.T
-    return np.linalg.norm(surface.vertices[one] - surface.vertices[other], axis=1)
+    first, other = topology.edges.T
+    return np.linalg.norm(surface.vertices[first] - surface.vertices[other], axis=1)
 
 
 @pytest.mark.parametrize("seed", range(12))

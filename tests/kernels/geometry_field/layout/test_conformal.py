@@ -22,23 +22,23 @@ def cap(turn=1.2, rings=40, around=80):
     """Part of the unit sphere about the pole, to a polar angle."""
     plane = flat_patch(rings + 1, around + 1)
     polar, azimuth = turn * plane.vertices[:, 0] / rings, 2 * np.pi * plane.vertices[:, 1] / around
-    places = np.column_stack(
+    points = np.column_stack(
         (np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar))
     )
-    _, first, inverse = np.unique(np.round(places, 9) + 0.0, axis=0, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(np.round(points, 9) + 0.0, axis=0, return_index=True, return_inverse=True)
     faces = inverse.ravel()[plane.faces]
     whole = (np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)
-    return type(plane)(places[first], faces[whole].astype(np.int32))
+    return type(plane)(points[first], faces[whole].astype(np.int32))
 
 
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 @settings(max_examples=20)
 def test_a_tilted_plane_is_laid_out_as_it_is(slope, other):
     disk = disk_of(flat_patch(height=lambda x, y: slope * x + other * y))
-    places = disk.isometric_layout()
-    distances = [np.linalg.norm(at[:, np.newaxis] - at, axis=-1) for at in (disk.vertices, places)]
+    points = disk.isometric_layout()
+    distances = [np.linalg.norm(at[:, np.newaxis] - at, axis=-1) for at in (disk.vertices, points)]
     np.testing.assert_allclose(distances[0], distances[1], atol=1e-9)
-    assert (signed_areas(places[disk.faces]) > 0.0).all()
+    assert (signed_areas(points[disk.faces]) > 0.0).all()
 
 
 def test_a_rolled_strip_unrolls():
@@ -46,8 +46,8 @@ def test_a_rolled_strip_unrolls():
     rolled = disk.vertices.copy()
     rolled[:, 0], rolled[:, 2] = 10 * np.sin(disk.vertices[:, 0] / 10), 10 * np.cos(disk.vertices[:, 0] / 10)
     bent = Disk(rolled, disk.faces, corner_angles(rolled[disk.faces]))
-    places = bent.layout(bent.isometric_turning)
-    span = np.linalg.norm(places[0] - places[-1])
+    points = bent.layout(bent.isometric_turning)
+    span = np.linalg.norm(points[0] - points[-1])
     assert span == pytest.approx(np.hypot(39 * 20 * np.sin(0.05), 8), rel=1e-3)
 
 
@@ -57,13 +57,13 @@ def test_a_cap_is_projected_stereographically(share):
     surface = cap()
     disk = disk_of(surface)
     assert disk.isometric_turning == pytest.approx(disk.round_turning(), rel=1e-6)
-    places = disk.layout((1.0 - share) * disk.isometric_turning + share * disk.round_turning())
+    points = disk.layout((1.0 - share) * disk.isometric_turning + share * disk.round_turning())
     polar = np.arccos(np.clip(surface.vertices[:, 2], -1.0, 1.0))
-    pole = places[np.argmin(polar)]
-    radius = np.linalg.norm(places - pole, axis=1)
+    pole = points[np.argmin(polar)]
+    radius = np.linalg.norm(points - pole, axis=1)
     edge = radius[polar > 1.199].mean()
     np.testing.assert_allclose(radius / edge, np.tan(polar / 2) / np.tan(0.6), atol=2e-3)
-    assert np.median(quasi_conformal_factors(surface.corners, places[disk.faces])) < 1.01
+    assert np.median(quasi_conformal_factors(surface.corners, points[disk.faces])) < 1.01
 
 
 def test_the_turning_of_every_layout_is_whole():
@@ -79,9 +79,9 @@ def test_the_error_of_angles_falls_with_the_size_of_the_faces():
     for n in (9, 33):
         scale = 8 / (n - 1)
         bumpy = flat_patch(n, n, lambda x, y, s=scale: np.sin(s * x) * np.cos(s * y) / s)
-        places = disk_of(bumpy)
+        points = disk_of(bumpy)
         factors = quasi_conformal_factors(
-            bumpy.corners, places.layout(places.isometric_turning)[places.faces]
+            bumpy.corners, points.layout(points.isometric_turning)[points.faces]
         )
         worst.append(np.median(factors) - 1.0)
     assert worst[1] < 0.4 * worst[0]
@@ -111,9 +111,9 @@ def test_the_stiffness_of_a_right_angle():
 
 def test_the_isometric_layout_is_the_same_either_way():
     disk = disk_of(flat_patch(9, 7, lambda x, y: np.sin(x) + np.cos(y)))
-    found, other = disk.isometric_layout(), disk.layout(disk.isometric_turning)
-    np.testing.assert_allclose(found, other, atol=1e-9)
-    lengths = np.linalg.norm(np.roll(found[disk.boundary], -1, axis=0) - found[disk.boundary], axis=1)
+    result, other = disk.isometric_layout(), disk.layout(disk.isometric_turning)
+    np.testing.assert_allclose(result, other, atol=1e-9)
+    lengths = np.linalg.norm(np.roll(result[disk.boundary], -1, axis=0) - result[disk.boundary], axis=1)
     np.testing.assert_allclose(lengths, disk.side_lengths, rtol=0.02)
 
 

@@ -64,9 +64,9 @@ def test_ends_do_not_repeat_and_run_out():
     ball = sphere(6, 7)
     cutter = Cutter(ball, topology_of(ball.faces))
     first = cutter.first()
-    found = list(cutter.far_ends(first))
-    ends = [end.vertex for end in found]
-    assert found[0].scale > 3.0 > found[-1].scale > 1e-3
+    listed = list(cutter.far_ends(first))
+    ends = [end.vertex for end in listed]
+    assert listed[0].scale > 3.0 > listed[-1].scale > 1e-3
     assert 10 < len(ends) == len(set(ends)) < len(ball.vertices)
     assert not set(ends) & set(np.flatnonzero(first.vertices).tolist())
 

@@ -23,15 +23,15 @@ def flat(angle=0.0, stretch=1.0):
     x = first / np.linalg.norm(first)
     y = second - (second @ x) * x
     y /= np.linalg.norm(y)
-    places = np.array([(0.0, 0.0), (first @ x, first @ y), (second @ x, second @ y)])
+    points = np.array([(0.0, 0.0), (first @ x, first @ y), (second @ x, second @ y)])
     c, s = math.cos(angle), math.sin(angle)
-    return (places @ np.array([(c, s), (-s, c)]) * (stretch, 1.0))[np.newaxis]
+    return (points @ np.array([(c, s), (-s, c)]) * (stretch, 1.0))[np.newaxis]
 
 
 @given(st.floats(0.0, 7.0), st.floats(1.0, 50.0), st.floats(1e-3, 1e3))
 def test_the_factor_is_the_ratio_of_the_stretches(angle, stretch, scale):
-    found = quasi_conformal_factors(CORNERS, scale * flat(angle, stretch))
-    assert found[0] == pytest.approx(stretch, rel=1e-6, abs=1e-6)
+    factors = quasi_conformal_factors(CORNERS, scale * flat(angle, stretch))
+    assert factors[0] == pytest.approx(stretch, rel=1e-6, abs=1e-6)
 
 
 def test_flipped_and_flat_faces_have_no_factor():
@@ -64,8 +64,8 @@ def test_stars_do_not_cross_themselves(radii, turn):
 def test_two_corners_of_a_round_polygon_that_change_places_make_it_cross_itself(number, turn, data):
     angle = turn + 2 * np.pi * np.arange(number) / number
     polygon = np.column_stack((np.cos(angle), 0.5 * np.sin(angle)))
-    one = data.draw(st.integers(0, number - 1))
-    pair = [one, (one + 1) % number]
+    index = data.draw(st.integers(0, number - 1))
+    pair = [index, (index + 1) % number]
     polygon[pair] = polygon[pair[::-1]]
     assert crosses_itself(polygon)
 

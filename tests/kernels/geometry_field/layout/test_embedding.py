@@ -62,9 +62,9 @@ def test_a_layout_without_folds_stays_as_it_is():
 def test_fixed_vertices_stay():
     disk = disk_of(flat_patch(5, 5))
     plane = np.random.default_rng(0).uniform(size=(25, 2))
-    found = relaxed(plane, disk.faces, np.array([6, 12]))
-    np.testing.assert_array_equal(np.flatnonzero((found != plane).any(axis=1)), [6, 12])
-    assert found[12] == pytest.approx(np.vstack((found[6], plane[[7, 11, 13, 17, 18]])).mean(axis=0))
+    moved = relaxed(plane, disk.faces, np.array([6, 12]))
+    np.testing.assert_array_equal(np.flatnonzero((moved != plane).any(axis=1)), [6, 12])
+    assert moved[12] == pytest.approx(np.vstack((moved[6], plane[[7, 11, 13, 17, 18]])).mean(axis=0))
     np.testing.assert_array_equal(relaxed(plane, disk.faces, np.array([], int)), plane)
 
 

@@ -12,8 +12,8 @@ from ...meshes.examples import ball_with_holes, two_handles, without
 
 
 def lengths_of(surface, topology):
-    one, other = topology.edges.T
-    return np.linalg.norm(surface.vertices[one] - surface.vertices[other], axis=1)
+    first, other = topology.edges.T
+    return np.linalg.norm(surface.vertices[first] - surface.vertices[other], axis=1)
 
 
 @pytest.mark.parametrize(
@@ -31,10 +31,10 @@ def test_the_loops_of_a_torus_are_about_as_short_as_can_be():
     surface = torus(40, 30, 0.3)
     topology = topology_of(surface.faces)
     lengths = lengths_of(surface, topology)
-    found = lengths[handle_cut(topology, lengths)].sum()
+    result = lengths[handle_cut(topology, lengths)].sum()
     # Round the inner rim, and round the tube.
     least = 2.0 * np.pi * (0.7 + 0.3)
-    assert 0.95 * least < found < 1.15 * least
+    assert 0.95 * least < result < 1.15 * least
 
 
 @pytest.mark.parametrize("surface", [sphere(6, 6), ball_with_holes()])
@@ -45,9 +45,9 @@ def test_without_handles_nothing_is_cut(surface):
 
 def test_dead_ends_are_removed():
     topology = topology_of(torus(6, 5).faces)
-    one, other = np.array([0, 5, 10, 1]), np.array([5, 10, 15, 2])
+    first, other = np.array([0, 5, 10, 1]), np.array([5, 10, 15, 2])
     cut = np.zeros(len(topology.edges), bool)
-    cut[edges_between(topology, one, other)] = True
+    cut[edges_between(topology, first, other)] = True
     assert cut.sum() == 4
     assert not pruned(topology, cut).any()
     cut[edges_between(topology, np.array([15, 20, 25]), np.array([20, 25, 0]))] = True

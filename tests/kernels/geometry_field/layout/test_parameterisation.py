@@ -49,10 +49,10 @@ SURFACES = {
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_surfaces_of_every_kind(name):
-    found = parameterise(SURFACES[name])
-    check(found, SURFACES[name])
-    assert found.conformal
-    assert found.area_stretch < 4.0
+    layout = parameterise(SURFACES[name])
+    check(layout, SURFACES[name])
+    assert layout.conformal
+    assert layout.area_stretch < 4.0
 
 
 @pytest.mark.parametrize(
@@ -63,10 +63,10 @@ def test_angles_are_kept(name, most):
 
 
 def test_a_flat_square_fills_the_image_uncut():
-    found = parameterise(flat_patch(9, 9))
-    assert not found.cut.any()
-    assert found.area_stretch == pytest.approx(1.0, rel=1e-6)
-    np.testing.assert_allclose(found.quasi_conformal, 1.0, atol=1e-6)
+    layout = parameterise(flat_patch(9, 9))
+    assert not layout.cut.any()
+    assert layout.area_stretch == pytest.approx(1.0, rel=1e-6)
+    np.testing.assert_allclose(layout.quasi_conformal, 1.0, atol=1e-6)
 
 
 @given(st.integers(0, 1000), st.floats(0.0, 0.04))
@@ -97,9 +97,9 @@ def test_two_faces_back_to_back():
 def test_needles_get_a_layout_that_reports_its_distortion():
     ball = bumpy_ball(3000)
     needles = mesh(ball.vertices * (1.0, 1.0, 80.0), ball.faces)
-    found = parameterise(needles)
-    check(found, needles)
-    assert not found.conformal
+    layout = parameterise(needles)
+    check(layout, needles)
+    assert not layout.conformal
 
 
 def test_size_place_and_unit_do_not_matter():
@@ -118,9 +118,9 @@ def test_size_place_and_unit_do_not_matter():
     ],
 )
 def test_other_meshes_are_rejected(faces, words):
-    places = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (2, 0, 0)]
+    points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (2, 0, 0)]
     with pytest.raises(InvalidInput, match=words):
-        parameterise(mesh(places, faces))
+        parameterise(mesh(points, faces))
 
 
 def test_touching_fans_are_rejected():
@@ -135,8 +135,8 @@ def test_touching_fans_are_rejected():
 @pytest.mark.nightly
 def test_bunny():
     surface = bunny()
-    found = parameterise(surface)
-    check(found, surface)
-    assert found.conformal
-    assert np.median(found.quasi_conformal) < 1.02
-    assert found.area_stretch < 3.0
+    layout = parameterise(surface)
+    check(layout, surface)
+    assert layout.conformal
+    assert np.median(layout.quasi_conformal) < 1.02
+    assert layout.area_stretch < 3.0

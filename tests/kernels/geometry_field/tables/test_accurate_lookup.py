@@ -76,10 +76,10 @@ def test_the_entry_itself_is_exact():
 
     n, surface = 6, ball(3)
     field = field_of(surface, n)
-    places = samples(n)
+    points = samples(n)
     i, j = np.nonzero(field.faces >= 0)
     for steps in (20, STEPS):
-        faces, distances, _ = found(surface, field, places[i], places[j] - places[i], steps)
+        faces, distances, _ = found(surface, field, points[i], points[j] - points[i], steps)
         at_an_edge = faces != field.faces[i, j]
         assert at_an_edge.mean() < 0.05
         np.testing.assert_allclose(distances, field.fractions[i, j], atol=1e-5)
@@ -197,5 +197,5 @@ def test_a_walk_does_not_go_on_in_another_part_of_the_mesh():
     assert left.sum() == 2
     for goal, (x, y, z) in enumerate(middle):
         for first in range(4):
-            found = settle(surface, first, 1.0, 9, x, y, z + 1.0, 0.0, 0.0, -1.0)[0]
-            assert found == (goal if left[goal] == left[first] else -1)
+            face = settle(surface, first, 1.0, 9, x, y, z + 1.0, 0.0, 0.0, -1.0)[0]
+            assert face == (goal if left[goal] == left[first] else -1)

@@ -18,9 +18,9 @@ def test_agreement_is_that_of_the_sixteen():
             if entry % 3 == 2 or exit_ % 3 == 2:
                 continue
             at = np.ix_(entry + np.array([0, 1, row, row + 1]), exit_ + np.array([0, 1, row, row + 1]))
-            meets, places = field.faces[at] >= 0, field.fractions[at]
+            meets, points = field.faces[at] >= 0, field.fractions[at]
             expected = NONE if not meets.any() else MIXED
-            if meets.all() and np.ptp(places) <= np.float32(APART / 3):
+            if meets.all() and np.ptp(points) <= np.float32(APART / 3):
                 expected = AGREE
             assert known[entry, exit_] == expected
             seen.add(expected)

@@ -16,10 +16,10 @@ NUMBERS = st.sampled_from([2, 3, 5, 24, 48])
 
 def numbers_of(points, n):
     """Numbers of the samples nearest to points of the cube's surface, on the face that each lies on."""
-    places = np.asarray(points)
-    face = np.stack([np.abs(places), np.abs(1.0 - places)], axis=-1).reshape(-1, 6).argmin(axis=1)
+    positions = np.asarray(points)
+    face = np.stack([np.abs(positions), np.abs(1.0 - positions)], axis=-1).reshape(-1, 6).argmin(axis=1)
     others = np.array([[1, 2], [0, 2], [0, 1]])[face // 2]
-    x, y = np.clip((np.take_along_axis(places, others, axis=1) * n).astype(np.int64), 0, n - 1).T
+    x, y = np.clip((np.take_along_axis(positions, others, axis=1) * n).astype(np.int64), 0, n - 1).T
     return 6 * n * y + face * n + x
 
 
@@ -50,10 +50,10 @@ def test_numbers_are_those_of_figure_24():
     n = 5
     for face in range(6):
         for x, y in ((0, 0), (3, 1), (4, 4)):
-            place = samples(n)[6 * n * y + x + face * n]
+            position = samples(n)[6 * n * y + x + face * n]
             across = [axis for axis in range(3) if axis != face // 2]
-            assert place[face // 2] == face % 2
-            np.testing.assert_allclose(place[across], [(x + 0.5) / n, (y + 0.5) / n])
+            assert position[face // 2] == face % 2
+            np.testing.assert_allclose(position[across], [(x + 0.5) / n, (y + 0.5) / n])
 
 
 @settings(deadline=None)

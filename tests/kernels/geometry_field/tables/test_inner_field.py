@@ -19,11 +19,11 @@ def test_entries_are_what_rays_from_the_points_meet():
     points, _ = spread_points(surface, 4)
     field = inner_of(surface, 4, 4)
     corners = surface.triangles[points, :9].astype(float).reshape(-1, 3, 3)
-    places = samples(4)
+    positions = samples(4)
     for row, start in enumerate(corners.mean(axis=1)):
-        starts = np.tile(start, (len(places), 1))
-        own = np.full(len(places), points[row], dtype=np.int32)
-        faces, distances, _, _ = first_faces(surface, starts, places - start, own)
+        starts = np.tile(start, (len(positions), 1))
+        own = np.full(len(positions), points[row], dtype=np.int32)
+        faces, distances, _, _ = first_faces(surface, starts, positions - start, own)
         faces[distances > 1.0] = -1
         # The points' last bits depend on the order of sums.
         assert (field.faces[row] != faces).mean() < 0.02

@@ -25,10 +25,10 @@ from .test_accurate_lookup import found, rays_through_the_cube
 def test_every_entry_is_what_the_ray_between_its_samples_meets():
     n, surface = 3, surface_of(over_the_poles(turned(octahedron(2))))
     field = field_of(surface, n)
-    places = samples(n)
+    points = samples(n)
     met = 0
-    for i, s in enumerate(places):
-        for j, t in enumerate(places):
+    for i, s in enumerate(points):
+        for j, t in enumerate(points):
             along_the_cube = ((s == t) & (s * (1.0 - s) == 0.0)).any()
             face, distance = (-1, np.inf) if along_the_cube else by_brute_force(surface, s, t - s)
             assert (field.faces[i, j] < 0) == (face < 0)
@@ -43,10 +43,10 @@ def test_every_entry_is_what_the_ray_between_its_samples_meets():
 def test_a_ray_that_touches_two_faces_returns_one_of_them():
     n, surface = 4, ball(1)
     field = field_of(surface, n)
-    places = samples(n)
+    positions = samples(n)
     corners = surface.triangles[:, :9].astype(float).reshape(-1, 3, 3)
     i, j = np.nonzero(field.faces >= 0)
-    points = places[i] + field.fractions[i, j][:, None] * (places[j] - places[i])
+    points = positions[i] + field.fractions[i, j][:, None] * (positions[j] - positions[i])
     a, b, c = corners[field.faces[i, j]].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
     off = ((points - a) * normal).sum(axis=1) / np.linalg.norm(normal, axis=1)

@@ -87,11 +87,11 @@ def test_a_field_holds_table_and_image():
 
 
 def test_too_many_samples_and_other_shapes_are_rejected():
-    surface, valid, places = ball(0), np.ones((9, 9), bool), np.zeros((9, 9, 3))
+    surface, valid, points = ball(0), np.ones((9, 9), bool), np.zeros((9, 9, 3))
     many = OuterField(MAX_REFERENCE_SAMPLES + 1, np.zeros((1, 1), np.int32), np.zeros((1, 1), np.float32))
     with pytest.raises(InvalidInput) as caught:
-        reference_field(surface, many, places, places, valid)
+        reference_field(surface, many, points, points, valid)
     assert caught.value.field == "samples"
     with pytest.raises(InvalidInput) as caught:
-        reference_field(surface, field_of(surface, 4), places[:8], places, valid)
+        reference_field(surface, field_of(surface, 4), points[:8], points, valid)
     assert caught.value.field == "positions"

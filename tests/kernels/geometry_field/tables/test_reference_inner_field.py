@@ -53,12 +53,12 @@ def test_exits_are_averaged_and_those_without_a_hit_left_out():
     q, p = np.indices((N, N), dtype=np.float32)
     row = np.full((N, 6, N, 2), np.nan, np.float32)
     row[:, 2, :, 0], row[:, 2, :, 1] = 0.1 * p + 0.02 * q, 0.05 * q
-    place = (2.25 + 0.5) / N, (1.5 + 0.5) / N
-    found = averaged_at(row.ravel(), N, 2, *map(np.float32, place))
-    np.testing.assert_allclose(found, (0.1 * 2.25 + 0.02 * 1.5, 0.05 * 1.5), atol=1e-6)
+    position = (2.25 + 0.5) / N, (1.5 + 0.5) / N
+    result = averaged_at(row.ravel(), N, 2, *map(np.float32, position))
+    np.testing.assert_allclose(result, (0.1 * 2.25 + 0.02 * 1.5, 0.05 * 1.5), atol=1e-6)
     row[:, 2, 3] = np.nan
-    found = averaged_at(row.ravel(), N, 2, *map(np.float32, place))
-    np.testing.assert_allclose(found, (0.1 * 2.0 + 0.02 * 1.5, 0.05 * 1.5), atol=1e-6)
+    result = averaged_at(row.ravel(), N, 2, *map(np.float32, position))
+    np.testing.assert_allclose(result, (0.1 * 2.0 + 0.02 * 1.5, 0.05 * 1.5), atol=1e-6)
 
 
 def test_points_of_another_field_and_large_tables_are_rejected(monkeypatch):

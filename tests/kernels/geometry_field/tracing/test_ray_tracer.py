@@ -259,8 +259,8 @@ def published(material: Material, **reference) -> Scene:
     shape = published_shape()
     shape = replace(shape, reference=shape.reference._replace(**reference))
     ground = Ground(-0.6, 0.4, 5.0)
-    place = placed((0.1, 0.2, 0.0), 1.2, (0.2, 0.1, 1.0), 25.0)
-    return Scene((Instance(shape, place, material),), striped(), ground)
+    position = placed((0.1, 0.2, 0.0), 1.2, (0.2, 0.1, 1.0), 25.0)
+    return Scene((Instance(shape, position, material),), striped(), ground)
 
 
 # Out of sight.
@@ -309,9 +309,9 @@ def test_published_hits_are_as_far_as_they_are(way):
     scene = published(Material(colour=(1.0, 0.0, 0.0)))
     low = replace(scene, ground=Ground(-0.2, 0.4, 5.0, ((0.0, 1.0, 0.0), (0.0, 1.0, 0.0))), ambient=1.0)
     camera = perspective((0.0, -0.6, 4.0), (0.1, 0.2, 0.0), (0.0, 1.0, 0.0), 25.0)
-    exact, found = picture(low, camera), picture(low, camera, eye=way)
+    exact, result = picture(low, camera), picture(low, camera, eye=way)
     assert (exact[..., 0] == 255).mean() > 0.3
-    assert np.mean((exact != found).any(axis=2)) < 0.06
+    assert np.mean((exact != result).any(axis=2)) < 0.06
 
 
 @pytest.mark.parametrize("way", UV_WAYS)
@@ -352,9 +352,9 @@ def test_rays_that_leave_the_surface_use_the_published_inner_field(way):
 
 
 def test_pictures_do_not_depend_on_threads_or_runs():
-    one = picture(crowded())
-    np.testing.assert_array_equal(one, picture(crowded(), threads=2))
-    np.testing.assert_array_equal(one, picture(crowded()))
+    picture_of = picture(crowded())
+    np.testing.assert_array_equal(picture_of, picture(crowded(), threads=2))
+    np.testing.assert_array_equal(picture_of, picture(crowded()))
 
 
 def test_the_ground_is_a_checkerboard_of_metres():

@@ -31,8 +31,8 @@ def tracer_of(world: World, precision: str = "float64") -> OpenCLTracer:
 def odd(world: World, precision: str, **how) -> float:
     """Share of pixels that differ by more than one level."""
     settings = TraceSettings(96, 80, **how)
-    found = tracer_of(world, precision).follow(CAMERA, settings)
-    return float(np.mean(np.abs(found.astype(int) - trace(world, CAMERA, settings)).max(axis=2) > 1))
+    colours = tracer_of(world, precision).follow(CAMERA, settings)
+    return float(np.mean(np.abs(colours.astype(int) - trace(world, CAMERA, settings)).max(axis=2) > 1))
 
 
 @pytest.mark.parametrize("way", FACE_WAYS)
@@ -66,16 +66,16 @@ def test_cpu_replaces_wrong_device_results(monkeypatch):
     tracer, settings = tracer_of(world), TraceSettings(32, 32)
     monkeypatch.setattr(tracer, "follow", lambda camera, how: np.zeros((how.rows, how.columns, 3), np.uint8))
     with pytest.warns(OpenCLFallbackWarning, match="takes over"):
-        found = tracer.trace(CAMERA, settings)
-    np.testing.assert_array_equal(found, trace(world, CAMERA, settings))
+        colours = tracer.trace(CAMERA, settings)
+    np.testing.assert_array_equal(colours, trace(world, CAMERA, settings))
     # The warning comes once.
-    np.testing.assert_array_equal(tracer.trace(CAMERA, settings), found)
+    np.testing.assert_array_equal(tracer.trace(CAMERA, settings), colours)
 
 
 def test_device_that_passes_the_self_test_is_used():
     world = world_of(crowded())
-    found = tracer_of(world).trace(CAMERA, TraceSettings(32, 32))
-    np.testing.assert_array_equal(found, tracer_of(world).follow(CAMERA, TraceSettings(32, 32)))
+    colours = tracer_of(world).trace(CAMERA, TraceSettings(32, 32))
+    np.testing.assert_array_equal(colours, tracer_of(world).follow(CAMERA, TraceSettings(32, 32)))
 
 
 def test_other_precisions_are_rejected():

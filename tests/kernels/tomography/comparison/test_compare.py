@@ -17,24 +17,24 @@ from .squares import WATER, disc, image, truth
 
 @given(st.floats(-40.0, 40.0))
 def test_a_constant_error_is_read_as_it_is(offset: float) -> None:
-    found = compare(image(disc() + offset), truth(disc()))
-    assert found.rms == pytest.approx(abs(offset), abs=1e-9)
-    assert found.mean_absolute_of_range == pytest.approx(abs(offset) / 100.0, abs=1e-9)
-    assert found.range == (1450.0, 1550.0)
-    assert found.region.sum() == 81
+    comparison = compare(image(disc() + offset), truth(disc()))
+    assert comparison.rms == pytest.approx(abs(offset), abs=1e-9)
+    assert comparison.mean_absolute_of_range == pytest.approx(abs(offset) / 100.0, abs=1e-9)
+    assert comparison.range == (1450.0, 1550.0)
+    assert comparison.region.sum() == 81
 
 
 def test_statistics_have_the_uncertainty_of_the_nodes_in_the_region() -> None:
     known = np.where(disc() == WATER, 90.0, 4.0)
-    found = compare(
+    comparison = compare(
         replace(image(disc() + 2.0), uncertainty=known, resolution_width_m=(3e-3,)), truth(disc())
     )
-    image_there, true_there = found.statistics()
+    image_there, true_there = comparison.statistics()
     assert image_there.uncertainty == pytest.approx(4.0)
     assert true_there.uncertainty is None
     assert image_there.mean - true_there.mean == pytest.approx(2.0)
-    assert found.mean_absolute == pytest.approx(2.0)
-    assert found.correlation == pytest.approx(1.0)
+    assert comparison.mean_absolute == pytest.approx(2.0)
+    assert comparison.correlation == pytest.approx(1.0)
 
 
 def test_errors_in_the_water_do_not_count() -> None:
@@ -56,12 +56,12 @@ def test_the_outline_holds_what_it_encloses_in_each_slice() -> None:
 def test_the_region_of_the_file_is_used_and_named() -> None:
     roi = np.zeros((17, 17), dtype=bool)
     roi[0:2, 0:2] = True
-    found = compare(image(disc() + 3.0), truth(disc()), roi)
-    assert found.region_choice == "mask/roi of the file"
-    assert found.region.sum() == 4
-    assert found.mean_absolute_of_range is None, "water alone has no range to divide by"
-    assert found.rms == pytest.approx(3.0)
-    assert found.caption() == "3.0 m/s rms"
+    comparison = compare(image(disc() + 3.0), truth(disc()), roi)
+    assert comparison.region_choice == "mask/roi of the file"
+    assert comparison.region.sum() == 4
+    assert comparison.mean_absolute_of_range is None, "water alone has no range to divide by"
+    assert comparison.rms == pytest.approx(3.0)
+    assert comparison.caption() == "3.0 m/s rms"
 
 
 def test_a_region_wider_than_the_outline_brings_in_what_equals_the_water() -> None:
@@ -78,14 +78,14 @@ def test_a_region_wider_than_the_outline_brings_in_what_equals_the_water() -> No
 
 @pytest.mark.parametrize("roi", [np.zeros((17, 17), bool), np.ones((3, 3), bool)])
 def test_a_region_that_marks_nothing_or_lies_on_another_grid_is_not_used(roi: np.ndarray) -> None:
-    found = compare(image(disc()), truth(disc()), roi)
-    assert found.region_choice == "the outline of what is not water in the truth"
+    comparison = compare(image(disc()), truth(disc()), roi)
+    assert comparison.region_choice == "the outline of what is not water in the truth"
 
 
 def test_a_truth_that_is_water_throughout_is_compared_everywhere() -> None:
-    found = compare(image(np.full((17, 17), WATER + 2.0)), truth(np.full((17, 17), WATER)))
-    assert found.region_choice == "every node that the truth covers"
-    assert found.region.all()
+    comparison = compare(image(np.full((17, 17), WATER + 2.0)), truth(np.full((17, 17), WATER)))
+    assert comparison.region_choice == "every node that the truth covers"
+    assert comparison.region.all()
 
 
 def test_x_and_y_are_not_exchanged() -> None:

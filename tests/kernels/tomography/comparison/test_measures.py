@@ -22,7 +22,7 @@ def pair(shape: tuple[int, ...] = (14, 12)) -> tuple[np.ndarray, np.ndarray]:
 def by_definition(image: np.ndarray, truth: np.ndarray, region: np.ndarray, value_range: float) -> float:
     """Equation 13 of Wang et al. 2004 with uniform windows of 7 x 7 nodes and sample covariances."""
     c1, c2 = (0.01 * value_range) ** 2, (0.03 * value_range) ** 2
-    found = []
+    results = []
     for i in range(3, image.shape[0] - 3):
         for j in range(3, image.shape[1] - 3):
             window = np.s_[i - 3 : i + 4, j - 3 : j + 4]
@@ -30,12 +30,12 @@ def by_definition(image: np.ndarray, truth: np.ndarray, region: np.ndarray, valu
                 continue
             x, y = image[window].ravel(), truth[window].ravel()
             (xx, xy), (_, yy) = np.cov(x, y)
-            found.append(
+            results.append(
                 (2 * x.mean() * y.mean() + c1)
                 * (2 * xy + c2)
                 / ((x.mean() ** 2 + y.mean() ** 2 + c1) * (xx + yy + c2))
             )
-    return float(np.mean(found))
+    return float(np.mean(results))
 
 
 def test_similarity_is_that_of_its_definition_in_windows_inside_the_region() -> None:
@@ -52,8 +52,8 @@ def test_similarity_equals_that_of_scikit_image() -> None:
     """``skimage.metrics.structural_similarity(truth, image, data_range=150)`` of scikit-image 0.26."""
     image, truth = pair()
     everywhere = np.ones(image.shape, bool)
-    found = structural_similarity(image, truth, everywhere, 150.0)
-    assert found == pytest.approx(0.8304962059667472, rel=1e-9)
+    similarity = structural_similarity(image, truth, everywhere, 150.0)
+    assert similarity == pytest.approx(0.8304962059667472, rel=1e-9)
 
 
 def test_similarity_of_a_volume_is_the_mean_over_its_slices() -> None:

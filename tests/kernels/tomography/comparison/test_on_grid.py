@@ -41,12 +41,12 @@ def test_a_ramp_is_read_between_its_nodes_and_missing_beyond_them():
     x, y = np.meshgrid(np.linspace(-0.01, 0.01, 7), np.linspace(-0.02, 0.02, 9), indexing="ij")
     ramp = Truth(1500.0 + 1e3 * x - 2e3 * y, (0.02 / 6, 0.005), (-0.01, -0.02))
     result = replace(image(np.full((24, 24), WATER), (-0.023, -0.023)), spacing_m=(SPACING_M, SPACING_M))
-    place = result.origin_m[0] + SPACING_M * np.arange(24)
-    expected = 1500.0 + 1e3 * place[:, None] - 2e3 * place[None, :]
-    inside = (np.abs(place) <= 0.01)[:, None] & (np.abs(place) <= 0.02)[None, :]
-    found = speed_on_grid(ramp, result)
-    np.testing.assert_allclose(found[inside], expected[inside])
-    assert np.isnan(found[~inside]).all()
+    position = result.origin_m[0] + SPACING_M * np.arange(24)
+    expected = 1500.0 + 1e3 * position[:, None] - 2e3 * position[None, :]
+    inside = (np.abs(position) <= 0.01)[:, None] & (np.abs(position) <= 0.02)[None, :]
+    computed = speed_on_grid(ramp, result)
+    np.testing.assert_allclose(computed[inside], expected[inside])
+    assert np.isnan(computed[~inside]).all()
 
 
 def test_axes_are_brought_to_x_and_y():
@@ -61,10 +61,10 @@ def test_a_volume_is_read_at_each_slice():
         np.full((3, 3, 3), 1500.0) + 10.0 * np.arange(3), (0.1, 0.1, 0.01), (-0.1, -0.1, 0.0), axes="x,y,z"
     )
     result = replace(made(slices=2), spacing_m=(SPACING_M, SPACING_M, 0.01), origin_m=(-0.02, -0.02, 0.005))
-    found = speed_on_grid(volume, result)
-    assert found.shape == result.speed.shape
-    np.testing.assert_allclose(found[..., 0], 1505.0)
-    np.testing.assert_allclose(found[..., 1], 1515.0)
+    results = speed_on_grid(volume, result)
+    assert results.shape == result.speed.shape
+    np.testing.assert_allclose(results[..., 0], 1505.0)
+    np.testing.assert_allclose(results[..., 1], 1515.0)
 
 
 def solid() -> Truth:

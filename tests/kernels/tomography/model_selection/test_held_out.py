@@ -27,9 +27,9 @@ def ring(elements, tx=None):
 @settings(max_examples=20, deadline=None)
 def test_the_parts_are_the_whole_and_share_no_pair(parts, elements):
     scan = ring(elements)
-    found = [np.isfinite(part_of(scan, part).differential_tof()) for part in parts]
-    assert np.array_equal(np.sum(found, axis=0), np.isfinite(scan.differential_tof()))
-    assert all(np.array_equal(part, part.T) for part in found)
+    result = [np.isfinite(part_of(scan, part).differential_tof()) for part in parts]
+    assert np.array_equal(np.sum(result, axis=0), np.isfinite(scan.differential_tof()))
+    assert all(np.array_equal(part, part.T) for part in result)
 
 
 @pytest.mark.parametrize(("elements", "kept"), [(255, 1), (256, 2), (400, 3)])

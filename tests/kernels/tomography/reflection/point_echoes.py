@@ -21,9 +21,9 @@ def pulse(late_s):
 def traces(elements, points, samples=400, delay_s=0.0, transmitted=0.0):
     """Traces of all pairs, (k, k, samples): an echo of each point and, if any, the transmitted wave."""
     time = T0 + np.arange(samples) / RATE_HZ
-    found = np.zeros((len(elements), len(elements), samples))
+    result = np.zeros((len(elements), len(elements), samples))
     for point in points:
         way = np.linalg.norm(elements - point, axis=1) / WATER
-        found += pulse(time - delay_s - (way[:, None] + way[None, :])[..., None])
+        result += pulse(time - delay_s - (way[:, None] + way[None, :])[..., None])
     direct = np.linalg.norm(elements[:, None] - elements[None], axis=-1) / WATER
-    return found + transmitted * pulse(time - delay_s - direct[..., None])
+    return result + transmitted * pulse(time - delay_s - direct[..., None])

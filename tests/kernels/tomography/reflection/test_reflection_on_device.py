@@ -41,10 +41,10 @@ def test_a_device_that_fails_leaves_the_sums_to_compiled_code(monkeypatch):
         return reflection_graph.sum_echoes(*given)
 
     monkeypatch.setattr(reflection_graph, "sum_echoes_opencl", failing)
-    found = reconstruct(scan(), ON_DEVICE).reflection.db
+    result = reconstruct(scan(), ON_DEVICE).reflection.db
     assert len(calls) % 2 == 0
     assert calls
-    np.testing.assert_array_equal(found, reconstruct(scan(), SETTINGS).reflection.db)
+    np.testing.assert_array_equal(result, reconstruct(scan(), SETTINGS).reflection.db)
 
 
 def test_only_a_reflection_image_on_opencl_needs_the_device():

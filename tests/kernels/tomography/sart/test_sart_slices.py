@@ -44,7 +44,7 @@ def plan(**changes):
 
 def advanced(rings, settings, emitters=10**6):
     """The final states of all slices, updated together."""
-    problems = [Problem.of(one, settings) for one in rings]
+    problems = [Problem.of(dataset, settings) for dataset in rings]
     states = [begin(initial_slowness(problem, None)) for problem in problems]
     while not all(state.done for state in states):
         calls = [SliceCall(*pair, emitters, k) for k, pair in enumerate(zip(problems, states, strict=True))]
@@ -54,18 +54,18 @@ def advanced(rings, settings, emitters=10**6):
 
 @pytest.mark.parametrize("changes", [{}, {"rays": "straight"}, {"subset": 5, "smoothing_nodes": 0.0}])
 def test_the_images_are_those_of_compiled_code(opencl_session, rings, changes):
-    found, expected = (advanced(rings, plan(**changes, device=device)) for device in ("opencl", "cpu"))
-    for one, other in zip(found, expected, strict=True):
-        difference = 1.0 / one.slowness - 1.0 / other.slowness
+    computed, expected = (advanced(rings, plan(**changes, device=device)) for device in ("opencl", "cpu"))
+    for first, other in zip(computed, expected, strict=True):
+        difference = 1.0 / first.slowness - 1.0 / other.slowness
         assert np.ptp(1.0 / other.slowness) > 30.0
         assert np.sqrt((difference**2).mean()) < RMS_MPS
         assert np.abs(difference).max() < LARGEST_MPS
-        assert np.abs(one.coverage - other.coverage).max() < 0.05 * other.coverage.max()
-        assert one.residuals.sum() == other.residuals.sum() > 0
-        assert np.abs(one.residuals - other.residuals).sum() <= 0.02 * other.residuals.sum()
-        for mine, theirs in zip(one.history, other.history, strict=True):
-            assert mine.residual_rms_s == pytest.approx(theirs.residual_rms_s, rel=1e-3)
-            assert mine.emitters == theirs.emitters
+        assert np.abs(first.coverage - other.coverage).max() < 0.05 * other.coverage.max()
+        assert first.residuals.sum() == other.residuals.sum() > 0
+        assert np.abs(first.residuals - other.residuals).sum() <= 0.02 * other.residuals.sum()
+        for iteration, theirs in zip(first.history, other.history, strict=True):
+            assert iteration.residual_rms_s == pytest.approx(theirs.residual_rms_s, rel=1e-3)
+            assert iteration.emitters == theirs.emitters
 
 
 def test_a_slice_has_the_same_bits_alone_and_in_parts(opencl_session, rings):
@@ -85,8 +85,8 @@ def test_tiles_of_slices_change_no_bit(opencl_session, rings, monkeypatch):
     from bentray_kernels.tomography.sart import device_slices
 
     monkeypatch.setattr(device_slices, "PROCESSOR_SLICES", 2)
-    for one, other in zip(together, advanced(rings, settings), strict=True):
-        assert np.array_equal(one.slowness, other.slowness)
+    for image, other in zip(together, advanced(rings, settings), strict=True):
+        assert np.array_equal(image.slowness, other.slowness)
 
 
 def test_what_a_device_cannot_hold_is_refused_by_number(opencl_session, monkeypatch):
@@ -122,10 +122,10 @@ def test_a_lost_device_is_replaced_by_the_processor(fresh_choice, rings, caplog)
 
     session.launch = failing
     settings = plan(iterations=1)
-    found = reconstruct(rings[0], settings)
+    result = reconstruct(rings[0], settings)
     assert session.lost
     assert session.lost in caplog.text
-    assert np.array_equal(found.speed, reconstruct(rings[0], settings.changed(device="cpu")).speed)
+    assert np.array_equal(result.speed, reconstruct(rings[0], settings.changed(device="cpu")).speed)
 
 
 @pytest.fixture

@@ -100,8 +100,8 @@ def test_cuts_of_the_compiled_pass_change_no_bit(scan, changes):
 
 def test_a_subset_is_one_update(scan):
     """With all emitters in one subset, nothing of the first hides from the last: seeds give the same."""
-    one, other = (reconstruct(scan, plan(subset=64, seed=seed, iterations=1)).speed for seed in (0, 1))
-    assert np.allclose(one, other, atol=1e-2)
+    first, other = (reconstruct(scan, plan(subset=64, seed=seed, iterations=1)).speed for seed in (0, 1))
+    assert np.allclose(first, other, atol=1e-2)
     alone = [reconstruct(scan, plan(seed=seed, iterations=1)).speed for seed in (0, 1)]
     assert np.abs(alone[0] - alone[1]).max() > 0.5
 

@@ -34,7 +34,7 @@ def problem(width):
 def dense(posterior):
     """The matrix of all rows with blurring and prior root, of the white variables; the map to images."""
     blocks = [
-        np.stack([part.project(blurred(one.reshape(SHAPE), posterior.width)) for one in np.eye(NODES)], 1)
+        np.stack([part.project(blurred(unit.reshape(SHAPE), posterior.width)) for unit in np.eye(NODES)], 1)
         for part in posterior.parts
     ]
     root = np.stack(
@@ -55,11 +55,11 @@ def test_the_first_probe_is_the_mean_of_the_posterior(width):
     posterior = problem(width)
     matrix, root = dense(posterior)
     noise = [np.repeat(part.residual[:, None], LANES, 1) for part in posterior.parts]
-    found = posterior.solutions(noise, np.zeros((LANES, *SHAPE)))
+    result = posterior.solutions(noise, np.zeros((LANES, *SHAPE)))
     right = matrix.T @ (np.sqrt(np.concatenate(posterior.weights)) * np.concatenate([n[:, 0] for n in noise]))
     mean = root @ np.linalg.solve(np.eye(NODES) + matrix.T @ matrix, right)
-    assert np.allclose(found.reshape(LANES, -1), mean, rtol=1e-7, atol=1e-9)
-    assert np.all(found[:, 0, 0] == 0.0)
+    assert np.allclose(result.reshape(LANES, -1), mean, rtol=1e-7, atol=1e-9)
+    assert np.all(result[:, 0, 0] == 0.0)
 
 
 def test_samples_have_the_covariance_of_the_posterior():
@@ -70,12 +70,12 @@ def test_samples_have_the_covariance_of_the_posterior():
     for _ in range(120):
         noise = [random.standard_normal((w.size, LANES)) / np.sqrt(w)[:, None] for w in posterior.weights]
         samples.append(posterior.solutions(noise, random.standard_normal((LANES, *SHAPE))))
-    found = np.concatenate(samples).reshape(-1, NODES)
+    result = np.concatenate(samples).reshape(-1, NODES)
     exact = root @ np.linalg.inv(np.eye(NODES) + matrix.T @ matrix) @ root.T
     spread = np.sqrt(np.diag(exact))[1:]
     # 960 samples: 2.3 % of a standard deviation.
-    assert np.allclose(found.std(axis=0)[1:], spread, rtol=0.12)
-    correlation = np.corrcoef(found[:, 1:].T) - exact[1:, 1:] / np.outer(spread, spread)
+    assert np.allclose(result.std(axis=0)[1:], spread, rtol=0.12)
+    correlation = np.corrcoef(result[:, 1:].T) - exact[1:, 1:] / np.outer(spread, spread)
     assert np.abs(correlation).max() < 0.17
 
 

@@ -26,20 +26,20 @@ def test_without_a_budget_all_bands_are_used():
 
 @given(st.floats(0.0, 1e4))
 def test_chosen_settings_fit_the_budget_or_are_minimal(minutes):
-    found = within(minutes)
+    result = within(minutes)
     least = (1, MIN_EMITTERS)
-    assert SCALE.minutes(found) <= minutes or (found.numerics.bands, found.numerics.emitters) == least
+    assert SCALE.minutes(result) <= minutes or (result.numerics.bands, result.numerics.emitters) == least
     # A larger budget never gives less.
-    assert SCALE.minutes(within(2.0 * minutes)) >= SCALE.minutes(found)
+    assert SCALE.minutes(within(2.0 * minutes)) >= SCALE.minutes(result)
 
 
 def test_bands_go_before_emitters():
     whole = SCALE.minutes(WAVEFORM)
     assert within(whole).numerics.bands == BANDS
     assert within(0.99 * whole).numerics.bands < BANDS
-    one = SCALE.minutes(WAVEFORM.changed(bands=1))
-    assert (within(one).numerics.bands, within(one).numerics.emitters) == (1, None)
-    assert within(0.99 * one).numerics.emitters == 16
+    minutes = SCALE.minutes(WAVEFORM.changed(bands=1))
+    assert (within(minutes).numerics.bands, within(minutes).numerics.emitters) == (1, None)
+    assert within(0.99 * minutes).numerics.emitters == 16
 
 
 @pytest.mark.parametrize("fixed", [{"bands": 3}, {"bands": 3, "emitters": 5}])

@@ -11,10 +11,10 @@ from .scans import SETTINGS, blob, error, lossy, refine, refined, scan, water
 
 
 def test_the_blob_is_found():
-    start, found = water(), refined()
-    assert error(found.image) < 0.5 * error(start)
-    assert not any(end.skipped for end in found.ends)
-    first, last = found.ends[1].history[0], found.ends[1].history[-1]
+    start, result = water(), refined()
+    assert error(result.image) < 0.5 * error(start)
+    assert not any(end.skipped for end in result.ends)
+    first, last = result.ends[1].history[0], result.ends[1].history[-1]
     assert last.misfit < 0.6 * first.misfit
     assert last.held < 0.8 * first.held
 
@@ -40,9 +40,9 @@ def losses(image):
 def test_the_loss_is_found_and_the_speed_stays():
     plan = replace(SETTINGS, bands=(replace(SETTINGS.bands[2], iterations=6),))
     start = true_speed()
-    found = refine(scan(loss=True), plan, start)
-    assert found.image.speed is start.speed
-    image, true = losses(found.image)
+    result = refine(scan(loss=True), plan, start)
+    assert result.image.speed is start.speed
+    image, true = losses(result.image)
     assert np.corrcoef(image, true)[0, 1] > 0.9
     assert np.sqrt(((image - true) ** 2).mean()) < 0.4 * true.std()
     none = losses(refine(scan(), plan, start).image)[0]

@@ -39,8 +39,8 @@ def pairs(spacing, origin, shape, hz):
 def test_pairs_are_those_of_the_same_misfit_on_the_new_grid():
     curvature = Curvature(*pairs(COARSE, ORIGIN, SHAPE, LOW_HZ), COARSE, ORIGIN, LOW_HZ)
     everywhere = np.ones(INNER_SHAPE, dtype=bool)
-    found = resampled_pairs(curvature, HIGH_HZ, FINE, INNER, everywhere)
-    for got, expected in zip(found, pairs(FINE, INNER, INNER_SHAPE, HIGH_HZ), strict=True):
+    computed = resampled_pairs(curvature, HIGH_HZ, FINE, INNER, everywhere)
+    for got, expected in zip(computed, pairs(FINE, INNER, INNER_SHAPE, HIGH_HZ), strict=True):
         assert np.abs(got - expected).max() < 0.02 * np.abs(expected).max()
 
 
@@ -49,8 +49,8 @@ def test_the_first_direction_of_a_band_is_the_newton_step_as_far_as_the_pairs_re
     steps, changes = resampled_pairs(curvature, HIGH_HZ, FINE, INNER, np.ones(INNER_SHAPE, dtype=bool))
     own, gradients = pairs(FINE, INNER, INNER_SHAPE, HIGH_HZ)
     wanted, gradient = (0.7 * part[-1] for part in (own, gradients))
-    found = search_direction(gradient, steps, changes, lambda image: image)
-    assert np.abs(found - wanted).max() < 0.03 * np.abs(wanted).max()
+    result = search_direction(gradient, steps, changes, lambda image: image)
+    assert np.abs(result - wanted).max() < 0.03 * np.abs(wanted).max()
 
 
 def test_nodes_that_are_fixed_have_no_pairs():
@@ -66,14 +66,14 @@ def test_a_pair_without_curvature_on_the_new_nodes_is_left_out():
     steps, changes = pairs(COARSE, ORIGIN, SHAPE, LOW_HZ)
     changes[1] *= -1.0
     curvature = Curvature(steps, changes, COARSE, ORIGIN, LOW_HZ)
-    found, _ = resampled_pairs(curvature, HIGH_HZ, FINE, INNER, np.ones(INNER_SHAPE, dtype=bool))
-    assert len(found) == 2
+    result, _ = resampled_pairs(curvature, HIGH_HZ, FINE, INNER, np.ones(INNER_SHAPE, dtype=bool))
+    assert len(result) == 2
 
 
 @pytest.mark.parametrize("spacing", [COARSE, FINE])
 def test_an_image_keeps_its_range_and_is_extrapolated_by_its_edge(spacing):
     x, y = nodes(COARSE, ORIGIN, SHAPE)
     image = Image(1500.0 + 40.0 * (x + y > 0.0), COARSE, ORIGIN)
-    found = resampled(image, spacing, (-0.03, -0.04), (64, 64))
-    assert (found.min(), found.max()) == (1500.0, 1540.0)
-    assert found[0, 0] == pytest.approx(image.speed[0, 0])
+    result = resampled(image, spacing, (-0.03, -0.04), (64, 64))
+    assert (result.min(), result.max()) == (1500.0, 1540.0)
+    assert result[0, 0] == pytest.approx(image.speed[0, 0])

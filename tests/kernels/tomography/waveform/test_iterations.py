@@ -16,8 +16,8 @@ PERIOD_S = 1.0 / 3e5
 @given(part=st.floats(0.01, 0.5))
 def test_a_shifted_tone_at_the_middle_of_the_band_gives_its_shift(part):
     turn = 2.0 * np.pi * np.arange(1000) / 1000
-    one, other = np.cos(turn), np.cos(turn - 2.0 * np.pi * part)
-    misfit = 0.5 * ((one - other) ** 2).sum() / (one**2).sum()
+    first, other = np.cos(turn), np.cos(turn - 2.0 * np.pi * part)
+    misfit = 0.5 * ((first - other) ** 2).sum() / (first**2).sum()
     assert shift_s(misfit, BAND) == pytest.approx(part * PERIOD_S, rel=1e-6)
 
 

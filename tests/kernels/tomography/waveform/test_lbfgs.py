@@ -20,10 +20,10 @@ def test_a_quadratic_is_solved(seed):
     factor = rng.standard_normal((6, 6))
     curvature = factor @ factor.T + np.eye(6)
     aim = rng.standard_normal(6)
-    place = np.zeros(6)
+    position = np.zeros(6)
     steps = changes = np.zeros((0, 2, 3))
     for _ in range(40):
-        gradient = curvature @ (place - aim)
+        gradient = curvature @ (position - aim)
         if np.linalg.norm(gradient) < 1e-10:
             break
         way = -search_direction(gradient.reshape(2, 3), steps, changes, same).ravel()
@@ -32,8 +32,8 @@ def test_a_quadratic_is_solved(seed):
         steps, changes = append_pair(
             steps, changes, (length * way).reshape(2, 3), (length * curvature @ way).reshape(2, 3), 6
         )
-        place = place + length * way
-    assert np.allclose(place, aim, atol=1e-6)
+        position = position + length * way
+    assert np.allclose(position, aim, atol=1e-6)
 
 
 def test_without_pairs_the_prior_decides():

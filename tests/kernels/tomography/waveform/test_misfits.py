@@ -37,8 +37,8 @@ def test_correlation_is_blind_to_the_size_of_each_trace():
     rng = np.random.default_rng(2)
     simulated, recorded = rng.standard_normal((2, 3, 30))
     factor = np.array([[0.1], [3.0], [40.0]])
-    one = misfits.correlation(simulated, recorded, np.ones((3, 1)))[0]
-    assert misfits.correlation(simulated, factor * recorded, np.ones((3, 1)))[0] == pytest.approx(one)
+    misfit = misfits.correlation(simulated, recorded, np.ones((3, 1)))[0]
+    assert misfits.correlation(simulated, factor * recorded, np.ones((3, 1)))[0] == pytest.approx(misfit)
 
 
 def test_silent_traces_have_zero_misfit():
@@ -54,7 +54,7 @@ def test_silent_traces_have_zero_misfit():
 
 def test_window_holds_the_arrival_and_ends():
     times = np.arange(100.0)
-    found = misfits.arrival_window(np.array([40.0]), times, 20.0, 30.0)[0]
-    assert (found[26:62] == 1.0).all()
-    assert not found[:20].any()
-    assert not found[71:].any()
+    result = misfits.arrival_window(np.array([40.0]), times, 20.0, 30.0)[0]
+    assert (result[26:62] == 1.0).all()
+    assert not result[:20].any()
+    assert not result[71:].any()

@@ -26,10 +26,10 @@ def test_water_shots_are_simulated_as_recorded():
     emitter = int(problem.held[0])
     heard = problem.valid_receivers(emitter)
     medium = problem.medium(np.full(problem.region.shape, 1500.0))
-    found = simulate(medium, problem.emitters[emitter], problem.receivers[heard], problem.wavelet)
+    traces = simulate(medium, problem.emitters[emitter], problem.receivers[heard], problem.wavelet)
     recorded = scan().waveform.water[emitter][heard] @ problem.sampler
     # Size as well as shape.
-    assert np.sqrt(((found - recorded) ** 2).sum() / (recorded**2).sum()) < 0.15
+    assert np.sqrt(((traces - recorded) ** 2).sum() / (recorded**2).sum()) < 0.15
 
 
 def test_a_wrong_speed_of_water_is_found():
@@ -77,16 +77,16 @@ def test_no_other_emissions_are_read_than_the_band_uses():
     recorded = data.waveform
     apart = replace(recorded, object=lazily(recorded.object), water=lazily(recorded.water))
     settings = replace(SETTINGS, bands=(replace(SETTINGS.bands[0], emitters=3),), held_out=2)
-    found, expected = (prepare(replace(data, waveform=one), settings, 0) for one in (apart, recorded))
-    drawn = {*found.used.tolist(), *found.held.tolist()}
-    assert set(read) == set(found.traces) == drawn
+    computed, expected = (prepare(replace(data, waveform=one), settings, 0) for one in (apart, recorded))
+    drawn = {*computed.used.tolist(), *computed.held.tolist()}
+    assert set(read) == set(computed.traces) == drawn
     assert len(drawn) == 5
-    assert np.array_equal(found.wavelet, expected.wavelet)
+    assert np.array_equal(computed.wavelet, expected.wavelet)
     assert np.array_equal(
-        found.recorded(int(found.held[0]), np.arange(24)), expected.recorded(0, np.arange(24))
+        computed.recorded(int(computed.held[0]), np.arange(24)), expected.recorded(0, np.arange(24))
     )
     # What is kept is no part of a block of emissions.
-    assert all(traces.base is None for traces in found.traces.values())
+    assert all(traces.base is None for traces in computed.traces.values())
 
 
 def test_dead_emitters_are_not_used():
@@ -95,8 +95,8 @@ def test_dead_emitters_are_not_used():
     dead = [int(whole.used[1]), int(whole.held[2])]
     traces = data.waveform.object.copy()
     traces[dead] = 0.0
-    found = prepare(replace(data, waveform=replace(data.waveform, object=traces)), SETTINGS, 0)
-    assert sorted({*whole.used, *whole.held} - {*found.used, *found.held}) == sorted(dead)
+    result = prepare(replace(data, waveform=replace(data.waveform, object=traces)), SETTINGS, 0)
+    assert sorted({*whole.used, *whole.held} - {*result.used, *result.held}) == sorted(dead)
     silent = replace(data, waveform=replace(data.waveform, water=np.zeros_like(traces)))
     with pytest.raises(InvalidInput, match="waveform/object, waveform/water: found zeros alone"):
         prepare(silent, SETTINGS, 0)

@@ -36,19 +36,19 @@ def rays():
 
 def test_auto_runs_waveform_inversion_where_it_predicts_better(rays):
     seen = []
-    found = reconstruct(heard(), PLAN, seen.append)
-    assert found.settings == replace(PLAN, method="waveform", decomposition="slices")
-    assert error_of(found) < 0.9 * error_of(rays)
+    result = reconstruct(heard(), PLAN, seen.append)
+    assert result.settings == replace(PLAN, method="waveform", decomposition="slices")
+    assert error_of(result) < 0.9 * error_of(rays)
     # What is refined comes on top of the water's.
     assert rays.attenuation is None
-    assert found.attenuation.shape == found.speed.shape
-    assert (found.attenuation[0] == 0.25).all()
-    assert found.attenuation.min() == 0.25
+    assert result.attenuation.shape == result.speed.shape
+    assert (result.attenuation[0] == 0.25).all()
+    assert result.attenuation.min() == 0.25
     assert seen[-1].done == seen[-1].total
     # What was chosen gives the same bits when asked for by itself.
-    again = reconstruct(heard(), found.settings)
-    assert np.array_equal(again.speed, found.speed)
-    assert again.history == found.history
+    again = reconstruct(heard(), result.settings)
+    assert np.array_equal(again.speed, result.speed)
+    assert again.history == result.history
 
 
 def test_without_a_budget_there_is_only_advice(rays):
@@ -84,12 +84,12 @@ def test_advice_without_waveform_inversion_uses_times():
 def test_held_out_emitters_decide_against_it():
     """Noise as high as the signal: what waves make of it predicts nothing."""
     loud = heard(0.3)
-    found = reconstruct(loud, PLAN)
+    result = reconstruct(loud, PLAN)
     rays = reconstruct(loud, replace(PLAN, minutes=0.0))
-    assert found.settings == replace(rays.settings, minutes=60.0)
-    assert np.array_equal(found.speed, rays.speed)
-    assert found.provenance["waveform"].endswith("not clearly better, so the image of the rays is given")
-    assert any(sweep.band_hz for sweep in found.history)
+    assert result.settings == replace(rays.settings, minutes=60.0)
+    assert np.array_equal(result.speed, rays.speed)
+    assert result.provenance["waveform"].endswith("not clearly better, so the image of the rays is given")
+    assert any(sweep.band_hz for sweep in result.history)
 
 
 def test_a_scan_without_traces_is_not_advised():

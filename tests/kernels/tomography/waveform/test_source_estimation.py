@@ -57,7 +57,7 @@ def test_a_band_begins_with_it_where_the_settings_say_so(truth, spoiled):
 
     band = start_band(Scan(), 0, truth)
     speed = band.state.image
-    assert any(np.array_equal(speed, one.speed) for one in starting_models(truth, spoiled[1], settings))
+    assert any(np.array_equal(speed, model.speed) for model in starting_models(truth, spoiled[1], settings))
     expected = estimate_source(spoiled[1], speed, settings.window_s)
     np.testing.assert_array_equal(band.model.wavelet, expected)
     assert band.model.attenuation is None

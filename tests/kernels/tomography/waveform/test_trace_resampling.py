@@ -25,9 +25,9 @@ def test_a_wave_in_the_band_is_read_at_other_times():
         return np.exp(-(((time - 1e-4) / 2e-5) ** 2)) * np.cos(2.0 * np.pi * 1.7e5 * (time - 1e-4))
 
     # So short a step and so fine a grid that there is no dispersion to put in.
-    found = wave(recorded) @ resampler(recorded, clock, BAND, Water(1500.0), 2e-5)
+    computed = wave(recorded) @ resampler(recorded, clock, BAND, Water(1500.0), 2e-5)
     expected = wave(clock.begin_s + clock.step_s * np.arange(clock.steps))
-    assert np.abs(found - expected).max() < 2e-3
+    assert np.abs(computed - expected).max() < 2e-3
 
 
 def test_coarse_simulations_agree_with_exact_traces_that_were_resampled():
@@ -47,9 +47,9 @@ def test_coarse_simulations_agree_with_exact_traces_that_were_resampled():
     clock = Clock(0.0, step, int(recorded[-1] / step))
 
     def gap(matrix):
-        found = simulate(medium, source, receiver, (wavelet @ matrix).astype(float))[0]
+        computed = simulate(medium, source, receiver, (wavelet @ matrix).astype(float))[0]
         expected = exact @ matrix
-        return np.sqrt(((found - expected) ** 2).sum() / (expected**2).sum())
+        return np.sqrt(((computed - expected) ** 2).sum() / (expected**2).sum())
 
     assert gap(resampler(recorded, clock, BAND, Water(1500.0), spacing)) < 0.06
     # Steps and spacing of an eighth have hardly any dispersion.
@@ -66,7 +66,7 @@ def test_the_water_recorded_is_taken_over():
         trace = np.exp(-(((recorded - 1.2e-4) / 1e-5) ** 2)) * np.cos(
             2.0 * np.pi * 1.7e5 * (recorded - 1.2e-4)
         )
-        found = trace @ resampler(recorded, clock, BAND, Water(1500.0, lead), 2e-4)
-        return 1e-7 * float((np.arange(2300) * found**2).sum() / (found**2).sum())
+        result = trace @ resampler(recorded, clock, BAND, Water(1500.0, lead), 2e-4)
+        return 1e-7 * float((np.arange(2300) * result**2).sum() / (result**2).sum())
 
     assert arrival(0.01) - arrival(0.0) == pytest.approx(0.01 * 1.2e-4, rel=0.05)

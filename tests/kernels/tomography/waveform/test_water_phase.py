@@ -25,9 +25,9 @@ def traces(water):
 @settings(max_examples=20, deadline=None)
 def test_lead_and_bend_are_found(lead, bend):
     plain, true = Water(1500.0), Water(1500.0, lead, bend)
-    found = fit_water(plain, DISTANCE, traces(plain), traces(true), STEP)
-    assert found.lead == pytest.approx(lead, abs=2e-4)
-    assert found.bend == pytest.approx(bend, abs=2e-15)
+    fitted = fit_water(plain, DISTANCE, traces(plain), traces(true), STEP)
+    assert fitted.lead == pytest.approx(lead, abs=2e-4)
+    assert fitted.bend == pytest.approx(bend, abs=2e-15)
 
 
 def test_few_pairs_are_rejected():

@@ -16,10 +16,10 @@ from ....extremes import EXTREMES
 
 @given(centre=st.floats(5e4, 5e6))
 def test_bands_rise_and_their_grids_carry_their_waves(centre):
-    found = bands(centre)
-    assert [band.high_hz for band in found] == sorted(band.high_hz for band in found)
-    assert [band.smoothing_m for band in found] == sorted((b.smoothing_m for b in found), reverse=True)
-    for band in found:
+    made = bands(centre)
+    assert [band.high_hz for band in made] == sorted(band.high_hz for band in made)
+    assert [band.smoothing_m for band in made] == sorted((b.smoothing_m for b in made), reverse=True)
+    for band in made:
         assert 1500.0 / (1.5 * band.high_hz * band.spacing_m) > MIN_POINTS_OPTIMISED
 
 
@@ -58,7 +58,7 @@ def test_bad_settings_are_rejected(words, field):
 
 @pytest.mark.parametrize("settings", [bands(4e5)[0], WaveSettings(bands(4e5))], ids=["band", "all"])
 def test_rejects_numbers_out_of_range(settings):
-    numbers = {one.name for one in fields(settings) if one.type in ("int", "float")}
+    numbers = {field.name for field in fields(settings) if field.type in ("int", "float")}
     assert numbers == set(ranges_of(type(settings)))
     for name, within in ranges_of(type(settings)).items():
         for value in EXTREMES:

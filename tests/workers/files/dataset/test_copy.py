@@ -67,18 +67,18 @@ def test_traces_may_be_stored_in_any_way(tmp_path, monkeypatch, kind, how):
     monkeypatch.setattr(copy, "PIECE_BYTES", 2000)
     values = np.arange(12 * 24 * 20).reshape(12, 24, 20) % 256
     copy_dataset(written(tmp_path / "s.h5", values.astype(kind), **how), tmp_path / "t.h5")
-    found = read_dataset(tmp_path / "t.h5").waveform.object
-    assert found.dtype == (np.float32 if "f" in kind else np.int16)
-    np.testing.assert_array_equal(found, values)
+    traces = read_dataset(tmp_path / "t.h5").waveform.object
+    assert traces.dtype == (np.float32 if "f" in kind else np.int16)
+    np.testing.assert_array_equal(traces, values)
 
 
 def test_damaged_traces_are_named_and_leave_nothing(tmp_path):
     values = np.random.default_rng(0).integers(-999, 999, (12, 24, 20)).astype(np.int16)
     path = written(tmp_path / "s.h5", values, chunks=(1, 24, 20), compression="gzip")
     with h5py.File(path) as file:
-        place = file["waveform/object"].id.get_chunk_info(7)
+        position = file["waveform/object"].id.get_chunk_info(7)
     content = bytearray(path.read_bytes())
-    middle = place.byte_offset + place.size // 2
+    middle = position.byte_offset + position.size // 2
     content[middle : middle + 20] = bytes(20)
     path.write_bytes(content)
     with pytest.raises(InvalidInput) as refused:
@@ -110,12 +110,12 @@ def test_boxes_cover_every_value_once_and_stay_small(data):
     shape = tuple(data.draw(st.lists(st.integers(1, 12), min_size=3, max_size=4)))
     sides = st.tuples(*(st.integers(1, n) for n in shape))
     own, chunk = data.draw(st.none() | sides), data.draw(sides)
-    found = SimpleNamespace(shape=shape, dtype=np.dtype(np.int16), chunks=own)
+    result = SimpleNamespace(shape=shape, dtype=np.dtype(np.int16), chunks=own)
     limit = data.draw(st.integers(2, 4000))
     counts = np.zeros(shape, dtype=int)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(copy, "PIECE_BYTES", limit)
-        for where in copy.blocks(found, chunk):
+        for where in copy.blocks(result, chunk):
             counts[where] += 1
             assert counts[where].size * 2 <= max(limit, 2 * np.prod(own or 1))
             if own is not None:

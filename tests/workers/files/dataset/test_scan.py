@@ -22,10 +22,10 @@ def test_a_missing_centre_frequency_is_estimated_from_the_traces(tmp_path, stack
         slices = replace(traces, object=traces.object[None], water=traces.water[None])
         whole = replace(whole, waveform=slices, slice_z_m=whole.element_position_m[:1, 0])
     write_dataset(tmp_path / "scan.h5", whole)
-    found = read_scan(tmp_path / "scan.h5")
-    assert found.waveform is None
-    assert found.center_frequency_hz == pytest.approx(FREQUENCY_HZ, rel=0.1)
-    assert counts_in(tmp_path / "scan.h5").frequency_hz == found.center_frequency_hz
+    result = read_scan(tmp_path / "scan.h5")
+    assert result.waveform is None
+    assert result.center_frequency_hz == pytest.approx(FREQUENCY_HZ, rel=0.1)
+    assert counts_in(tmp_path / "scan.h5").frequency_hz == result.center_frequency_hz
     assert counts_in(tmp_path / "scan.h5").summary(Settings(method="waveform")).traces is not None
 
 

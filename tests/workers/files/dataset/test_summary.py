@@ -18,11 +18,11 @@ def test_summary_counts_match_the_problem(tmp_path, reciprocity):
     dataset, path = small(), tmp_path / "scan.h5"
     write_dataset(path, dataset)
     asked = Settings.of(method="sart", reciprocity=reciprocity)
-    found, pairs = summary_of(path, asked), of(dataset, asked, 0)
-    assert (found.emitters, found.receivers) == pairs.delta_tof.shape
-    assert (found.pairs, found.slices, found.in_space, found.height_m) == (12 * 24, 1, False, 0.0)
-    assert found.width_m == pytest.approx(0.2, rel=1e-2)
-    assert (found.traces_bytes, found.amplitudes) == (0, False)
+    summary, pairs = summary_of(path, asked), of(dataset, asked, 0)
+    assert (summary.emitters, summary.receivers) == pairs.delta_tof.shape
+    assert (summary.pairs, summary.slices, summary.in_space, summary.height_m) == (12 * 24, 1, False, 0.0)
+    assert summary.width_m == pytest.approx(0.2, rel=1e-2)
+    assert (summary.traces_bytes, summary.amplitudes) == (0, False)
 
 
 def test_traces_that_must_be_picked_and_heights_count(tmp_path, scan):
@@ -30,6 +30,6 @@ def test_traces_that_must_be_picked_and_heights_count(tmp_path, scan):
     write_dataset(path, dataset)
     assert summary_of(path, Settings(method="sart")).traces_bytes == 2 * 12 * 24 * 20 * 2
     write_dataset(path, replace(scan, log_ratio_np=np.zeros_like(scan.delta_tof_s)))
-    found = summary_of(path, Settings(method="sart"))
-    assert (found.slices, found.pairs, found.height_m) == (3, 3 * 24 * 24, 0.006)
-    assert found.amplitudes
+    summary = summary_of(path, Settings(method="sart"))
+    assert (summary.slices, summary.pairs, summary.height_m) == (3, 3 * 24 * 24, 0.006)
+    assert summary.amplitudes

@@ -52,16 +52,16 @@ def test_an_emission_at_a_time_is_the_whole(tmp_path, monkeypatch, stacked, kind
     whole = read_dataset(path, traces=False)
     for index in range(dataset.slices):
         expected = dataset.slice(index).waveform
-        with open_slice(path, whole, index) as one:
+        with open_slice(path, whole, index) as slice_data:
             for name in ("object", "water"):
-                sought, lazily = getattr(expected, name), getattr(one.waveform, name)
+                sought, lazily = getattr(expected, name), getattr(slice_data.waveform, name)
                 assert (lazily.shape, lazily.dtype) == (sought.shape, sought.dtype)
                 for e in (5, 0, 7, 1):
                     np.testing.assert_array_equal(lazily[e], sought[e])
                 np.testing.assert_array_equal(np.asarray(lazily), sought)
-            assert one.waveform.scale == 2.0
-            np.testing.assert_array_equal(one.waveform.object_scale, expected.object_scale)
-            assert one.waveform.water_scale is None
+            assert slice_data.waveform.scale == 2.0
+            np.testing.assert_array_equal(slice_data.waveform.object_scale, expected.object_scale)
+            assert slice_data.waveform.water_scale is None
 
 
 def test_damaged_traces_are_reported_when_read(tmp_path):
@@ -72,14 +72,14 @@ def test_damaged_traces_are_reported_when_read(tmp_path):
     content = bytearray(path.read_bytes())
     content[at.byte_offset : at.byte_offset + at.size] = bytes(at.size)
     path.write_bytes(content)
-    with open_slice(path, read_dataset(path, traces=False), 0) as one:
-        assert one.waveform.object[2].shape == (8, 50)
+    with open_slice(path, read_dataset(path, traces=False), 0) as slice_data:
+        assert slice_data.waveform.object[2].shape == (8, 50)
         with pytest.raises(InvalidInput, match="waveform/object: found damaged data"):
-            one.waveform.object[3]
+            slice_data.waveform.object[3]
 
 
 def test_without_traces_there_are_none(tmp_path):
     known = replace(scan(elements=8), waveform=None, delta_tof_s=np.zeros((8, 8)))
     write_dataset(tmp_path / "scan.h5", known)
-    with open_slice(tmp_path / "scan.h5", known, 0) as one:
-        assert one.waveform is None
+    with open_slice(tmp_path / "scan.h5", known, 0) as slice_data:
+        assert slice_data.waveform is None

@@ -38,9 +38,9 @@ def traced(files, tof, receivers, source, *, curved):
     while blocks := rays.next_blocks():
         for block, some, mine, points in [(block, *rays.visit(block)) for block in blocks]:
             versions = ["tof"] * files.blocks if curved else []
-            found = trace_rays_in_block(files, 0, block, SPACING, versions, at_source, some, points)
-            rays.visited(block, mine, points, found)
-            visits, caught = visits + 1, caught + int((found.ends == CAUGHT).sum())
+            result = trace_rays_in_block(files, 0, block, SPACING, versions, at_source, some, points)
+            rays.visited(block, mine, points, result)
+            visits, caught = visits + 1, caught + int((result.ends == CAUGHT).sum())
     return rays, visits, caught
 
 
@@ -59,7 +59,7 @@ def whole_sums(files, rays, corrections):
 @pytest.mark.parametrize("contrast", [0.05, 0.9], ids=["smooth", "rough"])
 @pytest.mark.parametrize("blocks", effort([2, 7], [1, 2, 7, 19]))
 def test_rays_equal_those_of_the_whole_grid(tmp_path, kind, contrast, blocks):
-    found = []
+    computed = []
     chaotic = contrast > 0.5 and kind == "curved"
     differences = []
     for seed in range(effort(2, 10)):
@@ -67,10 +67,10 @@ def test_rays_equal_those_of_the_whole_grid(tmp_path, kind, contrast, blocks):
         speed = 1500.0 * rng.uniform(1.0 - contrast, 1.0 + contrast, SHAPE)
         extent = SPACING * (np.array(SHAPE) - 1)
         # Some on nodes, where two blocks meet, and on the faces of the grid.
-        places = rng.uniform(0.0, 1.0, (24, 3)) * extent
-        places[::3] = np.round(places[::3] / SPACING) * SPACING
-        places[::8, 0] = extent[0]
-        source, receivers = places[1], places
+        points = rng.uniform(0.0, 1.0, (24, 3)) * extent
+        points[::3] = np.round(points[::3] / SPACING) * SPACING
+        points[::8, 0] = extent[0]
+        source, receivers = points[1], points
         tof = eikonal.solve(speed, SPACING, source, "fsm")
         expected = sensitivities(tof, SPACING, receivers, source, kind=kind)
         files = BlockFiles(tmp_path / f"{seed}", SHAPE, blocks)
@@ -86,14 +86,14 @@ def test_rays_equal_those_of_the_whole_grid(tmp_path, kind, contrast, blocks):
             assert np.allclose(weights.ravel() * SPACING, expected.sum(axis=0), rtol=0.0, atol=1e-13)
         assert weights.sum() == pytest.approx(rays.lengths.sum(), rel=1e-12)
         assert sums.sum() == pytest.approx(corrections @ rays.lengths, rel=1e-9, abs=1e-9)
-        found.append((visits, caught))
+        computed.append((visits, caught))
     # Rough media amplify rounding along some rays.
     assert np.median(differences) < 1e-12
     assert np.max(differences) < (1e-2 if chaotic else 1e-12)
     if chaotic:
-        assert any(caught for _, caught in found), "some rays go from node to node"
+        assert any(caught for _, caught in computed), "some rays go from node to node"
     if kind == "curved":
-        assert all(visits <= 3 * blocks + 4 for visits, _ in found), "each block is visited about once"
+        assert all(visits <= 3 * blocks + 4 for visits, _ in computed), "each block is visited about once"
 
 
 def test_a_caught_ray_begins_again_and_its_first_parts_count_nothing(tmp_path):
