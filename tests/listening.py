@@ -29,7 +29,7 @@ def beyond_loopback(sockets: set[tuple[str, int]]) -> set[tuple[str, int]]:
 
 def pages(sockets: set[tuple[str, int]]) -> list[str]:
     """The pages of Dask that are shown."""
-    found = []
+    results = []
     with httpx.Client(timeout=5.0) as client:
         for host, port in sorted(sockets):
             for page in PAGES:
@@ -38,5 +38,5 @@ def pages(sockets: set[tuple[str, int]]) -> list[str]:
                 except httpx.HTTPError:  # speaks something else, as Dask's own protocol
                     break
                 if answer.status_code != httpx.codes.NOT_FOUND:
-                    found.append(str(answer.url))
-    return found
+                    results.append(str(answer.url))
+    return results

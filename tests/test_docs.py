@@ -66,9 +66,9 @@ def shell_lines() -> list[str]:
     return [
         line
         for page in PAGES
-        for one in blocks(page)
-        if one.language == "sh"
-        for line in one.text.splitlines()
+        for block in blocks(page)
+        if block.language == "sh"
+        for line in block.text.splitlines()
     ]
 
 
@@ -138,11 +138,11 @@ class Reader:
             self.seen[kind] = f"{kind}-{number}"
 
     def _run(self, command: list[str]) -> str:
-        place = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+        environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
         done = subprocess.run(
             command,
             cwd=self.folder,
-            env=place,
+            env=environment,
             capture_output=True,
             text=True,
             timeout=PATIENCE_S,
@@ -199,10 +199,10 @@ def test_links_of_every_page_resolve() -> None:
     for page in PAGES:
         text = page.read_text()
         for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text):
-            place = (page.parent / target).resolve()
-            built = place.is_relative_to(DOCS) and str(place.relative_to(DOCS).with_suffix("")) in GALLERY
+            linked = (page.parent / target).resolve()
+            built = linked.is_relative_to(DOCS) and str(linked.relative_to(DOCS).with_suffix("")) in GALLERY
             if "://" not in target:
-                assert built or place.exists(), f"{page.name}: {target}"
+                assert built or linked.exists(), f"{page.name}: {target}"
         for path in re.findall(r"`((?:deploy|benchmarks)/[\w./-]+)`", text):
             assert (ROOT / path).exists(), f"{page.name}: {path}"
 
@@ -255,14 +255,14 @@ def test_pictures_are_shown_small_and_in_full_colour() -> None:
 
 def symbols(text: str) -> set[str]:
     """Letters of the formulas of a text, without indices and words."""
-    found: set[str] = set()
+    listed: set[str] = set()
     for block, line in re.findall(r"\$\$(.*?)\$\$|\$([^$\n]+)\$", text, re.DOTALL):
         formula = re.sub(r"\\(?:text|mathrm|begin|end)\{[^}]*\}", " ", block or line)
         formula = re.sub(r"_(?:\{[^{}]*\}|\\?\w)", "", formula)
-        found |= set(GREEK.findall(formula)) | set(
+        listed |= set(GREEK.findall(formula)) | set(
             re.findall("[a-zA-Z]", re.sub(r"\\[a-zA-Z]+", " ", formula))
         )
-    return found
+    return listed
 
 
 @pytest.mark.parametrize("page", sorted((DOCS / "mathematics").glob("*.md")), ids=lambda page: page.stem)

@@ -26,14 +26,14 @@ PAGE = """<html><head><style>p { color: red; }</style></head><body>
 
 def formulas() -> list[tuple[str, str, bool]]:
     """Page, formula and whether it stands on lines of its own."""
-    found = []
+    results = []
     for page in sorted(DOCS.rglob("*.md")):
         text = re.sub(r"```.*?```|`[^`\n]*`", "", page.read_text(), flags=re.DOTALL)
-        found += [
+        results += [
             (page.name, block or line, bool(block))
             for block, line in re.findall(r"\$\$(.*?)\$\$|\$([^$\n]+)\$", text, re.DOTALL)
         ]
-    return found
+    return results
 
 
 def test_every_formula_is_converted() -> None:
@@ -50,27 +50,27 @@ def test_an_unknown_command_is_an_error() -> None:
 
 def test_pages_have_nothing_inline(tmp_path: Path) -> None:
     parts = offline.Parts(tmp_path)
-    found = parts.separated(PAGE, "../")
+    result = parts.separated(PAGE, "../")
     parts.write_styles()
-    assert not offline.LEFT.search(found)
+    assert not offline.LEFT.search(result)
     assert offline.LEFT.search(PAGE)
-    files = re.findall(r"(?:src|href)=\"\.\./([^\"]+)", found)
+    files = re.findall(r"(?:src|href)=\"\.\./([^\"]+)", result)
     content = [(tmp_path / name).read_bytes() for name in files]
     assert b"let a = 1;" in content
     assert b"p { color: red; }" in content
     assert any(one.startswith(b"\x89PNG") for one in content)
     assert any(b"width: 3%" in one for one in content)
-    assert parts.separated(found, "../") == found, "a page that was not built again stays as it is"
+    assert parts.separated(result, "../") == result, "a page that was not built again stays as it is"
 
 
 def test_style_sheets_have_no_data_addresses(tmp_path: Path) -> None:
     parts = offline.Parts(tmp_path)
     sheet = """a { --i: url('data:image/svg+xml;charset=utf-8,<svg x="1"/>'); b: url("own.svg") }
     c { d: url("data:image/svg+xml;charset=utf-8,%3Csvg y='2'/%3E") }"""
-    found = parts.with_files(sheet, "../")
-    assert "data:" not in found
-    assert "own.svg" in found
-    drawings = [(tmp_path / name).read_text() for name in re.findall(r'url\("\.\./([^"]+)', found)]
+    result = parts.with_files(sheet, "../")
+    assert "data:" not in result
+    assert "own.svg" in result
+    drawings = [(tmp_path / name).read_text() for name in re.findall(r'url\("\.\./([^"]+)', result)]
     assert drawings == ['<svg x="1"/>', "<svg y='2'/>"]
 
 

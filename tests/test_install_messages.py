@@ -56,9 +56,9 @@ def test_every_extra_that_is_named_exists() -> None:
 
 
 def test_every_optional_library_is_in_its_extra() -> None:
-    found = list(optional_calls())
-    assert {"xarray", "zarr", "highdicom", "dask_jobqueue"} <= {library for _, library, _ in found}
-    for name, library, extra in found:
+    listed = list(optional_calls())
+    assert {"xarray", "zarr", "highdicom", "dask_jobqueue"} <= {library for _, library, _ in listed}
+    for name, library, extra in listed:
         assert normal(library.partition(".")[0]) in EXTRAS[extra], (name, library, extra)
 
 

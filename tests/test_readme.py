@@ -37,22 +37,22 @@ COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 
 def shell_lines() -> list[tuple[str, list[str]]]:
     """Every command in a block of shell in the texts, as words; ``a && b`` are two."""
-    found = []
+    results = []
     for name in TEXTS:
         for block in re.findall(r"```sh\n(.*?)```", (ROOT / name).read_text(), re.DOTALL):
             for line in block.splitlines():
-                found += [(name, shlex.split(part)) for part in line.split(" && ")]
-    return found
+                results += [(name, shlex.split(part)) for part in line.split(" && ")]
+    return results
 
 
 def lines_of(program: str) -> list[list[str]]:
     """The words after ``program`` on every line that runs it."""
-    found = []
+    results = []
     for _, words in shell_lines():
         command = [word for word in words if not re.fullmatch(r"[A-Z_]+=.*", word)]
         if command[0].removeprefix(".venv/bin/") == program:
-            found.append(command[1:])
-    return found
+            results.append(command[1:])
+    return results
 
 
 def test_the_readme_opens_with_the_two_commands() -> None:

@@ -102,13 +102,13 @@ def test_folders_are_small_enough_to_search() -> None:
 
 
 def test_no_file_names_a_folder_of_somebodys_machine() -> None:
-    found = [(name, match[0]) for name, text in committed_texts() if (match := MACHINE_PATH.search(text))]
-    assert found == []
+    result = [(name, match[0]) for name, text in committed_texts() if (match := MACHINE_PATH.search(text))]
+    assert result == []
 
 
 def test_no_file_names_a_package_index() -> None:
-    found = [(name, match[0]) for name, text in committed_texts() if (match := INDEX_HOST.search(text))]
-    assert found == []
+    result = [(name, match[0]) for name, text in committed_texts() if (match := INDEX_HOST.search(text))]
+    assert result == []
 
 
 @pytest.mark.parametrize("folder", ["root", "work", "opt", "home/ann", "Users"])
@@ -133,15 +133,15 @@ def test_no_committed_file_is_large() -> None:
 
 def requirements(lock: str) -> dict[str, list[str]]:
     """The packages of a lock file, by their normalised name, each with the lines below it."""
-    found: dict[str, list[str]] = {}
+    results: dict[str, list[str]] = {}
     below: list[str] = []
     for line in (ROOT / lock).read_text().splitlines():
         if line.startswith("#") or not line.strip():
             continue
         if not line.startswith(" "):
-            below = found.setdefault(normal(line), [])
+            below = results.setdefault(normal(line), [])
         below.append(line)
-    return found
+    return results
 
 
 def normal(requirement: str) -> str:
@@ -166,7 +166,7 @@ def test_lock_files_cover_pyproject(lock: str, extras: tuple[str, ...]) -> None:
         *project["dependencies"],
         *(one for extra in extras for one in project["optional-dependencies"][extra]),
     ]
-    assert {normal(one) for one in asked} - set(requirements(lock)) == set()
+    assert {normal(request) for request in asked} - set(requirements(lock)) == set()
 
 
 def test_the_reference_gives_the_reason_of_every_dependency() -> None:

@@ -18,22 +18,22 @@ VARIABLE = re.compile(r"\$\{(\w+):-([^}]*)\}")
 
 def read(*overrides: Path) -> dict[str, Any]:
     """The whole file with the default of every variable in its place, and on top of it the overrides."""
-    found: dict[str, Any] = yaml.safe_load(VARIABLE.sub(r"\2", FILE.read_text()))
+    result: dict[str, Any] = yaml.safe_load(VARIABLE.sub(r"\2", FILE.read_text()))
     for path in overrides:
-        found = _merged(found, yaml.safe_load(VARIABLE.sub(r"\2", path.read_text())))
-    return found
+        result = _merged(result, yaml.safe_load(VARIABLE.sub(r"\2", path.read_text())))
+    return result
 
 
 def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     """As compose merges: mappings key by key, secrets one after the other, all else is replaced."""
-    found = dict(below)
+    result = dict(below)
     for name, value in above.items():
         known = below.get(name)
         if isinstance(value, dict) and isinstance(known, dict):
-            found[name] = _merged(known, value)
+            result[name] = _merged(known, value)
         else:
-            found[name] = [*known, *value] if name == "secrets" and isinstance(known, list) else value
-    return found
+            result[name] = [*known, *value] if name == "secrets" and isinstance(known, list) else value
+    return result
 
 
 def variables() -> set[str]:

@@ -38,14 +38,14 @@ LONG = Settings(method="sart", nodes=64, iterations=80, rays="straight")
 
 @pytest.fixture(scope="module")
 def installation(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installation]:
-    found = Installation(tmp_path_factory.mktemp("installation"))
+    result = Installation(tmp_path_factory.mktemp("installation"))
     try:
         for part in PARTS:
-            found.start(part)
-            found.wait_for(part)
-        yield found
+            result.start(part)
+            result.wait_for(part)
+        yield result
     finally:
-        found.close()
+        result.close()
 
 
 @pytest.fixture(scope="module")

@@ -36,8 +36,8 @@ def run(*command: str, folder: Path) -> str:
 
 
 def only(folder: Path, pattern: str) -> Path:
-    (found,) = folder.glob(pattern)
-    return found
+    (result,) = folder.glob(pattern)
+    return result
 
 
 def test_the_wheel_holds_the_packages_and_nothing_else(dist: Path) -> None:

@@ -61,10 +61,10 @@ def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Environme
     (wheel,) = dist.glob("*.whl")
     shutil.copy(ROOT / "requirements.lock", folder)
     subprocess.run([sys.executable, "-m", "venv", str(folder / "env")], check=True)
-    found = Environment(folder)
-    found.run("pip", "install", "-q", "--require-hashes", "-r", str(folder / "requirements.lock"))
-    found.run("pip", "install", "-q", "--no-deps", str(wheel))
-    return found
+    environment = Environment(folder)
+    environment.run("pip", "install", "-q", "--require-hashes", "-r", str(folder / "requirements.lock"))
+    environment.run("pip", "install", "-q", "--no-deps", str(wheel))
+    return environment
 
 
 @pytest.fixture(scope="module")
@@ -89,10 +89,10 @@ def url(installed: Environment) -> Iterator[str]:
 
 
 def test_the_demo_gets_a_better_image_along_bent_rays(installed: Environment) -> None:
-    found = json.loads(installed.run("bentray", "demo", "--nodes", "48", "--elements", "64", "--json"))[
+    record = json.loads(installed.run("bentray", "demo", "--nodes", "48", "--elements", "64", "--json"))[
         "jobs"
     ]
-    straight, bent = (found[name]["truth"]["mean_absolute_error_of_range"] for name in ("straight", "bent"))
+    straight, bent = (record[name]["truth"]["mean_absolute_error_of_range"] for name in ("straight", "bent"))
     assert bent < straight < 0.2
 
 

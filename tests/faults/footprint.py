@@ -57,7 +57,7 @@ def measured(service: LiveService) -> Footprint:
     family = [own, *own.children(recursive=True)]
     return Footprint(
         service_mib=own.memory_info().rss / MIB,
-        workers_mib=sum(one.memory_info().rss for one in workers) / MIB,
+        workers_mib=sum(worker.memory_info().rss for worker in workers) / MIB,
         descriptors=sum(one.num_fds() for one in family),
         threads=sum(one.num_threads() for one in family),
         processes=len(family),
@@ -70,8 +70,8 @@ def measured(service: LiveService) -> Footprint:
 def rows(data: Path) -> dict[str, int]:
     """How many rows each table has that clients fill, without empty ones."""
     with closing(_database(data)) as database:
-        found = {name: database.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in TABLES}
-    return {name: count for name, count in found.items() if count}
+        result = {name: database.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in TABLES}
+    return {name: count for name, count in result.items() if count}
 
 
 def stored(data: Path) -> list[Path]:
@@ -84,8 +84,8 @@ def oldest_upload(data: Path) -> float | None:
     """When the oldest unfinished upload was begun, s since 1970."""
     query = "SELECT min(created) FROM uploads WHERE state = 'receiving'"
     with closing(_database(data)) as database:
-        found = database.execute(query).fetchone()[0]
-    return None if found is None else float(found)
+        result = database.execute(query).fetchone()[0]
+    return None if result is None else float(result)
 
 
 def rise(values: Sequence[float]) -> float:

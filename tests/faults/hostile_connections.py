@@ -51,40 +51,40 @@ class HostileConnections:
 
     def tiny_chunks(self) -> None:
         """A body in chunks of a byte, as fast as they go."""
-        with self._connected() as one:
-            one.sendall(self._head("POST", "/v1/datasets", "Transfer-Encoding: chunked"))
+        with self._connected() as single:
+            single.sendall(self._head("POST", "/v1/datasets", "Transfer-Encoding: chunked"))
             with suppress(OSError):
                 for _ in range(200):
-                    one.sendall(b"1\r\nx\r\n" * 1000)
-            self._note(one, "tiny chunks")
+                    single.sendall(b"1\r\nx\r\n" * 1000)
+            self._note(single, "tiny chunks")
 
     def bodies_that_never_come(self) -> None:
         """Ten large bodies that are declared, and hardly begun."""
         with ExitStack() as open_ones:
             for path in 5 * ("/v1/datasets", "/v1/volumes?spacing_m=0.001"):
-                one = open_ones.enter_context(self._connected())
-                one.sendall(self._head("POST", path, f"Content-Length: {2 * 10**9}") + bytes(100))
+                single = open_ones.enter_context(self._connected())
+                single.sendall(self._head("POST", path, f"Content-Length: {2 * 10**9}") + bytes(100))
             time.sleep(2.0)
 
     def forged(self) -> None:
         """A body under a key that is none: refused before it comes."""
-        with self._connected() as one:
+        with self._connected() as single:
             head = self._head("POST", "/v1/datasets", "Content-Length: 1000000").replace(self._key, FORGED)
-            one.sendall(head)
-            self._note(one, "a forged key")
+            single.sendall(head)
+            self._note(single, "a forged key")
 
     def no_http(self) -> None:
         """What is no HTTP, and heads beyond every limit."""
         for words in NO_HTTP:
-            with self._connected() as one:
+            with self._connected() as single:
                 with suppress(OSError):
-                    one.sendall(words)
-                self._note(one, "no HTTP")
+                    single.sendall(words)
+                self._note(single, "no HTTP")
 
     def gone(self, path: str) -> None:
         """Ask for something, and leave."""
-        with self._connected() as one:
-            one.sendall(self._head("GET", path))
+        with self._connected() as single:
+            single.sendall(self._head("GET", path))
             time.sleep(0.2)
 
     def _connected(self) -> socket.socket:

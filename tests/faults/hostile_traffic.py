@@ -182,10 +182,10 @@ class HostileTraffic:
                 self._ledger.fault(f"{given[:40]} was answered {answer.status_code}")
 
     def _ids_of_others(self) -> None:
-        known = [one for victim in self._victims for one in self._ledger.ids(victim)]
+        known = [item for victim in self._victims for item in self._ledger.ids(victim)]
         for one in self._chance.sample(sorted(known), min(8, len(known))):
-            place = {"ds": "datasets", "vol": "volumes", "mesh": "meshes", "job": "jobs", "up": "uploads"}
-            path = f"/v1/{place[one.partition('-')[0]]}/{one}"
+            kinds = {"ds": "datasets", "vol": "volumes", "mesh": "meshes", "job": "jobs", "up": "uploads"}
+            path = f"/v1/{kinds[one.partition('-')[0]]}/{one}"
             further = {"volumes": "/data", "datasets": "/file", "jobs": "/events"}
             asked = [("GET", path, {}), ("GET", path + further.get(path.split("/")[2], ""), {})]
             if "jobs" in path:
@@ -249,8 +249,8 @@ class HostileTraffic:
             ]
             time.sleep(self._chance.uniform(0.0, 0.3))
             gone = pool.submit(self._ask, "DELETE", f"/v1/volumes/{volume}").result()
-            for one in reads:
-                one.result()
+            for item in reads:
+                item.result()
         if gone.status_code not in (204, 503):
             self._ledger.fault(f"DELETE beside readers was answered {gone.status_code}")
 

@@ -64,15 +64,15 @@ class Ledger:
 
     def told_to_two(self) -> set[str]:
         """Ids that were named to two tenants."""
-        found = Counter(one for its in self._ids.values() for one in its)
-        return {one for one, times in found.items() if times > 1}
+        result = Counter(item for its in self._ids.values() for item in its)
+        return {value for value, times in result.items() if times > 1}
 
     def statuses(self, who: str) -> dict[int, int]:
         """How often somebody got which status."""
-        found: Counter[int] = Counter()
+        result: Counter[int] = Counter()
         for (whose, _, status), times in self.counts.items():
-            found[status] += times if whose == who else 0
-        return {status: times for status, times in sorted(found.items()) if times}
+            result[status] += times if whose == who else 0
+        return {status: times for status, times in sorted(result.items()) if times}
 
 
 def _is_json(request: httpx.Request) -> bool:

@@ -25,8 +25,8 @@ def wait_until(so: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
     deadline = time.monotonic() + patience_s
     while True:
         try:
-            if found := so():
-                return found
+            if result := so():
+                return result
         except httpx.TransportError:
             pass
         assert time.monotonic() < deadline, "it did not happen in time"
@@ -139,18 +139,18 @@ class Machine:
 
     def job(self, job_id: str) -> dict[str, Any]:
         """The record of a job."""
-        found: dict[str, Any] = self.http.get(f"/v1/jobs/{job_id}").raise_for_status().json()
-        return found
+        record: dict[str, Any] = self.http.get(f"/v1/jobs/{job_id}").raise_for_status().json()
+        return record
 
     def ended(self, job_id: str, patience_s: float = PATIENCE_S) -> dict[str, Any]:
         """The record of a job at its end."""
 
         def record() -> dict[str, Any] | None:
-            found = self.job(job_id)
-            return found if found["state"] in ENDED else None
+            result = self.job(job_id)
+            return result if result["state"] in ENDED else None
 
-        found: dict[str, Any] = wait_until(record, patience_s)
-        return found
+        result: dict[str, Any] = wait_until(record, patience_s)
+        return result
 
     def close(self) -> None:
         """End every part; nothing may be left."""
@@ -173,11 +173,11 @@ class Machine:
 
 def below(pid: int) -> list[int]:
     """The processes that one has started, and theirs."""
-    found = []
+    results = []
     for task in Path(f"/proc/{pid}/task").glob("*"):
         for child in (task / "children").read_text().split():
-            found += [int(child), *below(int(child))]
-    return found
+            results += [int(child), *below(int(child))]
+    return results
 
 
 def command_of(pid: int) -> bytes:
@@ -190,12 +190,12 @@ def command_of(pid: int) -> bytes:
 
 def of_session(session: int) -> list[int]:
     """The processes of a session that are still there, and no zombies."""
-    found = []
+    results = []
     for status in Path("/proc").glob("[0-9]*/stat"):
         try:
             state, _, _, own = status.read_text().rpartition(") ")[2].split()[:4]
         except OSError:
             continue
         if int(own) == session and state != "Z":
-            found.append(int(status.parent.name))
-    return found
+            results.append(int(status.parent.name))
+    return results

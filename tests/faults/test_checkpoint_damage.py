@@ -27,7 +27,7 @@ def test_the_newest_checkpoint_is_flipped_while_the_service_is_dead(machine, sca
     machine.start("service")
     assert machine.ended(job)["state"] == "succeeded"
     assert f"checkpoint {newest.name} is not used" in (machine.data.parent / "service.log").read_text()
-    found = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
-    assert np.array_equal(found.speed, reconstruct(scan, from_stored(PLAN)).speed)
+    restored = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
+    assert np.array_equal(restored.speed, reconstruct(scan, from_stored(PLAN)).speed)
     assert older.parent == folder
     wait_until(lambda: not folder.exists())

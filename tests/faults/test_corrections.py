@@ -80,8 +80,8 @@ def test_a_killed_correction_leaves_the_scan_and_a_whole_copy_or_none(tmp_path):
         made = corrected(service, here)
         assert made.status_code == 201, made.text
         original = read_dataset(stored)
-        for one in scans(service)[:-1]:
-            copy = whole(service, one, tmp_path / "copy.h5")
+        for scan in scans(service)[:-1]:
+            copy = whole(service, scan, tmp_path / "copy.h5")
             assert copy.center_frequency_hz == CORRECTION["frequency_hz"]
             np.testing.assert_array_equal(copy.waveform.object, original.waveform.object)
     finally:

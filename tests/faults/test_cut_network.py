@@ -74,7 +74,7 @@ def test_a_cable_that_is_cut_for_a_while(tmp_path, away, scan, scan_file):
         assert machine.job(job)["state"] in ("running", "queued")
         ip("link", "set", cable, "up")
         assert machine.ended(job)["state"] == "succeeded"
-        found = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
-        assert np.array_equal(found.speed, reconstruct(scan, from_stored(PLAN)).speed)
+        restored = read_reconstruction(machine.files / "volumes" / f"vol-{job.removeprefix('job-')}.h5")
+        assert np.array_equal(restored.speed, reconstruct(scan, from_stored(PLAN)).speed)
     finally:
         machine.close()

@@ -30,10 +30,10 @@ def test_a_job_waits_for_room(tmp_path, small_disk, scan, scan_file):
         wait_until(lambda: "the disk is full" in (tmp_path / "service.log").read_text())
         filler.unlink()
         assert machine.ended(job)["state"] == "succeeded"
-        found = read_reconstruction(
+        restored = read_reconstruction(
             small_disk / "tenants/local/volumes" / f"vol-{job.removeprefix('job-')}.h5"
         )
-        assert np.array_equal(found.speed, reconstruct(scan, from_stored(PLAN)).speed)
+        assert np.array_equal(restored.speed, reconstruct(scan, from_stored(PLAN)).speed)
         with sqlite3.connect(small_disk / "bentray.sqlite") as database:
             notes = [note for (note,) in database.execute("SELECT note FROM events ORDER BY number")]
         assert "the disk is full; the job continues once there is space" in notes

@@ -194,13 +194,13 @@ def spell(honest: list[HonestTenant], hostile: HostileTraffic, until: float) -> 
 def at_rest(service: LiveService) -> Footprint:
     """A sample once nothing has become less for a while."""
     deadline = time.monotonic() + SETTLE_S
-    found = measured(service)
+    comparison = measured(service)
     while True:
         time.sleep(REST_S)
-        before, found = found, measured(service)
-        less = found.descriptors < before.descriptors or found.bytes < before.bytes
+        before, comparison = comparison, measured(service)
+        less = comparison.descriptors < before.descriptors or comparison.bytes < before.bytes
         if not less or time.monotonic() > deadline:
-            return found
+            return comparison
 
 
 def check_flat(samples: list[Footprint]) -> None:
@@ -210,9 +210,9 @@ def check_flat(samples: list[Footprint]) -> None:
     assert rise([one.workers_mib for one in warm]) < MAX_WORKERS_MIB
     assert rise([one.descriptors for one in warm]) < MAX_DESCRIPTORS
     assert rise([one.threads for one in warm]) < MAX_THREADS
-    assert {one.processes for one in samples} == {samples[0].processes}
-    assert [one.rows for one in samples] == [{}] * len(samples)
-    assert [one.bytes for one in samples] == [0] * len(samples)
+    assert {sample.processes for sample in samples} == {samples[0].processes}
+    assert [sample.rows for sample in samples] == [{}] * len(samples)
+    assert [sample.bytes for sample in samples] == [0] * len(samples)
 
 
 def check_stop(service: LiveService, hostile: HostileTraffic) -> None:

@@ -44,7 +44,7 @@ def test_submit_survives_a_service_restart(
     assert "The service answers again." in stderr
     jobs = machine.http.get("/v1/jobs").json()["jobs"]
     assert [job["id"] for job in jobs if job["id"] not in before] == [json.loads(stdout)["job"]]
-    found = read_reconstruction(tmp_path / "reconstruction.h5")
+    restored = read_reconstruction(tmp_path / "reconstruction.h5")
     np.testing.assert_array_equal(
-        found.speed, reconstruct(scan, Settings(method="sart", nodes=64, iterations=120)).speed
+        restored.speed, reconstruct(scan, Settings(method="sart", nodes=64, iterations=120)).speed
     )

@@ -33,8 +33,8 @@ def wait_for(happened):
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         try:
-            if found := happened():
-                return found
+            if result := happened():
+                return result
         except httpx.TransportError:
             pass
         time.sleep(0.05)
@@ -81,8 +81,8 @@ def test_upload_survives_a_service_kill(tmp_path):
     service.start()
     try:
         headers = {**TUS, "Upload-Length": str(len(content))}
-        place = httpx.post(f"{service.url}/v1/uploads", headers=headers).headers["location"]
-        stored = tmp_path / "data" / "tenants" / "local" / "uploads" / place.rpartition("/")[2]
+        location = httpx.post(f"{service.url}/v1/uploads", headers=headers).headers["location"]
+        stored = tmp_path / "data" / "tenants" / "local" / "uploads" / location.rpartition("/")[2]
 
         def slowly():
             for at in range(0, len(content), 2**18):
@@ -92,7 +92,7 @@ def test_upload_survives_a_service_kill(tmp_path):
         def send():
             headers = {**PIECE, "Upload-Offset": "0"}
             try:
-                httpx.patch(service.url + place, headers=headers, content=slowly(), timeout=PATIENCE_S)
+                httpx.patch(service.url + location, headers=headers, content=slowly(), timeout=PATIENCE_S)
             except httpx.TransportError:
                 return
             raise AssertionError("it was to break")
@@ -106,22 +106,22 @@ def test_upload_survives_a_service_kill(tmp_path):
         assert 10_000_000 < on_disk < len(content)
         assert stored.read_bytes() == content[:on_disk]
         service.start()
-        head = httpx.head(service.url + place, headers=TUS)
+        head = httpx.head(service.url + location, headers=TUS)
         assert int(head.headers["upload-offset"]) == on_disk
         # The rest of it, and a kill while it is read.
         headers = {**TUS, "Content-Type": "application/offset+octet-stream", "Upload-Offset": str(on_disk)}
         sent = httpx.patch(
-            service.url + place, headers=headers, content=content[on_disk:], timeout=PATIENCE_S
+            service.url + location, headers=headers, content=content[on_disk:], timeout=PATIENCE_S
         )
         assert sent.status_code == 204
         incoming = tmp_path / "data" / "tenants" / "local" / "incoming"
         wait_for(lambda: list(incoming.glob("*.reading/*.partial")))
-        assert httpx.get(service.url + place).json()["state"] == "reading"
+        assert httpx.get(service.url + location).json()["state"] == "reading"
         service.kill()
         assert stored.stat().st_size == len(content)
         service.start()
         with Client(service.url) as client:
-            dataset = client.upload(scan, resume=place.rpartition("/")[2])
+            dataset = client.upload(scan, resume=location.rpartition("/")[2])
         assert dataset.sha256 == hashlib.sha256(content).hexdigest()
         assert not stored.exists()
         assert not list(incoming.iterdir())

@@ -22,6 +22,6 @@ if __name__ == "__main__":
             folder.mkdir()
             outcomes += run_list(one, folder, console.print)
     show(outcomes, console)
-    held = sum(one.held for one in outcomes)
+    held = sum(outcome.held for outcome in outcomes)
     console.print(f"{held} of {len(outcomes)} held, {time.monotonic() - begun:.0f} s")
     sys.exit(0 if held == len(outcomes) else 1)

@@ -25,10 +25,10 @@ def exchange(
         connection.sendall("\r\n".join([head[0], "Host: 127.0.0.1", *head[1:], "", ""]).encode() + body)
         if ends:
             connection.shutdown(socket.SHUT_WR)
-        found = b""
+        result = b""
         try:
             while more := connection.recv(65536):
-                found += more
+                result += more
         except (TimeoutError, ConnectionError):
             pass
-    return [int(status) for status in STATUS.findall(found)], found
+    return [int(status) for status in STATUS.findall(result)], result

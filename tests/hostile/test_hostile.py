@@ -15,4 +15,4 @@ def test_the_service_holds(tmp_path, name):
     if name == "edge" and program() is None:
         pytest.skip(SKIPPED)
     outcomes = run_list(name, tmp_path, print)
-    assert [(one.attack.name, one.seen) for one in outcomes if not one.held] == []
+    assert [(outcome.attack.name, outcome.seen) for outcome in outcomes if not outcome.held] == []

@@ -129,9 +129,9 @@ def valid_data_accepted(ctx: Any, response: Any, case: Any) -> None:
 @schemathesis.check
 def invalid_data_refused(ctx: Any, response: Any, case: Any) -> None:
     """As ``negative_data_rejection``, but for undescribed headers, as proxies add them."""
-    found = case.meta.phase.data if case.meta is not None else None
+    result = case.meta.phase.data if case.meta is not None else None
     if (
-        getattr(found, "scenario", None) is not CoverageScenario.OBJECT_UNEXPECTED_PROPERTIES
-        or getattr(found, "parameter_location", None) is not ParameterLocation.HEADER
+        getattr(result, "scenario", None) is not CoverageScenario.OBJECT_UNEXPECTED_PROPERTIES
+        or getattr(result, "parameter_location", None) is not ParameterLocation.HEADER
     ):
         negative_data_rejection(ctx, response, case)

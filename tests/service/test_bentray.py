@@ -31,7 +31,7 @@ def test_every_name_is_there_and_listed() -> None:
     assert dir(bentray) == sorted(bentray.__all__)
     for name in bentray.__all__:
         assert getattr(bentray, name) is not None
-    public = {name for name, one in vars(bentray).items() if not name.startswith("_")}
+    public = {name for name, member in vars(bentray).items() if not name.startswith("_")}
     assert {name for name in public - {"TYPE_CHECKING", "PLACES"} if name not in bentray.__all__} == set()
     assert all(not isinstance(getattr(bentray, name), types.ModuleType) for name in bentray.__all__)
 

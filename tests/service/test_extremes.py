@@ -44,12 +44,12 @@ def volume(http):
 
 
 def numbers_of(kind):
-    ranged = [name for name, one in KINDS[kind].__dataclass_fields__.items() if RANGE in one.metadata]
+    ranged = [name for name, value in KINDS[kind].__dataclass_fields__.items() if RANGE in value.metadata]
     inner = [
         f"{record}.{name}"
         for record, outer in KINDS[kind].__dataclass_fields__.items()
-        for name, one in getattr(outer.default, "__dataclass_fields__", {}).items()
-        if RANGE in one.metadata
+        for name, value in getattr(outer.default, "__dataclass_fields__", {}).items()
+        if RANGE in value.metadata
     ]
     return [*ranged, *inner, *OTHERS.get(kind, ())]
 
@@ -110,7 +110,7 @@ def test_every_number_of_a_query_or_header_has_bounds(http, volume):
         small = {one["name"]: "16" for one in parameters if one["name"] in ("width", "height")}
         for parameter in parameters:
             types = [parameter["schema"], *parameter["schema"].get("anyOf", ())]
-            if parameter["in"] != "query" or not {"integer", "number"} & {one.get("type") for one in types}:
+            if parameter["in"] != "query" or not {"integer", "number"} & {item.get("type") for item in types}:
                 continue
             where = path.format(
                 volume_id=volume["id"], **dict.fromkeys(("dataset_id", "job_id", "field_id"), "none")

@@ -69,8 +69,8 @@ def test_the_last_of_several_failures_in_a_row_ends_the_container(container, mon
     monkeypatch.setitem(healthcheck.CHECKS, ("http",), lambda _url: answers.pop(0))
 
     def checked(*given):
-        for one in given:
-            answers.append(one)
+        for argument in given:
+            answers.append(argument)
             with suppress(SystemExit):
                 main(["--restart-after", "2"])
         return len(container)

@@ -87,16 +87,16 @@ def test_every_json_body_has_examples_that_are_taken():
         *(BatchRequest, DatasetChanges, JobChanges, MemberRequest, ProjectRequest),
         *(DirectUploadRequest, PartsRequest, ScanCorrection),
     )
-    changes = {f"#/components/schemas/{one.__name__}": one for one in models}
-    found = 0
+    changes = {f"#/components/schemas/{model.__name__}": model for model in models}
+    result = 0
     for _, operation in operations():
         content = operation.get("requestBody", {}).get("content", {}).get("application/json")
         if content is not None:
             taken = TypeAdapter(changes.get(content["schema"].get("$ref"), JobRequest))
             for example in content["examples"].values():
                 taken.validate_python(example["value"])
-                found += 1
-    assert found >= 5
+                result += 1
+    assert result >= 5
 
 
 def test_settings_of_a_job_are_described():

@@ -65,8 +65,8 @@ def test_every_parameter_is_refused_outside_its_description(places, cluster) -> 
         for value, accepted in wrong_values(schema):
             answer = http.get(path.format(**ids), params={name: value})
             body = answer.json()
-            found = (answer.status_code, body.get("field", "").partition(".")[0])
-            if found != (422, name) or accepted not in body["accepted"] or not body["accepted"]:
+            result = (answer.status_code, body.get("field", "").partition(".")[0])
+            if result != (422, name) or accepted not in body["accepted"] or not body["accepted"]:
                 wrong.append((path, name, value, accepted, answer.status_code, body.get("detail")))
             tried += 1
     assert not wrong, "\n".join(map(str, wrong))

@@ -28,17 +28,17 @@ REQUESTS: tuple[type, ...] = (Settings, PhantomScan, RefractionView, Turntable, 
 SIMULATIONS: tuple[type, ...] = (SimulationSettings, VolumeSimulationSettings, WaveSimulationSettings)
 
 
-def records(kind: type, place: str = "") -> Iterator[tuple[str, type]]:
+def records(kind: type, path: str = "") -> Iterator[tuple[str, type]]:
     """A record and those in it, each with the beginning of the places of its fields."""
-    yield place, kind
+    yield path, kind
     for field in fields(kind):
         if is_dataclass(field.default):
-            yield from records(type(field.default), f"{place}{field.name}.")
+            yield from records(type(field.default), f"{path}{field.name}.")
 
 
-def with_value(record: Any, place: str, value: Any) -> Any:
+def with_value(record: Any, path: str, value: Any) -> Any:
     """The record with another value of one field; not all records inside may be made by themselves."""
-    name, _, rest = place.partition(".")
+    name, _, rest = path.partition(".")
     return replace(record, **{name: with_value(getattr(record, name), rest, value) if rest else value})
 
 
@@ -66,19 +66,19 @@ def test_values_out_of_range_and_words_that_are_no_choice(kind: type) -> None:
             assert accepted in refused.value.accepted or "unless" in refused.value.accepted
 
 
-def requests_of(kind: type, place: str) -> list[Any]:
+def requests_of(kind: type, path: str) -> list[Any]:
     """Values of a field that ask for something."""
-    known = {one.place: one for one in declared(kind).values()}[place]
-    (record,) = (record for outer, record in records(kind) if place.rpartition(".")[0] == outer.rstrip("."))
-    name = place.rpartition(".")[2]
+    known = {one.place: one for one in declared(kind).values()}[path]
+    (record,) = (record for outer, record in records(kind) if path.rpartition(".")[0] == outer.rstrip("."))
+    name = path.rpartition(".")[2]
     if isinstance(known.default, bool) or get_type_hints(record)[name] == bool | None:
-        found: tuple[Any, ...] = (not known.default,)
+        result: tuple[Any, ...] = (not known.default,)
     elif name in choices_of(record):
-        found = choices_of(record)[name]
+        result = choices_of(record)[name]
     else:
         within = ranges_of(record).get(name)
-        found = () if within is None else (within.least + min(1, (within.most - within.least) / 2),)
-    return [value for value in found if value not in (known.default, *known.neutral)]
+        result = () if within is None else (within.least + min(1, (within.most - within.least) / 2),)
+    return [value for value in result if value not in (known.default, *known.neutral)]
 
 
 def states_without(kind: type, uses: Uses) -> Iterator[Any]:
@@ -134,8 +134,8 @@ def test_jobs_name_the_place_of_what_they_refuse(start, kind) -> None:
                 told = {outer: told}
             answer = http.post("/v1/plans", json={"kind": kind, "settings": told})
             named = {one["field"]: one for one in answer.json()["errors"]}
-            found = [field for field in named if field.startswith(f"settings.{place}{name}")]
-            assert (answer.status_code, len(found) > 0) == (422, True), (place, name, answer.text)
-            assert all(named[field]["accepted"] for field in found)
+            result = [field for field in named if field.startswith(f"settings.{place}{name}")]
+            assert (answer.status_code, len(result) > 0) == (422, True), (place, name, answer.text)
+            assert all(named[field]["accepted"] for field in result)
             tried += 1
     assert tried > 5

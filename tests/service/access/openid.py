@@ -46,7 +46,7 @@ class TestProvider:
         self.down = False
         self._challenges: dict[str, str] = {}
         self.app = app(
-            require_nonce=True, user_claims=[User(sub=sub, claims=one) for sub, one in users.items()]
+            require_nonce=True, user_claims=[User(sub=sub, claims=user) for sub, user in users.items()]
         )
         self.app.before_request(self._before)
         self.app.after_request(self._after)

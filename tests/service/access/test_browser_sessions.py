@@ -128,15 +128,15 @@ def test_the_way_to_the_provider_and_back(http, provider, folder):
     assert (access["tenant"], access["how"], access["who"]) == ("lab", "session", "alice")
     assert access["scopes"] == ["read", "write"]
     assert http.post("/v1/plans", json={}, headers=OWN).status_code == 422
-    logged = [one for one in entries(folder / "data" / "audit") if one["route"] == "/sign-in/callback"]
+    logged = [entry for entry in entries(folder / "data" / "audit") if entry["route"] == "/sign-in/callback"]
     assert (logged[-1]["tenant"], logged[-1]["how"], logged[-1]["who"]) == ("lab", "session", "alice")
 
 
 def test_cookies_are_closed_to_scripts_and_other_sites(http, provider):
     cookies = signed_in(http, provider).headers.get_list("set-cookie")
-    session = next(one for one in cookies if one.startswith("bentray="))
+    session = next(cookie for cookie in cookies if cookie.startswith("bentray="))
     assert {"Path=/", "HttpOnly", "SameSite=Strict", "Max-Age=43200"} <= set(session.split("; "))
-    assert any(one.startswith("bentray-sign-in=;") and "Max-Age=0" in one for one in cookies)
+    assert any(cookie.startswith("bentray-sign-in=;") and "Max-Age=0" in cookie for cookie in cookies)
     begun = http.get("/sign-in").headers["set-cookie"]
     assert {"HttpOnly", "SameSite=Lax", "Max-Age=600"} <= set(begun.split("; "))
 

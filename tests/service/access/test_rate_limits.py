@@ -17,42 +17,42 @@ class Clock:
 @given(st.integers(1, 50), st.lists(st.floats(0.0, 40.0), max_size=120))
 def test_rate_is_bounded_by_bucket_size_and_refill(per_minute, waits):
     clock = Clock()
-    found, taken = RateLimits(per_minute, clock), 0
+    limits, taken = RateLimits(per_minute, clock), 0
     for wait in waits:
         clock.now += wait
-        delay = found.take("a")
+        delay = limits.take("a")
         taken += delay == 0.0
         assert taken <= per_minute * (1.0 + clock.now / 60.0) + 1e-6
         if delay:
             clock.now += delay * (1.0 + 1e-9) + 1e-9
-            assert found.take("a") == 0.0, "what it says is enough"
+            assert limits.take("a") == 0.0, "what it says is enough"
             taken += 1
-    assert found.take("b") == 0.0
+    assert limits.take("b") == 0.0
 
 
 def test_nought_is_any_number():
-    found = RateLimits(0)
-    assert {found.take("a") for _ in range(1000)} == {0.0}
+    limits = RateLimits(0)
+    assert {limits.take("a") for _ in range(1000)} == {0.0}
 
 
 def test_full_buckets_are_dropped(monkeypatch):
     monkeypatch.setattr(rate_limits, "MANY", 10)
     clock = Clock()
-    found = RateLimits(60, clock)
+    limits = RateLimits(60, clock)
     for number in range(9):
-        found.take(str(number))
+        limits.take(str(number))
     for _ in range(60):
-        found.take("busy")
+        limits.take("busy")
     clock.now = 2.0
-    found.take("new")
-    assert found.take("busy") == 0.0
-    assert len(found._buckets) == 2
+    limits.take("new")
+    assert limits.take("busy") == 0.0
+    assert len(limits._buckets) == 2
 
 
 def test_what_takes_little_work_counts_a_share():
     clock = Clock()
-    found = RateLimits(60, clock)
-    assert {found.take("a", 0.125) for _ in range(479)} == {0.0}
-    assert found.take("a") == 0.875, "an eighth is left, and one a second comes"
-    assert found.take("a", 0.125) == 0.0
-    assert found.take("a", 0.125) == 0.125
+    limits = RateLimits(60, clock)
+    assert {limits.take("a", 0.125) for _ in range(479)} == {0.0}
+    assert limits.take("a") == 0.875, "an eighth is left, and one a second comes"
+    assert limits.take("a", 0.125) == 0.0
+    assert limits.take("a", 0.125) == 0.125

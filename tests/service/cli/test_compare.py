@@ -28,20 +28,20 @@ def test_figures_and_regions_are_printed_and_drawn(bentray: Callable[..., Result
     words = (folder, folder / "truth.npy", "--region", "9.4,0,18", "-o", picture)
     result = bentray("compare", *words, "--json")
     assert result.exit_code == 0, result.stderr
-    found = json.loads(result.stdout)
+    record = json.loads(result.stdout)
     image, true = made(48).speed, truth(48).sound_speed_mps
     object_ = true != 1500.0
-    assert found["nodes"] == object_.sum()
-    assert found["rmse"] == pytest.approx(rmse(image, true, object_))
-    assert found["ssim"] == pytest.approx(structural_similarity(image, true, object_, 40.0))
-    assert found["statistics"]["truth"]["mean"] == pytest.approx(1540.0)
-    assert found["statistics"]["truth"]["size"] == pytest.approx(object_.sum() * 4e-6)
-    (region,) = found["regions"]
+    assert record["nodes"] == object_.sum()
+    assert record["rmse"] == pytest.approx(rmse(image, true, object_))
+    assert record["ssim"] == pytest.approx(structural_similarity(image, true, object_, 40.0))
+    assert record["statistics"]["truth"]["mean"] == pytest.approx(1540.0)
+    assert record["statistics"]["truth"]["size"] == pytest.approx(object_.sum() * 4e-6)
+    (region,) = record["regions"]
     assert region["truth"]["contrast"] == pytest.approx(40.0, rel=0.3)
     assert region["image"]["contrast"] == pytest.approx(region["truth"]["contrast"], abs=2.0)
     assert picture.read_bytes().startswith(b"\x89PNG")
     table = bentray("compare", *words, "--force").stdout
-    assert f"{found['rmse']:.4g} m/s" in table
+    assert f"{record['rmse']:.4g} m/s" in table
     assert "(9.4, 0) mm" in table
 
 
@@ -51,9 +51,9 @@ def test_a_volume_has_balls(bentray: Callable[..., Result], tmp_path: Path) -> N
     solid = replace(made(nodes=10, slices=5), spacing_m=(2e-3, 2e-3, 3e-3))
     write_reconstruction(tmp_path / "reconstruction.h5", solid)
     result = bentray("compare", tmp_path, tmp_path, "--region", "0,0,16,4", "--json")
-    found = json.loads(result.stdout)
-    assert (found["rmse"], found["correlation"]) == (0.0, pytest.approx(1.0))
-    assert found["regions"][0]["image"] == found["regions"][0]["truth"]
+    record = json.loads(result.stdout)
+    assert (record["rmse"], record["correlation"]) == (0.0, pytest.approx(1.0))
+    assert record["regions"][0]["image"] == record["regions"][0]["truth"]
 
 
 @pytest.mark.parametrize(

@@ -27,8 +27,8 @@ def test_the_whole_path_ends_with_bent_rays_ahead_and_a_picture(
     said = json.loads(result.stdout)
     errors = {name: found["truth"]["mean_absolute_error_of_range"] for name, found in said["jobs"].items()}
     assert errors["bent"] < errors["straight"]
-    for name, found in said["jobs"].items():
-        shown = f"{100 * errors[name]:.1f} % of range, {found['truth']['rmse_mps']:.1f} m/s rms"
+    for name, computed in said["jobs"].items():
+        shown = f"{100 * errors[name]:.1f} % of range, {computed['truth']['rmse_mps']:.1f} m/s rms"
         assert f"{name.capitalize()}: {shown}" in drawn.words(), "picture and figures agree"
     assert said["jobs"]["straight"]["settings"]["rays"] == "straight"
     assert said["picture"] == str(tmp_path / "out" / "comparison.png")

@@ -16,11 +16,11 @@ SCAN, VOLUME = "ds-" + "0" * 20, "vol-" + "0" * 20
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """What the client is asked for, with a stand-in that writes a few bytes."""
-    found: list[Any] = []
+    results: list[Any] = []
 
     class StandIn:
         def __init__(self, url: str, on_wait: Callable[[str], None]) -> None:
-            found.append(url)
+            results.append(url)
 
         def __enter__(self) -> StandIn:
             return self
@@ -28,16 +28,16 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         def __exit__(self, *_: object) -> None: ...
 
         def download(self, volume: str, format: str, path: Path, **how: str) -> None:  # noqa: A002
-            found.append((volume, format, *how.values()))
+            results.append((volume, format, *how.values()))
             path.write_bytes(b"volume")
 
         def download_dataset(self, dataset: str, path: Path, told: Callable[[int, int], None]) -> None:
-            found.append(dataset)
+            results.append(dataset)
             path.write_bytes(b"scan")
             told(4, 4)
 
     monkeypatch.setattr("bentray_service.client.Client", StandIn)
-    return found
+    return results
 
 
 def test_a_scan_and_a_volume(bentray: Callable[..., Result], tmp_path: Path, asked: list[Any]) -> None:
@@ -47,7 +47,7 @@ def test_a_scan_and_a_volume(bentray: Callable[..., Result], tmp_path: Path, ask
     for name in ("v.nii", "v.MHA"):
         result = bentray("download", VOLUME, "-o", tmp_path / name)
         assert result.stdout.splitlines() == [str(tmp_path / name)]
-    told = [one for one in asked if not str(one).startswith("http")]
+    told = [request for request in asked if not str(request).startswith("http")]
     assert (asked[0], told) == ("http://lab:1", [SCAN, (VOLUME, "nifti"), (VOLUME, "metaimage")])
 
 
@@ -55,7 +55,7 @@ def test_a_format_by_its_name(bentray: Callable[..., Result], tmp_path: Path, as
     for form in ("h5", "hdf5", "npy"):
         result = bentray("download", VOLUME, "-o", tmp_path / f"image-{form}", "--format", form)
         assert result.exit_code == 0
-    told = [one for one in asked if not str(one).startswith("http")]
+    told = [request for request in asked if not str(request).startswith("http")]
     assert told == [(VOLUME, "hdf5"), (VOLUME, "hdf5"), (VOLUME, "npy")]
     refused = bentray("download", SCAN, "-o", tmp_path / "scan", "--format", "npy")
     assert refused.exit_code == 2

@@ -35,9 +35,9 @@ def test_a_field_and_its_pictures(bentray: Callable[..., Result], mesh: Path, tm
     for name, size in (("image", (32, 24)), ("geometry-image", (33, 33)), ("normal-map", (33, 33))):
         assert Image.open(out / f"{name}.png").size == size
         assert str(out / f"{name}.png") in result.stdout.splitlines()
-    found = json.loads((out / "geometry-field.json").read_text())
-    assert (found["faces"], found["samples"], found["view"]["mode"]) == (320, 6, "refract")
-    field = Path(found["outputs"]["field"])
+    record = json.loads((out / "geometry-field.json").read_text())
+    assert (record["faces"], record["samples"], record["view"]["mode"]) == (320, 6, "refract")
+    field = Path(record["outputs"]["field"])
     assert sorted(path.name for path in out.iterdir()) == sorted(
         [field.name, "image.png", "geometry-image.png", "normal-map.png", "geometry-field.json"]
     )

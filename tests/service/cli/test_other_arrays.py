@@ -46,9 +46,9 @@ def test_an_arc_has_an_image_and_a_sentence(
     # Neighbours, up to the third, are beyond 60° from the middle of the cone.
     assert "pairs (35 %) are outside the opening angle of 120° and left out. Limited angle:" in first
     assert "edges parallel to the missing directions" in first
-    found = json.loads((tmp_path / "out" / "reconstruction.json").read_text())
-    assert found["provenance"]["geometry"] == first
-    assert found["settings"]["opening_angle_deg"] == 120.0
+    record = json.loads((tmp_path / "out" / "reconstruction.json").read_text())
+    assert record["provenance"]["geometry"] == first
+    assert record["settings"]["opening_angle_deg"] == 120.0
     report = json.loads(bentray("quality", tmp_path / "arc.h5", "-o", tmp_path / "report", "--json").stdout)
     assert (
         "elements cover 240° of 360°"

@@ -25,9 +25,9 @@ def test_faults_are_reported_and_the_rest_continues(bentray: Callable[..., Resul
     assert result.exit_code == 0
     said = json.loads(result.stdout)
     assert said["verdict"] == "usable"
-    found = {(f["check"], tuple(f["elements"]), f["role"], f["action"]) for f in said["findings"]}
-    assert ("dead elements", (5,), "reception", "left out") in found
-    assert ("polarity", (9,), "emission", "corrected") in found
+    results = {(f["check"], tuple(f["elements"]), f["role"], f["action"]) for f in said["findings"]}
+    assert ("dead elements", (5,), "reception", "left out") in results
+    assert ("polarity", (9,), "emission", "corrected") in results
     assert json.loads((tmp_path / "out" / "quality.json").read_text()) == said
     assert (tmp_path / "out" / "quality.png").read_bytes().startswith(b"\x89PNG\r\n")
     picked = read_dataset(tmp_path / "out" / "picked.h5")
@@ -83,9 +83,9 @@ def test_a_calibration_puts_the_elements_where_the_water_shot_has_them(
     told = json.loads((tmp_path / "out" / "calibration.json").read_text())
     assert told["water_speed_mps"] == drawn.water_speed_mps
     assert 0.0 < np.median(told["position_sigma_m"]) < 3e-5
-    found = read_dataset(tmp_path / "out" / "picked.h5").element_position_m
-    np.testing.assert_array_equal(found, told["element_position_m"])
-    off = found - drawn.element_position_m
+    dataset = read_dataset(tmp_path / "out" / "picked.h5").element_position_m
+    np.testing.assert_array_equal(dataset, told["element_position_m"])
+    off = dataset - drawn.element_position_m
     turn = np.column_stack((-drawn.element_position_m[:, 1], drawn.element_position_m[:, 0]))
     off -= off.mean(axis=0)
     off -= turn * (off * turn).sum() / (turn * turn).sum()

@@ -152,7 +152,7 @@ def test_rejects_bad_headers_before_start(settings: Settings, field: str) -> Non
 
 
 def test_that_check_needs_no_compiled_code() -> None:
-    found = subprocess.run(
+    result = subprocess.run(
         [
             sys.executable,
             "-c",
@@ -162,7 +162,7 @@ def test_that_check_needs_no_compiled_code() -> None:
         text=True,
         check=True,
     )
-    assert not {"numba", "scipy", "distributed"} & set(found.stdout.split())
+    assert not {"numba", "scipy", "distributed"} & set(result.stdout.split())
 
 
 def spoil(path: Path, change: Callable[[h5py.File], None]) -> Path:

@@ -81,13 +81,13 @@ def test_map_contains_the_direction_of_each_pixel(
 ) -> None:
     words = ("--iso", 0.5, "--index", 1.0, "--map", tmp_path / "map.npy", "--spacing", 2e-3)
     assert bentray("render", volume, "-o", tmp_path / "p.png", *SMALL, *words).exit_code == 0
-    found = np.load(tmp_path / "map.npy")
-    assert found.shape == (24, 32, 2)
+    array = np.load(tmp_path / "map.npy")
+    assert array.shape == (24, 32, 2)
     # An index of 1 bends nothing: 1.25 times the side of the volume over 24 pixels.
-    np.testing.assert_allclose(np.diff(found[..., 0], axis=1), 1.25 * 0.022 / 24, rtol=1e-6)
+    np.testing.assert_allclose(np.diff(array[..., 0], axis=1), 1.25 * 0.022 / 24, rtol=1e-6)
     bent = (*words[:3], 1.5, *words[4:], "--force")
     assert bentray("render", volume, "-o", tmp_path / "p.png", *SMALL, *bent).exit_code == 0
-    assert not np.allclose(np.load(tmp_path / "map.npy"), found)
+    assert not np.allclose(np.load(tmp_path / "map.npy"), array)
 
 
 def test_a_backdrop_of_ones_own(bentray: Callable[..., Result], tmp_path: Path, volume: Path) -> None:

@@ -27,7 +27,7 @@ def test_a_folder_of_scans(bentray, serve, work, quick_pictures, scan_file, tmp_
     first = bentray(*words)
     said = json.loads(first.stdout)
     assert first.exit_code == 1
-    states = {one["name"]: one["state"] for one in said["datasets"]}
+    states = {sentence["name"]: sentence["state"] for sentence in said["datasets"]}
     assert states == {"broken": "failed", "one": "succeeded", "two": "succeeded"}
     for name in ("one", "two"):
         assert read_reconstruction(folder / "results" / name / "reconstruction.h5").speed.shape == (24, 24)

@@ -77,9 +77,9 @@ class Machine:
 
 @pytest.fixture(scope="module")
 def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
-    found = Machine(tmp_path_factory.mktemp("machine"))
-    yield found
-    found.close()
+    result = Machine(tmp_path_factory.mktemp("machine"))
+    yield result
+    result.close()
 
 
 @pytest.mark.slow
@@ -151,10 +151,10 @@ def test_the_lane_of_opencl_is_offered_where_a_device_passed(
     asked: list[local_workers.JoinRequest] = []
     monkeypatch.setattr(local_workers, "join", lambda joined, say: asked.append(joined))
     device = opencl.Device(0, "PoCL", "cpu", "cpu", "", "", True)
-    for found in (device, None):
-        monkeypatch.setattr(opencl, "select_device", lambda found=found: opencl.DeviceSelection(found, ()))
+    for result in (device, None):
+        monkeypatch.setattr(opencl, "select_device", lambda found=result: opencl.DeviceSelection(found, ()))
         assert bentray("worker", "--scheduler", "tcp://head:8786", "--workers", 3).exit_code == 0
-    assert [dict(one.resources) for one in asked] == [
+    assert [dict(request.resources) for request in asked] == [
         {"recon": 1, "render": 1, "short": 1, "opencl": 1},
         {"recon": 1, "render": 1, "short": 1},
     ]

@@ -22,7 +22,7 @@ def test_one_progress_for_many_scans(serve, scan, work):
         done = client.wait_batch(batch, lambda one: seen.append(one.progress))
         assert (done.state, done.counts, seen[-1]) == ("succeeded", {"succeeded": 2}, 1.0)
         assert seen == sorted(seen)
-        assert [one.id for one in client.batches()] == [batch.id]
+        assert [batch.id for batch in client.batches()] == [batch.id]
         assert client.batch(batch.id).jobs[0].volume is not None
         work.hold.clear()
         batch = client.submit_batch(datasets[:1], **QUICK)

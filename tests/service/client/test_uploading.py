@@ -136,16 +136,16 @@ def test_tuspy_interoperates_also_over_a_broken_line(serve, large):
         with pytest.raises(TusCommunicationError):
             uploader.upload()
     assert cuts == []
-    place = url + uploader.url.removeprefix(proxy.url)
+    location = url + uploader.url.removeprefix(proxy.url)
     # Every piece came whole or not at all, since it has a checksum.
     again = TusClient(f"{url}/v1/uploads").uploader(
-        str(large), chunk_size=2 * MIB, url=place, upload_checksum=True, retries=100, retry_delay=0.1
+        str(large), chunk_size=2 * MIB, url=location, upload_checksum=True, retries=100, retry_delay=0.1
     )
     assert again.offset == uploader.offset == 2 * MIB
     again.upload()
     assert again.offset == large.stat().st_size
     with Client(url) as client:
-        assert client.upload(large, resume=place.rpartition("/")[2]).sha256 == digest(large)
+        assert client.upload(large, resume=location.rpartition("/")[2]).sha256 == digest(large)
 
 
 def test_an_empty_file_is_rejected(serve, tmp_path):

@@ -21,11 +21,11 @@ def test_lists_and_removals_go_beyond_a_page(bucket_url):
 
 
 def test_two_prefixes_of_a_bucket_do_not_meet(bucket_url):
-    one, two = Bucket(bucket_url), Bucket(f"{bucket_url}-2/")
-    one.put_metadata("a", {"of": "one"})
+    first, two = Bucket(bucket_url), Bucket(f"{bucket_url}-2/")
+    first.put_metadata("a", {"of": "one"})
     two.put_metadata("a", {"of": "two"})
-    assert (one.metadata("a")["of"], two.metadata("a")["of"]) == ("one", "two")
-    assert [held.key for held in one.listed()] == ["a"]
+    assert (first.metadata("a")["of"], two.metadata("a")["of"]) == ("one", "two")
+    assert [held.key for held in first.listed()] == ["a"]
 
 
 def test_a_removal_that_is_rejected_is_no_removal(bucket_url, monkeypatch):

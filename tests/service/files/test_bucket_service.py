@@ -139,16 +139,17 @@ def test_an_upload_in_pieces_waits_too(service, scan, s3_server, monkeypatch):
     monkeypatch.setattr("bentray_service.ingest.upload_ingest.PATIENCE_SECONDS", 0.05)
     http, content = service("one"), scan().read_bytes()
     tus = {"Tus-Resumable": "1.0.0"}
-    place = http.post("/v1/uploads", headers={**tus, "Upload-Length": str(len(content))}).headers["location"]
+    begun = http.post("/v1/uploads", headers={**tus, "Upload-Length": str(len(content))})
+    location = begun.headers["location"]
     s3_server.away.set()
     s3_server.asked.clear()
     piece = {**tus, "Upload-Offset": "0", "Content-Type": "application/offset+octet-stream"}
-    assert http.patch(place, content=content, headers=piece).status_code == 204
+    assert http.patch(location, content=content, headers=piece).status_code == 204
     wait(lambda: any("/datasets/" in path for _, path in list(s3_server.asked)))
-    assert http.get(place).json()["state"] == "reading"
+    assert http.get(location).json()["state"] == "reading"
     s3_server.away.clear()
-    wait(lambda: http.get(place).json()["state"] != "reading")
-    assert http.get(place).json()["state"] == "done"
+    wait(lambda: http.get(location).json()["state"] != "reading")
+    assert http.get(location).json()["state"] == "done"
 
 
 def test_a_folder_from_before_there_was_a_bucket_is_put_into_it(start, uploaded, bucket_url):

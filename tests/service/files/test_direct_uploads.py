@@ -46,10 +46,10 @@ def send(http, upload, data, numbers=None):
 
 def ended(http, upload):
     deadline = time.monotonic() + 60.0
-    while (found := http.get(upload["links"]["self"]).json())["state"] in ("receiving", "reading"):
-        assert time.monotonic() < deadline, found
+    while (record := http.get(upload["links"]["self"]).json())["state"] in ("receiving", "reading"):
+        assert time.monotonic() < deadline, record
         time.sleep(0.02)
-    return found
+    return record
 
 
 def test_parts_are_assembled_and_read_as_any_upload(service, scan, objects):
@@ -110,8 +110,8 @@ def test_hostile_content_is_refused_and_forgotten(service, objects):
     upload = begun(http, b"certainly not HDF5")
     send(http, upload, b"certainly not HDF5")
     assert http.post(upload["links"]["complete"]).status_code == 202
-    found = ended(http, upload)
-    assert (found["state"], found["problem"]["status"]) == ("refused", 422)
+    result = ended(http, upload)
+    assert (result["state"], result["problem"]["status"]) == ("refused", 422)
     assert objects() == []
     assert http.get("/v1/access").json()["bytes_reserved"] == 0
     assert http.post(upload["links"]["parts"], json={"numbers": [1]}).json()["field"] == "state"

@@ -27,8 +27,8 @@ def damaged(whole: bytes, *, flips: int, cuts: int, losses: int, seed: int) -> I
     for k in range(flips):
         content = bytearray(whole)
         for _ in range(random.integers(1, 9)):
-            place = random.choice(books) if k % 2 else random.integers(len(whole))
-            content[place] ^= 1 << random.integers(8)
+            offset = random.choice(books) if k % 2 else random.integers(len(whole))
+            content[offset] ^= 1 << random.integers(8)
         yield f"flip-{k}", bytes(content)
     for k, end in enumerate(np.unique(np.linspace(0, len(whole) - 1, cuts).astype(int))):
         yield f"cut-{k}", whole[:end]
@@ -41,10 +41,10 @@ def damaged(whole: bytes, *, flips: int, cuts: int, losses: int, seed: int) -> I
 
 
 def _books(whole: bytes) -> set[int]:
-    places: set[int] = set()
+    offsets: set[int] = set()
     for mark in BOOKS:
         begin = whole.find(mark)
         while begin >= 0:
-            places.update(range(begin, min(begin + REACH, len(whole))))
+            offsets.update(range(begin, min(begin + REACH, len(whole))))
             begin = whole.find(mark, begin + 1)
-    return places
+    return offsets

@@ -15,22 +15,22 @@ SHAPE = (12, 24)
 Build = Callable[[h5py.File], None]
 
 
-def replaced(place: str, **how: object) -> Build:
+def replaced(path: str, **how: object) -> Build:
     """An array in the place of a sound one; ``how`` as ``h5py.Group.create_dataset`` takes it."""
 
     def build(file: h5py.File) -> None:
-        del file[place]
-        file.create_dataset(place, **how)
+        del file[path]
+        file.create_dataset(path, **how)
 
     return build
 
 
-def linked(place: str, target: object) -> Build:
+def linked(path: str, target: object) -> Build:
     """A link, a type or an object in the place of a sound one."""
 
     def build(file: h5py.File) -> None:
-        del file[place]
-        file[place] = target
+        del file[path]
+        file[path] = target
 
     return build
 
@@ -44,18 +44,18 @@ def told(owner: str, name: str, value: object) -> Build:
     return build
 
 
-def stored(place: str, place_in: tuple[int, ...], value: object) -> Build:
+def stored(path: str, place_in: tuple[int, ...], value: object) -> Build:
     """One value of an array."""
 
     def build(file: h5py.File) -> None:
-        file[place][place_in] = value
+        file[path][place_in] = value
 
     return build
 
 
-def without(place: str) -> Build:
+def without(path: str) -> Build:
     def build(file: h5py.File) -> None:
-        del file[place]
+        del file[path]
 
     return build
 

@@ -109,6 +109,6 @@ def test_damaged_scans_are_rejected(folder, sound):
             assert error["found"]
             assert error["accepted"]
     # The others were damaged where it does not show, and hold a scan of the same shape.
-    for read in [one for one in reads if not one.refused]:
+    for read in [read for read in reads if not read.refused]:
         assert (read.answer["ok"]["dimension"], read.answer["ok"]["ntx"]) == (2, 12)
     assert max(read.most_bytes for read in reads) < MAX_BYTES

@@ -34,10 +34,10 @@ def test_the_coefficients_are_those_of_the_spline(http, cluster, query, name, sm
     assert http.get(here).json()["links"]["coefficients"] == f"{here}/coefficients"
     answer = http.get(f"{here}/coefficients", params=query)
     assert answer.headers["content-type"] == "application/x-npy"
-    found = np.load(io.BytesIO(answer.content))
+    computed = np.load(io.BytesIO(answer.content))
     expected = Spline.from_volume(values, name, smoothing=smoothing).coefficients
-    assert found.dtype == np.float32
-    np.testing.assert_allclose(found, expected, atol=1e-4)
+    assert computed.dtype == np.float32
+    np.testing.assert_allclose(computed, expected, atol=1e-4)
     assert cluster.submitted[-1]["resources"] == {"render": 1}
     again = http.get(f"{here}/coefficients", params=query, headers={"If-None-Match": answer.headers["etag"]})
     assert again.status_code == 304

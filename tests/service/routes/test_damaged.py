@@ -85,7 +85,7 @@ def test_readers_during_a_deletion_get_410(start):
             places = ("data", "data?format=npy", "slice.png", "data?format=nifti", "slice.png?axis=x")
             asked = [pool.submit(http.get, f"/v1/volumes/{volume}/{place}") for place in places]
             asked.append(pool.submit(http.delete, f"/v1/volumes/{volume}"))
-            found = [one.result().status_code for one in asked]
-            assert set(found) <= {200, 204, 404}, found
+            result = [request.result().status_code for request in asked]
+            assert set(result) <= {200, 204, 404}, result
     root = http.app.state.parts.files.root
     assert [path.name for path in root.glob("tenants/**/*") if path.is_file()] == []

@@ -31,7 +31,7 @@ def requests(scan):
 @pytest.mark.parametrize("left", LEFT_BYTES)
 def test_every_write_says_so(start, small_disk, scan, left):
     http = start(str(small_disk / "data"), min_free_bytes=0)
-    volume = next(one for one in requests(scan) if one[1] == "/v1/volumes")
+    volume = next(request for request in requests(scan) if request[1] == "/v1/volumes")
     made = http.request(volume[0], volume[1], **volume[2]).json()
     before = sorted(path.name for path in small_disk.glob("data/tenants/*/*/*"))
     fill(small_disk, left)

@@ -44,7 +44,7 @@ def test_every_parameter_changes_picture_and_etag(http, here):
         {"colour_bar": False},
         {"frame": False},
     ]
-    answers = [http.get(here, params=one) for one in asked]
+    answers = [http.get(here, params=request) for request in asked]
     assert len({answer.content for answer in answers}) == len(asked)
     assert len({answer.headers["etag"] for answer in answers}) == len(asked)
 

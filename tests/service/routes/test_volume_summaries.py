@@ -50,21 +50,21 @@ def test_the_truth_is_read_at_the_nodes_of_the_result(http, result):
 
 
 def test_a_summary_names_quantities_candidates_and_errors(http, result):
-    found = http.get(f"{result}/summary").json()
-    assert found["quantities"] == ["speed", "coverage", "truth"]
-    assert [(one["label"], one["chosen"]) for one in found["candidates"]] == [
+    record = http.get(f"{result}/summary").json()
+    assert record["quantities"] == ["speed", "coverage", "truth"]
+    assert [(one["label"], one["chosen"]) for one in record["candidates"]] == [
         ("bent rays, SART", True),
         ("straight rays, SART", False),
     ]
-    assert found["candidates"][0]["held_out_mean_s"] == 1.5e-7
-    assert found["candidates"][1]["held_out_mean_s"] is None
-    assert found["reason"].startswith("auto chose bent rays, SART")
+    assert record["candidates"][0]["held_out_mean_s"] == 1.5e-7
+    assert record["candidates"][1]["held_out_mean_s"] is None
+    assert record["reason"].startswith("auto chose bent rays, SART")
     inside = values(http, result, "speed") - values(http, result, "truth")
-    assert 0 < found["truth"]["nodes"] <= inside.size
-    assert found["truth"]["rmse_mps"] == pytest.approx(np.sqrt(np.mean(inside**2)), rel=1e-9)
-    assert found["truth"]["mean_absolute_error_mps"] == pytest.approx(np.abs(inside).mean(), rel=1e-9)
-    assert found["truth"]["true_mean_mps"] == pytest.approx(found["truth"]["mean_mps"] - inside.mean())
-    assert -1.0 <= found["truth"]["ssim"] <= 1.0
+    assert 0 < record["truth"]["nodes"] <= inside.size
+    assert record["truth"]["rmse_mps"] == pytest.approx(np.sqrt(np.mean(inside**2)), rel=1e-9)
+    assert record["truth"]["mean_absolute_error_mps"] == pytest.approx(np.abs(inside).mean(), rel=1e-9)
+    assert record["truth"]["true_mean_mps"] == pytest.approx(record["truth"]["mean_mps"] - inside.mean())
+    assert -1.0 <= record["truth"]["ssim"] <= 1.0
 
 
 @pytest.mark.parametrize("quantity", ["attenuation", "recovery", "reflection", "colour"])

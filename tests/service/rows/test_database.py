@@ -19,11 +19,11 @@ def test_pragmas(tmp_path):
         closing(open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")) as database,
         database.read() as connection,
     ):
-        found = {
+        result = {
             name: connection.execute(text(f"PRAGMA {name}")).scalar()
             for name in ("journal_mode", "synchronous")
         }
-    assert found == {"journal_mode": "wal", "synchronous": 2}
+    assert result == {"journal_mode": "wal", "synchronous": 2}
 
 
 def test_foreign_keys_hold(database):

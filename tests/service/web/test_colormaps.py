@@ -13,6 +13,6 @@ def test_the_tables_are_those_of_matplotlib():
     tables = json.loads((WEB / "static" / "viewer" / "colormaps.json").read_text())
     assert set(tables) == {*COLORMAPS, "RdBu_r"}
     for name, table in tables.items():
-        found = np.frombuffer(bytes.fromhex(table), np.uint8)
+        computed = np.frombuffer(bytes.fromhex(table), np.uint8)
         expected = colormaps[name](np.arange(256), bytes=True)[:, :3]
-        np.testing.assert_array_equal(found.reshape(256, 3), expected, err_msg=name)
+        np.testing.assert_array_equal(computed.reshape(256, 3), expected, err_msg=name)

@@ -32,8 +32,8 @@ def test_both_images_have_one_range_and_one_cursor(page, both):
         node, value, _ = node_below(page, 0.4, 0.35, canvases.nth(k))
         assert value == values[node]
         # The limits in the fields are rounded to six digits: at most one colour away.
-        found, expected = drawn(page, 0.4, 0.35, canvases.nth(k)), colour_of(value, low, high)
-        assert np.abs(np.subtract(found, expected, dtype=int)).max() <= 4
+        computed, expected = drawn(page, 0.4, 0.35, canvases.nth(k)), colour_of(value, low, high)
+        assert np.abs(np.subtract(computed, expected, dtype=int)).max() <= 4
         expect(page.locator(".readout")).to_contain_text(f"{FIRST[node]:.2f} m/s")
         expect(page.locator(".readout")).to_contain_text(f"{SECOND[node]:.2f} m/s")
 

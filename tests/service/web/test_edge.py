@@ -113,8 +113,8 @@ def behind(tmp, **changed):
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory):
-    with behind(tmp_path_factory.mktemp("edge"), **SHORT) as found:
-        yield found
+    with behind(tmp_path_factory.mktemp("edge"), **SHORT) as result:
+        yield result
 
 
 @pytest.fixture
@@ -184,25 +184,25 @@ def test_invalid_headers_get_a_problem(front, sent, status, slug):
     if slug is None:
         assert answer.startswith(b"HTTP/1.1 %d" % status)
         return
-    found, problem = problem_in(answer)
-    assert (found, problem["status"], problem["type"]) == (status, status, f"/problems/{slug}")
+    result, problem = problem_in(answer)
+    assert (result, problem["status"], problem["type"]) == (status, status, f"/problems/{slug}")
 
 
 def test_every_problem_of_the_file_is_known():
     known = {(kind.status, kind.slug, kind.title) for kind in (*EDGE, *PROBLEMS.values())}
     texts = re.findall(r"^ +\d+ '(\{.*\})';$", CONFIGURATION.read_text(), re.M)
     problems = [json.loads(text) for text in texts]
-    found = {(one["status"], one["type"].rpartition("/")[2], one["title"]) for one in problems}
-    assert found - known == {(405, "method-not-allowed", "Method Not Allowed")}
-    assert {(kind.status, kind.slug, kind.title) for kind in EDGE} <= found
+    result = {(one["status"], one["type"].rpartition("/")[2], one["title"]) for one in problems}
+    assert result - known == {(405, "method-not-allowed", "Method Not Allowed")}
+    assert {(kind.status, kind.slug, kind.title) for kind in EDGE} <= result
 
 
 def test_slow_bodies_end_and_free_what_they_held(front):
-    place = front.http.post("/v1/uploads", headers={**TUS, "Upload-Length": "1000000"}).headers["location"]
+    location = front.http.post("/v1/uploads", headers={**TUS, "Upload-Length": "1000000"}).headers["location"]
     length = "Content-Length: 1000000"
     heads = [
         ["POST /v1/datasets HTTP/1.1", *lines(SCAN), length],
-        [f"PATCH {place} HTTP/1.1", *lines(PIECE), "Upload-Offset: 0", length],
+        [f"PATCH {location} HTTP/1.1", *lines(PIECE), "Upload-Offset: 0", length],
         ["POST /v1/jobs HTTP/1.1", "Content-Type: application/json", "Content-Length: 9"],
     ]
     with ThreadPoolExecutor(len(heads)) as pool:
@@ -212,8 +212,8 @@ def test_slow_bodies_end_and_free_what_they_held(front):
         assert not statuses or problem_in(answer)[1]["type"] == "/problems/too-slow"
     until(lambda: not list(front.data.glob("tenants/*/incoming/*")))
     # What came is kept, and the upload is free for whoever goes on with it.
-    until(lambda: front.http.head(place, headers=TUS).headers["upload-offset"] == "1")
-    more = front.http.patch(place, headers={**PIECE, "Upload-Offset": "1"}, content=b"more")
+    until(lambda: front.http.head(location, headers=TUS).headers["upload-offset"] == "1")
+    more = front.http.patch(location, headers={**PIECE, "Upload-Offset": "1"}, content=b"more")
     assert more.headers["upload-offset"] == "5", more.text
 
 
@@ -306,13 +306,13 @@ def test_tls(front, host, policy):
 
 
 def test_sign_ins_of_an_address_are_limited(front):
-    found = [front.http.get("/sign-in") for _ in range(40)]
-    assert {answer.status_code for answer in found} == {404, 429}
-    assert found[-1].json()["type"] == "/problems/too-often"
+    result = [front.http.get("/sign-in") for _ in range(40)]
+    assert {answer.status_code for answer in result} == {404, 429}
+    assert result[-1].json()["type"] == "/problems/too-often"
 
 
 def test_a_service_that_is_away_is_a_problem_of_its_own(tmp_path):
-    with listen("127.0.0.1", 0) as nobody, edge(tmp_path / "edge", nobody.getsockname()[1]) as found:
-        answer = httpx.get(f"{found.url}/v1/jobs", timeout=PATIENCE_S)
+    with listen("127.0.0.1", 0) as nobody, edge(tmp_path / "edge", nobody.getsockname()[1]) as result:
+        answer = httpx.get(f"{result.url}/v1/jobs", timeout=PATIENCE_S)
     assert (answer.status_code, answer.headers["retry-after"]) == (502, "10")
     assert answer.json()["type"] == "/problems/service-away"

@@ -122,18 +122,18 @@ def show_alerts(page):
 
 def sideways(page, path, *sizes):
     """Widths of the sizes at which the page scrolls sideways, with its path."""
-    found = []
+    results = []
     for size in sizes:
         resized(page, size)
         if page.evaluate("document.documentElement.scrollWidth > innerWidth"):
-            found.append((size[0], path))
-    return found
+            results.append((size[0], path))
+    return results
 
 
 def test_every_page_on_a_laptop_and_on_the_narrowest_telephone(page, places):
     """Each page once: axe finds nothing serious, nothing scrolls sideways, no request leaves the service."""
     address, pages = places
-    found, wide, asked = {}, [], []
+    results, wide, asked = {}, [], []
     page.on("request", lambda request: asked.append(request.url))
     page.emulate_media(color_scheme="light")
     for path, text in pages.items():
@@ -144,12 +144,12 @@ def test_every_page_on_a_laptop_and_on_the_narrowest_telephone(page, places):
         if not path.endswith(REPEATED):
             if path == "/jobs":
                 show_alerts(page)
-            found |= serious(page, path, "light")
-    assert found == {}
+            results |= serious(page, path, "light")
+    assert results == {}
     assert wide == []
     assert len(asked) > len(pages)
     own = (f"{address}/", f"blob:{address}/", "data:")
-    assert [one for one in asked if not one.startswith(own) and one != "about:blank"] == []
+    assert [request for request in asked if not request.startswith(own) and request != "about:blank"] == []
     expect(page.locator("h1")).to_have_count(1)
 
 
@@ -157,7 +157,7 @@ def test_every_page_on_a_laptop_and_on_the_narrowest_telephone(page, places):
 def test_axe_finds_nothing_serious_in_any_colours_or_width(page, places, scheme):
     address, pages = places
     page.emulate_media(color_scheme=scheme)
-    found = {}
+    results = {}
     for path, text in pages.items():
         resized(page, LAPTOP)
         opened(page, address, path, text)
@@ -165,8 +165,8 @@ def test_axe_finds_nothing_serious_in_any_colours_or_width(page, places, scheme)
             show_alerts(page)
         for size in (LAPTOP, TELEPHONE):
             resized(page, size)
-            found |= serious(page, path, scheme)
-    assert found == {}
+            results |= serious(page, path, scheme)
+    assert results == {}
 
 
 def test_nothing_scrolls_sideways_at_any_width(page, places):

@@ -84,8 +84,8 @@ def listening(answer):
 )
 def test_proxy_of_an_address(environment, variables, url, used):
     environment(**variables)
-    found = proxy_for(httpx.URL(url))
-    assert (found and str(found.url)) == used
+    proxy = proxy_for(httpx.URL(url))
+    assert (proxy and str(proxy.url)) == used
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_client_uses_the_proxy_and_names_it(environment, scheme, variable, kind,
             client.jobs()
         with pytest.raises(ClientError) as with_await:
             anyio.run(ask)
-    assert [one.startswith(seen) for one in connections] == [True, True]
+    assert [connection.startswith(seen) for connection in connections] == [True, True]
     for error in (plain, with_await):
         assert f"through the proxy {kind}://127.0.0.1:{port} ({variable})" in str(error.value)
         assert "secret" not in str(error.value)

@@ -111,13 +111,13 @@ def test_its_pictures_are_those_of_the_service(page, address, name):
     ]
     for view in views:
         here = page.evaluate(DRAW, {**view, **surfaces, **SIZE})
-        found = Image.open(io.BytesIO(base64.b64decode(here.partition(",")[2]))).convert("RGB")
+        computed = Image.open(io.BytesIO(base64.b64decode(here.partition(",")[2]))).convert("RGB")
         shown = surfaces if view["mode"] == "refract" else {"iso": surfaces["iso"]}
         query = urlencode({**view, **shown, **SIZE, "filter": chosen, "supersampling": "none"}, doseq=True)
         answer = httpx.get(f"{address}{volume['links']['refraction']}?{query}", timeout=120.0)
         expected = Image.open(io.BytesIO(answer.raise_for_status().content)).convert("RGB")
         assert np.ptp(np.asarray(expected)) > 100
-        assert structural_similarity(found, expected) >= 0.98
+        assert structural_similarity(computed, expected) >= 0.98
 
 
 def pretend(page, takes_ms, name="SwiftShader|"):
@@ -125,9 +125,9 @@ def pretend(page, takes_ms, name="SwiftShader|"):
 
     def changed(route):
         body = route.fetch().text()
-        for found, instead in (("performance.now() - begun", takes_ms), (name, "")):
-            assert found in body
-            body = body.replace(found, instead)
+        for computed, instead in (("performance.now() - begun", takes_ms), (name, "")):
+            assert computed in body
+            body = body.replace(computed, instead)
         route.fulfill(body=body, content_type="text/javascript")
 
     page.route("**/ray_caster.js", changed)

@@ -176,12 +176,12 @@ def test_two_requests_at_most_and_the_newest_view_wins(ball):
         page.keyboard.press("ArrowRight")
     whole(page, mode="refract", azimuth_deg="330")
     views = [settings_of(one) for one in requested]
-    previews = [one for one in views if one["width"] == "256"]
+    previews = [view for view in views if view["width"] == "256"]
     assert max(most) <= 2
     assert 0 < len(previews) < 60
-    assert all((one["ray_spacing"], one["supersampling"]) == ("2", "none") for one in previews)
+    assert all((preview["ray_spacing"], preview["supersampling"]) == ("2", "none") for preview in previews)
     # Each is of a later view than the one before it, and the last is whole.
-    turned = [float(one["azimuth_deg"]) for one in previews]
+    turned = [float(preview["azimuth_deg"]) for preview in previews]
     assert turned == sorted(turned)
     assert (views[-1]["width"], views[-1]["azimuth_deg"], views[-1]["supersampling"]) == (
         "512",

@@ -422,7 +422,7 @@ def test_scrubbing_draws_each_slice_from_the_values_in_the_page(page, volume):
         slider.fill(str(index))
         page.get_by_text(f"Slice {index} of 0 to 4").wait_for()
     # Others may come at any time: for the icon of the tab, and for the health of the service.
-    assert [one for one in asked if "/v1/volumes/" in one] == []
+    assert [request for request in asked if "/v1/volumes/" in request] == []
 
 
 @pytest.mark.nightly

@@ -43,8 +43,8 @@ def drag_and_turn(page):
     page.mouse.move(*pixel(goal))
     page.mouse.up()
     for name, place in zip(("x", "y"), goal, strict=True):
-        found = page.get_by_label(f"Object 1, {name}, m").input_value()
-        assert float(found) == pytest.approx(place, abs=0.01)
+        result = page.get_by_label(f"Object 1, {name}, m").input_value()
+        assert float(result) == pytest.approx(place, abs=0.01)
         expect(page.get_by_label(f"Object 2, {name}, m")).to_have_value(f"{other[name == 'y']:g}")
     image = page.locator("#field-picture[data-quality=full][data-address*='positions_m']")
     image.wait_for()

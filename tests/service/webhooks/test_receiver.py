@@ -121,11 +121,11 @@ def resolving(monkeypatch, *answers):
 
     def resolve(host, port, **how):
         asked.append(host)
-        found = left.pop(0)
+        result = left.pop(0)
         kinds = {4: socket.AF_INET, 6: socket.AF_INET6}
         return [
             (kinds[ipaddress.ip_address(one).version], socket.SOCK_STREAM, 6, "", (one, port))
-            for one in found
+            for one in result
         ]
 
     monkeypatch.setattr(socket, "getaddrinfo", resolve)

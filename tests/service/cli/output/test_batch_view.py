@@ -14,17 +14,17 @@ from bentray_workers.reconstruction.batch import Entry
 
 
 def entry(name: str, state: str) -> Entry:
-    found = Entry(Path(f"{name}.h5"))
+    result = Entry(Path(f"{name}.h5"))
     if state != "waiting":
-        found.begin()
-        found.show(Progress(3, 8, (Iteration(0, 1, 250e-9, 8),)))
+        result.begin()
+        result.show(Progress(3, 8, (Iteration(0, 1, 250e-9, 8),)))
     if state == "failed":
-        found.end(state, "a reason")
+        result.end(state, "a reason")
     elif state == "succeeded":
-        found.end(state)
+        result.end(state)
     elif state == "skipped":
-        found.skip(7.0, 1e-7)
-    return found
+        result.skip(7.0, 1e-7)
+    return result
 
 
 STATES = st.sampled_from(["waiting", "running", "succeeded", "failed", "skipped"])
@@ -41,7 +41,7 @@ def test_it_fits_the_terminal_and_shows_what_runs_first(states: list[str], heigh
     lines = said.get().splitlines()
     assert len(lines) <= height
     assert lines[0].startswith(f"{len(states)} datasets: ")
-    running = [one.name for one in entries if one.state == "running"]
+    running = [item.name for item in entries if item.state == "running"]
     rows = [line.split("│")[1].strip() for line in lines if line.startswith("│")]
     assert rows[: len(running)] == running[: len(rows)]
 

@@ -23,11 +23,11 @@ from ....kernels.tomography.comparison.squares import WATER, disc, image, truth
 
 
 def test_the_errors_are_those_of_compare_as_plain_values() -> None:
-    found = errors(image(disc() + 10.0), truth(disc()))
-    statistics = found.pop("statistics")
+    result = errors(image(disc() + 10.0), truth(disc()))
+    statistics = result.pop("statistics")
     assert statistics["image"]["mean"] == pytest.approx(statistics["truth"]["mean"] + 10.0)
     assert statistics["image"]["size"] == pytest.approx(81e-6)
-    assert json.loads(json.dumps(found)) == {
+    assert json.loads(json.dumps(result)) == {
         "region": "the outline of what is not water in the truth",
         "region_nodes": 81,
         "true_range_mps": [1450.0, 1550.0],
@@ -81,20 +81,20 @@ def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
         Iteration(0, 2, 3e-7, 3),
         Iteration(1, 2, 4e-7, 3),
     )
-    found = figures(replace(image(disc()), history=history), dataset(None), 1.25)
-    assert found["residual_rms_s"] == pytest.approx(math.sqrt((9 + 16) / 2) * 1e-7)
-    assert len(found["history"]) == 4
+    result = figures(replace(image(disc()), history=history), dataset(None), 1.25)
+    assert result["residual_rms_s"] == pytest.approx(math.sqrt((9 + 16) / 2) * 1e-7)
+    assert len(result["history"]) == 4
     last = {"slice": 1, "sweep": 2, "residual_rms_s": 4e-7, "emitters": 3, "stage": 0, "given": True}
-    assert found["history"][3] == last | {
+    assert result["history"][3] == last | {
         "band_hz": None,
         "misfit": None,
         "held_out_misfit": None,
         "of_attenuation": False,
     }
-    assert found["truth"] is None
-    assert found["seconds"] == 1.25
-    assert found["speed_range_mps"] == [1450.0, 1550.0]
-    assert from_stored(found["settings"]) == Settings(method="sart", nodes=16)
+    assert result["truth"] is None
+    assert result["seconds"] == 1.25
+    assert result["speed_range_mps"] == [1450.0, 1550.0]
+    assert from_stored(result["settings"]) == Settings(method="sart", nodes=16)
 
 
 def test_summary_shows_errors_and_region_only_with_a_truth() -> None:
@@ -109,10 +109,10 @@ def test_summary_shows_errors_and_region_only_with_a_truth() -> None:
 
 
 def test_missing_values_are_none_or_empty() -> None:
-    found = figures(image(disc()), dataset(None), 1.0)
-    assert (found["residual_within_s"], found["recovery_mean"]) == (None, None)
-    assert (found["reason"], found["trials"]) == ("", [])
-    assert "resolution check" not in dict(summary(found))
+    result = figures(image(disc()), dataset(None), 1.0)
+    assert (result["residual_within_s"], result["recovery_mean"]) == (None, None)
+    assert (result["reason"], result["trials"]) == ("", [])
+    assert "resolution check" not in dict(summary(result))
 
 
 def test_summary_shows_findings() -> None:
@@ -128,12 +128,12 @@ def test_summary_shows_the_uncertainty_inside_the_array() -> None:
     speed = disc()
     spread = np.where(np.arange(speed.shape[1]) < 5, 6.0, 0.0) * np.ones_like(speed)
     result = replace(image(speed), uncertainty=spread, resolution_width_m=(0.0016, 0.002, 0.0031))
-    found = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
-    assert found["uncertainty_rms_mps"] == pytest.approx(6.0)
-    assert found["resolution_width_m"] == [0.0016, 0.002, 0.0031]
-    assert dict(summary(found))["uncertainty"] == "6.0 m/s rms, at a resolution width of 2.0 mm"
+    record = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
+    assert record["uncertainty_rms_mps"] == pytest.approx(6.0)
+    assert record["resolution_width_m"] == [0.0016, 0.002, 0.0031]
+    assert dict(summary(record))["uncertainty"] == "6.0 m/s rms, at a resolution width of 2.0 mm"
     assert "uncertainty" not in dict(summary(figures(image(speed), dataset(None), 1.0)))
-    assert (found["doubt"], found["cautions"]) == ("", [])
+    assert (record["doubt"], record["cautions"]) == ("", [])
     cautious = replace(result, cautions=(Caution("uncertainty", "too small"),))
     listed = figures(cautious, dataset(None), 1.0)
     assert listed["cautions"] == [{"code": "uncertainty", "text": "too small", "doubtful": False}]
@@ -148,17 +148,17 @@ def test_summary_shows_residuals_resolution_and_candidates() -> None:
     trials = (Candidate({"rays": "straight"}, 4e-8, 3e-8), Candidate({"rays": "curved"}, 6e-8, 5e-8))
     residuals = residual_counts(np.random.default_rng(0).normal(0.0, 1e-7, 10_000))
     result = replace(image(speed), recovery=recovery, trials=trials, residuals=residuals)
-    found = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
-    assert found["residual_within_s"] == {
+    record = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
+    assert record["residual_within_s"] == {
         "50": pytest.approx(0.67e-7, rel=0.1),
         "90": pytest.approx(1.64e-7, rel=0.1),
         "99": pytest.approx(2.58e-7, rel=0.1),
     }
-    assert found["recovery_mean"] == pytest.approx(0.25)
-    assert dict(summary(found))["resolution check"] == "25 % of a checkerboard recovered"
-    assert found["reason"].startswith("auto chose straight rays: bent rays do not")
-    assert found["candidates"] == [["straight rays", "40 ns", "chosen"], ["bent rays", "60 ns", ""]]
-    assert found["trials"][1] == {
+    assert record["recovery_mean"] == pytest.approx(0.25)
+    assert dict(summary(record))["resolution check"] == "25 % of a checkerboard recovered"
+    assert record["reason"].startswith("auto chose straight rays: bent rays do not")
+    assert record["candidates"] == [["straight rays", "40 ns", "chosen"], ["bent rays", "60 ns", ""]]
+    assert record["trials"][1] == {
         "settings": {"rays": "curved"},
         "held_out_rms_s": 6e-8,
         "shown_rms_s": 5e-8,

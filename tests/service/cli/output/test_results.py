@@ -27,8 +27,8 @@ def test_a_doubt_is_the_first_line_and_other_cautions_follow(
         cautions=(Caution("bounds", "Cut off.", doubtful=True), Caution("uncertainty", "May be too small.")),
         provenance={"water": "Water of 20 °C is assumed."},
     )
-    found = write_results(tmp_path, result, scan, 1.0, draw=lambda: b"")
-    show_results("Reconstruction", found, as_json=False)
+    written = write_results(tmp_path, result, scan, 1.0, draw=lambda: b"")
+    show_results("Reconstruction", written, as_json=False)
     lines = [f"Doubtful result. Cut off. {CHECK}", "Water of 20 °C is assumed.", "May be too small."]
     assert capsys.readouterr().out.splitlines()[:3] == lines
     with pytest.raises(DoubtfulResult, match="the result is doubtful"):

@@ -35,13 +35,13 @@ def hostile(tmp_path):
     write_dataset(tmp_path / "sound.h5", small())
     sound = (tmp_path / "sound.h5").read_bytes()
     scans = hostile_datasets.files(sound, tmp_path, SCANS)
-    found = [("/v1/datasets", path.read_bytes()) for path in scans.values()]
-    found += [
+    result = [("/v1/datasets", path.read_bytes()) for path in scans.values()]
+    result += [
         ("/v1/datasets", content)
         for _, content in damaged(sound, flips=0, cuts=effort(1, 4), losses=effort(1, 3), seed=2)
     ]
-    found += [("/v1/volumes", hostile_volumes.REFUSED[name][0]) for name in VOLUMES]
-    return found + [("/v1/meshes", hostile_meshes.REFUSED[name][0]) for name in MESHES]
+    result += [("/v1/volumes", hostile_volumes.REFUSED[name][0]) for name in VOLUMES]
+    return result + [("/v1/meshes", hostile_meshes.REFUSED[name][0]) for name in MESHES]
 
 
 @pytest.mark.slow

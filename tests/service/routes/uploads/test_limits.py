@@ -14,14 +14,14 @@ from bentray_service.ingest.ingest_process import convert_upload
 HDF5 = {"Content-Type": "application/x-hdf5"}
 
 
-def packed(place, shape, dtype="f8", chunk=None):
+def packed(path, shape, dtype="f8", chunk=None):
     """A change that puts an array of zeros there, packed well: it is large only once it is read."""
 
     def change(file):
-        if place in file:
-            del file[place]
+        if path in file:
+            del file[path]
         chunks = chunk or (min(shape[0], 2**22 // math.prod(shape[1:])), *shape[1:])
-        made = file.create_dataset(place, shape, dtype, compression="gzip", chunks=chunks)
+        made = file.create_dataset(path, shape, dtype, compression="gzip", chunks=chunks)
         # One chunk, as often as it is needed: to pack them all would take longer than to refuse them.
         made[: chunks[0]] = np.zeros((), dtype)
         mask, raw = made.id.read_direct_chunk((0,) * len(shape))
@@ -55,8 +55,8 @@ def test_it_is_rejected_by_its_name_its_number_and_the_limit(scan, tmp_path, pla
         tracemalloc.stop()
     error = answer["error"]
     assert error["field"] == place
-    found, accepted = said.split(".*")
-    assert error["found"].startswith(found)
+    result, accepted = said.split(".*")
+    assert error["found"].startswith(result)
     assert error["accepted"].startswith(accepted)
     assert not (tmp_path / "out.h5").exists()
 

@@ -35,12 +35,12 @@ def begin(http, length, **said):
     return answer.headers["location"]
 
 
-def piece(http, place, offset, content, **headers):
-    return http.patch(place, headers={**PIECE, "Upload-Offset": str(offset), **headers}, content=content)
+def piece(http, location, offset, content, **headers):
+    return http.patch(location, headers={**PIECE, "Upload-Offset": str(offset), **headers}, content=content)
 
 
-def offset(http, place):
-    return int(http.head(place, headers=TUS).headers["upload-offset"])
+def offset(http, location):
+    return int(http.head(location, headers=TUS).headers["upload-offset"])
 
 
 def problem(answer, status):
@@ -66,20 +66,20 @@ def test_options_lists_supported_extensions(start):
 
 def test_a_scan_in_pieces_becomes_a_dataset(start, scan):
     http, content = start(), scan().read_bytes()
-    place = begin(http, len(content), filename="scan.h5", odd="ü")
-    assert http.get(place).json()["state"] == "receiving"
+    location = begin(http, len(content), filename="scan.h5", odd="ü")
+    assert http.get(location).json()["state"] == "receiving"
     at = 0
     for end in (1000, 1001, 5000, len(content)):
-        answer = piece(http, place, at, content[at:end])
+        answer = piece(http, location, at, content[at:end])
         assert (answer.status_code, answer.headers["upload-offset"]) == (204, str(end))
         at = end
-    record = settled(http, place)
+    record = settled(http, location)
     assert (record["state"], record["offset"], record["problem"]) == ("done", len(content), None)
     dataset = http.get(record["links"]["result"]).json()
     assert dataset["id"] == record["result"]
     assert dataset["title"] == "Sixteen elements"
     assert (dataset["bytes"], dataset["sha256"]) == (len(content), hashlib.sha256(content).hexdigest())
-    head = http.head(place, headers=TUS)
+    head = http.head(location, headers=TUS)
     assert head.headers["bentray-result"] == f"/v1/datasets/{dataset['id']}"
     assert (head.headers["upload-offset"], head.headers["upload-length"]) == (str(len(content)),) * 2
     assert head.headers["upload-metadata"] == metadata(filename="scan.h5", odd="ü")
@@ -89,9 +89,9 @@ def test_a_scan_in_pieces_becomes_a_dataset(start, scan):
 
 def test_it_can_be_reconstructed(start, scan, submitted, until, work):
     http, content = start(), scan().read_bytes()
-    place = begin(http, len(content))
-    piece(http, place, 0, content)
-    job = submitted(http, settled(http, place)["result"])
+    location = begin(http, len(content))
+    piece(http, location, 0, content)
+    job = submitted(http, settled(http, location)["result"])
     assert until(http, job["id"])["state"] == "succeeded"
 
 
@@ -99,14 +99,14 @@ def test_volumes_and_meshes_too(start):
     http, buffer = start(), io.BytesIO()
     np.save(buffer, np.arange(60.0).reshape(3, 4, 5))
     content = buffer.getvalue()
-    place = begin(http, len(content), kind="volume", title="A head", spacing_m="0.002")
-    piece(http, place, 0, content)
-    volume = http.get(settled(http, place)["links"]["result"]).json()
+    location = begin(http, len(content), kind="volume", title="A head", spacing_m="0.002")
+    piece(http, location, 0, content)
+    volume = http.get(settled(http, location)["links"]["result"]).json()
     assert (volume["title"], volume["spacing_m"]) == ("A head", [0.002] * 3)
     content = b"OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
-    place = begin(http, len(content), kind="mesh", title="Tetra")
-    piece(http, place, 0, content)
-    mesh = http.get(settled(http, place)["links"]["result"]).json()
+    location = begin(http, len(content), kind="mesh", title="Tetra")
+    piece(http, location, 0, content)
+    mesh = http.get(settled(http, location)["links"]["result"]).json()
     assert (mesh["title"], mesh["vertices"], mesh["faces"]) == ("Tetra", 4, 4)
 
 
@@ -115,12 +115,12 @@ def test_rejects_unreadable_uploads_with_a_problem(start, scan):
         file["geometry/element_position_m"][5] = np.nan
 
     http, content = start(), scan(spoil).read_bytes()
-    place = begin(http, len(content))
-    piece(http, place, 0, content)
-    record = settled(http, place)
+    location = begin(http, len(content))
+    piece(http, location, 0, content)
+    record = settled(http, location)
     assert (record["state"], record["result"]) == ("refused", None)
     assert record["problem"]["field"] == "geometry/element_position_m"
-    assert record["problem"]["instance"] == place
+    assert record["problem"]["instance"] == location
     assert http.get("/v1/datasets").json() == {"datasets": [], "next": None}
     assert left_in(http) == []
 
@@ -130,17 +130,17 @@ def test_rejects_unreadable_uploads_with_a_problem(start, scan):
 def test_chunk_offset_must_match(start, cuts, wrong):
     http = start(folder=f"data-{time.monotonic_ns()}")
     content, at = os.urandom(6001), 0
-    place = begin(http, len(content))
+    location = begin(http, len(content))
     for end in sorted(cuts):
-        body = problem(piece(http, place, at + wrong, content[at:end]), 409)
+        body = problem(piece(http, location, at + wrong, content[at:end]), 409)
         assert (body["type"], body["field"], body["found"]) == (
             "/problems/wrong-offset",
             "Upload-Offset",
             str(at + wrong),
         )
-        assert piece(http, place, at, content[at:end]).status_code == 204
+        assert piece(http, location, at, content[at:end]).status_code == 204
         at = end
-        assert offset(http, place) == at
+        assert offset(http, location) == at
     files = http.app.state.parts.files
     stored = next(files.root.glob("tenants/*/uploads/*"), None)
     assert (b"" if stored is None else stored.read_bytes()) == content[:at]
@@ -149,15 +149,15 @@ def test_chunk_offset_must_match(start, cuts, wrong):
 @pytest.mark.parametrize("algorithm", ["sha256", "sha1", "md5"])
 def test_checksums(start, algorithm):
     http = start()
-    place = begin(http, 100)
+    location = begin(http, 100)
     digest = base64.b64encode(hashlib.new(algorithm, b"right").digest()).decode()
     header = {"Upload-Checksum": f"{algorithm} {digest}"}
-    body = problem(piece(http, place, 0, b"wrong", **header), 460)
+    body = problem(piece(http, location, 0, b"wrong", **header), 460)
     # tests/service/schema_checks.py names the field too.
     assert (body["type"], body["field"]) == ("/problems/wrong-checksum", "body")
-    assert offset(http, place) == 0
-    assert piece(http, place, 0, b"right", **header).status_code == 204
-    assert offset(http, place) == 5
+    assert offset(http, location) == 0
+    assert piece(http, location, 0, b"right", **header).status_code == 204
+    assert offset(http, location) == 5
 
 
 def test_unknown_checksum(start):
@@ -168,17 +168,17 @@ def test_unknown_checksum(start):
 
 def test_protocol_version_header_is_required(start):
     http = start()
-    place = begin(http, 10)
+    location = begin(http, 10)
     for answer in (
         http.post("/v1/uploads", headers={"Tus-Resumable": "0.2.2", "Upload-Length": "9"}),
-        http.head(place, headers={"Tus-Resumable": "2.0.0"}),
-        http.delete(place, headers={"Tus-Resumable": "2.0.0"}),
-        piece(http, place, 0, b"x", **{"Tus-Resumable": "2.0.0"}),
+        http.head(location, headers={"Tus-Resumable": "2.0.0"}),
+        http.delete(location, headers={"Tus-Resumable": "2.0.0"}),
+        piece(http, location, 0, b"x", **{"Tus-Resumable": "2.0.0"}),
     ):
         assert (answer.status_code, answer.headers["tus-version"]) == (412, "1.0.0")
-    body = problem(http.patch(place, headers={**TUS, "Upload-Offset": "0"}, content=b"x"), 415)
+    body = problem(http.patch(location, headers={**TUS, "Upload-Offset": "0"}, content=b"x"), 415)
     assert body["accepted"] == "application/offset+octet-stream"
-    assert http.get(place).json()["offset"] == 0
+    assert http.get(location).json()["offset"] == 0
 
 
 @pytest.mark.parametrize("length", ["", "0", "-1", "many", str(2**64)])
@@ -198,12 +198,12 @@ def test_oversize_is_rejected_at_creation(start, monkeypatch):
 
 def test_chunk_beyond_the_length_is_rejected(start):
     http = start()
-    place = begin(http, 10)
-    assert piece(http, place, 0, b"1234").status_code == 204
-    problem(piece(http, place, 4, b"5678901"), 413)
-    assert offset(http, place) == 4
-    problem(piece(http, place, 4, iter([b"567", b"8901"])), 413)
-    assert offset(http, place) in (4, 7)
+    location = begin(http, 10)
+    assert piece(http, location, 0, b"1234").status_code == 204
+    problem(piece(http, location, 4, b"5678901"), 413)
+    assert offset(http, location) == 4
+    problem(piece(http, location, 4, iter([b"567", b"8901"])), 413)
+    assert offset(http, location) in (4, 7)
 
 
 @pytest.mark.parametrize(
@@ -223,33 +223,33 @@ def test_wrong_metadata_is_named(start, said, field):
 
 def test_termination_removes_the_upload(start):
     http = start()
-    place = begin(http, 10)
-    piece(http, place, 0, b"123")
+    location = begin(http, 10)
+    piece(http, location, 0, b"123")
     assert len(left_in(http)) == 1
-    assert http.delete(place, headers=TUS).status_code == 204
+    assert http.delete(location, headers=TUS).status_code == 204
     assert left_in(http) == []
     for answer in (
-        http.get(place),
-        http.head(place, headers=TUS),
-        http.delete(place, headers=TUS),
-        piece(http, place, 3, b"4"),
+        http.get(location),
+        http.head(location, headers=TUS),
+        http.delete(location, headers=TUS),
+        piece(http, location, 3, b"4"),
     ):
         assert answer.status_code == 404
 
 
 def test_termination_by_method_override(start):
     http = start()
-    place = begin(http, 10)
-    assert http.post(place, headers={**TUS, "X-HTTP-Method-Override": "DELETE"}).status_code == 204
-    assert http.get(place).status_code == 404
+    location = begin(http, 10)
+    assert http.post(location, headers={**TUS, "X-HTTP-Method-Override": "DELETE"}).status_code == 204
+    assert http.get(location).status_code == 404
 
 
 def test_dataset_survives_its_upload(start, scan):
     http, content = start(), scan().read_bytes()
-    place = begin(http, len(content))
-    piece(http, place, 0, content)
-    record = settled(http, place)
-    assert http.delete(place, headers=TUS).status_code == 204
+    location = begin(http, len(content))
+    piece(http, location, 0, content)
+    record = settled(http, location)
+    assert http.delete(location, headers=TUS).status_code == 204
     assert http.get(record["links"]["result"]).is_success
 
 
@@ -279,12 +279,12 @@ def test_expired_uploads_are_swept(start):
 
 def test_one_writer_at_a_time(start):
     http = start()
-    place = begin(http, 10)
-    with http.app.state.parts.hold(place.rpartition("/")[2]):
-        assert problem(piece(http, place, 0, b"x"), 423)["type"] == "/problems/locked"
-        problem(http.delete(place, headers=TUS), 423)
-        assert offset(http, place) == 0
-    assert piece(http, place, 0, b"x").status_code == 204
+    location = begin(http, 10)
+    with http.app.state.parts.hold(location.rpartition("/")[2]):
+        assert problem(piece(http, location, 0, b"x"), 423)["type"] == "/problems/locked"
+        problem(http.delete(location, headers=TUS), 423)
+        assert offset(http, location) == 0
+    assert piece(http, location, 0, b"x").status_code == 204
 
 
 @pytest.mark.parametrize("upload", ["up-" + "0" * 20, "nonsense", "..%2f..%2fetc%2fpasswd", "ds-" + "0" * 20])
@@ -298,13 +298,13 @@ def test_unknown_and_hostile_ids(start, upload):
 def test_upload_resumes_after_a_restart(start, scan):
     content = scan().read_bytes()
     http = start()
-    place = begin(http, len(content))
-    piece(http, place, 0, content[:3000])
+    location = begin(http, len(content))
+    piece(http, location, 0, content[:3000])
     http.__exit__()
     http = start()
-    assert offset(http, place) == 3000
-    piece(http, place, 3000, content[3000:])
-    assert settled(http, place)["state"] == "done"
+    assert offset(http, location) == 3000
+    piece(http, location, 3000, content[3000:])
+    assert settled(http, location)["state"] == "done"
 
 
 @pytest.mark.parametrize("state", ["receiving", "reading"])
@@ -312,7 +312,7 @@ def test_complete_uploads_are_ingested_at_the_next_start(start, scan, state):
     """Death after the last byte, before that was stored; and while it was read, with half a file left."""
     content = scan().read_bytes()
     http = start()
-    place = begin(http, len(content))
+    location = begin(http, len(content))
     row = http.app.state.parts.uploads.receiving()[0]
     files = http.app.state.parts.files.of("local")
     http.app.state.parts.upload_ingest.stop()
@@ -322,7 +322,7 @@ def test_complete_uploads_are_ingested_at_the_next_start(start, scan, state):
         http.app.state.parts.uploads.mark_complete(row.id)
     http.__exit__()
     http = start()
-    assert settled(http, place)["result"] == row.result_id
+    assert settled(http, location)["result"] == row.result_id
     assert http.get(f"/v1/datasets/{row.result_id}").json()["elements"] == 16
     assert left_in(http) == []
 
@@ -330,31 +330,31 @@ def test_complete_uploads_are_ingested_at_the_next_start(start, scan, state):
 def test_stored_uploads_are_not_ingested_twice(start, scan):
     content = scan().read_bytes()
     http = start()
-    place = begin(http, len(content))
-    piece(http, place, 0, content)
-    done = settled(http, place)
-    upload = place.rpartition("/")[2]
+    location = begin(http, len(content))
+    piece(http, location, 0, content)
+    done = settled(http, location)
+    upload = location.rpartition("/")[2]
     http.__exit__()
     http = start()
     http.app.state.parts.uploads.mark_complete(upload)
     http.app.state.parts.upload_ingest.notify()
-    assert settled(http, place)["result"] == done["result"]
+    assert settled(http, location)["result"] == done["result"]
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1
 
 
 def test_unverified_bytes_are_dropped_after_a_kill(start):
     http = start()
-    place = begin(http, 100)
-    piece(http, place, 0, b"verified")
-    stored = http.app.state.parts.files.of("local").upload(place.rpartition("/")[2])
+    location = begin(http, 100)
+    piece(http, location, 0, b"verified")
+    stored = http.app.state.parts.files.of("local").upload(location.rpartition("/")[2])
     http.__exit__()
     # As a kill within a piece with a checksum leaves it.
     stored.write_bytes(b"verified" + b"not verified")
     stored.with_name(f"{stored.name}.unverified").write_text("8")
     http = start()
-    assert offset(http, place) == 8
+    assert offset(http, location) == 8
     assert stored.read_bytes() == b"verified"
-    assert piece(http, place, 8, b" piece").headers["upload-offset"] == "14"
+    assert piece(http, location, 8, b" piece").headers["upload-offset"] == "14"
     assert left_in(http) == [stored.name]
 
 
@@ -364,6 +364,6 @@ def test_uploads_are_begun_no_faster_than_allowed(start):
         http.app.state.parts, upload_limits=UploadLimits(NoProjects(), begun_per_minute=2)
     )
     answers = [http.post("/v1/uploads", headers={**TUS, "Upload-Length": "9"}) for _ in range(3)]
-    assert [one.status_code for one in answers] == [201, 201, 429]
+    assert [answer.status_code for answer in answers] == [201, 201, 429]
     assert problem(answers[2], 429)["field"] == "uploads"
     assert 1 <= int(answers[2].headers["retry-after"]) <= 30
