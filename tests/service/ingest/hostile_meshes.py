@@ -115,10 +115,10 @@ REFUSED: dict[str, tuple[bytes, str]] = {
     "a buffer in the net": (gltf(buffers=[{"byteLength": 48, "uri": "http://127.0.0.1/x"}]), "buffers/uri"),
     "a buffer above": (gltf(buffers=[{"byteLength": 48, "uri": "../../x.bin"}]), "buffers/uri"),
     "a buffer of a number": (gltf(buffers=[{"byteLength": 48, "uri": 7}]), "file"),
-    "a count of billions": (gltf(accessors=views(4 * 10**9)), "accessors/0/count"),
+    "a count of billions": (gltf(accessors=views(4 * 10**9)), "file"),
     "a negative count of glTF": (gltf(accessors=views(-3)), "accessors/0/count"),
-    "an offset far away": (gltf(accessors=views(3, 10**12)), "accessors/0/byteOffset"),
-    "an accessor of nothing": (gltf(accessors=[]), "meshes/0/primitives/0/POSITION"),
+    "an offset far away": (gltf(accessors=views(3, 10**12)), "file"),
+    "an accessor of nothing": (gltf(accessors=[]), "meshes/0/primitives/0/indices"),
     "a mesh that is not there": (gltf(nodes=[{"mesh": 9}]), "nodes/0/mesh"),
     "a scene of nothing": (gltf(scenes=[], nodes=[], meshes=[]), "file"),
     "a sparse accessor": (
@@ -127,7 +127,7 @@ REFUSED: dict[str, tuple[bytes, str]] = {
     ),
     "a list for a scene": (b"[" * 5000, "file"),
     "a deep scene": (b'{"a":' * 100_000, "file"),
-    "a scene of a number": (b'{"meshes": 7}', "meshes"),
+    "a scene of a number": (b'{"meshes": 7}', "file"),
     "a long chunk": (glb(gltf(), length=2**32 - 1), "file"),
     "a short chunk": (glb(gltf(), length=5), "file"),
     "a GLB of the mark alone": (b"glTF", "file"),
@@ -139,6 +139,7 @@ REFUSED: dict[str, tuple[bytes, str]] = {
 TAKEN: dict[str, bytes] = {
     "a triangle": gltf(),
     "a node beside the tree": gltf(nodes=[{"mesh": 0}, {}]),
+    "very many nodes": gltf(nodes=[{"mesh": 0}] * 100_001),
 }
 
 

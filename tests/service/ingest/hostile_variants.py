@@ -128,6 +128,11 @@ def accessor(**changed: Any) -> bytes:
     return gltf(accessors=[plain[0] | changed, plain[1]])
 
 
+def view(**changed: Any) -> bytes:
+    plain = {"buffer": 0, "byteOffset": 0, "byteLength": 36}
+    return gltf(bufferViews=[plain | changed, {"buffer": 0, "byteOffset": 36, "byteLength": 12}])
+
+
 DRACO = "KHR_draco_mesh_compression"
 MESHES: dict[str, tuple[bytes, str]] = {
     **{
@@ -152,44 +157,44 @@ MESHES: dict[str, tuple[bytes, str]] = {
     "PLY with a face of two": (face(2, "0 1"), "faces"),
     "PLY with a face of one": (face(1, "0"), "faces"),
     "glTF nodes in a circle": (nodes([1], [0]), "nodes"),
-    "glTF nodes in a long circle": (nodes([1], [2], [3], [1]), "nodes/3/children"),
+    "glTF nodes in a long circle": (nodes([1], [2], [3], [1]), "nodes"),
     "glTF node in itself": (nodes([0]), "nodes"),
-    "glTF diamond": (nodes([1, 2], [3], [3], []), "nodes/2/children"),
-    "glTF diamond of thirty": (nodes(*([k + 1, k + 1] for k in range(30)), []), "nodes/0/children"),
-    "glTF child beyond": (nodes([7]), "nodes/0/children"),
-    "glTF child before": (nodes([-1]), "nodes/0/children"),
-    "glTF child of words": (gltf(nodes=[{"mesh": 0, "children": ["x"]}]), "nodes/0/children"),
-    "glTF children that are one": (gltf(nodes=[{"mesh": 0, "children": 1}]), "nodes/0/children"),
-    "glTF nodes of numbers": (gltf(nodes=[7]), "nodes"),
-    "glTF of many nodes": (gltf(nodes=[{"mesh": 0}] * 100_001), "nodes"),
-    "glTF matrix of fifteen": (nodes([], matrix=[1.0] * 15), "nodes/0/matrix"),
-    "glTF matrix of words": (nodes([], matrix=["a"] * 16), "nodes/0/matrix"),
-    "glTF scale of light years": (nodes([], scale=[1e300, 1, 1]), "nodes/0/scale"),
-    "glTF scale of 400 digits": (nodes([], scale=[10**400, 1, 1]), "nodes/0/scale"),
+    "glTF diamond": (nodes([1, 2], [3], [3], []), "nodes"),
+    "glTF diamond of thirty": (nodes(*([k + 1, k + 1] for k in range(30)), []), "nodes"),
+    "glTF child beyond": (nodes([7]), "file"),
+    "glTF child before": (nodes([-1]), "file"),
+    "glTF child of words": (gltf(nodes=[{"mesh": 0, "children": ["x"]}]), "file"),
+    "glTF children that are one": (gltf(nodes=[{"mesh": 0, "children": 1}]), "file"),
+    "glTF nodes of numbers": (gltf(nodes=[7]), "file"),
+    "glTF of a camera with a mesh": (nodes([], camera=0), "nodes/0"),
+    "glTF of a camera above a mesh": (nodes([1], [], camera=0), "nodes/0"),
+    "glTF mesh before the first": (nodes([], mesh=-1), "nodes/0/mesh"),
+    "glTF buffer before the first": (view(buffer=-1), "bufferViews/0/buffer"),
+    "glTF places before the first": (
+        primitive(attributes={"POSITION": -2}),
+        "meshes/0/primitives/0/POSITION",
+    ),
+    "glTF colours beyond": (
+        primitive(attributes={"POSITION": 0, "COLOR_0": 9}),
+        "meshes/0/primitives/0/COLOR_0",
+    ),
+    "glTF matrix of fifteen": (nodes([], matrix=[1.0] * 15), "file"),
+    "glTF matrix of words": (nodes([], matrix=["a"] * 16), "file"),
+    "glTF scale of light years": (nodes([], scale=[1e300, 1, 1]), "vertices"),
+    "glTF scale of 400 digits": (nodes([], scale=[10**400, 1, 1]), "file"),
     **{
-        f"glTF byteLength {length!r}": (gltf(buffers=[{"byteLength": length}]), "buffers/0/byteLength")
+        f"glTF byteLength {length!r}": (gltf(buffers=[{"byteLength": length}]), "file")
         for length in (10**15, -1, 1.5, "48", None, True)
     },
-    "glTF view beyond its buffer": (
-        gltf(bufferViews=[{"buffer": 0, "byteOffset": 0, "byteLength": 4800}]),
-        "bufferViews/0/byteLength",
-    ),
-    "glTF view of a far place": (
-        gltf(bufferViews=[{"buffer": 0, "byteOffset": 10**18, "byteLength": 1}]),
-        "bufferViews/0/byteOffset",
-    ),
-    "glTF view of no buffer": (
-        gltf(bufferViews=[{"buffer": 9, "byteLength": 1}]),
-        "bufferViews/0/buffer",
-    ),
-    "glTF stride": (
-        gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": 10**9}]),
-        "bufferViews/0/byteStride",
-    ),
-    "glTF count": (accessor(count=10**18), "accessors/0/count"),
-    "glTF count of nothing": (accessor(count=0), "accessors/0/count"),
-    "glTF component": (accessor(componentType=1), "accessors/0"),
-    "glTF type": (accessor(type="VEC9"), "accessors/0"),
+    "glTF view beyond its buffer": (view(byteLength=4800), "file"),
+    "glTF view of a far place": (view(byteOffset=10**18), "file"),
+    "glTF view before its buffer": (view(byteOffset=-36), "bufferViews/0/byteOffset"),
+    "glTF view of no buffer": (view(buffer=9), "bufferViews/0/buffer"),
+    "glTF stride": (view(byteStride=10**9), "file"),
+    "glTF count": (accessor(count=10**18), "file"),
+    "glTF count of nothing": (accessor(count=0), "faces"),
+    "glTF component": (accessor(componentType=1), "file"),
+    "glTF type": (accessor(type="VEC9"), "file"),
     "glTF sparse": (accessor(sparse={"count": 10**9}), "accessors/0"),
     "glTF with Draco required": (gltf(extensionsRequired=[DRACO]), "extensionsRequired"),
     "glTF with Draco used": (gltf(extensionsUsed=[DRACO]), "extensionsUsed"),
@@ -198,7 +203,7 @@ MESHES: dict[str, tuple[bytes, str]] = {
     "glTF of points": (primitive(mode=0), "meshes/0/primitives/0/mode"),
     "glTF of lines": (primitive(mode=1), "meshes/0/primitives/0/mode"),
     "glTF of a mode of words": (primitive(mode="x"), "meshes/0/primitives/0/mode"),
-    "glTF without places": (primitive(attributes={}), "meshes/0/primitives/0/POSITION"),
+    "glTF without places": (primitive(attributes={}), "file"),
     "glTF with other indices": (primitive(indices=9), "meshes/0/primitives/0/indices"),
     "GLB in a circle": (glb(nodes([1], [0])), "nodes"),
     "needles": (b"v 0 0 0\nv 1 0 0\nv 0 1e-12 0\nv 0 0 1e-12\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", "faces"),

@@ -163,6 +163,53 @@ def test_rejects_invalid_meshes(data, words):
         read_mesh(data)
 
 
+PLANE = b"OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "instead"),
+    [
+        (b"OFF\n", b"OFF "),
+        (b"\n", b"\r\n"),
+        (b"4 2 0", b"4 2 # edges are not counted"),
+        (b"4 2 0", b"4 2 0 # as counted"),
+        (b"3 0 1 2\n", b"# the first face\n\n3 0 1 2 # a face\n"),
+        (b"3 0 1 2", b"3 0 1 2 255 0 0"),
+    ],
+)
+def test_an_off_may_be_laid_out_freely(line, instead):
+    assert len(read_mesh(PLANE.replace(line, instead)).surface.mesh.faces) == 2
+
+
+@given(st.integers(3, len(PLANE) - 2))
+def test_every_truncation_of_an_off_is_detected(length):
+    # Only the last digit of the last corner can go without a trace, and that leaves no corner here.
+    with pytest.raises(InvalidInput):
+        read_mesh(PLANE[:length])
+
+
+@pytest.mark.parametrize(
+    ("line", "instead", "words"),
+    [
+        (b"4 2 0", b"-4 2 0", "file: found an OFF file that ends too soon"),
+        (b"4 2 0", b"many", "file: found OFF data that are truncated, damaged"),
+        (b"4 2 0", b"5 2 0", "ends too soon: 6 lines of the 5 vertices and 2 faces"),
+        (b"4 2 0", b"4000000000 4000000000 0", "ends too soon"),
+        (b"4 2 0", b"9" * 5000 + b" 1 0", "file: found"),
+        (b"1 1 0", b"1 x 0", "file: found"),
+        (b"1 1 0", b"1 1", "file: found"),
+        (b"3 0 2 3", b"3 0 2 4", "file: found"),
+        (b"3 0 2 3", b"3 0 2 -1", "file: found"),
+        (b"3 0 2 3", b"3 0 2", "faces: found '3 0 2' as face 1; accepted: the number of corners"),
+        (b"3 0 2 3", b"2 0 2", "faces: found"),
+        (b"3 0 2 3", b"9" * 5000 + b" 0 1 2", "file: found"),
+    ],
+)
+def test_rejects_invalid_off(line, instead, words):
+    with pytest.raises(InvalidInput, match=words):
+        read_mesh(PLANE.replace(line, instead))
+
+
 def scene(buffers, **more):
     return json.dumps({"asset": {"version": "2.0"}, "buffers": buffers, "meshes": [], **more}).encode()
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import io
-import json
 import re
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import trimesh
@@ -22,7 +20,7 @@ from bentray_kernels.meshes.defects import SoundMesh, sound
 from .damage import first_bytes, rejecting_damage
 from .gltf_checks import check_gltf
 from .obj_checks import plain_obj
-from .off_checks import HEADERS, check_off
+from .off_checks import HEADERS, plain_off
 
 ACCEPTED = "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB"
 
@@ -31,13 +29,6 @@ MAX_FACES = 2_000_000
 
 # Written before text by some editors.
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-
-# Chunks of GLB: JSON, "JSON" in little-endian.
-GLB_HEADER = struct.Struct("<4sII")
-GLB_CHUNK = struct.Struct("<I4s")
-
-# Fields of glTF for appearance and animation, which are not used; images would have to be decoded.
-MATERIALS = ("images", "textures", "samplers", "materials", "animations", "skins", "cameras")
 
 
 @dataclass(frozen=True)
@@ -72,20 +63,21 @@ def read_mesh(data: bytes) -> ReadMesh:
         raise InvalidInput("file", f"{len(data)} bytes", f"at most {LARGEST_BYTES} bytes")
     data = data.removeprefix(BYTE_ORDER_MARK)
     kind = _kind(data)
-    if kind in ("gltf", "glb"):
-        data = _without_materials(data, kind)
-    if kind == "off":
-        check_off(data)
-    if kind == "obj":
-        with _whole(kind):
-            data = plain_obj(data)
     with _whole(kind):
-        loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
+        if kind in ("gltf", "glb"):
+            check_gltf(data, kind)
+        elif kind == "off":
+            data = plain_off(data)
+        elif kind == "obj":
+            data = plain_obj(data)
+        # Images of materials would have to be decoded.
+        loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, skip_materials=True)
+        instances = [loaded.geometry[loaded.graph[node][1]] for node in loaded.graph.nodes_geometry]
+        faces = sum(len(getattr(instance, "faces", ())) for instance in instances)
+        if faces > MAX_FACES:
+            raise InvalidInput("faces", faces, f"at most {MAX_FACES}")
         mesh = loaded.to_mesh()
-        faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices)
-    if len(faces) > MAX_FACES:
-        raise InvalidInput("faces", len(faces), f"at most {MAX_FACES}")
-    surface = sound(vertices, faces)
+        surface = sound(np.asarray(mesh.vertices), np.asarray(mesh.faces))
     return ReadMesh(kind, surface, _colours(mesh, surface))
 
 
@@ -129,42 +121,6 @@ def _whole(kind: str) -> Iterator[None]:
             raise
         found = f"{kind.upper()} data that are truncated, damaged, or inconsistent with the header"
         raise InvalidInput("file", found, error.accepted) from None
-
-
-def _without_materials(data: bytes, kind: str) -> bytes:
-    """The same glTF without images and materials, after checking that it refers to no other file."""
-    with _whole(kind):
-        rest = b""
-        text = data
-        if kind == "glb":
-            length, name = GLB_CHUNK.unpack_from(data, GLB_HEADER.size)
-            begin = GLB_HEADER.size + GLB_CHUNK.size
-            text, rest = data[begin : begin + length], data[begin + length :]
-            if name != b"JSON" or len(text) < length:
-                raise InvalidInput("file", f"a first chunk {name!r}", "JSON, as a whole")
-        scene = json.loads(text)
-        outside = [buffer["uri"] for buffer in scene.get("buffers", []) if not _inside(buffer)]
-        if outside:
-            # The name may be that of any file of this machine; it is not repeated.
-            raise InvalidInput("buffers/uri", "data in another file", "data within the file")
-        check_gltf(scene, len(data), MAX_FACES)
-        stripped = json.dumps(_stripped(scene)).encode()
-    if kind == "gltf":
-        return stripped
-    stripped += b" " * (-len(stripped) % 4)
-    total = GLB_HEADER.size + GLB_CHUNK.size + len(stripped) + len(rest)
-    return GLB_HEADER.pack(b"glTF", 2, total) + GLB_CHUNK.pack(len(stripped), b"JSON") + stripped + rest
-
-
-def _inside(buffer: dict[str, Any]) -> bool:
-    return "uri" not in buffer or buffer["uri"].startswith("data:")
-
-
-def _stripped(scene: dict[str, Any]) -> dict[str, Any]:
-    for mesh in scene.get("meshes", []):
-        for primitive in mesh["primitives"]:
-            primitive.pop("material", None)
-    return {name: value for name, value in scene.items() if name not in MATERIALS}
 
 
 def _colours(mesh: trimesh.Trimesh, surface: SoundMesh) -> Floats | None:

@@ -11,8 +11,8 @@ SHOWN = 60
 
 # Continued lines; faces of fewer than three corners; vertices of fewer than three numbers.
 CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
-SHORT_FACE = re.compile(rb"^[ \t]*f(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
-SHORT_VERTEX = re.compile(rb"^[ \t]*v(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
+SHORT = re.compile(rb"^[ \t]*([vf])(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
+ACCEPTED = {b"v": ("vertices", "three numbers, x y z"), b"f": ("faces", "three corners or more")}
 # Vertices, and faces with their corners; a corner is a vertex, and after a slash texture and normal.
 RECORD = re.compile(rb"^[ \t]*(?:(v)[ \t]|f[ \t]+([^\r\n#]*))", re.MULTILINE)
 # A corner that counts vertices back from its face, or from 0.
@@ -34,15 +34,9 @@ def plain_obj(data: bytes) -> bytes:
             incomplete vertex, or a face of a vertex that is not there.
     """
     text = CONTINUED.sub(b" ", data)
-    for field, pattern, accepted in (
-        ("vertices", SHORT_VERTEX, "three numbers, x y z"),
-        ("faces", SHORT_FACE, "three corners or more"),
-    ):
-        match = pattern.search(text)
-        if match is not None:
-            line = text.count(b"\n", 0, match.start()) + 1
-            shown = match[0].strip()[:SHOWN].decode(errors="replace")
-            raise InvalidInput(field, f"{shown!r} in line {line}", accepted)
+    if (match := SHORT.search(text)) is not None:
+        field, accepted = ACCEPTED[match[1]]
+        raise InvalidInput(field, _shown(text, match), accepted)
     return _absolute(text) if RELATIVE.search(text) else data
 
 
@@ -57,9 +51,14 @@ def _absolute(text: bytes) -> bytes:
             return record[0]
         numbers = [int(corner.partition(b"/")[0]) for corner in record[2].split()]
         if 0 in numbers or -min(numbers) > before:
-            line = text.count(b"\n", 0, record.start()) + 1
-            found = f"{record[0].strip()[:SHOWN].decode(errors='replace')!r} in line {line}"
-            raise InvalidInput("faces", found, f"vertices from 1, or from -1 to -{before} back from the face")
+            raise InvalidInput(
+                "faces", _shown(text, record), f"vertices from 1, or from -1 to -{before} back from the face"
+            )
         return b"f " + b" ".join(b"%d" % (n if n > 0 else before + 1 + n) for n in numbers)
 
     return RECORD.sub(replaced, text)
+
+
+def _shown(text: bytes, line: re.Match[bytes]) -> str:
+    number = text.count(b"\n", 0, line.start()) + 1
+    return f"{line[0].strip()[:SHOWN].decode(errors='replace')!r} in line {number}"
