@@ -9,6 +9,7 @@ from typing import Any
 from .command_line import commands
 from .dispersion import dispersion
 from .dissertation import dissertation
+from .export_formats import export_formats
 from .reconstruction_settings import reconstruction_settings
 from .rest import records, routes
 from .scan_limits import scan_limits
@@ -24,6 +25,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "records": records,
     "dispersion": dispersion,
     "dissertation": dissertation,
+    "export formats": export_formats,
     "scan limits": scan_limits,
     "scan readers": scan_readers,
     "scoreboard": scoreboard,

@@ -18,6 +18,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.cluster.capacities import WorkerCapacity, capacities_by_address
 from bentray_workers.cluster.resources import PICTURE_PRIORITY
 from bentray_workers.files import volume_export
+from bentray_workers.files.export.registry import FormatName
 from bentray_workers.images import drawing_tasks
 from bentray_workers.images.result_summary import result_summary
 from bentray_workers.images.truth_export import export_truth
@@ -174,10 +175,10 @@ class Pictures:
         volume: VolumeRow,
         path: Path,
         target: Path,
-        name: str,
+        name: FormatName,
         selection: volume_export.Selection,
     ) -> None:
-        """Export a volume to another format, a key of ``volume_export.FORMATS``."""
+        """Export a volume to another format, a key of ``EXPORTED``."""
         cost = picture_cost.export_cost(VolumeFile.of(volume.values()), name)
         what = "volume", f"shape {tuple(volume.shape)}", cost
         how = {"target": target, "name": name, "selection": selection}
@@ -191,7 +192,7 @@ class Pictures:
         path: Path,
         scan: Path,
         target: Path,
-        name: str,
+        name: FormatName,
     ) -> None:
         """Export the truth of a scan at the nodes of a reconstruction, see ``images.truth_export``."""
         cost = picture_cost.truth_cost(VolumeFile.of(volume.values()), dataset.values())

@@ -19,7 +19,7 @@ import httpx
 import numpy as np
 import psutil
 
-from bentray_workers.files.volume_export import FORMATS
+from bentray_workers.files.export.registry import EXPORTED as FORMATS
 from bentray_workers.rendering.picture_cost import VolumeFile, export_cost
 
 from ..edge import edge

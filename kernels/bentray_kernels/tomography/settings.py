@@ -10,6 +10,7 @@ from ..limits import LEFT_OUT, MAX_LEFT_OUT, SPEED_MPS, WATER_C
 from ..picker_names import DEFAULT_PICKER, PickerName
 from ..ranges import SEED, Range
 from ..request_fields import ABOVE_ZERO, Uses, check, declared, setting
+from ..solver_names import SolverName
 from .numerics import Numerics
 
 # The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
@@ -288,18 +289,7 @@ class Settings:
         label="Rays",
         words={"curved": "Bent", "straight": "Straight"},
     )
-    eikonal: Literal[
-        "deviation",
-        "fmm",
-        "fmm-first-order",
-        "fmm-untidy",
-        "hafmm",
-        "fsm",
-        "fsm-simultaneous",
-        "fim",
-        "fim-opencl",
-        "accurate",
-    ] = setting(
+    eikonal: SolverName = setting(  # noqa: RUF009 - a string, by its alias
         DEVIATION,
         "Eikonal solver for curved rays. deviation is for SART on slices; elsewhere accurate replaces it.",
         label="Eikonal solver",

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import Annotated, Any
 
 import typer
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.export.suffixes import COMPRESSED, SUFFIXES
+from bentray_workers.files.export.registry import FORMATS, SUFFIXES, FormatName
 
 from .export import AttenuationFrequency, AttenuationUnit, Quantity
 from .options.paths import output_file
 from .output.exit_codes import client_errors
 from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
 
-if TYPE_CHECKING:
-    from ..client.flows import Format
+DOWNLOADED = "; ".join(
+    f"{form.title} {', '.join(suffix for suffix in form.suffixes if suffix not in form.local)}"
+    for form in FORMATS.values()
+)
 
 
 def download(
     stored: Annotated[str, typer.Argument(metavar="ID", help="Id of a scan (ds-…) or volume (vol-…).")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help=f"File to write: {DOWNLOADED}.")],
     form: Annotated[
         str | None,
         typer.Option(
             "--format",
             show_default="by the name",
-            help="hdf5 (or h5), nifti, metaimage, nrrd, mat, vti, ome-zarr, dicom or npy.",
+            help=f"{', '.join(FORMATS)}, or h5 for hdf5.",
         ),
     ] = None,
     quantity: Quantity = "speed",
@@ -39,22 +41,18 @@ def download(
 ) -> None:
     """Download a scan or a volume; the extension of OUTPUT selects the format.
 
-    Scans are HDF5 files (.h5), as bentray reconstruct takes them; volumes .h5, .nii, .mha, .nrrd, .mat,
-    .vti, .zip (OME-Zarr), .dcm or .npy.
+    Scans are HDF5 files (.h5), as bentray reconstruct takes them.
 
     Example:  bentray download ds-0123456789abcdef0123 -o scan.h5
     """
-    formats: dict[str, Format] = {".h5": "hdf5", ".hdf5": "hdf5"}
-    if stored.startswith("vol-"):
-        # A service sends OME-Zarr as a zip, and NIfTI uncompressed.
-        formats = {
-            suffix: cast("Format", name)
-            for suffix, name in SUFFIXES.items()
-            if suffix not in (".zarr", COMPRESSED)
-        }
-    elif not stored.startswith("ds-"):
+    formats = {
+        suffix: name
+        for suffix, name in SUFFIXES.items()
+        if suffix not in FORMATS[name].local and (stored.startswith("vol-") or name == "hdf5")
+    }
+    if not stored.startswith(("vol-", "ds-")):
         raise InvalidInput("id", repr(stored), "the id of a scan (ds-…) or a volume (vol-…)")
-    names: dict[str, Format] = {**{one: one for one in formats.values()}, "h5": "hdf5"}
+    names: dict[str, FormatName] = {**{one: one for one in formats.values()}, "h5": "hdf5"}
     if form is not None and form not in names:
         raise InvalidInput("format", repr(form), "one of " + ", ".join(names))
     chosen = formats.get(output.suffix.lower()) if form is None else names[form]

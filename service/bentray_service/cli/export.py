@@ -9,17 +9,18 @@ from typing import Annotated
 import typer
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.export.suffixes import format_of
+from bentray_workers.files.export.registry import FORMATS, SINGLE_SUFFIXES, format_of
 
 from .options.paths import check_apart, input_file, output_file
 from .output.terminal import AsJson, print_json, print_lines
 
+WRITTEN = "; ".join(f"{form.title} {', '.join(form.suffixes)}" for form in FORMATS.values())
 ACCEPTED = "a reconstruction.h5, its folder, or a volume of Bentray in HDF5"
 
 Quantity = Annotated[
     str,
     typer.Option(
-        help="Quantity of .npy, .nii, .nrrd and .mha, e.g. speed or reflection; others hold all, "
+        help=f"Quantity of {SINGLE_SUFFIXES}, e.g. speed or reflection; others hold all, "
         "but for the reflection, which has a grid of its own."
     ),
 ]
@@ -32,7 +33,9 @@ AttenuationFrequency = Annotated[
 
 def export(
     result: Annotated[Path, typer.Argument(help="reconstruction.h5, its folder, or a volume in HDF5.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write; the suffix is the format.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help=f"File to write; the suffix is the format: {WRITTEN}.")
+    ],
     quantity: Quantity = "speed",
     attenuation: AttenuationUnit = "Np/m",
     frequency: AttenuationFrequency = None,
@@ -40,9 +43,6 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write a result in the format of another program; the suffix of OUTPUT selects it.
-
-    .h5 HDF5, .npy NumPy, .nii or .nii.gz NIfTI, .nrrd NRRD, .mha MetaImage, .mat MATLAB, .vti VTK ImageData
-    (ParaView), .zarr, .ozx or .zip OME-Zarr 0.5 (a folder, or a zip), .dcm DICOM Parametric Map.
 
     Example:  bentray export result/reconstruction.h5 -o speed.nii
     """

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, Unpack
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.export.registry import FormatName
 
 from ..interactive.progress_bar import progress_bar
 from ..interactive.result import Result
@@ -28,7 +29,7 @@ from .stored import DatasetId, JobId, StoredId, VolumeId, id_of, volume_of
 from .uploading import PLACES, OnBytes, UploadKind, send_direct, send_file
 from .waiting import wait_for
 
-Format = Literal["hdf5", "h5", "nifti", "metaimage", "nrrd", "mat", "vti", "ome-zarr", "dicom", "npy"]
+Format = Literal[FormatName, "h5"]
 
 Uploaded: TypeAlias = DatasetRecord | VolumeRecord | MeshRecord
 

@@ -259,9 +259,7 @@ class Result:
     ) -> Path:
         """Write a file in the format of its suffix; an existing file is replaced, whole or not at all.
 
-        ``.h5`` holds everything and is read by ``bentray.load``; ``.npy``, ``.nii``, ``.nii.gz``, ``.nrrd``
-        and ``.mha`` hold one quantity; ``.mat``, ``.vti``, ``.zarr``, ``.zip`` and ``.ozx`` (OME-Zarr) all
-        images; ``.dcm`` (DICOM) speed and attenuation.
+        ``.h5`` holds everything and is read by ``bentray.load``; the reference of results lists the formats.
 
         Args:
             path: of the file.
@@ -276,7 +274,7 @@ class Result:
             InvalidInput: naming the argument and what is accepted, such as the suffixes.
             OSError: where the folder cannot be written to or the disk is full.
         """
-        from bentray_workers.files.export.suffixes import format_of
+        from bentray_workers.files.export.registry import format_of
         from bentray_workers.files.reconstruction import write_reconstruction
         from bentray_workers.files.volume import write_volume
         from bentray_workers.files.volume_export import Selection, export_image

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal, TypedDict
 
 from bentray_kernels.picker_names import PickerName
+from bentray_kernels.solver_names import SolverName
 
 Method = Literal["sart", "gauss-newton", "auto", "waveform"]
 PhantomName = Literal["table6", "table6-vertical", "detailed", "table7"]
@@ -14,18 +15,7 @@ class ReconstructionSettings(TypedDict, total=False):
     """The settings of a reconstruction beside its method, each by its own name; see the table of settings."""
 
     rays: Literal["curved", "straight"]
-    eikonal: Literal[
-        "deviation",
-        "fmm",
-        "fmm-first-order",
-        "fmm-untidy",
-        "hafmm",
-        "fsm",
-        "fsm-simultaneous",
-        "fim",
-        "fim-opencl",
-        "accurate",
-    ]
+    eikonal: SolverName
     decomposition: Literal["slices", "volume"] | None
     opening_angle_deg: float | None
     water_temperature_c: float | None

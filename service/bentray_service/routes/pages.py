@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
+
+from bentray_workers.files.export.registry import FORMATS
 
 from ..web.documentation import documentation_files, missing_page
 from ..web.reference import reference_page
@@ -49,6 +52,12 @@ def formats(request: Request) -> HTMLResponse:
     from ..web.formats import formats_page
 
     return HTMLResponse(formats_page(request.app.version))
+
+
+@router.get("/static/export_formats.json")
+def export_formats() -> list[dict[str, Any]]:
+    """The formats of exports, which the page lists."""
+    return [{"format": name, "title": form.title, "single": form.single} for name, form in FORMATS.items()]
 
 
 @router.get("/problems/{slug}")

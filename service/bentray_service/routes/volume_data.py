@@ -9,9 +9,10 @@ from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import FREQUENCY_HZ
+from bentray_workers.files.export.registry import FORMATS, SINGLE, FormatName
 from bentray_workers.files.quantities import QuantityName
 from bentray_workers.files.reconstruction import shape_of_quantity
-from bentray_workers.files.volume_export import FORMATS, REVISION, Selection, largest_bytes
+from bentray_workers.files.volume_export import REVISION, Selection, largest_bytes
 
 from .. import __version__
 from ..errors import UnknownId
@@ -21,7 +22,9 @@ from .downloads import download, download_of, file_status, headers_of, tag_of, u
 from .pictures import while_connected
 from .volume_summaries import scan_of
 
-HDF5 = "application/x-hdf5"
+HDF5 = FORMATS["hdf5"].media_type
+EVEN = ", ".join(name for name, form in FORMATS.items() if form.uneven)
+ABOUT = "; ".join(f"{name}: {form.content}" for name, form in FORMATS.items())
 
 router = APIRouter()
 
@@ -31,7 +34,7 @@ router = APIRouter()
     "/{volume_id}/data",
     response_class=Response,
     responses={
-        **download_of(HDF5, *sorted({one.media_type for one in FORMATS.values()})),
+        **download_of(*dict.fromkeys(form.media_type for form in FORMATS.values())),
         **problems(404, 422, 429, 503, 507),
     },
 )
@@ -41,21 +44,16 @@ async def volume_data(
     service: Service,
     tenant: CallerTenant,
     format: Annotated[  # noqa: A002 - the name of the query parameter
-        Literal["hdf5", "h5", "nifti", "metaimage", "nrrd", "mat", "vti", "ome-zarr", "dicom", "npy"],
-        Query(
-            description="hdf5 or h5: all data; mat: all images and the grid for MATLAB (version 5); npy: "
-            "values only; nifti, metaimage (.mha) and nrrd: values with spacing and origin in mm; vti: all "
-            "images for ParaView, lengths in m; ome-zarr: all images as channels of OME-Zarr 0.5 in a zip; "
-            "dicom: speed and attenuation as a Parametric Map. Uneven heights: hdf5, mat and npy only."
-        ),
+        Literal[FormatName, "h5"],
+        Query(description=f"{ABOUT}; h5: hdf5. Uneven heights: {EVEN} only."),
     ] = "hdf5",
     quantity: Annotated[
         Literal[QuantityName, "truth"],
         Query(
-            description="Quantity of npy, nifti, metaimage and nrrd of a reconstruction; truth: the true "
+            description=f"Quantity of {', '.join(SINGLE)} of a reconstruction; truth: the true "
             "speed at its nodes, NaN outside, of a scan that has it. uncertainty: standard deviation of the "
-            "speed, m/s. reflection, in dB, has a grid of its "
-            "own: mat, vti, ome-zarr and dicom then hold this image alone, otherwise all others."
+            "speed, m/s. reflection, in dB, has a grid of its own: the other formats then hold this image "
+            "alone, otherwise all others."
         ),
     ] = "speed",
     attenuation: Annotated[
@@ -76,24 +74,25 @@ async def volume_data(
     Interrupted downloads can be resumed with Range and If-Range. Formats other than hdf5 are exported by a
     worker on the first request; before, HEAD returns no Content-Length.
     """
+    kind: FormatName = "hdf5" if format == "h5" else format
     volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
     files = service.files.of(tenant)
     # Exports are deleted together with the volume.
     path = await run_in_threadpool(service.files.store.fetch, files.volume(volume.id))
-    seed = repr((volume.id, volume.created, "hdf5" if format == "h5" else format))
+    seed = repr((volume.id, volume.created, kind))
     of_truth = quantity == "truth"
     selection = Selection(
         "speed" if of_truth else quantity, attenuation, None if attenuation == "Np/m" else frequency_hz
     )
     if of_truth and volume.job_id is None:
         raise InvalidInput("quantity", "truth of an uploaded volume", "none: it has values only")
-    if format in ("hdf5", "h5"):
+    if kind == "hdf5":
         if selection != Selection() or of_truth:
             field = "quantity" if quantity != "speed" else "attenuation"
             accepted = "speed and Np/m for hdf5, which holds all quantities in SI units"
             raise InvalidInput(field, f"{quantity}, {attenuation}", accepted)
         return download(request, path, seed, HDF5)
-    chosen = FORMATS[format]
+    chosen = FORMATS[kind]
     # Exports are deterministic, so the ETag is computed from the volume.
     which = (
         ""
@@ -104,8 +103,8 @@ async def volume_data(
     tag = tag_of(path, repr((__version__, REVISION, seed)))
     if (response := unchanged(request, tag)) is not None:
         return response
-    name = f"{volume.id}-{'values' if volume.job_id is None else quantity}.{chosen.extension}"
-    made = files.export(volume.id, f"{which}{REVISION}.{chosen.extension}")
+    name = f"{volume.id}-{'values' if volume.job_id is None else quantity}.{chosen.download_extension}"
+    made = files.export(volume.id, f"{which}{REVISION}.{chosen.download_extension}")
     if not made.exists():
         if request.method == "HEAD":
             headers = {"Accept-Ranges": "bytes", "Content-Disposition": f'attachment; filename="{name}"'}
@@ -118,9 +117,9 @@ async def volume_data(
             try:
                 if of_truth:
                     dataset, scan = await run_in_threadpool(scan_of, service, tenant, volume)
-                    work = service.pictures.export_truth(tenant, volume, dataset, path, scan, made, format)
+                    work = service.pictures.export_truth(tenant, volume, dataset, path, scan, made, kind)
                 else:
-                    work = service.pictures.export(tenant, volume, path, made, format, selection)
+                    work = service.pictures.export(tenant, volume, path, made, kind, selection)
                 await while_connected(request, work)
             except InvalidInput:
                 # Report a volume that was deleted in the meantime as unknown.

@@ -227,6 +227,7 @@ def test_everything_is_described(place: Place) -> None:
         "/documentation",
         "/documentation/{path:path}",
         "/problems/{slug}",
+        "/static/export_formats.json",
     }
     sign_in = {"/sign-in", "/sign-in/callback", "/sign-in/provider", "/sign-out"}
     assert hidden <= pages | sign_in | {"/openapi.json", "/static"}

@@ -6,15 +6,15 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import nibabel
 import numpy as np
 import pytest
 from typer.testing import Result
 
-from bentray_workers.files.export.suffixes import SUFFIXES
+from bentray_workers.files.export.registry import FORMATS, SUFFIXES, FormatName
 from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
-from bentray_workers.files.volume_export import FORMATS
 
 from ...workers.files.reconstructions import made
 
@@ -41,8 +41,11 @@ def test_every_suffix_is_written(bentray: Callable[..., Result], folder: Path, s
     assert "exists" in again.stderr
 
 
-def test_every_format_has_a_suffix() -> None:
-    assert {*SUFFIXES.values()} == {"hdf5", *FORMATS}
+def test_every_format_is_listed_where_it_can_be_chosen(bentray: Callable[..., Result]) -> None:
+    assert get_args(FormatName) == tuple(FORMATS)
+    for command in ("export", "download"):
+        text = " ".join(bentray(command, "--help").stdout.split())
+        assert all(form.title in text for form in FORMATS.values()), command
 
 
 def test_quantity_and_unit_are_options(bentray: Callable[..., Result], folder: Path) -> None:

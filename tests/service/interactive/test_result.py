@@ -14,7 +14,7 @@ from matplotlib import pyplot as plt
 import bentray
 from bentray_kernels.tomography.result import Reflection
 from bentray_service.interactive.result import Result, result_of
-from bentray_workers.files.export.suffixes import SUFFIXES
+from bentray_workers.files.export.registry import SUFFIXES
 from bentray_workers.files.volume import Volume
 
 from ...workers.files.reconstructions import made, truth

@@ -12,7 +12,7 @@ ASSETS = sorted(
 )
 
 
-@pytest.mark.parametrize("path", ["/", "/docs", "/docs/formats", *ASSETS])
+@pytest.mark.parametrize("path", ["/", "/docs", "/docs/formats", "/static/export_formats.json", *ASSETS])
 def test_pages_load_only_own_files(start, path):
     answer = start().get(path)
     assert answer.status_code == 200

@@ -13,22 +13,12 @@ from scipy.io import loadmat
 from bentray_service.files.deletion import StoredItem
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.tenants import LOCAL
+from bentray_workers.files.export.registry import FORMATS
 from bentray_workers.files.volume import Volume, write_volume
 
 from ..conftest import FakeCluster, FakeFuture
 
 STREAM = {"Content-Type": "application/octet-stream"}
-FORMATS = {
-    "hdf5": "h5",
-    "nifti": "nii",
-    "metaimage": "mha",
-    "nrrd": "nrrd",
-    "mat": "mat",
-    "vti": "vti",
-    "ome-zarr": "ome.zarr.zip",
-    "dicom": "dcm",
-    "npy": "npy",
-}
 
 
 @pytest.fixture
@@ -78,7 +68,7 @@ def test_interrupted_download_can_be_resumed(http, request, kind, asked):
     whole = http.get(here)
     assert whole.status_code == 200
     assert whole.headers["accept-ranges"] == "bytes"
-    assert whole.headers["content-disposition"].endswith(f'.{FORMATS[asked]}"')
+    assert whole.headers["content-disposition"].endswith(f'.{FORMATS[asked].download_extension}"')
     tag = whole.headers["etag"]
     assert tag.startswith('"')
     rest = http.get(here, headers={"Range": "bytes=100-", "If-Range": tag})

@@ -125,7 +125,7 @@ def test_wrong_format(http, here):
     assert (body["status"], body["field"], body["accepted"]) == (
         422,
         "format",
-        "'hdf5', 'h5', 'nifti', 'metaimage', 'nrrd', 'mat', 'vti', 'ome-zarr', 'dicom' or 'npy'",
+        "'hdf5', 'npy', 'nifti', 'nrrd', 'metaimage', 'mat', 'vti', 'ome-zarr', 'dicom' or 'h5'",
     )
 
 

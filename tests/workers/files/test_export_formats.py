@@ -23,9 +23,10 @@ from scipy.io import loadmat
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
 from bentray_workers.files.export import optional_library
+from bentray_workers.files.export.registry import EXPORTED
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.files.volume import Volume, write_volume
-from bentray_workers.files.volume_export import FORMATS, Selection, export_volume, largest_bytes
+from bentray_workers.files.volume_export import Selection, export_volume, largest_bytes
 
 from .reconstructions import made
 
@@ -51,7 +52,7 @@ def stored(result: Reconstruction, tmp_path_factory: pytest.TempPathFactory) -> 
 
 
 def exported(stored: Path, tmp_path: Path, name: str, selection: Selection | None = None) -> Path:
-    target = tmp_path / f"volume.{FORMATS[name].extension}"
+    target = tmp_path / f"volume.{EXPORTED[name].download_extension}"
     export_volume(stored, target=target, name=name, selection=selection)
     return target
 
@@ -180,14 +181,14 @@ def test_vti_has_the_declared_data(stored, result, tmp_path):
     assert after.endswith(b"</AppendedData>\n</VTKFile>\n")
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", EXPORTED)
 def test_the_same_volume_gives_the_same_bytes_of_at_most_the_reserved_size(stored, result, tmp_path, name):
     first = exported(stored, tmp_path, name).read_bytes()
     assert exported(stored, tmp_path, name).read_bytes() == first
     assert len(first) <= largest_bytes(result.speed.shape, uploaded=False)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", EXPORTED)
 def test_uploaded_volumes_are_exported(tmp_path, name):
     write_volume(
         tmp_path / "up.h5", Volume(np.ones((3, 4, 5), np.float32), (1e-3,) * 3, (0.0,) * 3, "a title")

@@ -20,9 +20,10 @@ from ome_zarr_models.v05.image import Image
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
+from bentray_workers.files.export.registry import EXPORTED
 from bentray_workers.files.truth_file import read_truth
 from bentray_workers.files.volume import Volume, read_volume, write_volume
-from bentray_workers.files.volume_export import FORMATS, export_image
+from bentray_workers.files.volume_export import export_image
 from bentray_workers.files.volume_formats import import_volume
 from bentray_workers.images.slice import volume_slice_png
 
@@ -172,7 +173,7 @@ READERS = [
 def test_a_marker_is_in_the_same_place_for_every_library(
     tmp_path: Path, kind: str, name: str, read: Callable[[Path], np.ndarray]
 ) -> None:
-    path = tmp_path / f"v.{FORMATS[name].extension}"
+    path = tmp_path / f"v.{EXPORTED[name].download_extension}"
     if (kind, name) == ("oblique", "ome-zarr"):
         with pytest.raises(InvalidInput, match=r"turned by .* degrees against x, y and z"):
             export_image(IMAGES[kind](), target=path, name=name)
@@ -204,7 +205,7 @@ def test_a_file_that_another_program_saved_lands_where_it_was(
     image = IMAGES[kind]()
     if axes and isinstance(image, Reconstruction):
         pytest.skip("nibabel reorients three axes")
-    path, target = tmp_path / f"v.{FORMATS[name].extension}", tmp_path / f"again.{again}"
+    path, target = tmp_path / f"v.{EXPORTED[name].download_extension}", tmp_path / f"again.{again}"
     export_image(image, target=path, name=name)
     by_another_program(path, target, axes)
     if isinstance(image, Reconstruction):

@@ -7,8 +7,10 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files import volume_export
+from bentray_workers.files.export import npy_writing
+from bentray_workers.files.export.content import Content
 from bentray_workers.files.volume import Volume, write_volume
-from bentray_workers.files.volume_export import FORMATS, Format, export_volume
+from bentray_workers.files.volume_export import export_volume
 
 
 @pytest.fixture
@@ -25,15 +27,13 @@ def test_an_export_is_written(stored: Path, tmp_path: Path) -> None:
 def test_a_volume_deleted_during_its_export_is_named(
     stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = FORMATS["npy"]
-
-    def write(target: Path, content: volume_export.Content) -> None:
-        with volume_export.atomic_replace(target) as partial:
+    def write(target: Path, content: Content) -> None:
+        with npy_writing.atomic_replace(target) as partial:
             partial.write_bytes(b"begun")
             for path in tmp_path.iterdir():
                 path.unlink()
 
-    monkeypatch.setattr(volume_export, "FORMATS", {"npy": Format(whole.extension, whole.media_type, write)})
+    monkeypatch.setattr(npy_writing, "write", write)
     with pytest.raises(InvalidInput, match="volume: found one that was deleted during its export"):
         export_volume(stored, target=tmp_path / "volume.npy", name="npy")
     assert list(tmp_path.iterdir()) == []

@@ -40,5 +40,9 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     }
 )
 REFLECTION = QUANTITIES["reflection"].array
+# The attenuation over the frequency, which exports may hold in place of that at it.
+ATTENUATION_DB = "attenuation_db_cm_mhz"
+# Units by names of arrays.
+UNITS = {**{row.array: row.unit for row in QUANTITIES.values()}, ATTENUATION_DB: "dB/(cm.MHz)"}
 # The arrays on the nodes of the speed; the reflection has pixels of its own.
 IMAGES = {name: quantity.array for name, quantity in QUANTITIES.items() if quantity.array != REFLECTION}

@@ -3,42 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import FREQUENCY_HZ
 from bentray_kernels.tomography import Reconstruction
 
-from .atomic import atomic_replace
-from .export.dicom_writing import write_dicom
-from .export.mat_writing import write_mat
-from .export.metaimage_writing import write_metaimage
-from .export.nifti_writing import write_nifti
-from .export.nrrd_writing import write_nrrd
-from .export.ome_zarr_writing import write_ome_zarr
-from .export.vti_writing import write_vti
+from .export.content import Content
+from .export.registry import EXPORTED, FormatName
 from .hdf5_reading import Limits, opened
-from .quantities import IMAGES, QUANTITIES, REFLECTION
+from .quantities import ATTENUATION_DB, IMAGES, QUANTITIES, REFLECTION
 from .reconstruction import read_reconstruction
 from .volume import FORMAT, Volume, read_volume
 from .volume_axes import Grid
 
-ATTENUATION, ATTENUATION_DB = IMAGES["attenuation"], "attenuation_db_cm_mhz"
-UNITS = {**{quantity.array: quantity.unit for quantity in QUANTITIES.values()}, ATTENUATION_DB: "dB/(cm.MHz)"}
+ATTENUATION = IMAGES["attenuation"]
 TITLES = {
     **{quantity.array: quantity.label[0].upper() + quantity.label[1:] for quantity in QUANTITIES.values()},
     ATTENUATION_DB: "Attenuation (dB/(cm MHz))",
 }
-# Formats with one image.
-SINGLE = ("npy", "nifti", "metaimage", "nrrd")
 ATTENUATION_UNITS = ("Np/m", "dB/cm/MHz")
 # Entry of the provenance with the frequency of the attenuation.
 FREQUENCY = "frequency_hz"
@@ -74,41 +59,6 @@ class Selection:
             FREQUENCY_HZ.check("frequency", self.frequency_hz)
 
 
-@dataclass(frozen=True)
-class Content:
-    """Content of the file of a volume: one grid.
-
-    Attributes:
-        values: (nx, ny[, nz]): the selected quantity of a reconstruction, or the values of an upload.
-        grid: positions of the nodes.
-        title: of the volume.
-        images: all arrays on this grid by name, including the values.
-        seconds: time of the file, s since 1970.
-    """
-
-    values: NDArray[Any]
-    grid: Grid
-    title: str
-    images: Mapping[str, NDArray[Any]]
-    seconds: float = 0.0
-
-
-@dataclass(frozen=True)
-class Format:
-    """A file format: extension, media type and writer.
-
-    Attributes:
-        copies: memory while it is written, in sizes of the volume as it is read (measured).
-        library_bytes: memory of the libraries that it is written by.
-    """
-
-    extension: str
-    media_type: str
-    write: Callable[[Path, Content], None]
-    copies: float = 2.0
-    library_bytes: int = 0
-
-
 # Of what is written here; a service sends no stored export of another one. 2: positions in RAS or LPS.
 REVISION = 2
 # Size of a number, and of headers.
@@ -123,13 +73,15 @@ def largest_bytes(shape: Sequence[int], *, uploaded: bool) -> int:
     return images * (NUMBER_BYTES * math.prod(shape) + SLICE_BYTES * shape[-1]) + HEADER_BYTES
 
 
-def export_volume(volume: Path, *, target: Path, name: str, selection: Selection | None = None) -> None:
+def export_volume(
+    volume: Path, *, target: Path, name: FormatName, selection: Selection | None = None
+) -> None:
     """Task: write a volume or reconstruction file in another format.
 
     Args:
         volume: its file.
         target: the exported file, replaced atomically.
-        name: a key of ``FORMATS``.
+        name: a key of ``EXPORTED``.
         selection: of quantity and unit; None: the speed, and Np/m.
 
     Raises:
@@ -162,7 +114,7 @@ def export_image(
     image: Reconstruction | Volume,
     *,
     target: Path,
-    name: str,
+    name: FormatName,
     selection: Selection | None = None,
     seconds: float = 0.0,
 ) -> None:
@@ -171,7 +123,7 @@ def export_image(
     Args:
         image: what to write.
         target: the exported file, replaced atomically.
-        name: a key of ``FORMATS``.
+        name: a key of ``EXPORTED``.
         selection: of quantity and unit; None: the speed, and Np/m.
         seconds: time of the image, s since 1970.
 
@@ -189,7 +141,7 @@ def export_image(
         content = Content(image.values, image.grid, image.title, images, seconds)
     else:
         content = _reconstructed(image, chosen, seconds)
-    FORMATS[name].write(target, content)
+    EXPORTED[name].write(target, content)
 
 
 def _reconstructed(own: Reconstruction, chosen: Selection, seconds: float) -> Content:
@@ -230,56 +182,3 @@ def _frequency(provenance: Mapping[str, str], chosen: Selection) -> float:
         accepted = "Np/m, or a frequency: the result states none"
         raise InvalidInput("attenuation", repr(chosen.attenuation), accepted) from None
     return frequency
-
-
-def _npy(target: Path, content: Content) -> None:
-    with atomic_replace(target) as partial, partial.open("wb") as file:
-        np.save(file, np.ascontiguousarray(content.values), allow_pickle=False)
-
-
-def _on_grid(write: Callable[..., None]) -> Callable[[Path, Content], None]:
-    """Use a writer that takes values and grid."""
-    return lambda target, content: write(target, content.values, content.grid, content.title)
-
-
-def _mat(target: Path, content: Content) -> None:
-    own = content.grid
-    grid = {"spacing_m": np.array(own.spacing_m), "origin_m": np.array(own.origin_m)}
-    if content.values.ndim == 3:
-        grid["direction"] = own.direction
-    axes = ",".join("xyz"[: content.values.ndim])
-    write_mat(target, {**content.images, **grid, "axes": axes, "title": content.title})
-
-
-def _vti(target: Path, content: Content) -> None:
-    active = next(name for name, image in content.images.items() if image is content.values)
-    write_vti(target, content.images, content.grid, active)
-
-
-def _ome_zarr(target: Path, content: Content) -> None:
-    write_ome_zarr(target, content.images, UNITS, content.grid, content.title)
-
-
-def _dicom(target: Path, content: Content) -> None:
-    write_dicom(
-        target,
-        content.images,
-        content.grid,
-        content.title,
-        version("bentray"),
-        content.seconds,
-    )
-
-
-FORMATS: Mapping[str, Format] = MappingProxyType(
-    {
-        "npy": Format("npy", "application/octet-stream", _npy),
-        "nifti": Format("nii", "application/octet-stream", _on_grid(write_nifti)),
-        "metaimage": Format("mha", "application/octet-stream", _on_grid(write_metaimage)),
-        "nrrd": Format("nrrd", "application/octet-stream", _on_grid(write_nrrd)),
-        "mat": Format("mat", "application/x-matlab-data", _mat),
-        "vti": Format("vti", "application/octet-stream", _vti),
-        "ome-zarr": Format("ome.zarr.zip", "application/zip", _ome_zarr, library_bytes=96 * 2**20),
-        "dicom": Format("dcm", "application/dicom", _dicom, 3.0, 160 * 2**20),
-    }
-)

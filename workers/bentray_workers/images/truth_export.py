@@ -7,19 +7,20 @@ from pathlib import Path
 from bentray_kernels.errors import InvalidInput
 
 from ..files.dataset.read import read_dataset
+from ..files.export.content import Content
+from ..files.export.registry import EXPORTED, SINGLE, FormatName
 from ..files.reconstruction import read_reconstruction
 from ..files.volume_axes import Grid
-from ..files.volume_export import FORMATS, SINGLE, Content
 
 
-def export_truth(volume: Path, *, scan: Path, target: Path, name: str) -> None:
+def export_truth(volume: Path, *, scan: Path, target: Path, name: FormatName) -> None:
     """Task: write the true speed at the nodes of a reconstruction, m/s; NaN outside the truth.
 
     Args:
         volume: file of the reconstruction.
         scan: file of its scan.
         target: the exported file, replaced atomically.
-        name: of ``volume_export.SINGLE``.
+        name: of ``registry.SINGLE``.
 
     Raises:
         InvalidInput: naming ``format``, or ``quantity`` for a scan without truth, or whose truth has other
@@ -40,4 +41,4 @@ def export_truth(volume: Path, *, scan: Path, target: Path, name: str) -> None:
         raise InvalidInput("quantity", f"truth: {reason}", "a quantity of the result") from None
     title = "True speed of sound, m/s"
     images = {"truth_mps": values}
-    FORMATS[name].write(target, Content(values, Grid(own.spacing_m, own.origin_m), title, images))
+    EXPORTED[name].write(target, Content(values, Grid(own.spacing_m, own.origin_m), title, images))

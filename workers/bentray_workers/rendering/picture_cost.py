@@ -16,7 +16,7 @@ from bentray_kernels.errors import InvalidInput
 from ..cluster.capacities import MIB, WorkerCapacity
 from ..cluster.resources import RECONSTRUCTION, RENDER
 from ..files.dataset.counts import BLOCK_BYTES
-from ..files.volume_export import FORMATS
+from ..files.export.registry import EXPORTED, FormatName
 from .field_tasks import FACE_BYTES
 from .field_view import FieldView
 from .refraction_view import RefractionView
@@ -191,9 +191,9 @@ def mesh_cost(stored: VolumeFile) -> Cost:
     return Cost(4.0 + 3e-8 * nodes, 4 * FLOOR_BYTES + stored.read_bytes + 16 * nodes)
 
 
-def export_cost(stored: VolumeFile, name: str) -> Cost:
-    """Cost of an export to one of ``FORMATS``: the volume is read whole, and copied to write it."""
-    written = FORMATS[name]
+def export_cost(stored: VolumeFile, name: FormatName) -> Cost:
+    """Cost of an export to one of ``EXPORTED``: the volume is read whole, and copied to write it."""
+    written = EXPORTED[name]
     needed = FLOOR_BYTES + written.library_bytes + int(written.copies * stored.read_bytes)
     return Cost(FLOOR_SECONDS + 4 * READ_S * stored.read_bytes, needed)
 

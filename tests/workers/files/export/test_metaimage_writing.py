@@ -8,13 +8,19 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.export.metaimage_writing import ELEMENTS, write_metaimage
+from bentray_workers.files.export.content import Content
+from bentray_workers.files.export.metaimage_writing import ELEMENTS
+from bentray_workers.files.export.registry import EXPORTED
 from bentray_workers.files.volume_axes import Grid
 
 from ....effort import effort
 
 steps = st.floats(1e-6, 1e-1)
 places = st.floats(-1.0, 1.0)
+
+
+def write_metaimage(path, values, grid, title):
+    EXPORTED["metaimage"].write(path, Content(values, grid, title, {"values": values}))
 
 
 @settings(deadline=None, max_examples=effort(20, 40))

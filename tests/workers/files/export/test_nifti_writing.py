@@ -7,7 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.export.nifti_writing import write_nifti
+from bentray_workers.files.export.content import Content
+from bentray_workers.files.export.registry import EXPORTED
 from bentray_workers.files.volume_axes import Grid
 from bentray_workers.files.volume_formats import import_volume
 
@@ -16,6 +17,10 @@ from ..volumes import ramp
 
 SPACING, ORIGIN = (1e-3, 2e-3, 3e-3), (-0.01, 0.0, 0.02)
 GRID = Grid(SPACING, ORIGIN)
+
+
+def write_nifti(path, values, grid, title):
+    EXPORTED["nifti"].write(path, Content(values, grid, title, {"values": values}))
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.float64])

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +17,16 @@ from bentray_kernels.errors import InvalidInput
 
 from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
-from ..volume_axes import LPS, Grid
-from .even_spacing import check_even_spacing
+from ..quantities import ATTENUATION_DB
+from ..volume_axes import LPS
+from .content import Content
 from .optional_library import import_optional
 
 # UCUM code and meaning of each quantity: name of the image, label, explanation.
 QUANTITIES = {
     "speed_mps": ("SPEED", "Speed of sound", "m/s", "meter per second"),
     "attenuation_np_m": ("ATTENUATION", "Attenuation", "Np/m", "neper per meter"),
-    "attenuation_db_cm_mhz": (
+    ATTENUATION_DB: (
         "ATTENUATION",
         "Attenuation over frequency",
         "dB/(cm.MHz)",
@@ -38,36 +40,20 @@ MAX_NODES = 2**16 - 1
 MAKER, MODEL, SCHEME = "Bentray", "bentray", "99BENTRAY"
 
 
-def write_dicom(
-    path: Path,
-    images: Mapping[str, NDArray[Any]],
-    grid: Grid,
-    title: str,
-    version: str,
-    seconds: float,
-) -> None:
-    """Write the quantities of ``QUANTITIES`` as one Parametric Map; ``path`` is replaced atomically.
+def write(path: Path, content: Content) -> None:
+    """Write the quantities of ``QUANTITIES``, as float32, as one Parametric Map; see ``ExportFormat.write``.
 
     Frames are slices across z, rows are along y and columns along x, in the order of the volume; positions
     are in mm in the patient axes of DICOM, LPS. Patient and study are empty. The same volume gives the same
     bytes.
 
-    Args:
-        path: of the file.
-        images: (nx, ny[, nz]) by name, stored as float32.
-        grid: positions of the nodes.
-        title: for the description.
-        version: of the software.
-        seconds: time of the content, s since 1970.
-
     Raises:
-        InvalidInput: for uneven spacing, too many nodes, or without highdicom.
-        OSError: where the folder cannot be written to or the disk is full.
+        InvalidInput: for too many nodes, or without highdicom.
     """
     hd = import_optional("highdicom", "export", "DICOM")
+    images, grid = content.images, content.grid
     names = [name for name in QUANTITIES if name in images]
     first = images[names[0]]
-    check_even_spacing(grid.spacing_m, "DICOM")
     if max(first.shape) > MAX_NODES:
         raise InvalidInput(
             "volume", f"{max(first.shape)} nodes", f"at most {MAX_NODES} along an axis for DICOM"
@@ -81,7 +67,9 @@ def write_dicom(
     positions = [
         tuple(_decimal(value) for value in affine[:3, 3] + k * affine[:3, 2]) for k in range(len(pixels))
     ]
-    digest = hashlib.sha256(pixels.tobytes() + repr((names, title, *affine.ravel())).encode()).hexdigest()
+    digest = hashlib.sha256(
+        pixels.tobytes() + repr((names, content.title, *affine.ravel())).encode()
+    ).hexdigest()
     source = _source(digest, pixels.shape[1:3], steps, orientation, positions[0])
     made = hd.pm.ParametricMap(
         source_images=[source],
@@ -92,7 +80,7 @@ def write_dicom(
         instance_number=1,
         manufacturer=MAKER,
         manufacturer_model_name=MODEL,
-        software_versions=version,
+        software_versions=version("bentray"),
         device_serial_number="0",
         contains_recognizable_visual_features=False,
         real_world_value_mappings=[[_mapping(hd, name, images[name])] for name in names],
@@ -102,7 +90,7 @@ def write_dicom(
                 window_width=max(float(np.ptp(first)), 1.0),
             )
         ],
-        content_description=" ".join(title.split())[:64] or None,
+        content_description=content.line[:64] or None,
         content_label="BENTRAY",
         pixel_measures=hd.PixelMeasuresSequence(
             pixel_spacing=(_decimal(steps[1]), _decimal(steps[0])),
@@ -117,7 +105,7 @@ def write_dicom(
             for position in positions
         ],
     )
-    _settle(made, digest, datetime.fromtimestamp(math.floor(seconds), UTC))
+    _settle(made, digest, datetime.fromtimestamp(math.floor(content.seconds), UTC))
     with atomic_replace(path) as partial, partial.open("wb") as file:
         made.save_as(file)
 

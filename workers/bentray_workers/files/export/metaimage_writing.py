@@ -6,46 +6,30 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..bounded_reading import UNITS_M
-from ..volume_axes import LPS, Grid
-from .even_spacing import check_even_spacing
+from ..volume_axes import LPS
+from .content import Content
 from .header_and_values import type_name, write_header_and_values
 
 # Names of the types of volumes.
 ELEMENTS = {"u1": "MET_UCHAR", "u2": "MET_USHORT", "f4": "MET_FLOAT", "f8": "MET_DOUBLE"}
 
 
-def write_metaimage(
-    path: Path,
-    values: NDArray[Any],
-    grid: Grid,
-    title: str,
-) -> None:
-    """Write a volume as MetaImage, header and values in one file; ``path`` is replaced atomically.
-
-    Args:
-        path: of the file.
-        values: (nx, ny[, nz]), of a type of ``ELEMENTS``.
-        grid: positions of the nodes.
-        title: for the comment.
-
-    Raises:
-        InvalidInput: for uneven spacing, which MetaImage cannot store.
-        OSError: where the folder cannot be written to or the disk is full.
+def write(path: Path, content: Content) -> None:
+    """Write values of a type of ``ELEMENTS`` as MetaImage, in one file; see ``ExportFormat.write``.
 
     Source:
         The tags and their order are those of the MetaIO documentation of ITK.
     """
-    check_even_spacing(grid.spacing_m, "MetaImage")
+    values, grid = content.values, content.grid
     ndim = values.ndim
     origin = (LPS @ grid.affine(UNITS_M["mm"]))[:ndim, 3]
     directions = (LPS[:3, :3] @ grid.direction)[:ndim, :ndim]
     tags = {
         "ObjectType": "Image",
         "NDims": ndim,
-        "Comment": " ".join(title.split()),
+        "Comment": content.line,
         "BinaryData": True,
         "BinaryDataByteOrderMSB": False,
         "CompressedData": False,

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import shutil
 import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
 from ..atomic import atomic_replace
-from ..volume_axes import Grid, check_aligned
-from .even_spacing import check_even_spacing
+from ..quantities import UNITS
+from ..volume_axes import check_aligned
+from .content import Content
 from .optional_library import import_optional
 
 VERSION = "0.5"
@@ -27,58 +25,40 @@ CHUNK = 128
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-def write_ome_zarr(
-    path: Path,
-    images: Mapping[str, NDArray[Any]],
-    units: Mapping[str, str],
-    grid: Grid,
-    title: str,
-) -> None:
-    """Write images on one grid as channels of one multiscale image with one level.
+def write(path: Path, content: Content) -> None:
+    """Write images as channels of one multiscale image with one level; see ``ExportFormat.write``.
 
     The axes are (c, z, y, x), or (c, y, x) of a plane, in metres; scale and translation give the positions of
-    the nodes, RAS, which is stated as in RFC-4. Labels of channels have the unit.
-
-    Args:
-        path: of a zip, which is replaced atomically, or with the suffix ``.zarr`` of a new folder.
-        images: (nx, ny[, nz]) by name, of one type.
-        units: by name.
-        grid: positions of the nodes.
-        title: of the image.
+    the nodes, RAS, which is stated as in RFC-4. Labels of channels have the unit. A ``path`` with the suffix
+    ``.zarr`` is a new folder, else a zip.
 
     Raises:
-        InvalidInput: for uneven spacing, oblique axes, an existing folder, or without zarr.
-        OSError: where the folder cannot be written to or the disk is full.
+        InvalidInput: for oblique axes, an existing folder, or without zarr.
 
     Source:
         OME-Zarr 0.5, ngff.openmicroscopy.org/0.5; orientation: ngff.openmicroscopy.org/rfc/4.
     """
-    check_even_spacing(grid.spacing_m, "OME-Zarr")
-    check_aligned(grid, "volume", "axes along x, y and z for OME-Zarr; nifti, nrrd or hdf5 hold any")
-    members = _members(images, _attributes(images, units, grid, title))
+    check_aligned(content.grid, "volume", "axes along x, y and z for OME-Zarr; nifti, nrrd or hdf5 hold any")
+    members = _members(content)
     if path.suffix == ".zarr":
         _write_folder(path, members)
     else:
         _write_zip(path, members)
 
 
-def _attributes(
-    images: Mapping[str, NDArray[Any]],
-    units: Mapping[str, str],
-    grid: Grid,
-    title: str,
-) -> dict[str, Any]:
+def _attributes(content: Content) -> dict[str, Any]:
     """The attribute ``ome`` of the group."""
+    grid = content.grid
     space = [
         {"name": name, "type": "space", "unit": "meter", "orientation": {"type": "anatomical", "value": way}}
         for name, way in zip("xyz", RAS, strict=True)
     ][: len(grid.spacing_m)]
-    ranges = {name: (float(image.min()), float(image.max())) for name, image in images.items()}
+    ranges = {name: (float(image.min()), float(image.max())) for name, image in content.images.items()}
     return {
         "version": VERSION,
         "multiscales": [
             {
-                "name": " ".join(title.split()) or "volume",
+                "name": content.line or "volume",
                 "axes": [{"name": "c", "type": "channel"}, *space[::-1]],
                 "datasets": [
                     {
@@ -94,7 +74,7 @@ def _attributes(
         "omero": {
             "channels": [
                 {
-                    "label": f"{name} ({units[name]})" if units.get(name) else name,
+                    "label": f"{name} ({UNITS[name]})" if UNITS.get(name) else name,
                     "color": "FFFFFF",
                     "active": number == 0,
                     "window": {"start": low, "end": high, "min": low, "max": high},
@@ -105,13 +85,13 @@ def _attributes(
     }
 
 
-def _members(images: Mapping[str, NDArray[Any]], attributes: dict[str, Any]) -> dict[str, Any]:
+def _members(content: Content) -> dict[str, Any]:
     """Content by path in the hierarchy; that of the root group comes first."""
     zarr = import_optional("zarr", "export", "OME-Zarr")
     held: dict[str, Any] = {}
-    root = zarr.open_group(
-        zarr.storage.MemoryStore(held), mode="w", zarr_format=3, attributes={"ome": attributes}
-    )
+    store, attributes = zarr.storage.MemoryStore(held), {"ome": _attributes(content)}
+    root = zarr.open_group(store, mode="w", zarr_format=3, attributes=attributes)
+    images = content.images
     first = next(iter(images.values()))
     sides = first.shape[::-1]
     array = root.create_array(

@@ -3,44 +3,29 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..atomic import atomic_replace
-from ..volume_axes import Grid
-from .even_spacing import check_even_spacing
+from .content import Content
 
 TYPES = {"u1": "UInt8", "u2": "UInt16", "f4": "Float32", "f8": "Float64"}
 SIZE = struct.Struct("<Q")
 
 
-def write_vti(
-    path: Path,
-    images: Mapping[str, NDArray[Any]],
-    grid: Grid,
-    active: str,
-) -> None:
-    """Write images on one grid as point data; ``path`` is replaced atomically.
+def write(path: Path, content: Content) -> None:
+    """Write images of a type of ``TYPES`` as point data; see ``ExportFormat.write``.
 
-    Args:
-        path: of the file.
-        images: (nx, ny[, nz]) by name, of a type of ``TYPES``.
-        grid: positions of the nodes, stored in m, RAS: VTK has no unit and no body.
-        active: name of the image that is shown first.
-
-    Raises:
-        InvalidInput: for uneven spacing, which ImageData cannot store.
-        OSError: where the folder cannot be written to or the disk is full.
+    Positions are in m, RAS: VTK has no unit and no body. The selected image is shown first.
 
     Source:
         "VTK XML Formats" of the VTK documentation: ``ImageData``, appended data, encoding raw.
     """
-    check_even_spacing(grid.spacing_m, "VTI")
+    images, grid = content.images, content.grid
+    active = next(name for name, image in images.items() if image is content.values)
     shape = (*next(iter(images.values())).shape, 1)[:3]
     extent = " ".join(f"0 {n - 1}" for n in shape)
     # A plane has one layer; its thickness is not shown.

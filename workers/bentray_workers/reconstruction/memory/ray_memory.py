@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from bentray_kernels.eikonal import METHODS
 from bentray_kernels.eikonal.diagonals import Diagonals
 from bentray_kernels.rays.vectorised import LONGEST
 from bentray_kernels.tomography.problem import MARGIN_NODES
@@ -56,9 +57,8 @@ def field_bytes(shape: tuple[int, ...], method: str) -> int:
         method: one of ``eikonal.methods()``.
     """
     nodes = math.prod(n + 2 for n in shape)
-    # Two grids of times and crossings, and the mask of known nodes or a copy of the times for each order.
-    arrays = {"accurate": 5, "fsm": 5, "fsm-simultaneous": 4 + 2 ** len(shape)}.get(method, 0)
-    swept: int = arrays * REAL * Diagonals.of(shape).size
+    grids = METHODS[method].swept_grids[len(shape) - 2] if method in METHODS else 0
+    swept: int = grids * REAL * Diagonals.of(shape).size
     return FIELD_BYTES_PER_NODE * nodes + swept
 
 

@@ -1,5 +1,5 @@
 // Jobs as cards: pictures of what they made, state, progress, plan, misfit and files.
-import { WHOLE, SINGLE } from "../parts/export_menu.js";
+import { FORMATS } from "../parts/export_menu.js";
 import { inNanoseconds } from "../parts/amounts.js";
 import { inWords, request } from "../parts/api.js";
 import { KeyLink, Picture } from "../parts/key.js";
@@ -80,7 +80,7 @@ function Links({ job: { links }, onCancel }) {
     ${animation && html`<${KeyLink} href=${animation} download="">Frames</${KeyLink}>`}
     ${data && html`<details class="formats">
       <summary>Download</summary>
-      ${[...WHOLE, ...SINGLE].map(([format, name]) => html`<${KeyLink} href=${`${data}?format=${format}`} download="">${name}</${KeyLink}> `)}
+      ${FORMATS.map(({ format, title }) => html`<${KeyLink} href=${`${data}?format=${format}`} download="">${title}</${KeyLink}> `)}
     </details>`}
     ${cancel && html`<${Button} onClick=${onCancel}>Cancel</${Button}>`}
   </div>`;

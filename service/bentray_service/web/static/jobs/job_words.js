@@ -23,6 +23,7 @@ export function summaryOf({ kind, settings }) {
     const phantom = PHANTOMS[settings.phantom] ?? "2-D breast phantom";
     return [KINDS[kind], `${phantom}, ${settings.waveform ? "traces" : "travel times"}, ${settings.elements} elements`];
   }
+  if (kind !== "reconstruction") return [inWords(kind), ""];
   const { method, rays, nodes, iterations = settings.sweeps } = settings; // sweeps: of earlier versions
   const words = { auto: "automatic", waveform: "full waveform" }[method] ?? METHODS[method];
   const grid = nodes ? `${nodes} × ${nodes} nodes, ` : "";

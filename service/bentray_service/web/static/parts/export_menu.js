@@ -5,8 +5,9 @@ import { Menu } from "./menu.js";
 import { Facts, html, Options, useState } from "./view.js";
 import { queryOf } from "./views.js";
 
-export const WHOLE = [["hdf5", "HDF5"], ["mat", "MATLAB"], ["vti", "VTK (ParaView)"], ["ome-zarr", "OME-Zarr"], ["dicom", "DICOM"]];
-export const SINGLE = [["npy", "NumPy"], ["nifti", "NIfTI"], ["nrrd", "NRRD"], ["metaimage", "MetaImage"]];
+export const FORMATS = await (await fetch("/static/export_formats.json")).json();
+const WHOLE = FORMATS.filter(({ single }) => !single);
+const SINGLE = FORMATS.filter(({ single }) => single);
 const NAMES = {
   speed: "speed (m/s)", attenuation: "attenuation (Np/m)", coverage: "coverage (m)", recovery: "resolution",
   uncertainty: "uncertainty (m/s)", reflection: "reflection (dB)", truth: "truth (m/s)",
@@ -37,12 +38,12 @@ export function ExportMenu({ result, state }) {
   return html`<${Menu} title="Export" className="export" onOpen=${() => setPicture(pictureOf(result, state))}>
     <div class="sheet">
       <h2>All quantities${quantities.includes("reflection") && " (reflection: HDF5)"}</h2>
-      ${WHOLE.map(([format, title]) => html`<${Download} href=${`${data}?format=${format}`}>${title}</${Download}>`)}
+      ${WHOLE.map(({ format, title }) => html`<${Download} href=${`${data}?format=${format}`}>${title}</${Download}>`)}
       <h2>One quantity</h2>
       <label>Quantity ${" "}
         <select onChange=${({ target }) => setQuantity(target.value)}><${Options} entries=${entries} chosen=${quantity} /></select></label>
       <div class="single">
-        ${SINGLE.map(([format, title]) => html`<${Download} href=${`${data}?${queryOf({ format, ...query })}`}>${title}</${Download}>`)}
+        ${SINGLE.map(({ format, title }) => html`<${Download} href=${`${data}?${queryOf({ format, ...query })}`}>${title}</${Download}>`)}
       </div>
       <h2>Picture</h2>
       ${picture ? html`<${Download} href=${picture}>PNG of this quantity</${Download}>` : html`<${Facts}>No picture of this quantity</${Facts}>`}
