@@ -65,7 +65,7 @@ class Scanned:
     summary: str
 
     @property
-    def place(self) -> str:
+    def section(self) -> str:
         """Height of the slice."""
         return f"z = {1e3 * self.asked.z_m:.1f} mm"
 
@@ -98,7 +98,7 @@ def summarised(
     for name, slices in (("no noise", [*chosen, *judged]), (f"SNR {SNR:g}", noisy)):
         if not slices:
             continue
-        inside = {scan.place: contrasts(scan.asked.phantom, scan.speeds[WAVEFORM]) for scan in slices}
+        inside = {scan.section: contrasts(scan.asked.phantom, scan.speeds[WAVEFORM]) for scan in slices}
         least = np.nanmin([least_contrast(each, SMALLEST_VOXELS) for each in inside.values()])
         facts = (
             f"{where}, {what}: {read:.2f}" for where, each in inside.items() for what, read in each.items()
@@ -129,7 +129,7 @@ def errors(name: str, slices: Sequence[Scanned]) -> Iterator[Row]:
     size = (
         f"{NODES}², {asked.elements} transducers, {asked.emissions} emit, {1e-3 * asked.frequency_hz:.0f} kHz"
     )
-    where = ", ".join(scan.place for scan in slices)
+    where = ", ".join(scan.section for scan in slices)
     for region, whole in (("whole image", True), ("inside", False)):
         over = Slices([scan.asked.phantom for scan in slices], whole)
         errors = {way: over.error([scan.speeds[way] for scan in slices]) for way in slices[0].speeds}
@@ -145,7 +145,8 @@ def errors(name: str, slices: Sequence[Scanned]) -> Iterator[Row]:
 def drawn(clean: Sequence[Scanned], noisy: Sequence[Scanned]) -> bytes:
     """The phantom and the images of each slice, side by side, those with noise last."""
     panels = []
-    named = [(scan.place, scan) for scan in clean] + [(f"{scan.place}, SNR {SNR:g}", scan) for scan in noisy]
+    named = [(scan.section, scan) for scan in clean]
+    named += [(f"{scan.section}, SNR {SNR:g}", scan) for scan in noisy]
     for name, scan in named:
         over = Slices([scan.asked.phantom])
         panels.append(Panel(name, scan.asked.phantom.speed(NODES, TABLE7_SIDE_M)))

@@ -64,7 +64,7 @@ class FatScan:
         """Node spacing, m."""
         return SIDE_M / (self.nodes - 1)
 
-    def places(self) -> tuple[Floats, Floats]:
+    def node_positions(self) -> tuple[Floats, Floats]:
         """x and y of the nodes, (nodes, nodes) each, m, origin at the centre of the ring."""
         line = self.spacing_m * np.arange(self.nodes) - 0.5 * SIDE_M
         x, y = np.meshgrid(line, line, indexing="ij")
@@ -72,7 +72,7 @@ class FatScan:
 
     def speed(self, *, fat: bool, targets: bool) -> Floats:
         """Speed of sound at the nodes, m/s; without fat all is water but the targets."""
-        x, y = self.places()
+        x, y = self.node_positions()
         radius = np.hypot(x, y)
         within = [np.clip(0.5 - (radius - edge) / self.spacing_m, 0.0, 1.0) for edge in (FAT_M, GLAND_M)]
         speed = np.full_like(x, WATER_MPS)

@@ -53,7 +53,7 @@ def eight_bit() -> np.ndarray:
     return np.round(255.0 * np.exp(-0.5 * (np.maximum(radii() - FLAT, 0.0) / FRINGE) ** 2))
 
 
-def places() -> np.ndarray:
+def ray_starts() -> np.ndarray:
     """(pixels², 2) x and y of the rays, rows of the image first."""
     middle = (np.arange(PIXELS) + 0.5) / PIXELS * WIDTH - 0.5 * WIDTH
     x, y = np.meshgrid(middle, middle)
@@ -90,7 +90,7 @@ def scene(spline: Spline, iso: float, bound: str = "bernstein") -> Scene:
 
 def exact(radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Which rays are compared, and where they end, (pixels², 2)."""
-    start = places()
+    start = ray_starts()
     offset = np.hypot(*start.T)
     compared = offset < WITHIN * radius
     sine = np.minimum(offset / radius, 1.0)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ._refracting_ball import CAMERA_Z, INDEX, NODES, PIXELS, SCREEN_Z, SQUARES, WIDTH, places
+from ._refracting_ball import CAMERA_Z, INDEX, NODES, PIXELS, SCREEN_Z, SQUARES, WIDTH, ray_starts
 
 
 class Mitsuba:
@@ -81,7 +81,7 @@ class Mitsuba:
 
     def ends(self, scene) -> np.ndarray:
         """(pixels², 2) where rays end that go in and out of the ball once, NaN for those that do not."""
-        mi, start = self.mi, places().astype(np.float32)
+        mi, start = self.mi, ray_starts().astype(np.float32)
         ray = mi.Ray3f(mi.Point3f(start[:, 0], start[:, 1], CAMERA_Z), mi.Vector3f(0.0, 0.0, 1.0))
         entry = scene.ray_intersect(ray)
         inside = entry.spawn_ray(self._refracted(ray.d, entry, 1.0 / INDEX))

@@ -77,7 +77,7 @@ class PublicCase:
         blurred = uniform_filter(self.speed_mps, width, mode="nearest")
         lines = [self.pixel_m * (np.arange(n) - 0.5 * (n - 1)) for n in self.speed_mps.shape]
         read = RegularGridInterpolator(lines, blurred, bounds_error=False, fill_value=WATER_MPS)
-        return np.asarray(read(_places(nodes, side_m)))
+        return np.asarray(read(_node_positions(nodes, side_m)))
 
     def truth(self) -> Truth:
         """The map as a truth."""
@@ -204,7 +204,7 @@ def scores(image: Reconstruction | float, case: PublicCase) -> Scores:
 
     Its SSIM uses windows of 7 by 7 nodes within the tissue and the range of the whole truth, as ours does.
     """
-    points = _places(SCORED_NODES, SIDE_M)
+    points = _node_positions(SCORED_NODES, SIDE_M)
     true = case.at(SCORED_NODES, SIDE_M)
     region = tissue(true)
     if isinstance(image, Reconstruction):
@@ -233,7 +233,7 @@ def mean_speed(case: PublicCase) -> float:
     return float(true[tissue(true)].mean())
 
 
-def _places(nodes: int, side_m: float) -> Floats:
+def _node_positions(nodes: int, side_m: float) -> Floats:
     """Nodes of a square centred on 0, (nodes, nodes, 2), m."""
     line = np.linspace(-0.5 * side_m, 0.5 * side_m, nodes)
     return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)

@@ -61,7 +61,7 @@ def breast_scans(count: int, seed: int = SEED, water_mps: float | None = None) -
 
 def detailed(random: np.random.Generator, water_mps: float) -> DetailedBreast:
     """A breast of any density with a tumour and a cyst."""
-    centres = [_place(random, 0.045) for _ in range(2)]
+    centres = [_random_centre(random, 0.045) for _ in range(2)]
     sizes = random.uniform(0.0025, 0.007, 2)
     lesions = (
         Ellipse(centres[0], (sizes[0], 0.8 * sizes[0]), 1575.0, 25.0, "tumour", random.uniform(0.0, np.pi)),
@@ -90,17 +90,17 @@ def _of_ellipses(random: np.random.Generator, water_mps: float) -> EllipsePhanto
     ]
     for _ in range(int(random.integers(1, 4))):
         size = random.uniform(0.2, 0.5) * axes[1]
-        centre = _place(random, 0.9 * axes[1] - size - 0.004)
+        centre = _random_centre(random, 0.9 * axes[1] - size - 0.004)
         shape = size, size * random.uniform(0.4, 1.0)
         ellipses.append(Ellipse(centre, shape, random.uniform(1500.0, 1540.0), 10.0, "gland", turn))
     for _ in range(int(random.integers(1, 6))):
         size = random.uniform(0.002, 0.008)
-        centre = _place(random, 0.75 * axes[1] - size)
+        centre = _random_centre(random, 0.75 * axes[1] - size)
         speed = float(random.choice((1480.0, 1550.0, 1570.0)))
         ellipses.append(Ellipse(centre, (size, size * random.uniform(0.6, 1.0)), speed, 25.0, "lesion"))
     return EllipsePhantom(water_mps, tuple(ellipses))
 
 
-def _place(random: np.random.Generator, within_m: float) -> tuple[float, float]:
+def _random_centre(random: np.random.Generator, within_m: float) -> tuple[float, float]:
     distance, turn = random.uniform(0.0, within_m), random.uniform(0.0, 2.0 * np.pi)
     return distance * np.cos(turn), distance * np.sin(turn)

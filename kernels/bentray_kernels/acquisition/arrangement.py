@@ -327,7 +327,7 @@ class _Times:
         late, slope = self._lateness(distance, usable, times)
         short = np.where(distance <= SHORT * width, late, np.nan)
         # The same pairs in the other direction, if they were measured.
-        at_tx, at_rx = _places(tx, len(position)), _places(rx, len(position))
+        at_tx, at_rx = _indices_in(tx, len(position)), _indices_in(rx, len(position))
         row = np.arange(len(tried))[:, None]
         back_e, back_r = at_tx[row, heard][:, None, :], at_rx[row, sent][:, :, None]
         both = (back_e >= 0) & (back_r >= 0) & (sent[:, :, None] != heard[:, None, :])
@@ -569,7 +569,7 @@ def _distance(position: Floats, sent: Ints, heard: Ints) -> Floats:
     return np.asarray(np.sqrt(squares))
 
 
-def _places(listed: Ints, elements: int) -> Ints:
+def _indices_in(listed: Ints, elements: int) -> Ints:
     """Index of each element in lists, (arrangements, elements); -1 where it is absent."""
     indices = np.full((len(listed), elements), -1, dtype=np.int64)
     np.put_along_axis(indices, listed, np.broadcast_to(np.arange(listed.shape[1]), listed.shape), axis=1)

@@ -75,7 +75,7 @@ def check_plausible(dataset: Dataset) -> None:
         InvalidInput: naming the field and its value; ``ImplausibleUnit`` with the unit that is likely;
             ``WrongArrangement`` with the arrangement that explains the times.
     """
-    _check_places(dataset)
+    _check_positions(dataset)
     for path, times in (
         ("traveltime/tof_s", dataset.tof_s),
         ("traveltime/delta_tof_s", dataset.delta_tof_s),
@@ -128,7 +128,7 @@ def _check_missing(dataset: Dataset) -> None:
         raise InvalidInput(path, shortage, "arrival times of most pairs, NaN for missing ones")
 
 
-def _check_places(dataset: Dataset) -> None:
+def _check_positions(dataset: Dataset) -> None:
     position = dataset.element_position_m
     # Halved, so that the difference of the largest numbers is finite.
     width = 2.0 * float(np.ptp(0.5 * position, axis=0).max())

@@ -1,4 +1,4 @@
-"""Fast sweeping by domain decomposition: blocks without shared memory exchange faces until they agree."""
+"""Fast sweeping by domain decomposition: blocks without shared memory exchange halos until convergence."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
 from .fast_sweeping import Sweeper
+from .problem import Node
 
 # The sides of a block in the order of Faces: axis, and whether its high end.
 Side = tuple[int, bool]
 
 # Position of a block among the blocks, and the nodes that it holds.
-Place = tuple[int, ...]
+BlockIndex = tuple[int, ...]
 Box = tuple[slice, ...]
 
 # Times of a block's neighbouring nodes beyond each side, s: (low x, high x, low y, high y[, low z, high z]),
@@ -27,7 +28,7 @@ Faces = Sequence[Floats | None]
 
 
 @dataclass(frozen=True)
-class Edges:
+class Halo:
     """Halo of a block that its neighbours receive after a sweep.
 
     Attributes:
@@ -43,7 +44,7 @@ class Block:
     """The times of one block of a grid, swept in place from one exchange of faces to the next."""
 
     def __init__(
-        self, slowness: Floats, spacing: float, seeds: Mapping[Place, float], times: Floats | None = None
+        self, slowness: Floats, spacing: float, seeds: Mapping[Node, float], times: Floats | None = None
     ) -> None:
         """Begin a solve.
 
@@ -72,12 +73,12 @@ class Block:
     def _padded(self) -> tuple[int, ...]:
         return tuple(n + 2 for n in self._slowness.shape)
 
-    def sweep(self, faces: Faces, sent: Edges | None, tolerance: float = 1e-12) -> Edges:
+    def sweep(self, faces: Faces, sent_halo: Halo | None, tolerance: float = 1e-12) -> Halo:
         """Sweep until the times have converged; to repeat it changes nothing.
 
         Args:
             faces: of the neighbours; None for a side where nothing has changed.
-            sent: what the neighbours know of this block; None: nothing.
+            sent_halo: the halo that the neighbours have received; None: none yet.
             tolerance: as for ``fast_sweeping``.
 
         Raises:
@@ -96,13 +97,13 @@ class Block:
             zip(sides(self._slowness.ndim), self._beyond, strict=True)
         ):
             after = self._sweeper.take(_inwards(nodes, self._padded, side)).reshape(shape)
-            before = sent.faces[number] if sent else np.full(shape, math.inf)
+            before = sent_halo.faces[number] if sent_halo else np.full(shape, math.inf)
             earlier = after < before
             drop = before[earlier] - after[earlier]
             least = tolerance * self._spacing * face_of(self._slowness, side)[earlier]
             changed.append(bool((drop > least).any()))
             own.append(after)
-        return Edges(tuple(own), tuple(changed))
+        return Halo(tuple(own), tuple(changed))
 
     def times(self) -> Floats:
         """(nx, ny[, nz]), s; infinity where no front has arrived."""
@@ -128,7 +129,7 @@ def _inwards(nodes: Ints, padded: tuple[int, ...], side: Side) -> Ints:
     return nodes - stride if high else nodes + stride
 
 
-def cut(shape: tuple[int, ...], blocks: Sequence[int]) -> dict[Place, Box]:
+def cut(shape: tuple[int, ...], blocks: Sequence[int]) -> dict[BlockIndex, Box]:
     """The nodes of each block, by its position among the blocks.
 
     Raises:
@@ -138,8 +139,8 @@ def cut(shape: tuple[int, ...], blocks: Sequence[int]) -> dict[Place, Box]:
         raise InvalidInput("blocks", tuple(blocks), f"a number from 1 along each axis, at most {shape}")
     cuts = [[n * k // b for k in range(b + 1)] for n, b in zip(shape, blocks, strict=True)]
     return {
-        place: tuple(slice(c[k], c[k + 1]) for c, k in zip(cuts, place, strict=True))
-        for place in itertools.product(*(range(b) for b in blocks))
+        index: tuple(slice(c[k], c[k + 1]) for c, k in zip(cuts, index, strict=True))
+        for index in itertools.product(*(range(b) for b in blocks))
     }
 
 
@@ -160,11 +161,11 @@ def face_of(block: Floats, side: Side) -> Floats:
     return face
 
 
-def neighbours(place: Place, boxes: Mapping[Place, Box]) -> list[tuple[int, Place]]:
+def neighbours(index: BlockIndex, boxes: Mapping[BlockIndex, Box]) -> list[tuple[int, BlockIndex]]:
     """Numbers of the sides with a neighbouring block, and its position."""
     adjacent = []
-    for side, (axis, high) in enumerate(sides(len(place))):
-        beyond = (*place[:axis], place[axis] + (1 if high else -1), *place[axis + 1 :])
+    for side, (axis, high) in enumerate(sides(len(index))):
+        beyond = (*index[:axis], index[axis] + (1 if high else -1), *index[axis + 1 :])
         if beyond in boxes:
             adjacent.append((side, beyond))
     return adjacent

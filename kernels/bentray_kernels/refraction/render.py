@@ -114,7 +114,7 @@ def render(
     times = settings.degree if settings.supersampling == "real" else 1
     spacing = settings.ray_spacing
     rows, columns = -(-times * settings.rows // spacing), -(-times * settings.columns // spacing)
-    pixels = _places(rows, columns, settings.seed if settings.supersampling == "real" else None)
+    pixels = _pixel_positions(rows, columns, settings.seed if settings.supersampling == "real" else None)
     if spacing > 1:
         # The last ray may lie beyond the edge of the picture.
         covered = np.array([columns / settings.columns, rows / settings.rows])
@@ -194,7 +194,7 @@ def _tiles(rows: int, columns: int, at_once: int) -> Iterator[slice]:
         yield slice(first * columns, min(first + at_once, rows) * columns)
 
 
-def _places(rows: int, columns: int, seed: int | None) -> Floats:
+def _pixel_positions(rows: int, columns: int, seed: int | None) -> Floats:
     """(rows·columns, 2) u and v of the rays: middles of squares, or a random place in each."""
     within = (
         np.full((rows, columns, 2), 0.5)

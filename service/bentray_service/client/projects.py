@@ -27,7 +27,7 @@ def projects(connection: Connection) -> Flow[RecordList[ProjectRecord]]:
 
 def project(connection: Connection, project: ProjectId) -> Flow[ProjectDetails]:
     """Get a project with its members."""
-    return (yield from get(ProjectDetails, _place(project)))
+    return (yield from get(ProjectDetails, _path_of(project)))
 
 
 def create_project(connection: Connection, name: str) -> Flow[ProjectDetails]:
@@ -47,14 +47,14 @@ def set_member(
         role: ``reader``, ``contributor`` or ``owner``; None: no member any more.
     """
     request = {"json": {"member": member, "role": role}}
-    response = yield RequestStep("PUT", f"{_place(project)}/members", request, repeatable=True)
+    response = yield RequestStep("PUT", f"{_path_of(project)}/members", request, repeatable=True)
     return RecordList(MemberList.model_validate_json(response.content).members)
 
 
 def delete_project(connection: Connection, project: ProjectId) -> Flow[None]:
     """Delete an empty project."""
-    yield RequestStep("DELETE", _place(project))
+    yield RequestStep("DELETE", _path_of(project))
 
 
-def _place(project: ProjectId) -> str:
+def _path_of(project: ProjectId) -> str:
     return f"/v1/projects/{project if isinstance(project, str) else project.id}"

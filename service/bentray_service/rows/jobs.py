@@ -142,13 +142,13 @@ class Jobs(NamedTable[JobRow]):
         """
         if job.state != "queued":
             return None
-        return self._place(job.tenant, job.number)
+        return self._queue_position(job.tenant, job.number)
 
     def next_place(self, tenant: Tenant) -> int:
         """The ``place`` of a job that this tenant would submit now."""
-        return self._place(tenant, None)
+        return self._queue_position(tenant, None)
 
-    def _place(self, tenant: Tenant, number: int | None) -> int:
+    def _queue_position(self, tenant: Tenant, number: int | None) -> int:
         """The place of a queued job of a tenant, or without a number of one after all others."""
         with self._database.read() as session:
             account = account_of(session, tenant)

@@ -6,32 +6,32 @@ from bentray_kernels.eikonal.subdomains import Block, cut, neighbours, opposite,
 
 
 def solve_by_blocks(problem, blocks, tolerance=1e-12):
-    """Travel times, (nx, ny[, nz]), s, from blocks that exchange faces until they agree."""
+    """Travel times, (nx, ny[, nz]), s, from blocks that exchange halos until convergence."""
     shape = problem.slowness.shape
     boxes = cut(shape, blocks)
     seeded = np.full(problem.padded_slowness.size, np.inf)
     nodes, times = problem.seeds()
     seeded[nodes] = times
     seeded = problem.interior(seeded)
-    swept, sent, arrived, waiting = {}, {}, {}, set()
-    for place, box in boxes.items():
+    swept, sent_halo, arrived, waiting = {}, {}, {}, set()
+    for index, box in boxes.items():
         seeds = {tuple(node): seeded[box][tuple(node)] for node in np.argwhere(seeded[box] < np.inf)}
-        swept[place] = Block(problem.slowness[box], problem.spacing, seeds)
-        sent[place] = None
-        arrived[place] = [None for _ in sides(len(shape))]
+        swept[index] = Block(problem.slowness[box], problem.spacing, seeds)
+        sent_halo[index] = None
+        arrived[index] = [None for _ in sides(len(shape))]
         if seeds:
-            waiting.add(place)
+            waiting.add(index)
     while waiting:
-        for place in sorted(waiting):
-            sent[place] = swept[place].sweep(arrived[place], sent[place], tolerance)
-            arrived[place] = [None for _ in sides(len(shape))]
+        for index in sorted(waiting):
+            sent_halo[index] = swept[index].sweep(arrived[index], sent_halo[index], tolerance)
+            arrived[index] = [None for _ in sides(len(shape))]
         done, waiting = waiting, set()
-        for place in sorted(done):
-            for side, beyond in neighbours(place, boxes):
-                if sent[place].changed[side]:
-                    arrived[beyond][opposite(side)] = sent[place].faces[side]
+        for index in sorted(done):
+            for side, beyond in neighbours(index, boxes):
+                if sent_halo[index].changed[side]:
+                    arrived[beyond][opposite(side)] = sent_halo[index].faces[side]
                     waiting.add(beyond)
     time = np.empty(shape)
-    for place, box in boxes.items():
-        time[box] = swept[place].times()
+    for index, box in boxes.items():
+        time[box] = swept[index].times()
     return time

@@ -91,8 +91,8 @@ def test_a_task_that_runs_again_tells_the_neighbours_again():
     before = subdomains.begin(np.ones((4, 4)), 1.0, {(0, 0): 0.0})
     first = subdomains.sweep(before, [None] * 4, 1e-12)
     again = subdomains.sweep(before, [None] * 4, 1e-12)
-    assert first.edges.changed == again.edges.changed == (True,) * 4
-    assert all(np.array_equal(a, b) for a, b in zip(first.edges.faces, again.edges.faces, strict=True))
+    assert first.halo.changed == again.halo.changed == (True,) * 4
+    assert all(np.array_equal(a, b) for a, b in zip(first.halo.faces, again.halo.faces, strict=True))
 
 
 def test_cluster_is_empty_afterwards(cluster):

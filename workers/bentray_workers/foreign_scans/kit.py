@@ -134,10 +134,11 @@ class Measurement:
                 continue
             fields = stored.dtype.names or ()
             if "transducerPositions" in fields:
-                both = _places(stored, "transducerPositions", name)
+                both = _positions(stored, "transducerPositions", name)
                 return both, both
             if {"receiverPositions", "emitterPositions"} <= {*fields}:
-                return _places(stored, "receiverPositions", name), _places(stored, "emitterPositions", name)
+                kinds = ("receiverPositions", "emitterPositions")
+                return _positions(stored, kinds[0], name), _positions(stored, kinds[1], name)
             accepted = "transducerPositions, or receiverPositions and emitterPositions"
             raise InvalidInput(f"{name}: TASElements", f"the fields {', '.join(fields)}"[:120], accepted)
         accepted = (
@@ -238,7 +239,7 @@ def _matrix(arrays: Matlab5, name: str) -> NDArray[Any]:
     return arrays.whole(name)
 
 
-def _places(elements: NDArray[Any], name: str, file: str) -> list[NDArray[Any]]:
+def _positions(elements: NDArray[Any], name: str, file: str) -> list[NDArray[Any]]:
     positions = [np.asarray(of_tas) for of_tas in elements[name].ravel()]
     if any(of_tas.dtype.kind != "f" or of_tas.ndim != 2 or of_tas.shape[1] != 3 for of_tas in positions):
         raise InvalidInput(f"{file}: TASElements.{name}", "no positions", "(n, 3) numbers in m for every TAS")

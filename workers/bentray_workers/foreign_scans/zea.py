@@ -100,14 +100,14 @@ class _Fields:
         self._reader = reader
         self._track = track
 
-    def place(self, name: str) -> str:
+    def path(self, name: str) -> str:
         """The path of a field: positions are in the group ``probe`` of newer files."""
         paths = (f"{self._track}scan/{name}", f"probe/{name}", f"{self._track}probe/{name}")
         return next((path for path in paths if self._reader.has(path)), paths[0])
 
     def numbers(self, name: str, shape: tuple[int, ...], unit: str) -> NDArray[np.float64]:
         """An array of numbers that must be present."""
-        path, accepted = self.place(name), f"{shape} numbers in {unit}"
+        path, accepted = self.path(name), f"{shape} numbers in {unit}"
         if name == "probe_geometry":
             check_size("geometry/element_position_m", shape, path)
         stored = self._reader.checked(path, "f", accepted)
@@ -120,12 +120,12 @@ class _Fields:
         """A number that must be present."""
         value = self.optional(name, unit)
         if value is None:
-            raise InvalidInput(self.place(name), "nothing", f"a number in {unit}")
+            raise InvalidInput(self.path(name), "nothing", f"a number in {unit}")
         return value
 
     def optional(self, name: str, unit: str, of_emissions: int = 1) -> float | None:
         """A number, or the mean of one per emission, or None."""
-        path, accepted = self.place(name), f"one finite number in {unit}"
+        path, accepted = self.path(name), f"one finite number in {unit}"
         stored = self._reader.checked(path, "iuf", accepted)
         if stored is None:
             return None
@@ -147,7 +147,7 @@ def _emitters(field: _Fields, shape: tuple[int, int]) -> NDArray[np.int64]:
         given = f"{count[k]} elements that emit in emission {k}"
         accepted = "one emitting element for each emission (synthetic aperture); plane waves, focused and "
         raise InvalidInput(
-            field.place("tx_apodizations"), given, f"{accepted}diverging beams are not tomography"
+            field.path("tx_apodizations"), given, f"{accepted}diverging beams are not tomography"
         )
     return np.asarray(np.argmax(apodization, axis=1), dtype=np.int64)
 

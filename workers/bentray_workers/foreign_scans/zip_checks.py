@@ -51,7 +51,7 @@ def check_zip(archive: zipfile.ZipFile, most_members: int) -> None:
         total += member.file_size
     if total > LARGEST_TOTAL:
         raise InvalidInput("file", f"{total} bytes unpacked", f"at most {LARGEST_TOTAL} bytes")
-    _check_places(archive, members)
+    _check_offsets(archive, members)
 
 
 def plain_name(name: str) -> bool:
@@ -73,7 +73,7 @@ def _check_member(number: int, member: zipfile.ZipInfo) -> None:
         raise InvalidInput("file", given, "data that are in the file")
 
 
-def _check_places(archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> None:
+def _check_offsets(archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> None:
     """Check that members match the directory and do not overlap."""
     raw = archive.fp
     assert raw is not None

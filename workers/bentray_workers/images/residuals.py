@@ -28,7 +28,7 @@ def draw_residuals(axes: Axes, counts: Counts, rms_s: float | None) -> None:
     """
     linear = residual_within(counts, 0.68) or RESIDUAL_EDGES_S[-1]
     edges, merged = _merged(counts, linear)
-    axes.stairs(merged / np.diff(_place(edges, linear)), 1e9 * edges, fill=True, color=BAR)
+    axes.stairs(merged / np.diff(_axis_position(edges, linear)), 1e9 * edges, fill=True, color=BAR)
     # With this scale the axis is smooth at the end of its linear part.
     axes.set_xscale("symlog", linthresh=1e9 * linear, linscale=0.9 / np.log(10.0))
     reach = 1e9 * max(residual_within(counts, 1.0 - CUT_OFF), 2.0 * linear)
@@ -56,7 +56,7 @@ def _merged(counts: Counts, linear: float) -> tuple[Floats, Counts]:
     return RESIDUAL_EDGES_S[outer], np.diff(before[outer])
 
 
-def _place(value: Floats, linear: float) -> Floats:
+def _axis_position(value: Floats, linear: float) -> Floats:
     """Position of a value on the axis: linear up to ``linear``, logarithmic beyond, and smooth."""
     size = np.abs(value) / linear
     return np.sign(value) * linear * np.where(size <= 1.0, size, 1.0 + np.log(np.maximum(size, 1.0)))

@@ -35,7 +35,7 @@ MAX_TEXT_BYTES = 2**26
 FILE = re.compile(r"(\d+)-(\d{5})-(\d{6})\.npz")
 
 
-class _Place(NamedTuple):
+class _ImageSource(NamedTuple):
     """Where the image of a checkpoint is: number of its array, and whether that is the slowness, s/m.
 
     Its nodes are ``spacing`` apart, m; node 0 is at ``origin``, (x, y[, z]), m.
@@ -88,7 +88,7 @@ def _read(path: Path) -> dict[str, Any] | None:
         # Numbers in the place of the arrays.
         numbers = cast("list[NDArray[Any]]", range(len(archive.namelist()) - 1))
         checkpoint = unpack(content["state"], numbers, TYPES)
-        slowness = _place(checkpoint)
+        slowness = _find_image(checkpoint)
         if slowness is None:
             return None
         if not isinstance(checkpoint, BlockCheckpoint):
@@ -111,25 +111,25 @@ def _read(path: Path) -> dict[str, Any] | None:
     }
 
 
-def _place(checkpoint: Any) -> _Place | None:
+def _find_image(checkpoint: Any) -> _ImageSource | None:
     if isinstance(checkpoint, ReconstructionCheckpoint):
         state = checkpoint.state
         grid = checkpoint.spacing, checkpoint.origin
-        return _Place(cast(int, state.slowness), True, checkpoint.stage, state.sweep, *grid)
+        return _ImageSource(cast(int, state.slowness), True, checkpoint.stage, state.sweep, *grid)
     if isinstance(checkpoint, BlockCheckpoint) and checkpoint.updates:
         # Its images are in files of their own.
-        return _Place(0, True, 0, checkpoint.state.sweep, checkpoint.spacing, checkpoint.origin)
+        return _ImageSource(0, True, 0, checkpoint.state.sweep, checkpoint.spacing, checkpoint.origin)
     if isinstance(checkpoint, RefinementCheckpoint):
         band, ends = checkpoint.band, checkpoint.ends
         if band is not None and band.frozen is None:
             grid = band.spacing, band.origin
-            return _Place(
+            return _ImageSource(
                 cast(int, band.state.accepted_image), False, len(ends), len(band.state.history), *grid
             )
         if ends:
             image, iteration = ends[-1].image, len(ends[-1].history)
             grid = image.spacing, image.origin
-            return _Place(cast(int, image.speed), False, len(ends) - 1, iteration, *grid)
+            return _ImageSource(cast(int, image.speed), False, len(ends) - 1, iteration, *grid)
     return None
 
 

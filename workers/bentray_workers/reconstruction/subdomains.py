@@ -30,9 +30,9 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.eikonal.problem import Node, cell_of, placed, straight_times
 from bentray_kernels.eikonal.subdomains import (
     Block,
+    BlockIndex,
     Box,
-    Edges,
-    Place,
+    Halo,
     cut,
     neighbours,
     opposite,
@@ -51,10 +51,10 @@ Speed = Path | Floats
 
 
 class Swept(NamedTuple):
-    """Result of a sweep: the block, which later sweeps go on with, and what its neighbours get to know."""
+    """Result of a sweep: the block, for later sweeps, and its halo for the neighbours."""
 
     block: Block
-    edges: Edges | None
+    halo: Halo | None
 
 
 @sizeof.register(Block)
@@ -73,11 +73,11 @@ class BlockField:
     """
 
     shape: tuple[int, ...]
-    boxes: Mapping[Place, Box]
+    boxes: Mapping[BlockIndex, Box]
     rounds: int
-    swept: Mapping[Place, Future]
+    swept: Mapping[BlockIndex, Future]
 
-    def block(self, index: Place) -> Floats:
+    def block(self, index: BlockIndex) -> Floats:
         """The times of one block, s, in its own shape."""
         future = self.swept[index]
         times: Floats = future.client.submit(_times, future, resources=RECONSTRUCTION, pure=False).result()
@@ -172,7 +172,7 @@ def solve_many_in_blocks(
     all_seeds = (_seeds(array, spacing, placed(source, array.shape, spacing)) for source in sources)
     homes = _homes(client, list(boxes))
 
-    def run(index: Place, function: object, *arguments: object) -> Future:
+    def run(index: BlockIndex, function: object, *arguments: object) -> Future:
         return client.submit(
             function,
             *arguments,
@@ -209,7 +209,7 @@ def solve_many_in_blocks(
 
 
 def _exchange(
-    client: Client, run: Run, swept: dict[Place, Future], waiting: set[Place], tolerance: float
+    client: Client, run: Run, swept: dict[BlockIndex, Future], waiting: set[BlockIndex], tolerance: float
 ) -> int:
     """Sweep the waiting blocks and give their changed faces to their neighbours, until none has changed.
 
@@ -217,7 +217,7 @@ def _exchange(
         The number of rounds; ``swept`` holds the results of the last sweeps.
     """
     axes = len(next(iter(swept)))
-    arrived: dict[Place, list[Future | None]] = {index: [None] * (2 * axes) for index in swept}
+    arrived: dict[BlockIndex, list[Future | None]] = {index: [None] * (2 * axes) for index in swept}
     for rounds in itertools.count():
         if not waiting:
             return rounds
@@ -276,17 +276,17 @@ def sweep(before: Swept, faces: list[Floats | None], tolerance: float) -> Swept:
 
     It lowers the times of ``before`` in place, and its result is the same when Dask runs it again.
     """
-    return Swept(before.block, before.block.sweep(faces, before.edges, tolerance))
+    return Swept(before.block, before.block.sweep(faces, before.halo, tolerance))
 
 
 def _changed(swept: Swept) -> tuple[bool, ...]:
-    assert swept.edges is not None
-    return swept.edges.changed
+    assert swept.halo is not None
+    return swept.halo.changed
 
 
 def _face(swept: Swept, side: int) -> Floats:
-    assert swept.edges is not None
-    return swept.edges.faces[side]
+    assert swept.halo is not None
+    return swept.halo.faces[side]
 
 
 def _times(swept: Swept) -> Floats:
@@ -312,7 +312,7 @@ def _within(seeds: Mapping[Node, float], box: Box) -> dict[Node, float]:
     return inside
 
 
-def _homes(client: Client, indices: Sequence[Place]) -> dict[Place, str]:
+def _homes(client: Client, indices: Sequence[BlockIndex]) -> dict[BlockIndex, str]:
     """A worker for each block, in turn; its data stay there as long as the worker lives.
 
     Raises:

@@ -65,7 +65,7 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
             return 0.0
         return float(dark[through].mean())
 
-    coarse, spacing = _places(dataset)
+    coarse, spacing = _search_grid(dataset)
     line = max(coarse, key=darkness)
     steps = np.linspace(-0.5, 0.5, REFINED)
     line = max((line + spacing * np.array([x, y]) for x in steps for y in steps), key=darkness)
@@ -88,7 +88,7 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
     ]
 
 
-def _places(dataset: Dataset) -> tuple[Floats, Floats]:
+def _search_grid(dataset: Dataset) -> tuple[Floats, Floats]:
     """Places inside the array, (n, 2), and their spacing, (2,), m."""
     position = dataset.element_position_m
     low, high = position.min(axis=0), position.max(axis=0)

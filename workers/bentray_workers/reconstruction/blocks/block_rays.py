@@ -44,7 +44,7 @@ class RaysInBlocks:
         self._files, self._receivers, self._curved, self._name = files, receivers, curved, name
         self._source_block = files.block_of(float(source[0]))
         rays = len(receivers)
-        self._places = receivers.copy()
+        self._positions = receivers.copy()
         self._counts = np.ones(rays, np.int64)
         self._by_nodes = np.zeros(rays, np.bool_)
         self._blocks = np.array([files.block_of(float(x)) for x in receivers[:, 0]], np.int64)
@@ -69,7 +69,7 @@ class RaysInBlocks:
         """The rays that continue in a block, their numbers, and a name for the file of their points."""
         self._visits += 1
         numbers = np.flatnonzero(self._waiting & ((self._blocks == block) | (not self._curved)))
-        rays = WaitingRays(self._places[numbers], self._counts[numbers], self._by_nodes[numbers])
+        rays = WaitingRays(self._positions[numbers], self._counts[numbers], self._by_nodes[numbers])
         return rays, numbers, f"{self._name}-points-{self._visits:04d}"
 
     def visited(self, block: int, numbers: Ints, points: str, traced: TracedParts) -> None:
@@ -86,15 +86,15 @@ class RaysInBlocks:
         if not self._curved:
             self._waiting[:] = False
             return
-        self._places[numbers] = traced.places
+        self._positions[numbers] = traced.places
         self._counts[numbers] += np.diff(traced.starts) - 1
         self._waiting[numbers[traced.ends == ARRIVED]] = False
         caught = numbers[traced.ends == CAUGHT]
         self._by_nodes[caught], self._counts[caught] = True, 1
-        self._places[caught] = self._receivers[caught]
+        self._positions[caught] = self._receivers[caught]
         self.predicted[caught] = self.lengths[caught] = 0.0
         for ray in numbers:
-            self._blocks[ray] = self._files.block_of(float(self._places[ray, 0]))
+            self._blocks[ray] = self._files.block_of(float(self._positions[ray, 0]))
 
     def back_projected(self, corrections: Floats) -> dict[int, list[BackProjected]]:
         """The parts by block, in the order of the visits.

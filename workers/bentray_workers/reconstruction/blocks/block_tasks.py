@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bentray_kernels.arrays import Floats, Ints
-from bentray_kernels.eikonal.subdomains import Block, Edges, face_of, sides
+from bentray_kernels.eikonal.subdomains import Block, Halo, face_of, sides
 from bentray_kernels.rays.block_tracing import WaitingRays, back_project_block, trace_block
 from bentray_kernels.tomography.sart.sart_update import apply_update, smoothed_update, smoothing_reach
 from bentray_kernels.tomography.settings import Settings
@@ -72,11 +72,11 @@ def sweep_block(
     slowness = read_planes(files.state(update) / file_name(SLOWNESS, block))
     # As the undivided solver, whose medium is a speed.
     slowness = 1.0 / (1.0 / slowness)
-    times, sent = None, None
+    times, sent_halo = None, None
     if order.before is not None:
         times = read_planes(scratch / file_name(order.before, block))
         every = sides(times.ndim)
-        sent = Edges(tuple(face_of(times, side) for side in every), (False,) * len(every))
+        sent_halo = Halo(tuple(face_of(times, side) for side in every), (False,) * len(every))
     faces: list[Floats | None] = [None] * (2 * slowness.ndim)
     for side, name in enumerate(order.beyond):
         if name is not None:
@@ -86,9 +86,9 @@ def sweep_block(
             faces[side] = read_planes(scratch / file_name(name, other), plane, plane + 1)[0]
     swept = Block(slowness, spacing, order.seeds, times)
     del times
-    edges = swept.sweep(faces, sent, TOLERANCE)
+    halo = swept.sweep(faces, sent_halo, TOLERANCE)
     write_array(scratch / file_name(order.version, block), swept.times())
-    return edges.changed[0], edges.changed[1]
+    return halo.changed[0], halo.changed[1]
 
 
 def trace_rays_in_block(
