@@ -154,7 +154,7 @@ def made(dataset: Dataset) -> Made:
     def error_on(image: Reconstruction) -> ImageError:
         true = on_grid(truth.sound_speed_mps, truth, image)
         # Nodes beside the simulated medium, in which there are elements at most, do not count.
-        return ImageError(true, Problem.of(dataset, image.settings).region & np.isfinite(true))
+        return ImageError(true, Problem.from_dataset(dataset, image.settings).region & np.isfinite(true))
 
     images = Images(dataset, reconstruct, Settings(nodes=nodes))
     result, seconds = images.default()

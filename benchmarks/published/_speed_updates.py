@@ -76,7 +76,7 @@ def errors(phantom: str, seeds: int = SEEDS) -> dict[str, dict[str, list[float]]
             speed_range_mps=(low, high),
             seed=seed,
         )
-        problem = Problem.of(dataset, settings)
+        problem = Problem.from_dataset(dataset, settings)
         for start, share in STARTS.items():
             for name, reading in readings(inside, low, high).items():
 

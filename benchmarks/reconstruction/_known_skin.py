@@ -32,7 +32,7 @@ def knowing_skin(scan: PhantomScan, like: Reconstruction) -> Reconstruction:
         like: by SART, one slice.
     """
     nodes, coupling = like.speed.shape[0], scan.dataset.water_speed_mps
-    problem = Problem.of(scan.dataset, like.settings)
+    problem = Problem.from_dataset(scan.dataset, like.settings)
     start = skin_alone(coupling, nodes, like.spacing_m[0] * (nodes - 1))
     state = sart_step.begin(1.0 / start)
     while not state.done:

@@ -90,6 +90,6 @@ def _inside_array(dataset: Dataset) -> ErrorOn:
 
     def error_on(image: Reconstruction) -> ImageError:
         true = on_grid(truth.sound_speed_mps, truth, image)
-        return ImageError(true, Problem.of(dataset, image.settings).region & np.isfinite(true))
+        return ImageError(true, Problem.from_dataset(dataset, image.settings).region & np.isfinite(true))
 
     return error_on

@@ -185,7 +185,7 @@ def sweep(nodes: int, elements: int) -> tuple[float, int]:
     random = np.random.default_rng(0).normal(0.0, 2e-7, (elements, elements))
     dataset = Dataset(ring.positions(), everyone, everyone, COUPLING_MPS, delta_tof_s=random + random.T)
     settings = Settings(method="sart", nodes=nodes, side_m=TABLE7_SIDE_M, iterations=2)
-    problem = Problem.of(dataset, settings)
+    problem = Problem.from_dataset(dataset, settings)
     state = advance(problem, settings, begin(initial_slowness(problem, None)), elements)
     started = time.perf_counter()
     state = advance(problem, settings, state, elements)

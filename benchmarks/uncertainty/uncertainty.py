@@ -185,7 +185,7 @@ def judge(scan: BreastScan) -> Judged:
 def seconds_of_uncertainty(dataset: Dataset, result: Reconstruction) -> float:
     """CPU time of the uncertainty of a result, s."""
     begun = time.process_time()
-    problem = Problem.of(dataset, result.settings, 0).each_pair_once()
+    problem = Problem.from_dataset(dataset, result.settings, 0).each_pair_once()
     slowness = 1.0 / result.speed
     blocks = [
         trace_probed_rays(problem, result.settings, slowness, batch)

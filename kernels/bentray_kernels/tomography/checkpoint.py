@@ -34,6 +34,12 @@ TYPES: Mapping[str, type] = MappingProxyType(
     }
 )
 
+# Names in files of fields that were renamed, by record.
+STORED: Mapping[str, Mapping[str, str]] = {
+    "State": {"iteration": "sweep"},
+    "Measured": {"iteration": "sweep"},
+}
+
 Arrays = list[NDArray[Any]]
 
 
@@ -61,7 +67,7 @@ def unpack(tree: Any, arrays: Sequence[NDArray[Any]], types: Mapping[str, type] 
 
 def _pack(value: Any, arrays: Arrays) -> Any:
     if is_dataclass(value):
-        inner = {field.name: _pack(getattr(value, field.name), arrays) for field in fields(value)}
+        inner = {name: _pack(getattr(value, own), arrays) for name, own in _names(type(value)).items()}
         return {"of": type(value).__name__, "fields": inner}
     if isinstance(value, np.ndarray):
         arrays.append(value)
@@ -79,6 +85,13 @@ def _unpack(tree: Any, arrays: Sequence[NDArray[Any]], types: Mapping[str, type]
     if isinstance(tree, dict):
         if "array" in tree:
             return arrays[tree["array"]]
-        inner = {name: _unpack(item, arrays, types) for name, item in tree["fields"].items()}
+        names = _names(types[tree["of"]])
+        inner = {names[name]: _unpack(item, arrays, types) for name, item in tree["fields"].items()}
         return types[tree["of"]](**inner)
     return tree
+
+
+def _names(kind: Any) -> dict[str, str]:
+    """Names of the fields of a record, by their names in files."""
+    renamed = STORED.get(kind.__name__, {})
+    return {renamed.get(field.name, field.name): field.name for field in fields(kind)}

@@ -47,7 +47,9 @@ def predicted_delta(dataset: Dataset, result: Reconstruction) -> Floats:
     )
     predicted = np.full((dataset.slices, *shape), np.nan)
     for index in range(dataset.slices):
-        problem = Problem.of(zeroed, settings.changed(reciprocity=False, opening_angle_deg=None), index)
+        problem = Problem.from_dataset(
+            zeroed, settings.changed(reciprocity=False, opening_angle_deg=None), index
+        )
         speed = result.speed if result.speed.ndim == 2 else result.speed[:, :, index]
         rows = trace_rays(problem, settings, 1.0 / speed, np.arange(len(dataset.tx)))
         predicted[index][~same_element] = -rows.residual

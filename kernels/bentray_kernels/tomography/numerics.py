@@ -63,7 +63,7 @@ class Numerics:
     def __post_init__(self) -> None:
         check(self)
 
-    def explained(self, rms_s: float) -> bool:
+    def residual_within_noise(self, rms_s: float) -> bool:
         """Whether a residual, s, is small enough to stop."""
         return rms_s <= (self.stop_rms_s or 0.0)
 

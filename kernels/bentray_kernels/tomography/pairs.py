@@ -72,7 +72,7 @@ def count(dataset: Dataset, settings: Settings) -> int:
     return 1
 
 
-def of(dataset: Dataset, settings: Settings, index: int) -> Pairs:
+def from_dataset(dataset: Dataset, settings: Settings, index: int) -> Pairs:
     """The pairs of one problem; ``index`` counts from 0.
 
     Raises:

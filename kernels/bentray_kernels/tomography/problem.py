@@ -57,7 +57,7 @@ class Problem:
     noise_s: float = 0.0
 
     @classmethod
-    def of(cls, dataset: Dataset, settings: Settings, index: int = 0) -> Problem:
+    def from_dataset(cls, dataset: Dataset, settings: Settings, index: int = 0) -> Problem:
         """One problem of a dataset; ``index`` counts slices from 0 (a volume has one problem).
 
         Raises:
@@ -72,7 +72,7 @@ class Problem:
                 settings.speed_bounds_mps,
                 f"bounds around the speed of the water, {dataset.water_speed_mps:g} m/s",
             )
-        data = pairs.of(dataset, settings, index)
+        data = pairs.from_dataset(dataset, settings, index)
         elements = data.elements
         check_extent(elements)
         flat = dataset.element_position_m[:, :2]

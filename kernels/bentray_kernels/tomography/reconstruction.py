@@ -266,9 +266,9 @@ def problem_of(dataset: Dataset, settings: Settings, index: int, part: Part = "a
     of the noise for one method, and all of it for another, misfits could not be compared.
 
     Raises:
-        InvalidInput: as ``Problem.of``.
+        InvalidInput: as ``Problem.from_dataset``.
     """
-    problem = Problem.of(part_of(dataset, part), settings, index)
+    problem = Problem.from_dataset(part_of(dataset, part), settings, index)
     once = settings.method == "gauss-newton" or not (part == "all" or part.startswith("shown"))
     return problem.each_pair_once() if once and settings.numerics.reciprocity else problem
 

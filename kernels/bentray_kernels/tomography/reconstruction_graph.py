@@ -56,7 +56,7 @@ class ReconstructionCheckpoint:
     @property
     def milestone(self) -> tuple[Any, ...]:
         finished = tuple(value is not None for value in self.values)
-        return self.stage, self.state.sweep, self.state.done, finished
+        return self.stage, self.state.iteration, self.state.done, finished
 
 
 class ReconstructionGraph:

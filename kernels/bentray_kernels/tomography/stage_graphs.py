@@ -64,7 +64,7 @@ class Stage(ABC):
     @property
     def done(self) -> int:
         """Emitter passes made."""
-        return self._emitters * self.state.sweep + self.state.emitter
+        return self._emitters * self.state.iteration + self.state.emitter
 
     @property
     def history(self) -> tuple[Iteration, ...]:

@@ -106,7 +106,7 @@ EXPECTED = [
 
 @pytest.mark.parametrize(("name", "most", "words"), EXPECTED, ids=[name for name, *_ in EXPECTED])
 def test_the_image_inside_the_hull_is_better_than_water(name, most, words):
-    result, problem = image(name), Problem.of(scan(name), image(name).settings)
+    result, problem = image(name), Problem.from_dataset(scan(name), image(name).settings)
     true, place = truth(problem)
     depth = depth_inside(scan(name).element_position_m, place.reshape(-1, place.shape[-1]))
     inside = depth.reshape(true.shape) >= RIM_NODES * problem.spacing - 1e-9
@@ -142,8 +142,8 @@ def test_pairs_outside_the_opening_angle_are_left_out():
     # Seen from an element of a circle, the middle of the others is at half the angle of their arc.
     apart = np.abs(np.subtract.outer(np.arange(48), np.arange(48)))
     wide = np.minimum(apart, 48 - apart) >= 12
-    assert np.array_equal(np.isfinite(Problem.of(dataset, settings).delta_tof), wide)
-    result, problem = reconstruct(dataset, settings), Problem.of(dataset, settings)
+    assert np.array_equal(np.isfinite(Problem.from_dataset(dataset, settings).delta_tof), wide)
+    result, problem = reconstruct(dataset, settings), Problem.from_dataset(dataset, settings)
     words = "1056 of 2256 pairs (47 %) are outside the opening angle of 90°"
     assert words in result.provenance["geometry"]
     true, _ = truth(problem)
@@ -162,7 +162,7 @@ def test_pairs_outside_the_opening_angle_are_left_out():
 def test_directions_that_are_of_no_use_are_refused(normal, angle, field, words):
     dataset = replace(scan("ring"), element_normal=normal)
     with pytest.raises(InvalidInput, match=words) as refusal:
-        Problem.of(dataset, PLAN.changed(opening_angle_deg=angle))
+        Problem.from_dataset(dataset, PLAN.changed(opening_angle_deg=angle))
     assert refusal.value.field == field
     if normal is None:
         with pytest.raises(InvalidInput, match=words):
@@ -170,7 +170,7 @@ def test_directions_that_are_of_no_use_are_refused(normal, angle, field, words):
 
 
 def test_a_region_that_paths_leave_is_a_warning():
-    problem = Problem.of(scan("ring"), PLAN)
+    problem = Problem.from_dataset(scan("ring"), PLAN)
     grid = Truth(np.full(problem.region.shape, WATER), (problem.spacing,) * 2, problem.origin, axes="x,y")
     x, y = np.meshgrid(*2 * [np.arange(40) - 19.5])
     dataset = replace(scan("ring"), truth=grid, roi=np.hypot(x, y) < 7.0)

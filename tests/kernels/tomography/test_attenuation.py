@@ -165,7 +165,7 @@ def test_attenuation_is_optional(scan):
 
 def test_focusing_is_taken_off(scan):
     """Amplitudes that a smooth lens focuses: without the correction they read as absorption or gain."""
-    problem = Problem.of(replace(scan, amplitude_frequency_hz=5e5), plan())
+    problem = Problem.from_dataset(replace(scan, amplitude_frequency_hz=5e5), plan())
     slowness = 1.0 / PHANTOM.speed(NODES, SIDE)
     lens = focusing(
         slowness,
@@ -196,7 +196,7 @@ def test_focusing_does_not_depend_on_emitter_batches(scan):
         amplitude_frequency_hz=5e5,
     )
     settings = plan(focusing=True, reciprocity=False)
-    problem = Problem.of(few, settings)
+    problem = Problem.from_dataset(few, settings)
     slowness = 1.0 / PHANTOM.speed(NODES, SIDE)
     near, far = np.array([12]), np.array([12, 36])
     alone, together = (trace_rays(problem, settings, slowness, emitters) for emitters in (near, far))

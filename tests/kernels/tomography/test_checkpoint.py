@@ -1,6 +1,7 @@
 """Task graphs interrupted anywhere and resumed from a checkpoint give the same bits."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,11 +16,13 @@ from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.model_selection.candidates import CandidateGraph
 from bentray_kernels.tomography.reconstruction import MemoryScan
 from bentray_kernels.tomography.reconstruction_graph import (
+    ReconstructionCheckpoint,
     ReconstructionGraph,
     check_resolution,
     estimate_uncertainty,
     solve_attenuation,
 )
+from bentray_kernels.tomography.sart.sart_step import begin
 
 from ...effort import effort
 
@@ -125,3 +128,10 @@ def test_a_value_that_is_no_checkpoint_is_rejected():
         unpack([1, 2], [])
     with pytest.raises(KeyError):
         unpack({"of": "Path", "fields": {}}, [])
+
+
+def test_files_keep_the_name_of_a_renamed_field():
+    state = replace(begin(np.ones((2, 2))), iteration=3)
+    tree, arrays = pack(ReconstructionCheckpoint(0, 0, (), state, (), 1e-3, (0.0, 0.0)))
+    assert tree["fields"]["state"]["fields"]["sweep"] == 3
+    assert unpack(tree, arrays).state.iteration == 3

@@ -43,7 +43,7 @@ def test_the_blur_is_linear_and_its_own_adjoint(seed, width):
 
 
 def test_thin_rays_see_the_image_itself_and_water_stays_water():
-    problem = Problem.of(scan(), PLAN)
+    problem = Problem.from_dataset(scan(), PLAN)
     image = np.full(problem.region.shape, 1.0 / WATER)
     assert np.array_equal(ray_slowness(problem, PLAN, image), image)
     image[20, 20] *= 1.1
@@ -54,7 +54,7 @@ def test_thin_rays_see_the_image_itself_and_water_stays_water():
 
 
 def test_rays_bend_in_an_image_blurred_by_twice_their_width():
-    problem = Problem.of(scan(), PLAN)
+    problem = Problem.from_dataset(scan(), PLAN)
     width = width_in_nodes(problem, PLAN)
     assert width == pytest.approx(WIDTH / problem.spacing)
     assert np.hypot(width, front_smoothing(problem, PLAN)) == pytest.approx(BENDS_WIDER * width)
@@ -65,7 +65,7 @@ def test_rays_bend_in_an_image_blurred_by_twice_their_width():
 def test_wide_times_select_wide_rays():
     """Times that rays of this width would take: thin ones make a blurred disc of them."""
     plan = replace(PLAN, rays="straight")
-    problem = Problem.of(scan(), plan)
+    problem = Problem.from_dataset(scan(), plan)
     axis = (np.arange(40) - 19.5) * problem.spacing
     far = np.hypot(axis[:, None] - 0.01, axis[None, :])
     true = WATER + 60.0 * (far < 0.02)

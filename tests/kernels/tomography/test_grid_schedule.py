@@ -51,7 +51,7 @@ def test_each_stage_is_in_the_history_and_better_than_water(scan, method):
 
 
 def test_a_finer_grid_begins_with_the_same_image(scan):
-    coarse, fine = (Problem.of(scan, replace(PLAN, nodes=n, side_m=0.2)) for n in (25, 49))
+    coarse, fine = (Problem.from_dataset(scan, replace(PLAN, nodes=n, side_m=0.2)) for n in (25, 49))
     x = np.linspace(-1.0, 1.0, 25)
     image = 1.0 / WATER * (1.0 + 0.02 * np.exp(-((x[:, None] - 0.2) ** 2 + x[None, :] ** 2) / 0.05))
     slowness = initial_slowness(fine, image, coarse)
@@ -68,7 +68,7 @@ def test_a_finer_grid_of_a_volume_begins_with_the_same_image_at_the_same_heights
     delta = np.zeros((3, RING.elements, RING.elements))
     scan = Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=delta, slice_z_m=heights)
     plan = replace(PLAN, decomposition="volume", side_m=0.2)
-    coarse, fine = (Problem.of(scan, replace(plan, nodes=n)) for n in (25, 48))
+    coarse, fine = (Problem.from_dataset(scan, replace(plan, nodes=n)) for n in (25, 48))
 
     def tilted(problem):
         z = problem.origin[2] + problem.spacing * np.arange(problem.region.shape[2])

@@ -9,7 +9,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.pairs import count, heights, of
+from bentray_kernels.tomography.pairs import count, from_dataset, heights
 from bentray_kernels.tomography.problem import Problem
 
 RING, Z, WATER = Ring(6, 0.05), np.array([-0.004, 0.0, 0.004]), 1500.0
@@ -38,11 +38,11 @@ def test_noise_is_measured_where_pairs_were_measured_both_ways():
     one_way = random.normal(0.0, 1e-6, (64, 64))
     delta = one_way + one_way.T + random.normal(0.0, 1e-8, (64, 64))
     both = Dataset(ring.positions(), everyone, everyone, WATER, delta_tof_s=delta)
-    assert of(both, SLICES, 0).noise_s == pytest.approx(1e-8, rel=0.05)
+    assert from_dataset(both, SLICES, 0).noise_s == pytest.approx(1e-8, rel=0.05)
     once = replace(both, delta_tof_s=np.where(everyone[:, None] < everyone, delta, np.nan))
-    assert of(once, SLICES, 0).noise_s == 0.0
+    assert from_dataset(once, SLICES, 0).noise_s == 0.0
     # Two times have a mean of half the variance; one that is filled in from its reverse has not.
-    problem = Problem.of(both, SLICES.changed(nodes=32), 0)
+    problem = Problem.from_dataset(both, SLICES.changed(nodes=32), 0)
     assert problem.each_pair_once().noise_s == pytest.approx(problem.noise_s / np.sqrt(2.0))
     assert problem.each_pair_once().each_pair_once().noise_s == problem.each_pair_once().noise_s
 
@@ -56,14 +56,14 @@ def test_heights_are_those_of_slices_and_rings():
 def test_rings_in_space_fall_into_the_slices_of_a_ring_that_moves():
     assert count(moved(), SLICES) == count(rings(), SLICES) == 3
     for k in range(3):
-        a, b = of(moved(), SLICES, k), of(rings(), SLICES, k)
+        a, b = from_dataset(moved(), SLICES, k), from_dataset(rings(), SLICES, k)
         assert np.array_equal(a.emitters, b.emitters)
         assert np.array_equal(a.receivers, b.receivers)
         assert np.array_equal(a.delta_tof, b.delta_tof, equal_nan=True)
 
 
 def test_a_volume_has_every_emitter_at_its_height():
-    apart, together = of(moved(), VOLUME, 0), of(rings(), VOLUME, 0)
+    apart, together = from_dataset(moved(), VOLUME, 0), from_dataset(rings(), VOLUME, 0)
     assert count(moved(), VOLUME) == 1
     assert np.array_equal(apart.emitters, together.emitters)
     assert apart.delta_tof.shape == (18, 6)
@@ -79,7 +79,7 @@ def test_a_volume_has_every_emitter_at_its_height():
 def test_reverses_fill_gaps_ring_by_ring():
     gap = moved()
     gap.delta_tof_s[1, 2, 4] = np.nan
-    result = of(gap, VOLUME, 0)
+    result = from_dataset(gap, VOLUME, 0)
     assert result.delta_tof[6 + 2, 4] == gap.delta_tof_s[1, 4, 2]
 
 
@@ -87,7 +87,7 @@ def test_invalid_pairs_have_neither_time_nor_amplitude():
     valid = np.ones((3, 6, 6), bool)
     valid[0, 1, 2] = valid[0, 2, 1] = False
     loud = replace(moved(), valid=valid, log_ratio_np=np.ones((3, 6, 6)))
-    result = of(loud, SLICES, 0)
+    result = from_dataset(loud, SLICES, 0)
     assert np.isnan(result.delta_tof[1, 2])
     assert np.isnan(result.log_ratio[1, 2])
 
@@ -99,13 +99,15 @@ def test_an_uneven_ring_is_one_ring():
     assert count(uneven, SLICES) == 3
     for k in range(3):
         assert np.array_equal(
-            of(uneven, SLICES, k).delta_tof, of(moved(), SLICES, k).delta_tof, equal_nan=True
+            from_dataset(uneven, SLICES, k).delta_tof,
+            from_dataset(moved(), SLICES, k).delta_tof,
+            equal_nan=True,
         )
 
 
 def test_one_height_is_no_volume():
     with pytest.raises(InvalidInput) as refusal:
-        of(moved().slice(0), VOLUME, 0)
+        from_dataset(moved().slice(0), VOLUME, 0)
     assert refusal.value.field == "decomposition"
 
 
@@ -121,4 +123,4 @@ def test_a_ring_without_times_is_named(dataset):
     delta = dataset.delta_tof_s.copy()
     delta[(1,) if delta.ndim == 3 else (slice(6, 12), slice(6, 12))] = np.nan
     with pytest.raises(InvalidInput, match="slice 1"):
-        of(replace(dataset, delta_tof_s=delta), SLICES, 1)
+        from_dataset(replace(dataset, delta_tof_s=delta), SLICES, 1)

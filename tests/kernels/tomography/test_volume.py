@@ -18,7 +18,7 @@ PLAN = Settings.of(method="sart", nodes=NODES, decomposition="volume", iteration
 
 
 def problem_of(dataset, plan=PLAN):
-    return Problem.of(dataset, plan)
+    return Problem.from_dataset(dataset, plan)
 
 
 def positions():

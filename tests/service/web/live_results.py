@@ -58,7 +58,7 @@ def in_turns(work: FakeWork, monkeypatch: pytest.MonkeyPatch) -> queue.Queue[Non
             speed = 1500.0 + CONTRASTS_MPS[sweep - 1] * np.linspace(0.0, 1.0, np.prod(SHAPE)).reshape(SHAPE)
             if sweep == 3:
                 speed[20, 15] = SPIKE_MPS
-            state = replace(sart_step.begin(1.0 / speed), sweep=sweep)
+            state = replace(sart_step.begin(1.0 / speed), iteration=sweep)
             kept.save("0-00000", ReconstructionCheckpoint(0, 0, (), state, (), SPACING_M, ORIGIN_M))
             history += (Iteration(0, sweep, 2e-6 / sweep, 8),)
             on_progress(Progress(8 * sweep, 8 * ITERATIONS, history, "reconstructing"))

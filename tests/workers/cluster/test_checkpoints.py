@@ -24,7 +24,7 @@ def checkpoint(sweep, emitter=0, seed=0):
     image = np.random.default_rng((seed, sweep, emitter)).normal(size=(5, 4))
     history = tuple(Iteration(0, k + 1, 1.0 / 3.0**k, 8) for k in range(sweep))
     state = replace(
-        sart_step.begin(image), sweep=sweep, emitter=emitter, squares=0.1 + emitter, history=history
+        sart_step.begin(image), iteration=sweep, emitter=emitter, squares=0.1 + emitter, history=history
     )
     values = None, image[:, 0], float("inf")
     return ReconstructionCheckpoint(

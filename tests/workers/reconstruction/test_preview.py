@@ -29,7 +29,7 @@ def speeds(*shape, seed=0):
 
 
 def by_rays(speed, sweep=2, stage=1):
-    state = replace(sart_step.begin(1.0 / speed), sweep=sweep)
+    state = replace(sart_step.begin(1.0 / speed), iteration=sweep)
     return ReconstructionCheckpoint(stage, 0, (), state, (None,), 2e-3, (-0.01, -0.02, 0.03)[: speed.ndim])
 
 

@@ -37,7 +37,7 @@ def test_executed_solver_equals_the_planned_one(scans, monkeypatch, rays, cut, e
     if eikonal in ON_DEVICE:
         pytest.skip("its fallback on the CPU is tested with the device")
     settings = Settings(method="sart", nodes=16, iterations=1, rays=rays, decomposition=cut, eikonal=eikonal)
-    problem = Problem.of(scans[cut], settings, 0)
+    problem = Problem.from_dataset(scans[cut], settings, 0)
     chosen = solver_of(settings, problem.region.ndim)
     solved, passed = [], []
     solve, trace = sart_update.solve, sart_update.EmitterPass.trace

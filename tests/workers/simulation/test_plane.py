@@ -58,7 +58,7 @@ def test_default_reconstruction_grid_is_the_grid_of_the_truth():
     from bentray_kernels.tomography import Problem, Settings
 
     dataset = simulate(SMALL)
-    problem = Problem.of(dataset, Settings(method="sart", nodes=32))
+    problem = Problem.from_dataset(dataset, Settings(method="sart", nodes=32))
     assert problem.origin == pytest.approx(dataset.truth.origin_m)
     assert problem.spacing == pytest.approx(dataset.truth.spacing_m[0])
 

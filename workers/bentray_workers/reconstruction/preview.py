@@ -115,10 +115,10 @@ def _find_image(checkpoint: Any) -> _ImageSource | None:
     if isinstance(checkpoint, ReconstructionCheckpoint):
         state = checkpoint.state
         grid = checkpoint.spacing, checkpoint.origin
-        return _ImageSource(cast(int, state.slowness), True, checkpoint.stage, state.sweep, *grid)
+        return _ImageSource(cast(int, state.slowness), True, checkpoint.stage, state.iteration, *grid)
     if isinstance(checkpoint, BlockCheckpoint) and checkpoint.updates:
         # Its images are in files of their own.
-        return _ImageSource(0, True, 0, checkpoint.state.sweep, checkpoint.spacing, checkpoint.origin)
+        return _ImageSource(0, True, 0, checkpoint.state.iteration, checkpoint.spacing, checkpoint.origin)
     if isinstance(checkpoint, RefinementCheckpoint):
         band, ends = checkpoint.band, checkpoint.ends
         if band is not None and band.frozen is None:

@@ -37,14 +37,14 @@ class Measured:
 
     Attributes:
         slowness: of the region's shape, s/m.
-        sweep: number of the iteration that evaluated it, from 1; 0 for none.
+        iteration: number of the iteration that evaluated it, from 1; 0 for none.
         limit: Huber limit of its residuals, s.
         loss: of its residuals, s; see ``gauss_newton.huber.loss``.
         residuals: their histogram over ``RESIDUAL_EDGES_S``.
     """
 
     slowness: Floats
-    sweep: int
+    iteration: int
     limit: float
     loss: float
     residuals: Ints
@@ -77,7 +77,7 @@ class Iterate:
     history: tuple[Iteration, ...] = ()
 
     @property
-    def sweep(self) -> int:
+    def iteration(self) -> int:
         """Iterations finished."""
         return len(self.history)
 
@@ -135,9 +135,9 @@ def step(
     stuck = (worse and not halve) or idle == PATIENCE
     # The last iteration only evaluates the previous image.
     last = number == settings.iterations
-    if number > 1 and (stuck or last or settings.numerics.explained(rms)):
+    if number > 1 and (stuck or last or settings.numerics.residual_within_noise(rms)):
         best = current if loss < state.best.loss / MIN_GAIN else best
-        history = tuple(replace(record, given=record.sweep == best.sweep) for record in history)
+        history = tuple(replace(record, given=record.sweep == best.iteration) for record in history)
         return replace(state, slowness=best.slowness, best=best, history=history, done=True)
     if halve:
         middle = 0.5 * (best.slowness + state.slowness)

@@ -181,7 +181,7 @@ def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     each += settings.attenuation.enabled and dataset.log_ratio_np is not None
     each += settings.resolution_check + settings.uncertainty
     problems = range(pairs.count(dataset, settings))
-    return each * sum(len(pairs.of(dataset, settings, index).emitters) for index in problems)
+    return each * sum(len(pairs.from_dataset(dataset, settings, index).emitters) for index in problems)
 
 
 def explain_candidates(candidates: Sequence[Candidate]) -> str:

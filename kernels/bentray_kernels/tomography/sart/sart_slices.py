@@ -120,7 +120,7 @@ def _advance(session: Session, calls: Sequence[SliceCall], settings: Settings) -
             np.stack([call.problem.region for call in calls]),
             emissions,
             update,
-            np.array([relaxation_of(settings, call.state.sweep) for call in calls]),
+            np.array([relaxation_of(settings, call.state.iteration) for call in calls]),
         )
         slices.run()
         slowness, coverage = slices.images()

@@ -21,7 +21,7 @@ class State:
     Attributes:
         slowness: of the region's shape, s/m.
         coverage: as ``slowness``, metres of ray in the current iteration.
-        sweep: finished iterations.
+        iteration: finished iterations.
         emitter: emitters done in the current iteration.
         squares, count: sum of squared residuals, s², and their number, in the current iteration.
         residuals: histogram over ``RESIDUAL_EDGES_S``.
@@ -31,7 +31,7 @@ class State:
 
     slowness: Floats
     coverage: Floats
-    sweep: int = 0
+    iteration: int = 0
     emitter: int = 0
     squares: float = 0.0
     count: int = 0
@@ -72,7 +72,7 @@ def advance(problem: Problem, settings: Settings, state: State, emitters: int, s
     squares, residuals = state.squares, []
     update = update_for(problem, settings)
     for first in range(0, len(batch), size):
-        residual = update(slowness, coverage, batch[first : first + size], state.sweep)
+        residual = update(slowness, coverage, batch[first : first + size], state.iteration)
         residuals.append(residual)
         squares += float((residual * residual).sum())
     counts = residual_counts(np.concatenate(residuals))
@@ -82,7 +82,7 @@ def advance(problem: Problem, settings: Settings, state: State, emitters: int, s
 
 def batch_of(problem: Problem, settings: Settings, state: State, emitters: int, slice_index: int = 0) -> Ints:
     """The next emitters of the current iteration, in order; see ``advance``."""
-    order = emitter_order(problem, settings.seed, slice_index, state.sweep)
+    order = emitter_order(problem, settings.seed, slice_index, state.iteration)
     size = settings.numerics.subset
     return order[state.emitter : state.emitter + -(-emitters // size) * size]
 
@@ -129,13 +129,13 @@ def emitter_order(problem: Problem, seed: int, slice_index: int, iteration: int)
 
 def _finish_iteration(state: State, settings: Settings, slice_index: int, emitters: int) -> State:
     rms = math.sqrt(state.squares / state.count)
-    number = state.sweep + 1
+    number = state.iteration + 1
     return replace(
         state,
-        sweep=number,
+        iteration=number,
         emitter=0,
         squares=0.0,
         count=0,
-        done=number >= settings.iterations or settings.numerics.explained(rms),
+        done=number >= settings.iterations or settings.numerics.residual_within_noise(rms),
         history=(*state.history, Iteration(slice_index, number, rms, emitters)),
     )

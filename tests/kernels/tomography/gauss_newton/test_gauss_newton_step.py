@@ -23,7 +23,7 @@ def problem(delta, tx=None, rx=None):
     rx = np.arange(count) if rx is None else rx
     ring = Ring(max(tx.max(), rx.max()) + 1, 0.08)
     dataset = Dataset(ring.positions(), tx, rx, WATER, delta_tof_s=delta)
-    return Problem.of(dataset, PLAN.changed(reciprocity=False))
+    return Problem.from_dataset(dataset, PLAN.changed(reciprocity=False))
 
 
 def test_each_pair_is_kept_once():

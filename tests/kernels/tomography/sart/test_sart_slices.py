@@ -44,7 +44,7 @@ def plan(**changes):
 
 def advanced(rings, settings, emitters=10**6):
     """The final states of all slices, updated together."""
-    problems = [Problem.of(dataset, settings) for dataset in rings]
+    problems = [Problem.from_dataset(dataset, settings) for dataset in rings]
     states = [begin(initial_slowness(problem, None)) for problem in problems]
     while not all(state.done for state in states):
         calls = [SliceCall(*pair, emitters, k) for k, pair in enumerate(zip(problems, states, strict=True))]
@@ -147,9 +147,9 @@ def test_calls_of_several_scans_are_told_apart(opencl_session, rings):
             return (settings,)
 
         def problems(self, indices, stage=-1):
-            return tuple(Problem.of(rings[self.index], settings) for _ in indices)
+            return tuple(Problem.from_dataset(rings[self.index], settings) for _ in indices)
 
-    start = begin(initial_slowness(Problem.of(rings[0], settings), None))
+    start = begin(initial_slowness(Problem.from_dataset(rings[0], settings), None))
     calls = [(scan, 0, 0, start, 100) for scan in (Scan(0), Scan(1))]
     for (state, seconds), expected in zip(update_sart_slices(calls), (rings[:1], rings[1:2]), strict=True):
         assert np.array_equal(state.slowness, advanced(expected, settings)[0].slowness)

@@ -37,7 +37,7 @@ def test_cutting_the_work_changes_no_bit(cuts):
     delta = rng.normal(0.0, 2e-7, (16, 16))
     dataset = Dataset(ring.positions(), everyone, everyone, WATER, delta_tof_s=delta)
     wanted = Settings(method="sart", nodes=24, iterations=2)
-    problem = Problem.of(dataset, wanted)
+    problem = Problem.from_dataset(dataset, wanted)
     whole = begin(initial_slowness(problem, None))
     while not whole.done:
         whole = advance(problem, wanted, whole, 10**6)
@@ -58,7 +58,7 @@ def test_same_seed_same_bits_other_seed_other_order(scan):
 
 
 def test_every_pass_slice_and_seed_has_an_order_of_its_own(scan):
-    problem = Problem.of(scan, plan())
+    problem = Problem.from_dataset(scan, plan())
     orders = [emitter_order(problem, *which) for which in ((0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0))]
     assert len({tuple(order) for order in orders}) == 4
     assert all(sorted(order) == list(range(RING.elements)) for order in orders)

@@ -35,7 +35,7 @@ def plan(**changes):
 @pytest.mark.parametrize(("wrong_s", "end"), [(-1e-3, 1), (1e-3, 0)], ids=["too early", "too late"])
 def test_impossible_times_move_the_image_to_its_bounds_and_no_further(scan, eikonal, wrong_s, end):
     wanted = plan(speed_bounds_mps=(1300.0, 1600.0), relaxation=1.0, **eikonal)
-    problem = Problem.of(replace(scan, delta_tof_s=scan.delta_tof_s + wrong_s), wanted)
+    problem = Problem.from_dataset(replace(scan, delta_tof_s=scan.delta_tof_s + wrong_s), wanted)
     slowness, coverage = initial_slowness(problem, None), np.zeros(problem.region.shape)
     before = slowness.copy()
     update_for(problem, wanted)(slowness, coverage, np.arange(8), 0)
@@ -85,7 +85,7 @@ def test_the_compiled_pass_gives_the_images_of_the_traced_one(scan, changes):
 def test_cuts_of_the_compiled_pass_change_no_bit(scan, changes):
 
     wanted = plan(subset=changes.get("subset", 1))
-    problem = Problem.of(scan, wanted)
+    problem = Problem.from_dataset(scan, wanted)
     whole = cut = begin(initial_slowness(problem, None))
     before = whole.slowness.copy()
     while not whole.done:

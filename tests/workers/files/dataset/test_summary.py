@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.pairs import of
+from bentray_kernels.tomography.pairs import from_dataset
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.summary import summary_of
 
@@ -18,7 +18,7 @@ def test_summary_counts_match_the_problem(tmp_path, reciprocity):
     dataset, path = small(), tmp_path / "scan.h5"
     write_dataset(path, dataset)
     asked = Settings.of(method="sart", reciprocity=reciprocity)
-    summary, pairs = summary_of(path, asked), of(dataset, asked, 0)
+    summary, pairs = summary_of(path, asked), from_dataset(dataset, asked, 0)
     assert (summary.emitters, summary.receivers) == pairs.delta_tof.shape
     assert (summary.pairs, summary.slices, summary.in_space, summary.height_m) == (12 * 24, 1, False, 0.0)
     assert summary.width_m == pytest.approx(0.2, rel=1e-2)

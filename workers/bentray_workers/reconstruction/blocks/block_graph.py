@@ -74,7 +74,7 @@ class BlockSartGraph:
     @property
     def done(self) -> int:
         """See ``stage_graphs.Stage``."""
-        return self._emitters * self._state.sweep + self._state.emitter
+        return self._emitters * self._state.iteration + self._state.emitter
 
     @property
     def history(self) -> tuple[Iteration, ...]:
@@ -140,7 +140,7 @@ class BlockSartGraph:
                 residual, blocks = yield from self._emitter(name, int(emitter))
                 residuals.append(residual)
                 sums.append((name, blocks))
-            common = problem.spacing, sums, settings, state.sweep, state.emitter == 0
+            common = problem.spacing, sums, settings, state.iteration, state.emitter == 0
             yield [Task(update_block, (files, update, block, *common)) for block in range(files.blocks)]
             squares = state.squares + float(sum((residual * residual).sum() for residual in residuals))
             counts = residual_counts(np.concatenate(residuals))

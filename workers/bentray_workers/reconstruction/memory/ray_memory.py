@@ -63,7 +63,7 @@ def field_bytes(shape: tuple[int, ...], method: str) -> int:
 
 
 def shape_of(scan: Summary, settings: Settings) -> tuple[int, ...]:
-    """Shape of an image, as ``Problem.of`` makes it."""
+    """Shape of an image, as ``Problem.from_dataset`` makes it."""
     nodes = settings.grid_nodes
     if settings.decomposition != "volume":
         return nodes, nodes
