@@ -11,5 +11,5 @@ NIGHTLY = os.environ.get("HYPOTHESIS_PROFILE") == "nightly"
 
 
 def effort(push: Effort, nightly: Effort) -> Effort:
-    """What a test takes of the two in this run."""
+    """Number that this run takes of the two."""
     return nightly if NIGHTLY else push

@@ -74,7 +74,7 @@ def shell_lines() -> list[str]:
 
 @pytest.fixture(scope="module")
 def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the reader brings: a scan with times."""
+    """The reader's own file: a scan with times."""
     folder = tmp_path_factory.mktemp("scans")
     settings = SimulationSettings(nodes=48, elements=24, coupling_mps=1375.0)
     write_dataset(folder / "scan.h5", simulate(settings, lambda _: None))

@@ -31,7 +31,7 @@ def dataset() -> Dataset:
 
 
 def ring() -> TravelTimes:
-    """The same as a peer gets it."""
+    """The ring in the form that a peer gets."""
     return TravelTimes.from_dataset(dataset(), NODES, SIDE_M)
 
 

@@ -17,7 +17,7 @@ SHOT = Shot("water", 4.5, 0.012, receivers=7)
 
 
 def programs() -> list[Path]:
-    """What lies where k-Wave keeps the programs that it downloads."""
+    """Files where k-Wave keeps the programs that it downloads."""
     spec = importlib.util.find_spec("kwave")
     points = spec.submodule_search_locations if spec is not None else None
     return [path for place in points or () for path in Path(place, "bin").rglob("*")]

@@ -25,7 +25,7 @@ def read(*overrides: Path) -> dict[str, Any]:
 
 
 def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    """As compose merges: mappings key by key, secrets one after the other, all else is replaced."""
+    """Merge by the rules of compose: mappings key by key, secrets are joined, all else is replaced."""
     result = dict(below)
     for name, value in above.items():
         known = below.get(name)

@@ -91,11 +91,11 @@ class Installation:
         process.wait()
 
     def pid(self, part: str) -> int:
-        """Of the process that the command of a part became."""
+        """Process that the command of a part became."""
         return self._processes[part].pid
 
     def healthy(self, part: str) -> bool:
-        """What the health check of a part says."""
+        """Answer of the health check of a part."""
         _, *words = self.services[part]["healthcheck"]["test"]
         words = self.words(words)
         environment = self.environment(part)

@@ -69,7 +69,7 @@ def test_libraries_lose_their_symbols_and_still_load(trimmed: Path) -> None:
 
 
 def test_libraries_that_were_edited_after_linking_keep_their_segments_on_pages(trimmed: Path) -> None:
-    """What strip breaks: ``ELF load command address/offset not page-aligned``."""
+    """Strip breaks them: ``ELF load command address/offset not page-aligned``."""
     content = (trimmed / EDITED_HERE).read_bytes()
     (table,) = struct.unpack_from("<Q", content, 32)
     size, count = struct.unpack_from("<HH", content, 54)

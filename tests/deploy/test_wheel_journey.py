@@ -56,7 +56,7 @@ class Environment:
 
 @pytest.fixture(scope="module")
 def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Environment:
-    """As how-to/install-without-a-network.md says, but from the package index."""
+    """Install by how-to/install-without-a-network.md, but from the package index."""
     folder = tmp_path_factory.mktemp("journey")
     (wheel,) = dist.glob("*.whl")
     shutil.copy(ROOT / "requirements.lock", folder)
@@ -69,7 +69,7 @@ def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Environme
 
 @pytest.fixture(scope="module")
 def url(installed: Environment) -> Iterator[str]:
-    """Of a service that listens on a free port, from the line that it prints."""
+    """Address of a service that listens on a free port, from the line that it prints."""
     command = [str(installed.programs / "bentray"), "serve", "--port", "0", "--workers", "1"]
     data = installed.home / "data"
     service = subprocess.Popen(

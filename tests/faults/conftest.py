@@ -28,7 +28,7 @@ def scan() -> Dataset:
 
 @pytest.fixture(scope="session")
 def scan_file(scan: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same as a file."""
+    """The scan as a file."""
     path = tmp_path_factory.mktemp("scan") / "scan.h5"
     write_dataset(path, scan)
     return path

@@ -74,7 +74,7 @@ class HostileConnections:
             self._note(single, "a forged key")
 
     def no_http(self) -> None:
-        """What is no HTTP, and heads beyond every limit."""
+        """Bytes that are not HTTP, and heads beyond every limit."""
         for words in NO_HTTP:
             with self._connected() as single:
                 with suppress(OSError):

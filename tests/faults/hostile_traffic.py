@@ -77,7 +77,7 @@ class HostileTraffic:
         self._files = itertools.cycle(_files(self._scan, folder))
 
     def actors(self) -> list[Callable[[float], None]]:
-        """What is to run side by side, each until a time of the monotonic clock."""
+        """Attacks to run side by side, each until a time of the monotonic clock."""
         steps = (
             [self._connections.idle],
             [self._connections.slow_heads, self._connections.bodies_that_never_come],

@@ -21,7 +21,7 @@ ENDED = ("succeeded", "failed", "cancelled")
 
 
 def wait_until(so: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
-    """What ``so`` gives, once it is something; a service that is away is waited for."""
+    """Value of ``so``, once there is one; a service that is away is waited for."""
     deadline = time.monotonic() + patience_s
     while True:
         try:

@@ -117,7 +117,7 @@ DEPENDENT: Mapping[str, Mapping[int, set[str]]] = {
 
 @schemathesis.check
 def valid_data_accepted(ctx: Any, response: Any, case: Any) -> None:
-    """As ``positive_data_acceptance``, but for what ``DEPENDENT`` names."""
+    """Check ``positive_data_acceptance``, but for what ``DEPENDENT`` names."""
     try:
         positive_data_acceptance(ctx, response, case)
     except RejectedPositiveData:
@@ -128,7 +128,7 @@ def valid_data_accepted(ctx: Any, response: Any, case: Any) -> None:
 
 @schemathesis.check
 def invalid_data_refused(ctx: Any, response: Any, case: Any) -> None:
-    """As ``negative_data_rejection``, but for undescribed headers, as proxies add them."""
+    """Check ``negative_data_rejection``, but for undescribed headers, as proxies add them."""
     result = case.meta.phase.data if case.meta is not None else None
     if (
         getattr(result, "scenario", None) is not CoverageScenario.OBJECT_UNEXPECTED_PROPERTIES

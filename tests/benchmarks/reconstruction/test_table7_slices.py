@@ -14,7 +14,7 @@ CENTRE = table7(WATER_MPS).at(0.0)
 
 
 def thickness(skin):
-    """Of the skin along the x axis, m."""
+    """Thickness of the skin along the x axis, m."""
     x = np.arange(0.05, 0.09, 2e-5)
     return 2e-5 * (varied(WATER_MPS, skin).at(0.0).speed_at(x, 0.0) == 1650.0).sum()
 

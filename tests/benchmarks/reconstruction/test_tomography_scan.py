@@ -16,7 +16,7 @@ from benchmarks.reconstruction._tomography_scan import (
 
 
 def in_water(speed: np.ndarray, spacing: float, node: tuple[int, ...]) -> np.ndarray:
-    """As a solver would in the speed of the corner, everywhere."""
+    """Solve in the speed of the corner, everywhere."""
     i, j = np.ogrid[: speed.shape[0], : speed.shape[1]]
     return np.hypot(i - node[0], j - node[1]) * spacing / speed[0, 0]
 

@@ -8,7 +8,7 @@ from bentray_kernels.acquisition.simulation.array_shapes import arc, bowl, facin
 
 
 def coverage(position, used=None):
-    """Of the paths between all elements, or those where ``used`` is true."""
+    """Coverage of the paths between all elements, or those where ``used`` is true."""
     pairs = ~np.eye(len(position), dtype=bool) if used is None else used
     start, end = np.nonzero(pairs)
     return angular_coverage(position, position[start], position[end])

@@ -15,7 +15,7 @@ from bentray_kernels.acquisition.robust_line import robust_line
     seed=st.integers(0, 2**16),
 )
 def test_outliers_do_not_move_it(slope, intercept, points, seed):
-    """Of 240 points at few or many places, equal but for rounding, a fifth lies anywhere above the line."""
+    """A fifth of 240 points at few or many places, equal but for rounding, lies anywhere above the line."""
     random = np.random.default_rng(seed)
     x = random.permutation(np.resize(np.linspace(1.0, 2.0, points), 240)) * (1.0 + 1e-16)
     x += random.choice([0.0, 2.2e-16], x.size)

@@ -31,7 +31,7 @@ PROGRAMS = tuple(dict.fromkeys(every_program()))
 
 
 def compiled(programs, folder):
-    """What clang says of programs; their files are numbered."""
+    """Messages of clang about programs; their files are numbered."""
     clang = shutil.which("clang")
     if clang is None:
         pytest.skip(

@@ -31,7 +31,7 @@ def octahedron(levels: int) -> TriangleMesh:
 
 
 def dented(levels: int, depth: float = 0.55) -> TriangleMesh:
-    """The same ball with a dent from above, so that it sees itself."""
+    """A ball with a dent from above, so that it sees itself."""
     ball = octahedron(levels)
     away = 2.0 * ball.vertices - 1.0
     pressed = depth * np.exp(-(away[:, 0] ** 2 + away[:, 1] ** 2) / 0.18) * (away[:, 2] > 0.0)

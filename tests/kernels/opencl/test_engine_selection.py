@@ -157,7 +157,7 @@ def slow_card(monkeypatch, gpu, fresh, tmp_path):
 
 
 def forget():
-    """As another process."""
+    """Forget results, like another process."""
     engine_selection._passing.cache_clear()
     engine_selection._tried.cache_clear()
 

@@ -107,7 +107,7 @@ def test_the_step_of_a_homogeneous_medium_is_that_of_the_exact_hessian(ndim, cou
 @given(seed=SEEDS)
 @settings(deadline=None)
 def test_the_medium_bends_the_hessian_of_one_point_exactly(ndim, slope, seed):
-    """Of one inner point no term is neglected, in 3-D where the slowness has no slope."""
+    """No term of one inner point is neglected, in 3-D where the slowness has no slope."""
     rng = np.random.default_rng(seed)
     medium, path = Medium(rng, ndim, slope, 0.05), zigzag(rng, 3, ndim)
     medium.origin = path[1].copy()

@@ -37,7 +37,7 @@ def test_1_in_a_homogeneous_medium(ndim):
 
 @pytest.mark.parametrize(("ndim", "n", "error"), [(2, 65, 1e-3), (3, 33, 5e-3)])
 def test_constant_gradient(ndim, n, error):
-    """Of the length ds/v the medium v₀ + g·x is a hyperbolic space: a tube is sinh(gT)/g wide, in s."""
+    """In the length ds/v the medium v₀ + g·x is a hyperbolic space: a tube is sinh(gT)/g wide, in s."""
     g = 4.0
     receivers = places(2, 60, ndim)
     apart = np.linalg.norm(receivers - SOURCE[:ndim], axis=1)

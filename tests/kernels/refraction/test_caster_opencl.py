@@ -91,7 +91,7 @@ def both(
     seed=0,
     compiled: Scene | None = None,
 ) -> tuple[Traced, Traced]:
-    """The same 300 rays of a camera somewhere about the scene by the device and by the compiled caster.
+    """300 rays of a camera somewhere about the scene, by the device and by the compiled caster.
 
     The latter traces another scene where one is given.
     """

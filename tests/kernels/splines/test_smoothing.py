@@ -81,7 +81,7 @@ def test_whole_numbers_have_at_least_the_noise_of_rounding():
 
 
 def test_the_response_is_the_fourier_transform():
-    """Of the prefilter of a long line with a 1 in its middle."""
+    """The prefilter acts on a long line with a 1 in its middle."""
     numerator, denominator = symbols(4, 0.5)
     line = np.zeros(129)
     line[64] = 1.0

@@ -23,7 +23,7 @@ def moved():
 
 
 def rings():
-    """The same elements at all heights at once, times within a ring being those of ``moved``."""
+    """Elements at all heights at once; times within a ring are those of ``moved``."""
     everyone = np.arange(18)
     delta = np.random.default_rng(1).normal(0.0, 1e-7, (18, 18))
     for k, within in enumerate(moved().delta_tof_s):

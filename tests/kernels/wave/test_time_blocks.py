@@ -18,7 +18,7 @@ from .test_adjoint import EMITTER, RECEIVERS, STEPS, WAVELET, medium, speeds
 
 
 class Unheard(Exception):
-    """What a poll raises."""
+    """Exception that a poll raises."""
 
 
 @given(steps=st.integers(0, 5000), nodes=st.integers(1, 10**9))

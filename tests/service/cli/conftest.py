@@ -34,7 +34,7 @@ def scan() -> Dataset:
 
 @pytest.fixture(scope="session")
 def scan_file(scan: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same as a file."""
+    """The scan as a file."""
     from bentray_workers.files.dataset import write_dataset
 
     path = tmp_path_factory.mktemp("scan") / "scan.h5"

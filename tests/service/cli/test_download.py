@@ -15,7 +15,7 @@ SCAN, VOLUME = "ds-" + "0" * 20, "vol-" + "0" * 20
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """What the client is asked for, with a stand-in that writes a few bytes."""
+    """Requests to the client, with a stand-in that writes a few bytes."""
     results: list[Any] = []
 
     class StandIn:

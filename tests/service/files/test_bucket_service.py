@@ -20,7 +20,7 @@ def service(start, tmp_path, bucket_url, monkeypatch):
 
 
 def told(answer):
-    """What a refusal says."""
+    """Text of a refusal."""
     assert answer.headers["content-type"] == "application/problem+json"
     return answer.status_code, answer.json()["type"], answer.headers["retry-after"]
 

@@ -135,7 +135,7 @@ def test_verified_bytes_survive_a_kill(tmp_path, checked):
 
 
 def test_a_piece_may_follow_one_that_was_not_verified(tmp_path):
-    """As where cutting it off failed."""
+    """It could not be cut off, for example."""
     path = tmp_path / "u"
     path.write_bytes(BEGIN + b"unverified")
     (tmp_path / "u.unverified").write_text(str(len(BEGIN)))

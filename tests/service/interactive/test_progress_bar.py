@@ -13,7 +13,7 @@ from bentray_service.interactive.progress_bar import bar_html, progress_bar
 
 @pytest.fixture
 def cell(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What a cell of a notebook shows, one entry for each drawing."""
+    """Texts of a notebook's cell, one entry for each drawing."""
     drawn: list[str] = []
     display = ModuleType("IPython.display")
     display.HTML = lambda text: text  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""What earlier versions left behind, killed at work."""
+"""Data of earlier versions, killed at work."""
 
 import json
 import tarfile
@@ -12,7 +12,7 @@ VERSIONS = sorted(path.name.removesuffix(".tar.xz") for path in FOLDER.glob("ver
 
 @pytest.fixture(params=VERSIONS)
 def left(request, tmp_path):
-    """What an earlier version answered; its data folder is ``tmp_path / "data"``."""
+    """Answers of an earlier version; its data folder is ``tmp_path / "data"``."""
     with tarfile.open(FOLDER / f"{request.param}.tar.xz") as archive:
         archive.extractall(tmp_path, filter="data")
     return json.loads((tmp_path / "expected.json").read_text())

@@ -73,7 +73,7 @@ class SharedService(NamedTuple):
 
 @pytest.fixture(scope="module")
 def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SharedService]:
-    """As ``serve``, once for a file."""
+    """Serve like ``serve``, once for a file."""
     folder = tmp_path_factory.mktemp("shared")
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setattr(canonical, "ingest", ingest_here)
@@ -89,5 +89,5 @@ def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SharedS
 
 @pytest.fixture
 def address(shared_service: SharedService) -> str:
-    """Of the service of all tests of a file; each has scans and results of its own."""
+    """Address of the service of all tests of a file; each has scans and results of its own."""
     return shared_service.address

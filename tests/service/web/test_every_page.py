@@ -102,7 +102,7 @@ def opened(page, address, path, text):
 
 
 def serious(page, path, scheme):
-    """What axe finds in this page: the parts, by the name of the rule."""
+    """Serious findings of axe in this page: the parts, by the name of the rule."""
     report = Axe().run(page, options=RULES[scheme]).response
     assert report["passes"], path
     return {

@@ -59,7 +59,7 @@ def test_what_was_changed_is_refused(change, field):
 
 
 def test_the_signature_is_that_of_a_few_lines():
-    """As a receiver in another language computes it."""
+    """A receiver in another language computes it so."""
     headers = signed_headers([OTHER], "msg-1", 5, b"{}")
     expected = hmac.new(bytes(32), b"msg-1.5.{}", hashlib.sha256).digest()
     assert headers["webhook-signature"] == "v1," + base64.b64encode(expected).decode()

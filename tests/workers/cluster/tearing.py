@@ -4,7 +4,7 @@ from bentray_workers.reconstruction.reconstruction_run import RECONSTRUCTING
 
 
 class Torn(Exception):
-    """What takes the driver away half-way."""
+    """Exception that ends the driver half-way."""
 
 
 def torn_runs(run, patiences):

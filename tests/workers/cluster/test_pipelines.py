@@ -52,7 +52,7 @@ def geometry_field(client, folder, work, on_progress):
 
 @pytest.fixture
 def inputs(scan, tmp_path):
-    """What the pipelines read."""
+    """Inputs of the pipelines."""
     loud = replace(scan, log_ratio_np=-1e6 * scan.delta_tof_s, water_attenuation_np_m=0.1)
     write_dataset(tmp_path / "scan.h5", loud)
     write_volume(tmp_path / "volume.h5", Volume.from_values(sampled(TWO_HOLES, 12), (1e-3,) * 3))

@@ -41,7 +41,7 @@ class FakeManager:
 
 @pytest.fixture
 def managers(monkeypatch: pytest.MonkeyPatch) -> list[FakeManager]:
-    """What was made of the fakes that stand in for dask-jobqueue and dask-kubernetes."""
+    """Calls of the fakes that stand in for dask-jobqueue and dask-kubernetes."""
     FakeManager.made = []
     for module, name in (("dask_jobqueue", "SLURMCluster"), ("dask_kubernetes.operator", "KubeCluster")):
         fake: Any = ModuleType(module)

@@ -7,7 +7,7 @@ from bentray_workers.compilation import cache_misses
 
 
 class Witness(event.Listener):
-    """What a function returns whenever a compilation starts or has ended."""
+    """Listener that a function calls whenever a compilation starts or has ended."""
 
     def __init__(self, ask):
         self._ask, self.at_starts, self.at_ends = ask, [], []

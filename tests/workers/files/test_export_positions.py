@@ -73,7 +73,7 @@ PLACE = {
 
 
 def index(values: np.ndarray) -> np.ndarray:
-    """Of the brightest node, in three axes."""
+    """Index of the brightest node, in three axes."""
     found = np.argwhere(values > 0.5 * (WATER + BRIGHT))
     assert len(found) == 1
     return np.append(found[0], [0.0] * (3 - values.ndim))
@@ -105,7 +105,7 @@ def by_highdicom(path: Path) -> np.ndarray:
 
 
 def by_pydicom(path: Path) -> np.ndarray:
-    """As PS3.3 C.7.6.2.1.1 says."""
+    """Position by PS3.3 C.7.6.2.1.1."""
     image = pydicom.dcmread(path)
     pixels = image.pixel_array.reshape(-1, image.Rows, image.Columns)
     frame, row, column = (int(k) for k in np.argwhere(pixels > 0.5 * (WATER + BRIGHT))[0])

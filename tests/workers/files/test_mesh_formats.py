@@ -31,7 +31,7 @@ def exported(file_type, colours=None):
 
 
 def gltf(mesh):
-    """As one file: the buffers of trimesh's several files written into it."""
+    """Write one file: the buffers of trimesh's several files in it."""
     files = mesh.export(file_type="gltf")
     scene = json.loads(files["model.gltf"])
     for buffer in scene["buffers"]:

@@ -93,7 +93,7 @@ def write_measurement(folder: Path, delay: float = 0.0, *, second: bool = False,
 
 
 def zipped(folder: Path, target: Path) -> Path:
-    """The same as a zip."""
+    """The measurement as a zip."""
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in sorted(folder.rglob("*.mat")):
             archive.write(path, path.relative_to(folder).as_posix())

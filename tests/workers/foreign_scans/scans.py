@@ -31,18 +31,18 @@ def traces() -> np.ndarray:
 
 
 def travel_times() -> dict[str, np.ndarray]:
-    """As of open-UST."""
+    """Travel times in the form of open-UST."""
     return {"delta_tof": delta_tof(), "element_positions": positions()}
 
 
 def waveforms() -> dict[str, np.ndarray]:
-    """As of full waveform inversions in MATLAB."""
+    """Waveforms in the form of full waveform inversions in MATLAB."""
     time = T0_S + np.arange(SAMPLES) / RATE_HZ
     return {"time": time[None], "transducerPositionsXY": positions().T, "full_dataset": traces()}
 
 
 def write_matlab73(path: Path, variables: dict[str, np.ndarray], *, header: bool = True) -> None:
-    """As MATLAB does: axes reversed, a block of 512 bytes in front."""
+    """Write like MATLAB: axes reversed, a block of 512 bytes in front."""
     with h5py.File(path, "w", userblock_size=512 if header else 0) as file:
         for name, array in variables.items():
             made = file.create_dataset(name, data=np.asarray(array).T, compression="gzip")

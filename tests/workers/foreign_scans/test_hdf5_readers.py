@@ -14,7 +14,7 @@ from .scans import ELEMENTS, RATE_HZ, T0_S, positions
 
 
 def in_track(fields: dict) -> dict:
-    """As newer files of zea: in a track, with the positions in the group ``probe``."""
+    """Fields of newer files of zea: in a track, with the positions in the group ``probe``."""
     moved = {f"tracks/track_0/{path}": value for path, value in fields.items()}
     moved["probe/probe_geometry"] = moved.pop("tracks/track_0/scan/probe_geometry")
     return moved | {"probe/name": np.bytes_("ring")}

@@ -28,7 +28,7 @@ def path(scan, tmp_path):
 
 @pytest.fixture
 def trial(monkeypatch):
-    """What the trial decides, and how often it is asked."""
+    """Decision of the benchmark, and how often it is asked."""
     asked, answer = [], [SimpleNamespace(device=GPU)]
 
     def place(work, device="auto"):

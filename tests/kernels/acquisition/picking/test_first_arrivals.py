@@ -205,7 +205,7 @@ def test_noise_alone_is_not_picked(picker):
 
 @every_picker
 def test_a_prediction_leads_past_an_earlier_pulse(picker):
-    """What comes early by a path that the model does not have, and louder, is not taken."""
+    """A louder pulse that comes early, by a path that the model does not have, is not taken."""
     dataset, early = scan(8.0e-7, elements=16), scan(-26.0e-7, elements=16, gain=1.5)
     wide = dataset.distance_m() > 0.05
     both = Waveform(dataset.waveform.object + early.waveform.object, dataset.waveform.water)

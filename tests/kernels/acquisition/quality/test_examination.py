@@ -24,7 +24,7 @@ def clean() -> Dataset:
 
 @cache
 def sought() -> np.ndarray:
-    """What the clean scan gives: what every survivor must give too."""
+    """Result of the clean scan, which every survivor must give too."""
     picked = examine(clean()).picked
     assert picked is not None
     return picked.differential_tof()

@@ -28,7 +28,7 @@ CONSTANT, INFINITE, NAN = ([2, 15], [9, 30]), ([5], [21]), ([28], [12])
 
 @pytest.fixture(scope="module")
 def sought() -> np.ndarray:
-    """What the scan gives that nothing is wrong with, (ntx, nrx), s."""
+    """Times of the scan without faults, (ntx, nrx), s."""
     examined = examine(wave_scan())
     assert examined.report.verdict == "clean"
     assert examined.picked is not None

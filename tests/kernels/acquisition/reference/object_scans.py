@@ -52,6 +52,6 @@ def with_elements(
 
 
 def without_water(dataset: Dataset) -> Dataset:
-    """The same scan without its water shot."""
+    """The scan without its water shot."""
     assert dataset.waveform is not None
     return replace(dataset, waveform=replace(dataset.waveform, water=None, water_scale=None))

@@ -18,7 +18,7 @@ from ...meshes.examples import ball_with_holes, bunny, flat_patch, mesh, tetrahe
 
 
 def check(found, surface):
-    """What holds for every chart: an embedding of the whole surface in the unit square."""
+    """Every chart is an embedding of the whole surface in the unit square."""
     uv = found.chart.uv
     assert uv.shape == (len(surface.faces), 3, 2)
     assert uv.min() >= 0.0
@@ -80,7 +80,7 @@ def test_noise_flips_nothing(seed, height):
 
 @pytest.mark.parametrize("seed", range(15))
 def test_ragged_surfaces(seed):
-    """What is left of a surface when faces are lost at random: many holes side by side."""
+    """Surfaces that lost faces at random: many holes side by side."""
     random = np.random.default_rng(seed)
     whole = (torus(8, 6), bumpy_ball(500), torus(20, 12))[seed % 3]
     left = mesh(whole.vertices, whole.faces[random.uniform(size=len(whole.faces)) < 0.6 + 0.025 * seed])

@@ -244,7 +244,7 @@ def published_shape() -> Shape:
 
 @cache
 def wholly_published_shape() -> Shape:
-    """The same with both inner fields."""
+    """The published shape with both inner fields."""
     shape, chart = published_shape(), parameterise(turned(octahedron(4))).chart
     image, points = geometry_image(chart, 129), spread_points(shape.surface, 12)[0]
     inner = inner_of(shape.surface, 12, 12)

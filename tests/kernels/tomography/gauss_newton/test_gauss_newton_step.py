@@ -133,7 +133,7 @@ def test_stops_without_improvement():
 
 
 def test_one_image_without_improvement_does_not_stop_the_search():
-    """As bent rays gave it on waves of 1 MHz: far less was missed after an image that missed as much."""
+    """Bent rays did so on waves of 1 MHz: far less was missed after an image that missed as much."""
     of = problem(np.zeros((8, 8)))
     state = gauss_newton_step.begin(initial_slowness(of, None))
     # One that grows is halved, and counts for nothing.

@@ -109,7 +109,7 @@ def test_an_edge_loses_the_height_that_its_logarithm_costs(edge):
 
 
 def second_differences(shape):
-    """Of an image of two axes, as a matrix."""
+    """Second differences of an image of two axes, as a matrix."""
 
     def along(n):
         forward = diags_array([-np.ones(n - 1), np.ones(n - 1)], offsets=[0, 1], shape=(n - 1, n))

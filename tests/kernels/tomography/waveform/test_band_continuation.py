@@ -24,7 +24,7 @@ def test_it_is_found_through_noise():
 
 
 def true_speed():
-    """What refined speeds come near to, on a grid of its own."""
+    """True speeds that refined ones approach, on a grid of their own."""
     line = 1e-3 * np.arange(-28, 29)
     return Image(blob(*np.meshgrid(line, line, indexing="ij")), 1e-3, (line[0], line[0]))
 

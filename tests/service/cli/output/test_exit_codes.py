@@ -18,7 +18,7 @@ from bentray_service.web.problem import Problem
 
 
 def ending(raised: BaseException | None) -> Result:
-    """What becomes of a command that raises ``raised``."""
+    """Exit of a command that raises ``raised``."""
     app = typer.Typer(cls=Commands)
 
     @app.command()

@@ -1,4 +1,4 @@
-"""What offsets, blurs or doubts an image is printed before its figures."""
+"""Offsets, blur and doubts of an image are printed before its figures."""
 
 import numpy as np
 import pytest
