@@ -54,7 +54,8 @@ def main() -> None:
     # What every fork needs is imported once.
     for what in {what for what, _, _ in files}:
         ingest_process.convert_upload(what, Path("/dev/null"), Path("/dev/null/none"), {"title": ""})
-    import_module("bentray_workers.files.reconstruction")
+    for name in ("bentray_workers.files.reconstruction", "nibabel", "nrrd", "scipy.io", "trimesh"):
+        import_module(name)
     for what, path, given in files:
         sys.stdout.write(json.dumps(read_one(memory, seconds, what, Path(path), given)) + "\n")
         # Or every fork to come would write it again.

@@ -387,6 +387,7 @@ def test_the_image_is_used_by_keys_alone(page, result):
     page.wait_for_url(re.compile("^((?!view-z).)*$"))
 
 
+@pytest.mark.nightly
 def test_slices_of_a_volume_and_three_planes_share_a_cursor(page, volume):
     values = known((8, 6, 5))
     ready(page, volume(values))
@@ -470,6 +471,7 @@ def test_the_copied_code_reads_the_values(page, result):
     np.testing.assert_array_equal(np.load(io.BytesIO(httpx.get(words[3]).content)), SPEED - 1300.0)
 
 
+@pytest.mark.nightly
 def test_a_result_is_exported_and_deleted(page, own_result):
     ready(page, own_result)
     page.get_by_text("Export", exact=True).click()

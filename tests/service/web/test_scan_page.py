@@ -61,6 +61,7 @@ def test_upload_start_watch(page, address, scan, work):
     assert page.get_by_text("Nothing has run yet").is_hidden()
 
 
+@pytest.mark.nightly
 def test_only_changed_settings_are_sent(page, address, scan, work):
     sent(page, address, scan)
     page.get_by_text("All settings").click()
@@ -362,6 +363,7 @@ def test_name_notes_and_water_are_edited(page, own_traced, work):
     assert traced("")["water_temperature_c"] is None
 
 
+@pytest.mark.nightly
 def test_a_scan_in_wrong_units_is_corrected_as_the_page_proposes(page, address, scan):
     def in_microseconds(file):
         file["traveltime/delta_tof_s"][...] *= 1e-3

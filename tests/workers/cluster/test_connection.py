@@ -80,6 +80,7 @@ def test_other_users_cannot_connect(own):
     assert own.client.submit(sum, [1, 2]).result() == 3
 
 
+@pytest.mark.nightly
 def test_the_search_for_pages_finds_those_that_dask_shows_by_default(tmp_path):
     """Guards the test above."""
     with LocalCluster(

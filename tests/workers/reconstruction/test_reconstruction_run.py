@@ -154,6 +154,7 @@ def test_interrupted_run_resumes_to_the_same_bits(cluster, scan, path, tmp_path,
         assert getattr(result, name) == getattr(expected, name), name
 
 
+@pytest.mark.nightly
 def test_a_small_job_of_another_tenant_runs_beside_a_large_one_to_the_same_bits(cluster, scan, path):
     """The large one has been there first and fills every worker; it goes on meanwhile and ends as alone."""
     shares, seen = Shares(), []

@@ -170,6 +170,7 @@ def test_without_a_water_shot_the_image_is_nearly_as_good(picked, tmp_path, expe
     assert without < 1.3 * with_water
 
 
+@pytest.mark.nightly
 def test_an_estimated_water_shot_is_the_same_on_a_cluster(cluster, tmp_path):
     write_dataset(tmp_path / "bare.h5", replace(scan(), waveform=Waveform(scan().waveform.object)))
     rays = Settings.of(method="sart", nodes=32, iterations=2)

@@ -115,6 +115,7 @@ def test_two_at_once_make_one(path, tmp_path):
     assert FieldFiles(tmp_path / "field").figures.read_bytes() == before
 
 
+@pytest.mark.nightly
 def test_a_threshold_halves_the_image(path, tmp_path):
     settings = FieldSettings(samples=4, inner_samples=4, divisions=2, image_size=129, image_threshold=1e-3)
     assert made(path, tmp_path, settings=settings)["image_rms"] < 1e-3
@@ -133,6 +134,7 @@ def test_rejects_invalid_input(path, tmp_path, monkeypatch):
     assert not (tmp_path / "field").exists()
 
 
+@pytest.mark.nightly
 def test_an_open_surface(tmp_path):
     (tmp_path / "work").mkdir()
     whole = bumpy_ball(500)
