@@ -1,8 +1,6 @@
 """SIGKILL of the service at each step of a correction, and the memory of a correction of a large scan."""
 
 import hashlib
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import httpx
@@ -21,14 +19,6 @@ KILL = "import os, signal\ndef killed(*_, **__):\n    os.kill(os.getpid(), signa
 FILE_IS_MOVED = f"{KILL}from bentray_service.files.store import Store\nStore.publish = killed\n"
 ROW_IS_DUE = f"{KILL}from bentray_service.rows.stored_tables import Datasets\nDatasets.add = killed\n"
 ANSWER_IS_DUE = f"{KILL}from bentray_service.routes import names\nnames.dataset_record = killed\n"
-# Prints the peak of the memory of a correction, KiB; that of ``getrusage`` is at least that of the parent.
-CORRECT = """
-import re, sys
-from pathlib import Path
-from bentray_workers.files.dataset.correct import Correction, correct_dataset
-correct_dataset(Path(sys.argv[1]), Path(sys.argv[2]), Correction(frequency_hz=5e5))
-print(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])
-"""
 
 
 def corrected(service, here):
@@ -96,12 +86,3 @@ def killed_while_it_writes(service, here, folder):
         service.kill()
         with pytest.raises(httpx.TransportError):
             asked.result()
-
-
-def test_the_memory_of_a_correction_does_not_grow_with_the_scan(tmp_path):
-    peaks = []
-    for megabytes in (30, 300):
-        scan = a_scan(tmp_path / "scan.h5", megabytes)
-        command = [sys.executable, "-c", CORRECT, str(scan), str(tmp_path / "copy.h5")]
-        peaks.append(int(subprocess.run(command, check=True, capture_output=True).stdout) / 1024)
-    assert peaks[1] - peaks[0] < 30.0, peaks

@@ -1,28 +1,20 @@
 """The application: the whole path, and what happens when it stops, dies and starts again."""
 
 import io
-import os
-import signal
-import subprocess
-import sys
 import time
 
-import httpx
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import update
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.app import create_app
 from bentray_service.rows.ids import new_id
 from bentray_service.rows.tables import JobRow
 from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
-
-from ..free_ports import free_port
 
 
 def test_dataset_in_image_out(start, uploaded, submitted, until, work):
@@ -115,65 +107,3 @@ def test_two_services_cannot_share_a_folder(start):
     with pytest.raises(InvalidInput, match="in use by another service"):
         start("one")
     assert arriving.exists()
-
-
-def a_reconstruction(http, scan):
-    content = scan().read_bytes()
-    dataset = http.post("/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"})
-    settings = {"rays": "straight", "nodes": 512, "iterations": 40}
-    return {"kind": "reconstruction", "dataset": dataset.json()["id"], "settings": settings}
-
-
-def a_turntable(http, scan):
-    buffer = io.BytesIO()
-    np.save(buffer, sampled(ONE_HOLE, 24))
-    content = buffer.getvalue()
-    volume = http.post("/v1/volumes", content=content, headers={"Content-Type": "application/octet-stream"})
-    settings = {"frames": 400, "width": 400, "height": 400, "iso": [0.5]}
-    return {"kind": "refraction", "volume": volume.json()["id"], "settings": settings}
-
-
-# A service is killed for every change in tests/faults, where more of it is looked at.
-@pytest.mark.nightly
-@pytest.mark.parametrize("asked", [a_reconstruction, a_turntable])
-def test_a_killed_service_loses_no_job(tmp_path, scan, asked):
-    """The real thing: SIGKILL while a job runs, then the same folder again."""
-    program = (
-        "import sys, uvicorn\n"
-        "from bentray_service.app import create_app\n"
-        "from bentray_service.settings import ServiceSettings\n"
-        "from bentray_workers.cluster.connection import open_cluster\n"
-        "cluster = open_cluster(workers=1, processes=False)\n"
-        "uvicorn.run(create_app(ServiceSettings(), cluster), port=int(sys.argv[1]), log_level='warning')\n"
-    )
-    port = free_port()
-    environment = {**os.environ, "BENTRAY_DATA_DIR": str(tmp_path / "data")}
-    command = [sys.executable, "-c", program, str(port)]
-    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60.0) as http:
-        service = subprocess.Popen(command, env=environment)
-        try:
-            wait_for(lambda: http.get("/health/ready").is_success)
-            job = http.post("/v1/jobs", json=asked(http, scan)).json()
-            wait_for(lambda: http.get(job["links"]["self"]).json()["progress"]["done"] > 0)
-            service.send_signal(signal.SIGKILL)
-            service.wait()
-            service = subprocess.Popen(command, env=environment)
-            wait_for(lambda: http.get("/health/ready").is_success)
-            wait_for(lambda: http.get(job["links"]["self"]).json()["state"] in ("running", "succeeded"))
-            http.post(job["links"]["self"] + "/cancel")
-            wait_for(lambda: http.get(job["links"]["self"]).json()["state"] in ("cancelled", "succeeded"))
-        finally:
-            service.terminate()
-            service.wait()
-
-
-def wait_for(happened, seconds=60.0):
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        try:
-            if happened():
-                return
-        except httpx.TransportError:
-            pass
-        time.sleep(0.05)
-    raise AssertionError("it did not happen in time")

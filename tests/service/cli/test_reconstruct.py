@@ -75,17 +75,6 @@ def test_without_json_it_ends_with_a_table_and_the_paths(
     assert result.stderr == ""
 
 
-@pytest.mark.nightly
-def test_several_workers_give_the_same_bits(
-    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
-) -> None:
-    for workers in (1, 2):
-        done = bentray("reconstruct", scan_file, "-o", tmp_path / str(workers), *QUICK, "--workers", workers)
-        assert done.exit_code == 0
-    alone, shared = (read_reconstruction(tmp_path / str(n) / "reconstruction.h5") for n in (1, 2))
-    np.testing.assert_array_equal(alone.speed, shared.speed)
-
-
 def test_auto_prints_its_choice_and_reason_in_one_line(
     bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
 ) -> None:

@@ -38,33 +38,3 @@ def test_whole_path(serve, work, scan, tmp_path):
     assert seen[-1] == done
     assert result.values["speed"].shape == (16, 16)
     assert (tmp_path / "speed.npy").stat().st_size > 0
-
-
-def test_refusals_and_ends(serve, work, scan, tmp_path):
-    work.hold.clear()
-
-    async def call(client):
-        dataset = (await client.upload(scan())).id
-        with pytest.raises(ClientError, match="magic"):
-            await client.submit(dataset, {"eikonal": "magic"})
-        job = await client.submit(dataset, {"nodes": 16})
-        with pytest.raises(ClientError, match=r"after 0\.1 s"):
-            await client.wait(job.id, timeout_s=0.1)
-        await client.cancel(job.id)
-        with pytest.raises(ClientError, match="was cancelled"):
-            await client.wait(job.id)
-        with pytest.raises(ClientError, match="cannot be read"):
-            await client.upload(tmp_path / "none.h5")
-        with pytest.raises(ClientError, match="not the id"):
-            await client.delete("nothing")
-
-    run(serve, call)
-
-
-def test_unreachable_service_is_reported():
-    async def call():
-        async with AsyncClient("http://127.0.0.1:9") as client:
-            await client.job("x")
-
-    with pytest.raises(ClientError, match=r"no answer from http://127\.0\.0\.1:9"):
-        asyncio.run(call())

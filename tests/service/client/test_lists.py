@@ -1,6 +1,5 @@
 """Lists, quality and pictures of the client, ids and records alike, and how a notebook shows them."""
 
-import asyncio
 import inspect
 
 import numpy as np
@@ -133,18 +132,6 @@ def test_a_job_without_a_result_says_so(client, scan, work):
     with pytest.raises(ClientError, match=r"has no volume: wait for it with client\.wait"):
         client.result(job)
     client.cancel(job)
-
-
-def test_the_asynchronous_client_does_the_same(serve, work, scan):
-    async def call():
-        async with AsyncClient(serve(), None, poll_s=0.02) as client:
-            result = await client.reconstruct(scan(), "sart", nodes=16, iterations=1, progress=False)
-            (job,) = await client.jobs()
-            assert (await client.slice_png(job)).startswith(b"\x89PNG")
-            return result, await client.result(job)
-
-    result, again = asyncio.run(call())
-    np.testing.assert_array_equal(result.speed, again.speed)
 
 
 def test_both_clients_have_the_same_methods_and_signatures():

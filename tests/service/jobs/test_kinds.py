@@ -1,7 +1,6 @@
 """Kinds of jobs: turntables and geometry fields; cancelled, refused, and taken up again after a death."""
 
 import io
-import threading
 import time
 import zipfile
 from contextlib import contextmanager
@@ -203,47 +202,6 @@ def put_mesh(http, mesh=None):
 def ask_field(http, mesh, **settings):
     asked = {"kind": "geometry-field", "mesh": mesh, "settings": {**COARSE, **settings}}
     return http.post("/v1/jobs", json=asked)
-
-
-def test_interrupted_field_resumes_at_the_next_start(serving, until, monkeypatch):
-    monkeypatch.setattr(geometry_field, "TASK_RAYS", 32 * 216)
-    plain, calls, torn = geometry_field.build_field, [], threading.Event()
-
-    def held(*given, on_progress, on_saved, stop, share):
-        """As a service that leaves once three tasks have ended: the rest is still to do."""
-        told = []
-        calls.append(told)
-
-        def saved():
-            told.append(1)
-            on_saved()
-            if len(told) == 3:
-                torn.set()
-
-        def leave():
-            while not stop():
-                if len(calls) > 1 or not torn.is_set():
-                    return False
-                time.sleep(0.01)
-            return True
-
-        return plain(*given, on_progress=on_progress, on_saved=saved, stop=leave, share=share)
-
-    monkeypatch.setattr(geometry_field, "build_field", held)
-    with serving() as http:
-        job = ask_field(http, put_mesh(http)).json()
-        files = http.app.state.parts.files.of(LOCAL)
-        assert torn.wait(PATIENCE_S)
-    with serving() as http:
-        done = until(http, job["id"])
-        assert done["state"] == "succeeded", done["error"]
-        total = http.get(done["links"]["field"]).json()
-        states = [event.state for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
-        assert (states[:4], states[-1]) == (["queued", "running", "queued", "running"], "succeeded")
-        wait_until_empty(files.root / "work")
-        assert [one.name for one in (files.root / "fields").iterdir()] == [total["id"]]
-    # Layout, batches and the end: fewer in the second run than there are.
-    assert 1 <= len(calls[1]) < done["progress"]["total"] - 2
 
 
 def wait_until_empty(folder):

@@ -9,10 +9,6 @@ import numpy as np
 import pytest
 
 from bentray_service.access.audit import entries
-from bentray_service.access.quota import Quota
-from bentray_service.files.tenant_files import TenantFiles
-from bentray_service.ingest import canonical
-from bentray_service.routes import names
 from bentray_service.routes.models.name_changes import LengthUnit, TimeUnit
 from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.keys import Keys
@@ -175,68 +171,6 @@ def test_another_tenant_corrects_nothing(http, scan):
         theirs = http.post(f"{here}/corrections", json={"frequency_hz": 500000}, headers=tokens[tenant])
         assert theirs.status_code == status
     assert len(http.get("/v1/datasets", headers=tokens["local"]).json()["datasets"]) == 1
-
-
-def dies_while_it_writes(patch):
-    def ingest(what, source, target, **_):
-        target.with_suffix(".partial").write_bytes(source.read_bytes()[:500])
-        raise RuntimeError
-
-    patch.setattr(canonical, "ingest", ingest)
-
-
-def dies_before_the_file_is_moved(patch):
-    patch.setattr(TenantFiles, "adopt", dying)
-
-
-def dies_before_the_row(patch):
-    patch.setattr(Datasets, "add_once", dying)
-
-
-def dies_before_the_answer(patch):
-    patch.setattr(names, "dataset_record", dying)
-
-
-def dying(*_, **__):
-    raise RuntimeError
-
-
-@pytest.mark.parametrize(
-    ("dies", "copies"),
-    [
-        (dies_while_it_writes, 0),
-        pytest.param(dies_before_the_file_is_moved, 0, marks=pytest.mark.nightly),
-        (dies_before_the_row, 0),
-        pytest.param(dies_before_the_answer, 1, marks=pytest.mark.nightly),
-    ],
-)
-def test_a_service_that_dies_leaves_the_scan_and_a_whole_copy_or_none(
-    start, http, here, monkeypatch, dies, copies
-):
-    """``tests/faults/test_corrections.py`` kills processes at the same steps."""
-    before, file = http.get(here).json(), http.get(f"{here}/file").content
-    with monkeypatch.context() as patch:
-        dies(patch)
-        # A dead process cleans up nothing.
-        patch.setattr(TenantFiles, "discard_candidate", lambda *_: None)
-        patch.setattr(Quota, "release", lambda *_: None)
-        assert http.post(f"{here}/corrections", json=WRONG).status_code == 500
-    http.__exit__()
-    http = start()
-    listed = http.get("/v1/datasets").json()["datasets"]
-    assert len(listed) == 1 + copies
-    assert listed[-1] == before
-    assert http.get(f"{here}/file").content == file
-    for copy in listed[:-1]:
-        content = http.get(f"{copy['links']['self']}/file").content
-        assert (copy["bytes"], copy["sha256"]) == (len(content), hashlib.sha256(content).hexdigest())
-    folder = http.app.state.parts.files.of(Tenant("local")).root
-    sizes = [path.stat().st_size for path in (folder / "datasets").iterdir()]
-    assert len(sizes) == len(listed)
-    assert list((folder / "incoming").iterdir()) == []
-    usage = http.app.state.parts.quota.of(Tenant("local"))
-    assert (usage.stored, usage.reserved) == (sum(sizes), 0)
-    assert http.post(f"{here}/corrections", json=WRONG).status_code == 201
 
 
 def test_corrections_are_audited(http, here):

@@ -23,7 +23,7 @@ from bentray_service.web.errors import EDGE, PROBLEMS
 from bentray_service.web.server import configuration, listen
 
 from ...edge import CONFIGURATION, SKIPPED, edge, program
-from ...hostile.raw_http import exchange
+from ...raw_http import exchange
 from ..conftest import FakeCluster
 
 pytestmark = pytest.mark.skipif(program() is None, reason=SKIPPED)

@@ -10,7 +10,6 @@ import pytest
 from bentray_kernels.acquisition import speed_from_temperature
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_kernels.tomography.requirements import check_scan
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.read import read_dataset
@@ -63,15 +62,6 @@ def test_the_result_is_that_of_a_file_that_states_it(tmp_path, which, assumed):
     # An assumed speed is fitted to the chords, where there are traces.
     least = 0.1 if assumed else 5.0
     assert np.abs(other.speed - result.speed).max() > least
-
-
-def test_in_this_process_too(tmp_path):
-    data = times().in_water_of(16.0)
-    write_dataset(tmp_path / "scan.h5", data)
-    plain = SETTINGS.changed(examine=False)
-    here = reconstruct_here(data, plain)
-    np.testing.assert_array_equal(here.speed, reconstruct(None, tmp_path / "scan.h5", plain).speed)
-    assert here.water_speed_mps == speed_from_temperature(STATED_C)
 
 
 def test_the_bounds_of_the_image_contain_the_stated_water():

@@ -170,18 +170,6 @@ def test_without_a_water_shot_the_image_is_nearly_as_good(picked, tmp_path, expe
     assert without < 1.3 * with_water
 
 
-@pytest.mark.nightly
-def test_an_estimated_water_shot_is_the_same_on_a_cluster(cluster, tmp_path):
-    write_dataset(tmp_path / "bare.h5", replace(scan(), waveform=Waveform(scan().waveform.object)))
-    rays = Settings.of(method="sart", nodes=32, iterations=2)
-    here, there = (
-        reconstruction_run.reconstruct(client, tmp_path / "bare.h5", rays)
-        for client in (None, cluster.client)
-    )
-    assert np.array_equal(here.speed, there.speed)
-    assert here.provenance == there.provenance
-
-
 def test_times_do_not_need_a_water_shot_that_cannot_be_estimated(tmp_path):
     """Chords through water are searched only where they are needed."""
     silent = np.random.default_rng(0).standard_normal(scan().waveform.object.shape).astype(np.float32)

@@ -1,17 +1,14 @@
 """Pictures through volumes: straight where nothing refracts, the same in tiles and on a cluster."""
 
-import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, FringeSphere, sampled
-from bentray_workers.cluster.resources import RECONSTRUCTION
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.images.backdrop_card import backdrop_card
-from bentray_workers.rendering import refraction, tiles
+from bentray_workers.rendering import refraction
 from bentray_workers.rendering.refraction import draw_tile, frame_of, picture_png, tile_image
 from bentray_workers.rendering.refraction_view import RefractionView
 from bentray_workers.rendering.scene_cache import scene_at
@@ -20,12 +17,6 @@ from bentray_workers.rendering.tiles import stack_png, tile_rows
 from ..pixels import pixels_of
 
 SMALL = RefractionView(iso=(0.5,), width=48, height=32)
-# Workers of this process wait for it.
-GO_ON = threading.Event()
-
-
-def wait_to_go_on():
-    assert GO_ON.wait(60.0)
 
 
 @pytest.fixture(scope="module")
@@ -161,32 +152,3 @@ def test_a_picture_of_ones_own(path):
 def test_a_task_has_about_a_second_of_work(view, rows):
     assert [last - first for first, last in tile_rows(view)] == rows
     assert tile_rows(view)[-1][1] == view.height
-
-
-@pytest.mark.parametrize("rays", [2**19, 200])
-def test_on_a_cluster(cluster, path, rays, monkeypatch):
-    monkeypatch.setattr(tiles, "TASK_RAYS", rays)
-    png = tiles.submit(cluster.client, refraction.tasks_of(path, SMALL), 0).result(timeout=60)
-    image = whole(path, SMALL).image
-    assert (pixels_of(png) != image).any(axis=-1).mean() < 0.005
-
-
-def test_a_picture_does_not_wait_for_reconstructions(cluster, path):
-    picture_png(path, SMALL)
-    GO_ON.clear()
-    busy = [
-        cluster.client.submit(wait_to_go_on, pure=False, resources=RECONSTRUCTION, priority=0)
-        for _ in range(8)
-    ]
-    try:
-        tiles.submit(cluster.client, refraction.tasks_of(path, SMALL), 10).result(timeout=30)
-        assert not any(future.done() for future in busy)
-    finally:
-        GO_ON.set()
-
-
-def test_worker_rejection_arrives_as_a_message(cluster, path):
-    with pytest.raises(InvalidInput, match="the range of the volume"):
-        tiles.submit(cluster.client, refraction.tasks_of(path, replace(SMALL, iso=(9.0,))), 0).result(
-            timeout=60
-        )

@@ -101,10 +101,3 @@ def test_it_stops_between_pictures(cluster, path, folder, tmp_path):
         )
     assert told[-1].done < 200
     assert not list(tmp_path.glob("t.zip*"))
-
-
-def test_worker_rejection_stops_the_turntable(cluster, path, folder, tmp_path):
-    table = Turntable(**{**SMALL, "iso": (9.0,)}, frames=3)
-    with pytest.raises(InvalidInput, match="the range of the volume"):
-        draw_turntable(cluster.client, path, table, tmp_path / "t.zip", folder)
-    assert not list(tmp_path.glob("t.zip*"))

@@ -42,30 +42,6 @@ def test_tasks_may_finish_in_any_order():
     assert np.array_equal(found.image.attenuation, refined().image.attenuation)
 
 
-def test_resumed_chain_gives_the_same_bits():
-    expected = refined()
-    # In the first band, in the second and in that of the loss; looks that wait are lost and made again.
-    for stop in (25, 60, 115):
-        broken = run_in_random_order(begun(), random.Random(4), stop)
-        assert not broken.over
-        other = begun()
-        other.restore(broken.checkpoint)
-        run_in_random_order(other, random.Random(5))
-        assert np.array_equal(other.image.speed, expected.image.speed)
-        assert np.array_equal(other.image.attenuation, expected.image.attenuation)
-        assert other.ends[0].history == expected.ends[0].history
-
-
-def test_initial_state_has_no_band():
-    graph = begun()
-    assert graph.checkpoint.band is None
-    assert graph.checkpoint.ends == ()
-    assert not graph.over
-    assert graph.image is not None
-    assert graph.done == 0
-    assert graph.history == ()
-
-
 def test_progress_is_monotonic_and_history_records_the_bands():
     graph = RefinementGraph(
         MemoryWaveScan(scan(), SETTINGS),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ....hostile.raw_http import exchange
+from ....raw_http import exchange
 
 
 @pytest.mark.parametrize(
