@@ -11,9 +11,7 @@ from typer.testing import CliRunner
 
 from bentray_service.app import create_app
 from bentray_service.cli import app as command_line
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.simulation import parts
@@ -195,23 +193,3 @@ def test_a_file_that_the_tenant_has_no_room_for_is_not_begun(start):
     answer = ask(http, nodes=16, elements=200)
     assert (answer.status_code, answer.json()["field"]) == (507, "storage"), answer.text
     assert ask(http, **SMALL).status_code == 202
-
-
-def test_another_tenant_finds_neither_job_nor_dataset(serving, until):
-    with serving() as http:
-        auth = {}
-        for name in ("acme", "other"):
-            token = ApiKey.new()
-            Keys(http.app.state.parts.database).add(token, Tenant(name), name, ("read", "write"))
-            auth[name] = {"Authorization": f"Bearer {token.shown()}"}
-        http.headers.update(auth["acme"])
-        done = until(http, ask(http, **SMALL).json()["id"])
-        links = {done["links"]["self"], done["links"]["dataset"], done["links"]["self"] + "/events"}
-        links.add(done["links"]["dataset"] + "/file")
-        for link in links:
-            assert http.get(link, headers=auth["other"]).status_code == 404, link
-        asked = {"kind": "reconstruction", "dataset": done["dataset"]}
-        answer = http.post("/v1/jobs", json=asked, headers=auth["other"])
-        assert (answer.status_code, answer.json()["field"]) == (404, "dataset")
-        assert http.get("/v1/datasets", headers=auth["other"]).json() == {"datasets": [], "next": None}
-        assert len(http.get("/v1/datasets").json()["datasets"]) == 1

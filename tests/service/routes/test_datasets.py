@@ -81,34 +81,19 @@ def test_newest_first(start, scan):
     assert [one["id"] for one in listed] == [made[2], made[1]]
 
 
-def without_geometry(file):
-    del file["geometry"]
-
-
 def nan_position(file):
     file["geometry/element_position_m"][5] = np.nan
-
-
-def tx_out_of_range(file):
-    file["acquisition/tx"][2] = 99
 
 
 def negative_speed(file):
     file["water"].attrs["sound_speed_mps"] = -1500.0
 
 
-def zero_speed(file):
-    file["water"].attrs["sound_speed_mps"] = 0.0
-
-
 @pytest.mark.parametrize(
     ("spoil", "field"),
     [
-        (without_geometry, "geometry"),
         (nan_position, "geometry/element_position_m"),
-        (tx_out_of_range, "acquisition/tx"),
         (negative_speed, "sound_speed_mps"),
-        (zero_speed, "sound_speed_mps"),
     ],
 )
 def test_bad_contents_are_named(start, scan, spoil, field):
@@ -129,12 +114,6 @@ def test_not_hdf5(start):
     body = problem(upload(start(), b"P5 2 2 255 this is a picture"))
     assert (body["status"], body["type"]) == (422, "/problems/invalid-input")
     assert "HDF5" in body["detail"]
-
-
-@pytest.mark.parametrize("kept", [0.1, 0.5, 0.95])
-def test_truncated(start, scan, kept):
-    content = scan().read_bytes()
-    assert problem(upload(start(), content[: int(kept * len(content))]))["status"] == 422
 
 
 def test_empty_body(start):
@@ -173,17 +152,6 @@ def test_a_file_larger_than_a_batch_arrives_whole(start, scan):
     answer = upload(start(), content)
     assert answer.status_code == 201
     assert answer.json()["sha256"] == hashlib.sha256(content).hexdigest()
-
-
-@pytest.mark.parametrize("path", ["ds-" + "0" * 20, "nonsense", "..%2f..%2fetc%2fpasswd", "%2e%2e", "ds-%00"])
-def test_unknown_and_hostile_ids(start, path):
-    assert problem(start().get(f"/v1/datasets/{path}"))["status"] == 404
-
-
-@pytest.mark.parametrize("limit", ["0", "1001", "many"])
-def test_wrong_limit(start, limit):
-    body = problem(start().get(f"/v1/datasets?limit={limit}"))
-    assert (body["status"], body["field"], body["found"]) == (422, "limit", repr(limit))
 
 
 def test_a_thousand_scans_are_searched_and_read_in_pages(start, uploaded):

@@ -1,7 +1,5 @@
 """DELETE over HTTP: gone at once, and refused while a job needs it."""
 
-import pytest
-
 
 def test_a_scan_and_its_result_are_gone(start, uploaded, submitted, until, work):
     http = start()
@@ -27,8 +25,3 @@ def test_while_a_job_needs_it_it_stays(start, uploaded, submitted, until, work):
     http.post(f"/v1/jobs/{job['id']}/cancel")
     until(http, job["id"], "cancelled")
     assert http.delete(f"/v1/datasets/{dataset}").status_code == 204
-
-
-@pytest.mark.parametrize("place", ["datasets/ds-", "volumes/vol-", "meshes/mesh-"])
-def test_missing_objects_are_not_found(start, place):
-    assert start().delete(f"/v1/{place}{'0' * 20}").status_code == 404

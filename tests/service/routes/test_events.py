@@ -178,11 +178,6 @@ def test_unavailable_database_ends_no_stream(start, uploaded, submitted, until, 
     assert json.loads(told[-1]["data"])["state"] == "succeeded"
 
 
-def test_no_such_job(start, work):
-    http = start()
-    assert http.get(f"/v1/jobs/job-{20 * '0'}/events").status_code == 404
-
-
 def changes_in(answer):
     return [json.loads(one["data"]) for one in parsed(answer.text)]
 

@@ -184,10 +184,3 @@ def test_refused_views(http, here, cluster, query, field, accepted):
     assert (answer.status_code, answer.json()["field"]) == (422, field), answer.text
     assert accepted in answer.json()["accepted"]
     assert not cluster.submitted
-
-
-def test_unknown_fields(http):
-    for path in ("", "/image.png", "/geometry-image.png", "/normal-map.png"):
-        answer = http.get(f"/v1/geometry-fields/{field_of('b' * 64)}{path}")
-        assert (answer.status_code, answer.json()["field"]) == (404, "field")
-    assert http.get("/v1/geometry-fields").json() == {"geometry_fields": []}

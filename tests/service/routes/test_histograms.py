@@ -7,7 +7,6 @@ import pytest
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service import pictures
-from bentray_service.rows.ids import new_id
 
 from ..stored_volumes import store_volume
 
@@ -64,7 +63,3 @@ def test_rejects_invalid_input(http, cluster, query, field, accepted):
     assert (answer.status_code, answer.json()["field"]) == (422, field), answer.json()
     assert accepted in answer.json()["accepted"]
     assert not cluster.submitted
-
-
-def test_an_unknown_volume(http):
-    assert http.get(f"/v1/volumes/{new_id('volume')}/histogram").status_code == 404

@@ -163,21 +163,6 @@ def test_every_wrong_value_is_listed(http, dataset):
     assert {"settings.nodes", "settings.rays", "colour"} <= {one["field"] for one in body["errors"]}
 
 
-@pytest.mark.parametrize("dataset", ["ds-" + "0" * 20, "../../etc/passwd", ""])
-def test_unknown_dataset(http, dataset):
-    body = problem(ask(http, dataset))
-    assert (body["status"], body["type"], body["field"]) == (404, "/problems/unknown-id", "dataset")
-
-
-def test_wrong_kind(http, dataset):
-    body = problem(http.post("/v1/jobs", json={"kind": "miracle", "dataset": dataset}))
-    assert (body["status"], body["field"], body["accepted"]) == (
-        422,
-        "kind",
-        "'reconstruction' or 'simulation' or 'refraction' or 'geometry-field'",
-    )
-
-
 def test_no_json(http):
     body = problem(http.post("/v1/jobs", content=b"{", headers={"Content-Type": "application/json"}))
     assert (body["status"], body["accepted"]) == (422, "a JSON object")
@@ -191,12 +176,6 @@ def test_a_request_of_megabytes(http, dataset):
 def test_wrong_media_type(http):
     body = problem(http.post("/v1/jobs", content=b"a=b", headers={"Content-Type": "text/plain"}))
     assert (body["status"], body["accepted"]) == (415, "application/json")
-
-
-@pytest.mark.parametrize("path", ["job-" + "0" * 20, "nonsense", "..%2f..%2fetc"])
-def test_unknown_job(http, path):
-    assert problem(http.get(f"/v1/jobs/{path}"))["status"] == 404
-    assert problem(http.post(f"/v1/jobs/{path}/cancel"))["status"] == 404
 
 
 def test_cancel_an_ended_job(http, dataset, until):

@@ -11,7 +11,11 @@ PAGES = ("/", "/docs", "/docs/formats")
 ASSETS = [
     # Written as it is asked for.
     "/static/export_formats.json",
-    *(f"/static/{path.relative_to(WEB / 'static')}" for path in (WEB / "static").rglob("*") if path.is_file()),
+    *(
+        f"/static/{path.relative_to(WEB / 'static')}"
+        for path in (WEB / "static").rglob("*")
+        if path.is_file()
+    ),
 ]
 
 

@@ -66,15 +66,5 @@ def test_a_refused_scan_has_its_report_too(start, tmp_path):
     assert http.get(f"{here}/quality.png").status_code == 200
 
 
-@pytest.mark.parametrize("name", ["quality", "quality.png"])
-def test_rejects_invalid_input(start, uploaded, name):
-    http = start()
-    assert http.get(f"/v1/datasets/ds-00000000000000000000/{name}").status_code == 404
-    answer = http.get(f"/v1/datasets/{uploaded(http)}/{name}?picker=eye")
-    assert answer.status_code == 422
-    assert answer.headers["content-type"] == "application/problem+json"
-    assert answer.json()["field"] == "picker"
-
-
 def test_every_picker_can_be_requested():
     assert get_args(get_args(Picker)[0]) == tuple(PICKERS)

@@ -14,7 +14,6 @@ from bentray_kernels.tomography.result import Reconstruction
 from bentray_service import pictures
 from bentray_service.app import create_app
 from bentray_service.routes import pictures as routes_of_pictures
-from bentray_service.rows.ids import new_id
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.cluster.resources import RECONSTRUCTION
@@ -192,19 +191,6 @@ def test_a_volume_that_no_worker_can_hold(http, cluster, monkeypatch):
     assert (body["status"], body["field"]) == (422, "volume")
     assert "1000 bytes" in body["accepted"]
     assert not cluster.submitted
-
-
-def test_an_unknown_volume(http):
-    assert http.get(f"/v1/volumes/{new_id('volume')}/refraction.png").status_code == 404
-
-
-def test_late_is_503(http, cluster, monkeypatch):
-    def late(path, view):
-        raise TimeoutError
-
-    monkeypatch.setattr(refraction, "picture_png", late)
-    answer = http.get(put(http), params=SMALL)
-    assert (answer.status_code, answer.json()["type"]) == (503, "/problems/busy")
 
 
 def test_worker_rejection_is_422(http, monkeypatch):

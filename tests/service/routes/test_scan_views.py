@@ -8,9 +8,6 @@ import h5py
 import numpy as np
 import pytest
 
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
 from bentray_workers.files.dataset import write_dataset
 
 from ...kernels.acquisition.traces import WATER_MPS, blob_delay, scan
@@ -102,22 +99,3 @@ def test_a_scan_without_traces_says_so(start, uploaded):
     answer = http.get(f"/v1/datasets/{uploaded(http)}/traces")
     assert (answer.status_code, answer.json()["field"]) == (422, "quantity")
     assert "no traces" in answer.json()["found"]
-
-
-@pytest.mark.parametrize("name", ["geometry", "traces"])
-def test_an_unknown_dataset_is_not_found(start, name):
-    assert start().get(f"/v1/datasets/ds-00000000000000000000/{name}").status_code == 404
-
-
-@pytest.mark.parametrize("name", ["geometry", "traces"])
-def test_another_tenant_finds_nothing(start, traced, name):
-    http = start()
-    auth = {}
-    for tenant in ("acme", "other"):
-        token = ApiKey.new()
-        Keys(http.app.state.parts.database).add(token, Tenant(tenant), tenant, ("read", "write"))
-        auth[tenant] = {"Authorization": f"Bearer {token.shown()}"}
-    http.headers.update(auth["acme"])
-    here = traced[1](http)
-    assert http.get(f"{here}/{name}").status_code == 200
-    assert http.get(f"{here}/{name}", headers=auth["other"]).status_code == 404

@@ -3,9 +3,6 @@
 import pytest
 
 from bentray_kernels.acquisition import speed_from_temperature
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
 
 
 @pytest.fixture
@@ -65,16 +62,3 @@ def test_a_temperature_without_a_speed_is_rejected(http, here, wrong):
     answer = http.patch(here, json={"water_temperature_c": wrong})
     assert (answer.status_code, answer.json()["field"]) == (422, "water_temperature_c")
     assert http.get(here).json()["water_temperature_c"] is None
-
-
-def test_another_tenant_changes_nothing(http, scan):
-    tokens = {}
-    for tenant in ("local", "other"):
-        token = ApiKey.new()
-        Keys(http.app.state.parts.database).add(token, Tenant(tenant), tenant, ("read", "write"))
-        tokens[tenant] = {"Authorization": f"Bearer {token.shown()}"}
-    stream = {"Content-Type": "application/x-hdf5", **tokens["local"]}
-    here = http.post("/v1/datasets", content=scan().read_bytes(), headers=stream).json()["links"]["self"]
-    theirs = http.patch(here, json={"water_temperature_c": 31.5}, headers=tokens["other"])
-    assert theirs.status_code == 404
-    assert http.get(here, headers=tokens["local"]).json()["water_temperature_c"] is None
