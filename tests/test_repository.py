@@ -1,11 +1,10 @@
-"""The repository itself: import rules, first lines, lock files, and no paths of one machine."""
+"""The repository itself: first lines, lock files, and no paths of one machine."""
 
 from __future__ import annotations
 
 import ast
 import re
 import subprocess
-import sys
 import tomllib
 from collections import Counter
 from pathlib import Path
@@ -13,7 +12,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = {"bentray_kernels": "kernels", "bentray_workers": "workers", "bentray_service": "service"}
 LOCKS = {
     "requirements.lock": ("build", "export", "postgres"),
     "requirements-dev.lock": ("build", "export", "postgres", "test", "lint"),
@@ -41,38 +39,6 @@ def committed_texts() -> list[tuple[str, str]]:
         if b"\0" not in content:
             texts.append((str(path.relative_to(ROOT)), content.decode()))
     return texts
-
-
-def modules(package: str) -> list[str]:
-    """The names of every module of a package."""
-    folder = ROOT / PACKAGES[package]
-    names = []
-    for path in sorted((folder / package).rglob("*.py")):
-        parts = path.relative_to(folder).with_suffix("").parts
-        names.append(".".join(parts[:-1] if parts[-1] == "__init__" else parts))
-    return names
-
-
-@pytest.mark.parametrize(
-    ("package", "heavy"),
-    [
-        (
-            "bentray_kernels",
-            "dask distributed fastapi h5py httpx matplotlib pydantic sqlalchemy typer uvicorn",
-        ),
-        ("bentray_workers", "fastapi httpx pydantic sqlalchemy typer uvicorn"),
-    ],
-)
-def test_lower_layers_import_no_upper_layer(package: str, heavy: str) -> None:
-    names = modules(package)
-    assert len(names) > 5
-    code = (
-        "import importlib, sys\n"
-        f"for name in {names!r}: importlib.import_module(name)\n"
-        f"print(*sorted(set({heavy.split()!r}) & set(sys.modules)))\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == []
 
 
 def test_every_source_file_starts_with_its_purpose() -> None:

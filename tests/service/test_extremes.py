@@ -2,6 +2,7 @@
 
 import io
 import json
+from itertools import product
 
 import numpy as np
 import pytest
@@ -62,7 +63,11 @@ def refused_by_name(answer, name):
     assert len(answer.content) < 4000
 
 
-@pytest.mark.parametrize("kind", KINDS)
+# Every record has its ranges tested (``test_refused_settings``); here is the way through JSON.
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[] if kind == "simulation" else [pytest.mark.nightly]) for kind in KINDS],
+)
 def test_an_extreme_setting_of_a_job_is_rejected_or_taken(http, uploaded, volume, work, kind):
     named = {"reconstruction": {"dataset": uploaded(http)}, "refraction": {"volume": volume["id"]}}
     refused = 0
@@ -83,9 +88,8 @@ def test_an_extreme_setting_of_a_job_is_rejected_or_taken(http, uploaded, volume
     assert refused > 10 * len(numbers_of(kind))
 
 
-@pytest.mark.parametrize("name", ["low", "high", "index", "size"])
-def test_an_extreme_number_of_a_slice(http, volume, name):
-    for value in EXTREMES:
+def test_an_extreme_number_of_a_slice(http, volume):
+    for name, value in product(("low", "high", "index", "size"), EXTREMES):
         answer = http.get(volume["links"]["image"], params={name: str(value)})
         if answer.status_code != 200:
             refused_by_name(answer, name)

@@ -39,7 +39,7 @@ def plan(method="gauss-newton", **changes):
     return Settings.of(method=method, nodes=NODES, side_m=SIDE, **changes)
 
 
-@pytest.mark.parametrize("method", ["sart", "gauss-newton"])
+@pytest.mark.parametrize("method", [pytest.param("sart", marks=pytest.mark.nightly), "gauss-newton"])
 def test_line_integrals_give_it_back(scan, method):
     truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     result = reconstruct(scan, plan(method))
@@ -132,6 +132,7 @@ def test_a_slice_without_amplitudes_has_that_of_the_water(scan):
     assert np.ptp(result[..., 0]) > 1.0
 
 
+@pytest.mark.nightly
 def test_along_straight_rays_it_is_worse(scan):
     truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     bent, straight = (reconstruct(scan, plan(rays=rays)).attenuation for rays in ("curved", "straight"))
@@ -149,6 +150,7 @@ def test_a_medium_like_its_water_is_found_to_be_so(scan):
     assert np.allclose(reconstruct(same, plan()).attenuation, 2.0, atol=1e-3)
 
 
+@pytest.mark.nightly
 def test_gaps_in_the_amplitudes_are_only_gaps(scan):
     truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     kept = np.random.default_rng(1).random(scan.log_ratio_np.shape) < 0.2

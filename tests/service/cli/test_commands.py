@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from typer.testing import Result
 from bentray_service.cli import app
 
 
+@cache
 def named() -> dict[str, Any]:
     """Every command by its words, those of groups too, as ``keys create``."""
     found = {}

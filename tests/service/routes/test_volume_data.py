@@ -62,24 +62,25 @@ def test_an_upload_for_matlab_and_itk(http, upload):
 
 
 @pytest.mark.parametrize("kind", ["result", "upload"])
-@pytest.mark.parametrize("asked", FORMATS)
-def test_interrupted_download_can_be_resumed(http, request, kind, asked):
-    here = f"{request.getfixturevalue(kind)}?format={asked}"
-    whole = http.get(here)
-    assert whole.status_code == 200
-    assert whole.headers["accept-ranges"] == "bytes"
-    assert whole.headers["content-disposition"].endswith(f'.{FORMATS[asked].download_extension}"')
-    tag = whole.headers["etag"]
-    assert tag.startswith('"')
-    rest = http.get(here, headers={"Range": "bytes=100-", "If-Range": tag})
-    size = len(whole.content)
-    assert (rest.status_code, rest.headers["etag"]) == (206, tag)
-    assert rest.headers["content-range"] == f"bytes 100-{size - 1}/{size}"
-    assert rest.content == whole.content[100:]
-    head = http.head(here)
-    assert (head.headers["etag"], head.headers["content-length"]) == (tag, str(size))
-    known = http.get(here, headers={"If-None-Match": tag})
-    assert (known.status_code, known.content, known.headers["etag"]) == (304, b"", tag)
+def test_interrupted_download_can_be_resumed(http, request, kind):
+    data = request.getfixturevalue(kind)
+    for asked, form in FORMATS.items():
+        here = f"{data}?format={asked}"
+        whole = http.get(here)
+        assert whole.status_code == 200
+        assert whole.headers["accept-ranges"] == "bytes"
+        assert whole.headers["content-disposition"].endswith(f'.{form.download_extension}"')
+        tag = whole.headers["etag"]
+        assert tag.startswith('"')
+        rest = http.get(here, headers={"Range": "bytes=100-", "If-Range": tag})
+        size = len(whole.content)
+        assert (rest.status_code, rest.headers["etag"]) == (206, tag)
+        assert rest.headers["content-range"] == f"bytes 100-{size - 1}/{size}"
+        assert rest.content == whole.content[100:]
+        head = http.head(here)
+        assert (head.headers["etag"], head.headers["content-length"]) == (tag, str(size))
+        known = http.get(here, headers={"If-None-Match": tag})
+        assert (known.status_code, known.content, known.headers["etag"]) == (304, b"", tag)
 
 
 @pytest.mark.parametrize("asked", ["nifti", "metaimage", "mat", "npy"])

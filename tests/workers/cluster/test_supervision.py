@@ -79,6 +79,7 @@ def test_a_worker_without_its_nanny_is_replaced(own: Cluster) -> None:
     assert own.client.submit(sum, [1, 2], pure=False).result(timeout=PATIENCE_S) == 3
 
 
+@pytest.mark.nightly
 def test_workers_that_do_not_start_are_tried_again(
     own: Cluster, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
