@@ -148,31 +148,6 @@ def test_pictures_do_not_block_request_threads(tmp_path, held):
     asyncio.run(go())
 
 
-def test_too_many_pictures_get_retry_after(tmp_path, held):
-    async def go():
-        async with service(tmp_path, held) as (_, (anna, here), (bert, there)):
-            large = {**SMALL, "width": 4096, "height": 4096}
-            asked = [
-                asyncio.create_task(
-                    anna.get(f"{here}/refraction.png", params={**large, "index": 1.1 + k / 100})
-                )
-                for k in range(20)
-            ]
-            await until(lambda: sum(task.done() for task in asked) >= 19)
-            refused = [task.result() for task in asked if task.done()]
-            assert {answer.status_code for answer in refused} == {429}
-            assert refused[0].json()["field"] == "pictures"
-            assert 1 <= int(refused[0].headers["retry-after"]) <= 60
-            late = asyncio.create_task(bert.get(f"{there}/slice.png", params={"frame": False}))
-            for task in asked:
-                task.cancel()
-            await asyncio.gather(*asked, return_exceptions=True)
-            held.gate.set()
-            assert (await late).status_code == 200
-
-    asyncio.run(go())
-
-
 def test_a_picture_ends_with_its_client(tmp_path, held):
     async def go():
         async with service(tmp_path, held) as (app, (anna, here), _):
@@ -211,19 +186,6 @@ def test_a_picture_ends_with_its_client(tmp_path, held):
             # Its worker is free for the next one.
             held.gate.set()
             assert (await anna.get(f"{here}/slice.png")).status_code == 200
-
-    asyncio.run(go())
-
-
-def test_slow_pictures_are_rejected_with_a_size_that_fits(tmp_path, held):
-    async def go():
-        async with service(tmp_path, held) as (_, (anna, here), _):
-            query = {**SMALL, "width": 4096, "height": 4096, "depth": 256}
-            answer = await anna.get(f"{here}/refraction.png", params=query)
-            body = answer.json()
-            assert (answer.status_code, body["field"]) == (422, "width, height, depth")
-            assert "a job of kind `refraction`" in body["accepted"]
-            assert not held.futures
 
     asyncio.run(go())
 
