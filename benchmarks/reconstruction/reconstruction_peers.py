@@ -113,15 +113,15 @@ def run_ours(
         return result
 
     images, error_on = Images(dataset, run), object_error(dataset)
-    found = {}
+    measured = {}
     for name, settings in OURS.items():
         # The default settings choose their own grid.
         asked = settings if settings.selects_model else replace(settings, nodes=nodes)
         run(tiny, replace(asked, nodes=None))
         image, seconds = images.made(asked)
         compared = images.compared(image, error_on)
-        found[name] = Found(compared.error, seconds, spent[asked]), compared
-    return found
+        measured[name] = Found(compared.error, seconds, spent[asked]), compared
+    return measured
 
 
 def run_peer(peer: Peer, dataset: Dataset, tiny: Dataset) -> Found:

@@ -89,8 +89,8 @@ class Block:
                 continue
             if face.shape != shape:
                 raise InvalidInput(f"faces[{number}]", f"shape {face.shape}", f"{shape}")
-            known = np.isfinite(face.ravel())
-            self._sweeper.lower(nodes[known], face.ravel()[known])
+            finite = np.isfinite(face.ravel())
+            self._sweeper.lower(nodes[finite], face.ravel()[finite])
         self._sweeper.settle(self._slowness, self._spacing, tolerance)
         own, changed = [], []
         for number, (side, (nodes, shape)) in enumerate(

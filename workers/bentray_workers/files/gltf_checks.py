@@ -59,35 +59,35 @@ def check_gltf(data: bytes, kind: str) -> None:
                 most = len(lists[indices[key]]) - 1 if key in indices else math.inf
                 _check_number(f"{name}/{number}/{key}", row.get(key), most)
             if name == "accessors" and ("sparse" in row or "bufferView" not in row):
-                found = "a sparse accessor, or one without data"
-                raise InvalidInput(f"accessors/{number}", found, "an accessor with its own data")
+                given = "a sparse accessor, or one without data"
+                raise InvalidInput(f"accessors/{number}", given, "an accessor with its own data")
     for number, mesh in enumerate(lists["meshes"]):
         for which, primitive in enumerate(mesh["primitives"]):
             _check_primitive(f"meshes/{number}/primitives/{which}", primitive, len(lists["accessors"]) - 1)
     _check_tree(lists["nodes"], lists["scenes"])
 
 
-def _check_packing(place: str, extensions: Iterable[str]) -> None:
+def _check_packing(path: str, extensions: Iterable[str]) -> None:
     if any(extension in PACKED for extension in extensions):
         raise InvalidInput(
-            place, "a compressed mesh", "a mesh that is not compressed; export it without Draco"
+            path, "a compressed mesh", "a mesh that is not compressed; export it without Draco"
         )
 
 
-def _check_number(place: str, value: int | None, most: float) -> None:
+def _check_number(path: str, value: int | None, most: float) -> None:
     if value is not None and not 0 <= value <= most:
         accepted = "a number of 0 or more" if most == math.inf else f"an index of the file, 0 to {most}"
-        raise InvalidInput(place, value, accepted)
+        raise InvalidInput(path, value, accepted)
 
 
-def _check_primitive(place: str, primitive: Json, last: int) -> None:
+def _check_primitive(path: str, primitive: Json, last: int) -> None:
     """Check a primitive, whose accessors are numbered up to ``last``."""
-    _check_packing(place, primitive.get("extensions", ()))
+    _check_packing(path, primitive.get("extensions", ()))
     mode = primitive.get("mode", TRIANGLES)
     if mode not in (TRIANGLES, STRIP):
-        raise InvalidInput(f"{place}/mode", repr(mode)[:40], "4 or 5: triangles, or a strip of them")
+        raise InvalidInput(f"{path}/mode", repr(mode)[:40], "4 or 5: triangles, or a strip of them")
     for name, index in ({"indices": primitive.get("indices")} | primitive["attributes"]).items():
-        _check_number(f"{place}/{name}", index, last)
+        _check_number(f"{path}/{name}", index, last)
 
 
 def _check_tree(nodes: Sequence[Json], scenes: Sequence[Json]) -> None:
@@ -98,7 +98,7 @@ def _check_tree(nodes: Sequence[Json], scenes: Sequence[Json]) -> None:
             raise InvalidInput("nodes", "a node with two parents, or below itself", "a tree of nodes")
     for number, node in enumerate(nodes):
         if "camera" in node and ("mesh" in node or node.get("children")):
-            found = "a camera with a mesh or with nodes below it"
+            given = "a camera with a mesh or with nodes below it"
             raise InvalidInput(
-                f"nodes/{number}", found, "a mesh in nodes of its own; export it without cameras"
+                f"nodes/{number}", given, "a mesh in nodes of its own; export it without cameras"
             )

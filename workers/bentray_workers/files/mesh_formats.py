@@ -102,12 +102,12 @@ def _kind(data: bytes) -> str:
     text = b"\0" not in data[: 2**16]
     if text and re.search(rb"^v[ \t]", data, re.MULTILINE):
         return "obj"
-    found = f"a file of another kind ({first_bytes(data)})"
+    content = f"a file of another kind ({first_bytes(data)})"
     if not data:
-        found = "an empty file"
+        content = "an empty file"
     elif as_stl and not text:
-        found += f"; or a binary STL of {len(data)} bytes, where its header means {as_stl}"
-    raise InvalidInput("file", found, ACCEPTED)
+        content += f"; or a binary STL of {len(data)} bytes, where its header means {as_stl}"
+    raise InvalidInput("file", content, ACCEPTED)
 
 
 @contextmanager
@@ -119,8 +119,8 @@ def _whole(kind: str) -> Iterator[None]:
     except InvalidInput as error:
         if not error.value.startswith("damaged data"):
             raise
-        found = f"{kind.upper()} data that are truncated, damaged, or inconsistent with the header"
-        raise InvalidInput("file", found, error.accepted) from None
+        given = f"{kind.upper()} data that are truncated, damaged, or inconsistent with the header"
+        raise InvalidInput("file", given, error.accepted) from None
 
 
 def _colours(mesh: trimesh.Trimesh, surface: SoundMesh) -> Floats | None:

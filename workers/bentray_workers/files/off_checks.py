@@ -30,10 +30,10 @@ def plain_off(data: bytes) -> bytes:
     counts, *rows = [lines[0][1:], *lines[1:]] if lines[0][1:] else lines[1:]
     vertices, faces = int(counts[0]), int(counts[1])
     if min(vertices, faces) < 0 or len(rows) < vertices + faces:
-        found = f"{len(rows)} lines of the {vertices} vertices and {faces} faces of its counts"
-        raise InvalidInput("file", f"an OFF file that ends too soon: {found}", "a whole OFF file")
+        given = f"{len(rows)} lines of the {vertices} vertices and {faces} faces of its counts"
+        raise InvalidInput("file", f"an OFF file that ends too soon: {given}", "a whole OFF file")
     for number, words in enumerate(rows[vertices : vertices + faces]):
         if not 3 <= int(words[0]) < len(words):
-            found = f"{b' '.join(words)[:SHOWN].decode(errors='replace')!r} as face {number}"
-            raise InvalidInput("faces", found, "the number of corners, 3 or more, and their vertices")
+            given = f"{b' '.join(words)[:SHOWN].decode(errors='replace')!r} as face {number}"
+            raise InvalidInput("faces", given, "the number of corners, 3 or more, and their vertices")
     return plain

@@ -143,7 +143,7 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, emitter
         window = problem.window(emitter, valid, settings.window_s)
         return measure(traces, problem.recorded(emitter, valid), window)
 
-    def parts(emitters: Ints) -> tuple[EmissionMisfit, Observed]:
+    def misfit_and_data(emitters: Ints) -> tuple[EmissionMisfit, Observed]:
         numbers = emitters.tolist()
         return (
             lambda k, traces: compare(numbers[k], traces),
@@ -151,13 +151,14 @@ def evaluate(problem: WaveProblem, settings: WaveSettings, model: Model, emitter
         )
 
     validated, used = emitters[held_out], emitters[~held_out]
-    here, observed = parts(validated)
+    misfit_of, observed = misfit_and_data(validated)
     engine, poll = settings.engine, problem.poll
-    held = sum(emission_misfits(medium, emissions(validated), here, poll, engine, observed), 0.0)
-    here, observed = parts(used)
+    held = sum(emission_misfits(medium, emissions(validated), misfit_of, poll, engine, observed), 0.0)
+    misfit_of, observed = misfit_and_data(used)
     misfit = 0.0
     gradient, illumination = np.zeros_like(model.speed), np.zeros_like(model.speed)
-    for shot in misfit_gradients(medium, emissions(used), here, problem.every, by, poll, engine, observed):
+    shots, every = emissions(used), problem.every
+    for shot in misfit_gradients(medium, shots, misfit_of, every, by, poll, engine, observed):
         misfit += shot.misfit
         gradient += shot.gradient
         illumination += shot.illumination

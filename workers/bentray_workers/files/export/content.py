@@ -41,5 +41,5 @@ class Content:
         """Raise InvalidInput for slices with uneven spacing (not finite), which a format cannot store."""
         spacing = self.grid.spacing_m
         if not np.isfinite(spacing).all():
-            found = f"uneven slices (spacing {tuple(float(step) for step in spacing)} m)"
-            raise InvalidInput("volume", found, f"even spacing for {title}; hdf5 holds any")
+            given = f"uneven slices (spacing {tuple(float(step) for step in spacing)} m)"
+            raise InvalidInput("volume", given, f"even spacing for {title}; hdf5 holds any")
