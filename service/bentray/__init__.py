@@ -39,8 +39,8 @@ else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         from importlib import import_module
 
-        found = globals()[name] = getattr(import_module(PLACES[name]), name)
-        return found
+        value = globals()[name] = getattr(import_module(PLACES[name]), name)
+        return value
 
     def __dir__() -> list[str]:
         """For completion, and the documentation."""

@@ -109,10 +109,10 @@ class Compute:
             InvalidInput: when no worker has enough memory or the required resource.
         """
         capacities = self._known(lambda client: probed_capacities(client, settings))
-        known = None if counts is None else DatasetCounts(**counts)
-        if known is None or (known.samples and known.frequency_hz is None):
-            known = counts_in(self._fetch(path))
-        return planning.plan(known.summary(settings), settings, capacities).to_dict()
+        stored = None if counts is None else DatasetCounts(**counts)
+        if stored is None or (stored.samples and stored.frequency_hz is None):
+            stored = counts_in(self._fetch(path))
+        return planning.plan(stored.summary(settings), settings, capacities).to_dict()
 
     def plan_simulation(self, request: PhantomScan) -> dict[str, Any]:
         """Plan a simulation in the same way."""

@@ -212,4 +212,4 @@ class NotReady(Exception):  # noqa: N818 - names a state, like the other refusal
 
     def __init__(self, faults: Sequence[tuple[str, str, str]]) -> None:
         self.faults = tuple(faults)
-        super().__init__("; ".join(f"{part}: {found}" for part, found, _ in faults))
+        super().__init__("; ".join(f"{component}: {fault}" for component, fault, _ in faults))

@@ -48,11 +48,11 @@ def check_ready(url: str) -> str | None:
 
 def _check_service(url: str, question: str) -> str | None:
     try:
-        parts = urlsplit(url)
-        kind = http.client.HTTPSConnection if parts.scheme == "https" else http.client.HTTPConnection
-        connection = kind(parts.hostname or "", parts.port, timeout=SECONDS)
+        address = urlsplit(url)
+        kind = http.client.HTTPSConnection if address.scheme == "https" else http.client.HTTPConnection
+        connection = kind(address.hostname or "", address.port, timeout=SECONDS)
         try:
-            connection.request("GET", f"{parts.path.rstrip('/')}/health/{question}")
+            connection.request("GET", f"{address.path.rstrip('/')}/health/{question}")
             response = connection.getresponse()
             body = response.read()
         finally:
@@ -68,8 +68,8 @@ def check_scheduler(address: str) -> str | None:
     With TLS, the certificates are in the folder ``BENTRAY_TLS_DIR``.
     """
     try:
-        parts = urlsplit(address)
-        with _connected(parts.hostname or "", parts.port or 0, secured=parts.scheme == "tls") as connection:
+        split = urlsplit(address)
+        with _connected(split.hostname or "", split.port or 0, secured=split.scheme == "tls") as connection:
             greeting = connection.recv(4096)
             if GREETING not in greeting:
                 return f"the server at {address} is not a Dask scheduler"
@@ -85,8 +85,8 @@ def check_worker(address: str) -> str | None:
     silence = heartbeat.seconds_since_heartbeat(address)
     if silence is not None and silence <= heartbeat.STALE_S:
         return None
-    known = "none so far" if silence is None else f"the last one {silence:.0f} s ago"
-    return f"no heartbeat of a worker of {address}: {known}"
+    last = "none so far" if silence is None else f"the last one {silence:.0f} s ago"
+    return f"no heartbeat of a worker of {address}: {last}"
 
 
 def _connected(host: str, port: int, *, secured: bool) -> socket.socket:
@@ -168,15 +168,15 @@ def main(words: list[str]) -> None:
     most = 0
     if words[:1] == ["--restart-after"]:
         most, words = int(words[1]) if words[1:] and words[1].isdigit() else -1, words[2:]
-    address, *part = words or ["http://127.0.0.1:8000"]
-    chosen = CHECKS.get((address.partition("://")[0], *part))
+    address, *check = words or ["http://127.0.0.1:8000"]
+    chosen = CHECKS.get((address.partition("://")[0], *check))
     if chosen is None or most < 0:
         sys.stderr.write((__doc__ or "").splitlines()[2] + "\n")
         sys.exit(2)
     failures = Failures() if most else None
     count = failures.count() if failures else 0
     trouble = chosen(address)
-    if failures and (trouble is None or (count and part == ["worker"] and check_scheduler(address))):
+    if failures and (trouble is None or (count and check == ["worker"] and check_scheduler(address))):
         # A worker whose scheduler is away waits for it; a restart would not help.
         failures.reset()
     elif failures and count >= most:

@@ -44,7 +44,7 @@ class RecordList(list[Shown]):
         if not self:
             return "<em>none</em>"
         columns = self[0].columns
-        return table_html(columns, [[getattr(one, name) for name in columns] for one in self])
+        return table_html(columns, [[getattr(record, name) for name in columns] for record in self])
 
 
 def figures_html(title: str, rows: Iterable[tuple[str, Any]]) -> str:

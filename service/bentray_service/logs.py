@@ -54,8 +54,8 @@ class TextFormatter(logging.Formatter):
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the name of the library
         return "".join(
-            one if one.isprintable() else one.encode("unicode_escape").decode()
-            for one in super().formatMessage(record)
+            character if character.isprintable() else character.encode("unicode_escape").decode()
+            for character in super().formatMessage(record)
         )
 
     def format(self, record: logging.LogRecord) -> str:
@@ -133,8 +133,8 @@ def configured(form: Literal["text", "json"]) -> Iterator[None]:
     handler = _Stderr()
     handler.setFormatter(TextFormatter() if form == "text" else JsonFormatter())
     root, own, dask, closed = (logging.getLogger(name) for name in (None, "bentray", "distributed", CLOSED))
-    known = [logging.getLogger(name) for name in list(logging.Logger.manager.loggerDict)]
-    before = [(logger, logger.handlers[:], logger.propagate, logger.level) for logger in (root, *known)]
+    loggers = [logging.getLogger(name) for name in list(logging.Logger.manager.loggerDict)]
+    before = [(logger, logger.handlers[:], logger.propagate, logger.level) for logger in (root, *loggers)]
     for logger, handlers, *_ in before:
         if handlers:
             logger.handlers[:] = []

@@ -134,13 +134,13 @@ class PictureQueue:
         late = (own + others) / max(1, len(self._workers)) - LATEST_S
         held, all_of_them = self._pictures[account], self._pictures.total()
         if all_of_them and late > 0.0:
-            found = f"{held} images of this tenant in progress, {all_of_them} in total"
+            given = f"{held} images of this tenant in progress, {all_of_them} in total"
             accepted = f"images that can be rendered in about {LATEST_S:g} s; see Retry-After"
-            raise RateLimited("pictures", found, accepted, min(LATEST_S, max(1.0, late)))
+            raise RateLimited("pictures", given, accepted, min(LATEST_S, max(1.0, late)))
         if held >= MAX_PER_ACCOUNT or all_of_them >= MAX_IN_TOTAL:
-            found = f"{held} images of this tenant in progress, {all_of_them} in total"
+            given = f"{held} images of this tenant in progress, {all_of_them} in total"
             accepted = f"fewer than {MAX_PER_ACCOUNT} per tenant and {MAX_IN_TOTAL} in total; see Retry-After"
-            raise RateLimited("pictures", found, accepted, 1.0)
+            raise RateLimited("pictures", given, accepted, 1.0)
 
     def _assign(self) -> None:
         """Assign free workers to waiting tasks, first of the account served least recently."""

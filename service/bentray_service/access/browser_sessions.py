@@ -43,9 +43,9 @@ class Cookie:
 
     def header(self) -> str:
         """The value of Set-Cookie. Scripts cannot read the cookie, and it belongs to this host alone."""
-        parts = [f"{self.name}={self.value}", "Path=/", f"Max-Age={int(self.seconds) if self.value else 0}"]
+        words = [f"{self.name}={self.value}", "Path=/", f"Max-Age={int(self.seconds) if self.value else 0}"]
         return "; ".join(
-            [*parts, "HttpOnly", f"SameSite={self.same_site}", *(["Secure"] if self.secure else [])]
+            [*words, "HttpOnly", f"SameSite={self.same_site}", *(["Secure"] if self.secure else [])]
         )
 
 
@@ -59,11 +59,11 @@ class BrowserSessions:
         url = settings.public_url
         if url is None:
             raise InvalidInput("BENTRAY_PUBLIC_URL", "nothing", "the address of this service for browsers")
-        parts = urlsplit(url)
-        self._secure = parts.scheme == "https"
-        if not self._secure and not names_loopback(parts.netloc):
+        address = urlsplit(url)
+        self._secure = address.scheme == "https"
+        if not self._secure and not names_loopback(address.netloc):
             raise InvalidInput("BENTRAY_PUBLIC_URL", url, "an https address, since cookies need encryption")
-        self._origin = f"{parts.scheme}://{parts.netloc.lower()}"
+        self._origin = f"{address.scheme}://{address.netloc.lower()}"
         self._sessions = sessions
         self._provider = Provider(settings)
         self._mapping = ClaimMapping(settings, claimed)
@@ -108,14 +108,14 @@ class BrowserSessions:
         browser = _cookies(headers).get(self._pending, "")
         pending = self._sessions.take(query.get("state", ""), browser)
         if pending is None:
-            found = "a sign-in that is unknown, used, expired or of another browser"
-            raise NotAuthenticated("state", found, "a new sign-in")
+            given = "a sign-in that is unknown, used, expired or of another browser"
+            raise NotAuthenticated("state", given, "a new sign-in")
         # RFC 9207: a response of another provider is not ours to exchange.
         if query.get("iss", self._provider.issuer) != self._provider.issuer:
             raise NotAuthenticated("iss", "another provider", self._provider.issuer)
         if "code" not in query:
-            found = repr(query.get("error", "nothing")[:80])
-            raise NotAuthenticated("code", f"{found} from the provider", "a code; sign in again")
+            given = repr(query.get("error", "nothing")[:80])
+            raise NotAuthenticated("code", f"{given} from the provider", "a code; sign in again")
         claims = self._provider.claims(
             query["code"],
             self._origin + CALLBACK,

@@ -46,9 +46,9 @@ class KeyWatch:
         try:
             yield
         finally:
-            mine = self._under_way.get(key_id, set())
-            mine.discard(end)
-            if not mine:
+            ends = self._under_way.get(key_id, set())
+            ends.discard(end)
+            if not ends:
                 self._under_way.pop(key_id, None)
 
     def _ended(self, ids: list[str]) -> list[str]:
@@ -119,8 +119,8 @@ async def answer_while_valid(
             await send(message)
 
     with ExitStack() as watched:
-        for one in ids:
-            watched.enter_context(watch.during(one, end))
+        for key_id in ids:
+            watched.enter_context(watch.during(key_id, end))
         watched.enter_context(cancelling)
         await app(scope, receive_while_valid, send_while_valid)
     if begun and events and not complete:

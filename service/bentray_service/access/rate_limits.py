@@ -50,6 +50,6 @@ class RateLimits:
         return min(float(self.per_minute), bucket.left + (now - bucket.seen) * self.per_minute / 60.0)
 
     def _forget(self, now: float) -> None:
-        full = [name for name, one in self._buckets.items() if self._level(one, now) >= self.per_minute]
+        full = [name for name, bucket in self._buckets.items() if self._level(bucket, now) >= self.per_minute]
         for name in full:
             del self._buckets[name]

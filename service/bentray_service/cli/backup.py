@@ -43,7 +43,7 @@ def backup(
         print_json({"folder": str(folder.resolve()), **asdict(made)})
     else:
         remark(f"{made.items} stored items, {made.bytes} bytes with database and audit log")
-        print_lines([str(folder), *(f"missing: {one}" for one in made.missing)])
+        print_lines([str(folder), *(f"missing: {path}" for path in made.missing)])
     if made.missing:
         count = len(made.missing)
         raise WorkFailed(f"{count} damaged or missing items are not in the backup; see `bentray verify`")

@@ -89,19 +89,19 @@ def entries_of(folder: Path, results: Path, settings: Settings, given: ScanMetad
 
     if not folder.is_dir():
         raise InvalidInput("--batch", f"{folder} (no such folder)", ACCEPTED)
-    found = sorted(
+    paths = sorted(
         path
         for path in folder.resolve().iterdir()
         if path.suffix.lower() in SUFFIXES and path.is_file() and not path.name.startswith(".")
     )
-    if not found:
+    if not paths:
         raise InvalidInput("--batch", f"{folder} (without any scan)", ACCEPTED)
-    for one, other in pairwise(sorted(found, key=lambda path: path.stem)):
-        if one.stem == other.stem:
+    for path, other in pairwise(sorted(paths, key=lambda path: path.stem)):
+        if path.stem == other.stem:
             raise InvalidInput(
-                "--batch", f"{one.name} and {other.name}", "names that differ without their endings"
+                "--batch", f"{path.name} and {other.name}", "names that differ without their endings"
             )
-    entries = [Entry(path) for path in found]
+    entries = [Entry(path) for path in paths]
     for entry in entries:
         result = finished(results / entry.name, entry.source, settings, given)
         if result is not None:
@@ -158,8 +158,8 @@ def request_of(source: Path, settings: Settings, given: ScanMetadata) -> dict[st
     request = {"bytes": there.st_size, "mtime_ns": there.st_mtime_ns, "settings": settings.to_dict()}
     if given:
         request["scan"] = asdict(given)
-    found: dict[str, Any] = json.loads(json.dumps(without_nan(request)))
-    return found
+    plain: dict[str, Any] = json.loads(json.dumps(without_nan(request)))
+    return plain
 
 
 def finished(folder: Path, source: Path, settings: Settings, given: ScanMetadata) -> dict[str, Any] | None:
@@ -167,13 +167,13 @@ def finished(folder: Path, source: Path, settings: Settings, given: ScanMetadata
     from bentray_workers.files.reconstruction import read_reconstruction
 
     try:
-        found: dict[str, Any] = json.loads((folder / "reconstruction.json").read_text())
+        stored: dict[str, Any] = json.loads((folder / "reconstruction.json").read_text())
         if (
-            found["request"] != request_of(source, settings, given)
+            stored["request"] != request_of(source, settings, given)
             or not (folder / "reconstruction.png").is_file()
         ):
             return None
         read_reconstruction(folder / "reconstruction.h5")
     except (OSError, ValueError, KeyError, TypeError, RecursionError, InvalidInput):
         return None
-    return found
+    return stored

@@ -88,8 +88,8 @@ def bench(
     """
     if name == REPORT:
         if json_file is not None or pictures is not None:
-            found = "--json" if json_file is not None else "--pictures"
-            raise InvalidInput(found, f"given with {REPORT}", "-o DIR, which holds rows and pictures")
+            option = "--json" if json_file is not None else "--pictures"
+            raise InvalidInput(option, f"given with {REPORT}", "-o DIR, which holds rows and pictures")
         if output is None:
             raise InvalidInput("-o", "none", f"a folder for the report of {REPORT}")
         with progress_bar("Measuring") as step:
@@ -174,15 +174,15 @@ def module_of(name: str, folder: Path) -> ModuleType:
     """
     # Modules imported by several benchmarks start with an underscore.
     files = (path for path in folder.glob("*/*.py") if not path.stem.startswith("_"))
-    known = {path.stem: path.parent.name for path in sorted(files, key=lambda path: path.stem)}
+    benchmarks = {path.stem: path.parent.name for path in sorted(files, key=lambda path: path.stem)}
     # Hyphens are accepted in place of underscores.
     stem = name.replace("-", "_")
-    if stem not in known:
-        raise InvalidInput("name", repr(name), "one of " + ", ".join(known))
+    if stem not in benchmarks:
+        raise InvalidInput("name", repr(name), "one of " + ", ".join(benchmarks))
     # The benchmarks are a namespace package of the checkout.
     if str(folder.parent) not in sys.path:
         sys.path.insert(0, str(folder.parent))
-    return importlib.import_module(f"{folder.name}.{known[stem]}.{stem}")
+    return importlib.import_module(f"{folder.name}.{benchmarks[stem]}.{stem}")
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -64,7 +64,7 @@ def compare(
     """
     source = input_file(result / "reconstruction.h5" if result.is_dir() else result, ACCEPTED)
     other = truth / "reconstruction.h5" if truth.is_dir() else truth
-    places = [_region(text) for text in region or ()]
+    regions = [_region(text) for text in region or ()]
     if output is not None:
         output = output_file(output, force=force, suffix=".png")
         check_apart({"output": output}, {"result": source, "truth": other})
@@ -75,32 +75,32 @@ def compare(
     from ..interactive.result import load
 
     compared = load(source).compare(other, quantity, spacing_m=spacing)
-    found = _figures(compared, places)
+    record = _figures(compared, regions)
     if output is not None:
         write_bytes(output, compared.to_png())
     if as_json:
         paths = {"result": str(source), "truth": str(other), "output": output and str(output)}
-        print_json({**paths, **found})
+        print_json({**paths, **record})
         return
     unit = compared.unit
     rows = [
-        ("RMSE", f"{found['rmse']:.4g} {unit}"),
-        ("MAE", f"{found['mean_absolute_error']:.4g} {unit}"),
-        ("bias", f"{found['bias']:.4g} {unit}"),
-        ("SSIM", _number(found["ssim"])),
-        ("PCC", _number(found["correlation"])),
-        ("region", f"{found['region']}, {found['nodes']} nodes"),
+        ("RMSE", f"{record['rmse']:.4g} {unit}"),
+        ("MAE", f"{record['mean_absolute_error']:.4g} {unit}"),
+        ("bias", f"{record['bias']:.4g} {unit}"),
+        ("SSIM", _number(record["ssim"])),
+        ("PCC", _number(record["correlation"])),
+        ("region", f"{record['region']}, {record['nodes']} nodes"),
     ]
     print_table(f"{result}: {quantity} against {truth}", ("figure", "value"), rows)
     columns = ("statistics", "size", "result", "truth", "contrast: result", "truth")
     shown = [(compared.region_choice, *compared.statistics())]
-    shown += [(str(RoundRegion(*place)), *compared.statistics(*place)) for place in places]
-    print_table("", columns, [_row(*one, unit, compared.image.ndim) for one in shown])
+    shown += [(str(RoundRegion(*region)), *compared.statistics(*region)) for region in regions]
+    print_table("", columns, [_row(*row, unit, compared.image.ndim) for row in shown])
     if output is not None:
         print_lines([str(output)])
 
 
-def _figures(compared: Comparison, places: list[tuple[tuple[float, ...], float]]) -> dict[str, Any]:
+def _figures(compared: Comparison, regions: list[tuple[tuple[float, ...], float]]) -> dict[str, Any]:
     names = ("image", "truth")
     return {
         "quantity": compared.quantity,
@@ -117,7 +117,7 @@ def _figures(compared: Comparison, places: list[tuple[tuple[float, ...], float]]
         "regions": [
             {"centre_m": list(centre), "radius_m": radius}
             | dict(zip(names, map(asdict, compared.statistics(centre, radius)), strict=True))
-            for centre, radius in places
+            for centre, radius in regions
         ],
     }
 
@@ -125,7 +125,7 @@ def _figures(compared: Comparison, places: list[tuple[tuple[float, ...], float]]
 def _region(text: str) -> tuple[tuple[float, ...], float]:
     """Centre and radius, m, of an option in mm."""
     try:
-        *centre, radius = (1e-3 * float(part) for part in text.split(","))
+        *centre, radius = (1e-3 * float(number) for number in text.split(","))
     except ValueError:
         raise InvalidInput("--region", repr(text), REGION) from None
     if len(centre) not in (2, 3) or not all(map(math.isfinite, centre)) or not 0.0 < radius < math.inf:
@@ -137,7 +137,7 @@ def _row(
     name: str, image: RegionStatistics, truth: RegionStatistics, unit: str, dimensions: int
 ) -> tuple[str, ...]:
     size = f"{1e6 * image.size:.4g} mm²" if dimensions == 2 else f"{1e9 * image.size:.4g} mm³"
-    means = [f"{one.mean:.6g} ± {one.spread:.3g} {unit}" for one in (image, truth)]
+    means = [f"{region.mean:.6g} ± {region.spread:.3g} {unit}" for region in (image, truth)]
     if image.uncertainty is not None:
         means[0] += f", uncertain by {image.uncertainty:.2g}"
     contrasts = ["none" if one.contrast is None else f"{one.contrast:+.4g} {unit}" for one in (image, truth)]

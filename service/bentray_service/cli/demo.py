@@ -78,11 +78,11 @@ def demo(
                 client, sent.id, name, {**options, "nodes": nodes}, folder
             )
     assert dataset.truth is not None
-    found = {name: figures(result, dataset, seconds[name]) for name, result in results.items()}
+    record = {name: figures(result, dataset, seconds[name]) for name, result in results.items()}
     picture = folder / "comparison.png"
     write_bytes(picture, comparison_png(dataset.truth, results, dataset.roi))
-    _show(found, picture, time.perf_counter() - started, as_json)
-    straight, bent = (found[name]["truth"]["mean_absolute_error_of_range"] for name in JOBS)
+    _show(record, picture, time.perf_counter() - started, as_json)
+    straight, bent = (record[name]["truth"]["mean_absolute_error_of_range"] for name in JOBS)
     if not bent < straight:
         raise WorkFailed(
             f"bent rays ({100 * bent:.1f} %) are not better than straight rays ({100 * straight:.1f} %)"
@@ -100,9 +100,9 @@ def _reconstruct(
     return read_reconstruction(path), job.seconds or 0.0
 
 
-def _show(found: dict[str, dict[str, Any]], picture: Path, seconds: float, as_json: bool) -> None:
+def _show(record: dict[str, dict[str, Any]], picture: Path, seconds: float, as_json: bool) -> None:
     if as_json:
-        print_json({"jobs": found, "picture": str(picture), "seconds": round(seconds, 3)})
+        print_json({"jobs": record, "picture": str(picture), "seconds": round(seconds, 3)})
         return
     rows = [
         (
@@ -112,7 +112,7 @@ def _show(found: dict[str, dict[str, Any]], picture: Path, seconds: float, as_js
             f"{figures['residual_rms_s'] * 1e9:.0f} ns",
             f"{figures['seconds']:.1f} s",
         )
-        for name, figures in found.items()
+        for name, figures in record.items()
     ]
     columns = ("rays", "mean abs. error of range", "rms error", "residual", "time")
     print_table("2-D breast phantom (Li 2008, Table 6), inside the breast", columns, rows, columns[1:])

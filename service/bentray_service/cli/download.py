@@ -52,7 +52,7 @@ def download(
     }
     if not stored.startswith(("vol-", "ds-")):
         raise InvalidInput("id", repr(stored), "the id of a scan (ds-…) or a volume (vol-…)")
-    names: dict[str, FormatName] = {**{one: one for one in formats.values()}, "h5": "hdf5"}
+    names: dict[str, FormatName] = {**{name: name for name in formats.values()}, "h5": "hdf5"}
     if form is not None and form not in names:
         raise InvalidInput("format", repr(form), "one of " + ", ".join(names))
     chosen = formats.get(output.suffix.lower()) if form is None else names[form]

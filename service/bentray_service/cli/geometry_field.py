@@ -67,10 +67,10 @@ def geometry_field(
     with progress_bar("Drawing") as step:
         outputs = _draw(target, view, folder, step)
     seconds = {"make_seconds": made - started, "draw_seconds": time.perf_counter() - made}
-    found = {"mesh": str(source), **summary, **settings.plain(), "figures": figures, **seconds}
-    found |= {"view": view.plain(), "outputs": {"field": str(target), **outputs}}
-    write_json(folder / "geometry-field.json", found)
-    _show(source, found, as_json=as_json)
+    record = {"mesh": str(source), **summary, **settings.plain(), "figures": figures, **seconds}
+    record |= {"view": view.plain(), "outputs": {"field": str(target), **outputs}}
+    write_json(folder / "geometry-field.json", record)
+    _show(source, record, as_json=as_json)
 
 
 def _draw(field: Path, view: FieldView, folder: Path, step: Step) -> dict[str, str]:
@@ -99,22 +99,22 @@ def _draw(field: Path, view: FieldView, folder: Path, step: Step) -> dict[str, s
     return {name.replace("-", "_"): str(folder / f"{name}.png") for name in draw}
 
 
-def _show(source: Path, found: dict[str, Any], *, as_json: bool) -> None:
+def _show(source: Path, record: dict[str, Any], *, as_json: bool) -> None:
     if as_json:
-        print_json(found)
+        print_json(record)
         return
-    figures = found["figures"]
-    mended = ", ".join(f"{n} {what.replace('_', ' ')}" for what, n in found["repairs"].items() if n)
-    kind = "closed" if found["holes"] == 0 else f"{found['holes']} holes"
+    figures = record["figures"]
+    mended = ", ".join(f"{n} {what.replace('_', ' ')}" for what, n in record["repairs"].items() if n)
+    kind = "closed" if record["holes"] == 0 else f"{record['holes']} holes"
     tables = (figures["outer_bytes"] + figures["inner_bytes"]) / 1e6
     rows = [
-        ("mesh", f"{found['faces']} faces, {kind}, genus {found['genus']}"),
+        ("mesh", f"{record['faces']} faces, {kind}, genus {record['genus']}"),
         ("mended", mended or "nothing"),
         ("geometry image", f"{figures['image_pixels']}², rms error {figures['image_rms']:.1e} of the cube"),
-        ("tables", f"{found['samples']} samples along an edge, {tables:.0f} MB"),
+        ("tables", f"{record['samples']} samples along an edge, {tables:.0f} MB"),
         ("wrong hits and misses", f"{100.0 * figures['lookup_wrong']:.2f} % of random rays"),
         ("error of the others", f"{figures['lookup_median']:.1e} of the cube, median"),
-        ("time", f"{found['make_seconds']:.1f} s to build, {found['draw_seconds']:.1f} s to render"),
+        ("time", f"{record['make_seconds']:.1f} s to build, {record['draw_seconds']:.1f} s to render"),
     ]
     print_table(f"Geometry field of {source.name}", ("figure", "value"), rows)
-    print_lines(found["outputs"].values())
+    print_lines(record["outputs"].values())

@@ -55,42 +55,42 @@ def quality(
     calibration = None
     with dataset_file(source, given, folder) as scan, progress_bar("Examining") as step:
         if calibrate is None:
-            found = examine_file(scan, picker, step, max_left_out=max_left_out)
+            report = examine_file(scan, picker, step, max_left_out=max_left_out)
         else:
             fitted_speed = calibrate == "fitted"
-            found, calibration = calibrate_file(
+            report, calibration = calibrate_file(
                 scan, picker, step, fit_speed=fitted_speed, max_left_out=max_left_out
             )
     paths = {kind: folder / f"quality.{kind}" for kind in ("json", "png")}
-    if found.picked is not None:
+    if report.picked is not None:
         paths["h5"] = folder / "picked.h5"
-        write_dataset(paths["h5"], found.picked)
+        write_dataset(paths["h5"], report.picked)
     if calibration is not None:
         paths["calibration"] = folder / "calibration.json"
         fitted = json.dumps(calibration.to_dict(), indent=2, allow_nan=False) + "\n"
         write_bytes(paths["calibration"], fitted.encode())
     summary: dict[str, Any] = {
         "file": str(source),
-        **found.report,
+        **report.report,
         "outputs": {kind: str(path) for kind, path in paths.items()},
     }
-    write_bytes(paths["png"], found.page)
+    write_bytes(paths["png"], report.page)
     write_bytes(paths["json"], (json.dumps(summary, indent=2, allow_nan=False) + "\n").encode())
     if as_json:
         print_json(summary)
     else:
-        lines = [(f["check"], f["found"], _elements(f), f["action"]) for f in found.report["findings"]]
-        title = f"{source.name}: {found.report['verdict']}"
+        lines = [(f["check"], f["found"], _elements(f), f["action"]) for f in report.report["findings"]]
+        title = f"{source.name}: {report.report['verdict']}"
         if lines:
             print_table(title, ("check", "found", "elements", "done"), lines)
         else:
             print_lines([title])
-        checked = f"checked: {', '.join(found.report['checked'])}"
-        usable = f"{found.report['usable_pairs']} of {found.report['pairs']} pairs usable"
-        excluded = [f"not checked: {name}, {why}" for name, why in found.report["not_checked"].items()]
+        checked = f"checked: {', '.join(report.report['checked'])}"
+        usable = f"{report.report['usable_pairs']} of {report.report['pairs']} pairs usable"
+        excluded = [f"not checked: {name}, {why}" for name, why in report.report["not_checked"].items()]
         print_lines([checked, *excluded, usable, *summary["outputs"].values()])
-    if found.picked is None:
-        refused = next(f for f in found.report["findings"] if f["action"] == "refused")
+    if report.picked is None:
+        refused = next(f for f in report.report["findings"] if f["action"] == "refused")
         raise WorkFailed(f"{refused['check']}: {refused['found']}; accepted: {refused['accepted']}")
 
 

@@ -74,8 +74,8 @@ def render(
     from bentray_kernels.opencl import check_available
 
     if (file is None) == (phantom is None):
-        found = "neither a file nor --phantom" if file is None else "a file and --phantom"
-        raise InvalidInput("file", found, "one of the two")
+        shown = "neither a file nor --phantom" if file is None else "a file and --phantom"
+        raise InvalidInput("file", shown, "one of the two")
     if phantom is not None:
         _refuse({"--shape": shape, "--dtype": dtype, "--spacing": spacing})
     view, picture = options.view()
@@ -177,8 +177,8 @@ def _joined(strips: list[Tile]) -> tuple[Colours, Any]:
     """The image, and the backdrop position of each pixel; None for a shaded image."""
     import numpy as np
 
-    positions = [one.position_m for one in strips if one.position_m is not None]
-    image = np.concatenate([one.image for one in strips])
+    positions = [strip.position_m for strip in strips if strip.position_m is not None]
+    image = np.concatenate([strip.image for strip in strips])
     return image, np.concatenate(positions) if positions else None
 
 
@@ -204,7 +204,7 @@ def _show(
     rays = view.width * view.height * view.times**2
     outputs = [str(path) for path in (png, placed) if path is not None]
     if as_json:
-        found = {
+        record = {
             "output": str(png),
             "map": None if placed is None else str(placed),
             "shape": list(volume.values.shape),
@@ -215,7 +215,7 @@ def _show(
             "render_seconds": round(seconds[1], 4),
             "view": view.plain(),
         }
-        print_json(found)
+        print_json(record)
         return
     low, high = volume.range()
     surfaces = ", ".join(f"{iso:g} (index {n:g})" for iso, n in zip(view.iso, view.indices, strict=True))

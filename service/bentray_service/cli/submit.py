@@ -113,8 +113,8 @@ def submit(
             "output", f"{output} with --no-wait", "one of the two: there is no result to download yet"
         )
     if webhook is not None and (batch is not None or wait):
-        found = "an address with --batch" if batch is not None else "an address without --no-wait"
-        raise InvalidInput("webhook", found, "FILE with --no-wait")
+        shown = "an address with --batch" if batch is not None else "an address without --no-wait"
+        raise InvalidInput("webhook", shown, "FILE with --no-wait")
     settings = settings_from(options)
     given = scan_options.metadata()
     if file is not None:
@@ -127,12 +127,12 @@ def submit(
         from .service_batch import submit_service_batch
 
         entries = submit_service_batch(batch, url, settings, given, output, wait=wait, as_json=as_json)
-        end_doubtful(sum(bool(one.doubt) for one in entries), len(entries), accepted=accept_doubtful)
+        end_doubtful(sum(bool(entry.doubt) for entry in entries), len(entries), accepted=accept_doubtful)
     elif batch is not None and scheduler is not None:
         from .batch import submit_batch
 
         entries = submit_batch(batch, scheduler, settings, given, output, at_once, tls, as_json=as_json)
-        end_doubtful(sum(bool(one.doubt) for one in entries), len(entries), accepted=accept_doubtful)
+        end_doubtful(sum(bool(entry.doubt) for entry in entries), len(entries), accepted=accept_doubtful)
 
 
 def _submit(
@@ -190,5 +190,5 @@ def _report(source: Path, scan: Path, folder: Path, volume: Path, job: JobRecord
     # The ground truth is in the local file only.
     dataset = read_dataset(scan, traces=False)
     result = read_reconstruction(volume)
-    found = write_results(folder, result, dataset, job.seconds or 0.0, file=str(source), job=job.id)
-    show_results(f"Reconstruction of {source.name}", found, as_json=as_json)
+    record = write_results(folder, result, dataset, job.seconds or 0.0, file=str(source), job=job.id)
+    show_results(f"Reconstruction of {source.name}", record, as_json=as_json)

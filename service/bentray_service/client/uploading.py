@@ -43,15 +43,15 @@ def send_file(
     except OSError as error:
         raise _unreadable(path, error) from error
     if resume is None:
-        place = yield from _begin(total, {"filename": path.name, **metadata, "kind": kind})
+        location = yield from _begin(total, {"filename": path.name, **metadata, "kind": kind})
     else:
-        place = f"/v1/uploads/{resume}"
+        location = f"/v1/uploads/{resume}"
     try:
-        yield from _send(path, place, total, on_progress)
+        yield from _send(path, location, total, on_progress)
     except ClientError as error:
-        error.upload = place.rpartition("/")[2]
+        error.upload = location.rpartition("/")[2]
         raise
-    return (yield from _read(place))
+    return (yield from _read(location))
 
 
 def send_direct(
@@ -70,11 +70,11 @@ def send_direct(
         # Asked for one by one, since addresses expire.
         asked = {"json": {"numbers": [number]}}
         response = yield RequestStep("POST", upload.links["parts"], asked, repeatable=True)
-        part = PartAddresses.model_validate_json(response.content).parts[0]
+        piece = PartAddresses.model_validate_json(response.content).parts[0]
         begin = (number - 1) * upload.part_bytes
-        headers = {"Content-Length": str(part.bytes)}
-        chunks = _chunks(path, begin, begin + part.bytes, on_progress, total)
-        yield RequestStep("PUT", part.url, {"headers": headers}, chunks, repeatable=True)
+        headers = {"Content-Length": str(piece.bytes)}
+        chunks = _chunks(path, begin, begin + piece.bytes, on_progress, total)
+        yield RequestStep("PUT", piece.url, {"headers": headers}, chunks, repeatable=True)
     yield RequestStep("POST", upload.links["complete"], repeatable=True)
     return (yield from _read(upload.links["self"]))
 
@@ -87,21 +87,21 @@ def _begin(total: int, said: Mapping[str, str]) -> Flow[str]:
     return httpx.URL(response.headers["Location"]).path
 
 
-def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Flow[None]:
+def _send(path: Path, where: str, total: int, on_progress: OnBytes | None) -> Flow[None]:
     """Send the missing data, with retries."""
     failures, reached, pause = 0, -1, FIRST_PAUSE_S
     while True:
         try:
-            there = yield RequestStep("HEAD", place, {"headers": TUS}, repeatable=True)
+            there = yield RequestStep("HEAD", where, {"headers": TUS}, repeatable=True)
             offset, length = int(there.headers["Upload-Offset"]), int(there.headers["Upload-Length"])
             if length != total:
-                raise ClientError(f"{path} has {total} bytes, but the upload at {place} has {length}")
+                raise ClientError(f"{path} has {total} bytes, but the upload at {where} has {length}")
             if offset > reached:
                 failures, reached, pause = 0, offset, FIRST_PAUSE_S
             if offset == total:
                 return
             headers = {**TUS, **PIECE, "Upload-Offset": str(offset), "Content-Length": str(total - offset)}
-            yield RequestStep("PATCH", place, {"headers": headers}, _chunks(path, offset, total, on_progress))
+            yield RequestStep("PATCH", where, {"headers": headers}, _chunks(path, offset, total, on_progress))
             return
         except ClientError as error:
             # Locked: the service has not yet noticed that the previous connection is broken.
@@ -114,11 +114,11 @@ def _send(path: Path, place: str, total: int, on_progress: OnBytes | None) -> Fl
         pause = min(2.0 * pause, LONGEST_PAUSE_S)
 
 
-def _read(place: str) -> Flow[httpx.Response]:
+def _read(where: str) -> Flow[httpx.Response]:
     """Wait until the service has ingested the upload."""
     pause = FIRST_LOOK_S
     while True:
-        record = UploadRecord.model_validate_json((yield RequestStep("GET", place, repeatable=True)).content)
+        record = UploadRecord.model_validate_json((yield RequestStep("GET", where, repeatable=True)).content)
         if record.state == "done":
             result: httpx.Response = yield RequestStep("GET", record.links["result"], repeatable=True)
             return result

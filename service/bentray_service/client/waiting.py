@@ -20,9 +20,9 @@ def wait_for(
 ) -> Flow[JobRecord]:
     """Wait until a job has succeeded; the result is its record."""
     deadline = None if timeout_s is None else time.monotonic() + timeout_s
-    place, broken = f"/v1/jobs/{job_id}", 0
+    path, broken = f"/v1/jobs/{job_id}", 0
     while True:
-        response = yield RequestStep("GET", place, repeatable=True, until=deadline)
+        response = yield RequestStep("GET", path, repeatable=True, until=deadline)
         job = JobRecord.model_validate_json(response.content)
         if on_progress is not None:
             on_progress(job)
@@ -38,7 +38,7 @@ def wait_for(
             left = SILENCE_S if deadline is None else deadline - time.monotonic()
             try:
                 if not (
-                    yield from _wait_event(f"{place}/events", max(poll_s, min(SILENCE_S, left)), deadline)
+                    yield from _wait_event(f"{path}/events", max(poll_s, min(SILENCE_S, left)), deadline)
                 ):
                     broken += 1
                 else:
@@ -49,10 +49,10 @@ def wait_for(
         yield PauseStep(poll_s)
 
 
-def _wait_event(place: str, seconds: float, deadline: float | None) -> Flow[bool]:
+def _wait_event(path: str, seconds: float, deadline: float | None) -> Flow[bool]:
     """Wait for an event or the deadline; False at the end of the stream."""
     while deadline is None or time.monotonic() <= deadline:
-        line = yield EventStep(place, seconds)
+        line = yield EventStep(path, seconds)
         if line is None:
             return False
         if line.startswith("data:"):

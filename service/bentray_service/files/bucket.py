@@ -68,17 +68,17 @@ class Bucket:
         """
         self.url = url.rstrip("/")
         with self._watched():
-            known = _aws_files() if self.url.startswith("s3:") else {}
-            self._store = _client(self.url, ANSWER_S, **known)
-            self._transfers = _client(self.url, TRANSFER_S, **known)
+            credentials = _aws_files() if self.url.startswith("s3:") else {}
+            self._store = _client(self.url, ANSWER_S, **credentials)
+            self._transfers = _client(self.url, TRANSFER_S, **credentials)
             # The host is signed, too, so that addresses cannot be rewritten afterwards.
             if public_endpoint is not None:
-                known["endpoint_url"] = public_endpoint
-            self._signing: Any = _client(self.url, ANSWER_S, **known)
+                credentials["endpoint_url"] = public_endpoint
+            self._signing: Any = _client(self.url, ANSWER_S, **credentials)
 
     def put(self, path: Path, key: str, metadata: Mapping[str, str]) -> None:
         """Upload a file with metadata; the object is complete or absent."""
-        part = max(PART_BYTES, -(-path.stat().st_size // MAX_PARTS))
+        chunk_bytes = max(PART_BYTES, -(-path.stat().st_size // MAX_PARTS))
         attributes = dict(metadata)
         with self._watched():
             obstore.put(
@@ -86,7 +86,7 @@ class Bucket:
                 key,
                 path,
                 attributes=attributes,
-                chunk_size=part,
+                chunk_size=chunk_bytes,
                 max_concurrency=PARTS_AT_ONCE,
             )
 
@@ -129,8 +129,8 @@ class Bucket:
                 page = next(pages, None)
             if page is None:
                 return
-            for one in page:
-                yield BucketObject(one["path"], one["size"], one["last_modified"].timestamp())
+            for entry in page:
+                yield BucketObject(entry["path"], entry["size"], entry["last_modified"].timestamp())
 
     def remove(self, keys: Collection[str]) -> None:
         """Delete objects; missing ones are ignored."""
@@ -167,15 +167,15 @@ class Bucket:
 def _aws_files() -> dict[str, str]:
     """Settings of the profile in the files of AWS, without those that a variable states."""
     profile = os.environ.get("AWS_PROFILE", "default")
-    known: dict[str, str] = {}
+    settings: dict[str, str] = {}
     for name, file in (("AWS_SHARED_CREDENTIALS_FILE", "credentials"), ("AWS_CONFIG_FILE", "config")):
         parser = configparser.RawConfigParser()
         # Without a home the path does not exist.
         parser.read(os.environ.get(name) or os.path.expanduser(f"~/.aws/{file}"))  # noqa: PTH111
         for section in (profile, f"profile {profile}"):
-            known |= dict(parser[section]) if parser.has_section(section) else {}
+            settings |= dict(parser[section]) if parser.has_section(section) else {}
     stated = {name for name, variable in AWS_SETTINGS.items() if variable in os.environ}
-    return {name: known[name] for name in AWS_SETTINGS.keys() & known.keys() - stated}
+    return {name: settings[name] for name in AWS_SETTINGS.keys() & settings.keys() - stated}
 
 
 def _client(url: str, seconds: float, **more: str) -> ObjectStore:

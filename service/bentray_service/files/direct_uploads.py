@@ -41,8 +41,8 @@ class DirectUploads:
 
     def received(self, row: UploadRow) -> dict[int, int]:
         """Sizes of the parts in the bucket by number, in their order."""
-        held = sorted(self._bucket.listed(_folder(row)), key=lambda one: one.key)
-        return {int(one.key.rpartition("/")[2]): one.size for one in held}
+        held = sorted(self._bucket.listed(_folder(row)), key=lambda item: item.key)
+        return {int(piece.key.rpartition("/")[2]): piece.size for piece in held}
 
     def fetch(self, row: UploadRow, path: Path) -> None:
         """Download all parts to ``path``, one after the other.
@@ -61,7 +61,7 @@ class DirectUploads:
         Raises:
             StorageUnavailable: when they cannot be deleted now.
         """
-        self._bucket.remove([one.key for one in self._bucket.listed(_folder(row))])
+        self._bucket.remove([piece.key for piece in self._bucket.listed(_folder(row))])
 
     def drop_later(self, row: UploadRow) -> None:
         """Delete all parts; if that is not possible now, ``tidy`` does it."""
@@ -74,9 +74,9 @@ class DirectUploads:
         """Delete old data of uploads that are not among ``ids()``, from services that died."""
         held = list(self._bucket.listed(FOLDER))
         # Queried last: the row of an upload is older than its data.
-        known, now = ids(), time.time()
-        unknown = [one for one in held if one.key.removeprefix(FOLDER).partition("/")[0] not in known]
-        self._bucket.remove([one.key for one in unknown if now - one.changed > FORGOTTEN_S])
+        current, now = ids(), time.time()
+        unknown = [piece for piece in held if piece.key.removeprefix(FOLDER).partition("/")[0] not in current]
+        self._bucket.remove([piece.key for piece in unknown if now - piece.changed > FORGOTTEN_S])
 
 
 def part_sizes(length: int) -> list[int]:

@@ -112,8 +112,8 @@ async def append(
         size = await write_body(stream, file, length - offset, accepted, digest)
         if checksum is not None and digest is not None:
             if not hmac.compare_digest(digest.digest(), checksum.digest):
-                found = base64.b64encode(digest.digest()).decode()
-                raise WrongChecksum("body", f"{checksum.algorithm} {found}", "the value of Upload-Checksum")
+                value = base64.b64encode(digest.digest()).decode()
+                raise WrongChecksum("body", f"{checksum.algorithm} {value}", "the value of Upload-Checksum")
             await run_in_threadpool(_verified, path)
     finally:
         await run_in_threadpool(file.close)

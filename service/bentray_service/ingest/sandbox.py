@@ -100,8 +100,8 @@ def ingest(
         finally:
             _kill(process)
         if outcome is None:
-            found = f"a file that takes longer than {WALL * seconds:g} s to read"
-            raise InvalidInput("file", found, ACCEPTED[what])
+            slow_file = f"a file that takes longer than {WALL * seconds:g} s to read"
+            raise InvalidInput("file", slow_file, ACCEPTED[what])
         if process.returncode != 0:
             complaint.seek(0)
             output = complaint.read(LONGEST_COMPLAINT).decode(errors="replace")

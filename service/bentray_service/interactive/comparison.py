@@ -55,8 +55,8 @@ class Comparison(comparison.Comparison):
         ]
         limits = robust_limits([self.image[self.region], self.other[self.region]])
         label = f"{self.quantity} ({self.unit})"
-        for place, plane, name in zip(axes[:2], planes[:2], self.names, strict=True):
-            draw_plane(place, plane, limits, colormap=SPEED, title=name.capitalize(), label=label)
+        for panel, plane, name in zip(axes[:2], planes[:2], self.names, strict=True):
+            draw_plane(panel, plane, limits, colormap=SPEED, title=name.capitalize(), label=label)
         spread = symmetric_limits([self.difference[self.region]])
         title, label = f"Difference: {self.rms:.3g} {self.unit} rms", f"difference ({self.unit})"
         draw_plane(axes[2], planes[2], spread, colormap=DIFFERENCE, title=title, label=label)

@@ -98,7 +98,7 @@ def _in_notebook(description: str, display: Any) -> Iterator[Step]:
 
 def bar_html(description: str, done: int, total: int, note: str = "") -> str:
     """The bar in HTML; it moves without a value while the total is unknown."""
-    place = f' value="{done}" max="{total}"' if total else ""
+    value = f' value="{done}" max="{total}"' if total else ""
     count = f"{done}/{total}" if total else ""
-    words = " ".join(html.escape(part) for part in (count, note) if part)
-    return f"{html.escape(description)} <progress{place}></progress> {words}"
+    words = " ".join(html.escape(word) for word in (count, note) if word)
+    return f"{html.escape(description)} <progress{value}></progress> {words}"

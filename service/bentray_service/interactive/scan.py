@@ -114,7 +114,7 @@ class Scan:
         if own.sampling_rate_hz is not None:
             rows.append(("sampling rate", f"{1e-6 * own.sampling_rate_hz:.3g} MHz"))
         size = np.ptp(own.element_position_m, axis=0) * 1e3
-        rows.append(("array", " x ".join(f"{one:.1f}" for one in size) + " mm"))
+        rows.append(("array", " x ".join(f"{length:.1f}" for length in size) + " mm"))
         rows += [("source", own.source), ("licence", own.license)]
         return figures_html(own.title or self.name, [row for row in rows if row[1]])
 

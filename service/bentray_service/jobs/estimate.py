@@ -48,13 +48,13 @@ def estimate(plan: Mapping[str, Any] | None, finished: Sequence[tuple[Mapping[st
     planned = _work(plan)
     if planned is None:
         return Estimate(None, 0, "No estimate yet: jobs of this kind are not counted.")
-    name, seconds, known = planned
+    name, seconds, measurable = planned
     counted = [(work, took) for other, took in finished if (work := _work(other)) is not None]
     ratios = [took / work[1] for work, took in counted if work[0] == name][:COMPARED]
     if ratios:
         jobs = "one finished job" if len(ratios) == 1 else f"{len(ratios)} finished jobs"
         return Estimate(median(ratios) * seconds / 60.0, len(ratios), f"From {jobs} of the same method.")
-    if not known:
+    if not measurable:
         return Estimate(None, 0, "No estimate yet: no job of this method has finished here.")
     none = "no job of this method has finished here."
     others = [(work[1], took) for work, took in counted if work[2]][:COMPARED]

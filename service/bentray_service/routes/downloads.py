@@ -81,9 +81,9 @@ def file_status(path: Path) -> os.stat_result:
 
 def unchanged(request: Request, tag: str) -> Response | None:
     """A 304 response if the client has the current version, else None."""
-    known = request.headers.get("if-none-match")
+    tags = request.headers.get("if-none-match")
     # "*" matches any version.
-    if known is not None and (tag in known or known.strip() == "*"):
+    if tags is not None and (tag in tags or tags.strip() == "*"):
         return Response(status_code=304, headers=headers_of(tag))
     return None
 
@@ -123,23 +123,23 @@ class OpenFile(FileResponse):
         self._whole = whole
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        headers = [one for one in scope["headers"] if not (self._whole and one[0] == b"range")]
+        headers = [header for header in scope["headers"] if not (self._whole and header[0] == b"range")]
         with self._file:
             await super().__call__({**scope, "headers": headers}, receive, send)
 
 
 def _wants_range(request: Request, tag: str, size: int) -> bool:
     """Whether to send a range; raises RangeNotSatisfiable."""
-    part = ONE_PART.fullmatch(request.headers.get("range", ""))
-    if part is None or part.groups() == ("", ""):
+    match = ONE_PART.fullmatch(request.headers.get("range", ""))
+    if match is None or match.groups() == ("", ""):
         return False
     # Without a matching ETag the whole file is sent.
     if request.headers.get("if-range", tag) != tag:
         return False
-    first, last = part.groups()
+    first, last = match.groups()
     if first and last and int(last) < int(first):
         return False
     begins_inside = int(first) < size if first else int(last) > 0
     if not begins_inside:
-        raise RangeNotSatisfiable(part.group(), size)
+        raise RangeNotSatisfiable(match.group(), size)
     return True

@@ -40,14 +40,14 @@ def networks(words: str, setting: str = "BENTRAY_TRUSTED_PROXIES") -> tuple[Netw
     Raises:
         InvalidInput: naming the setting.
     """
-    found = []
-    for word in filter(None, (part.strip() for part in words.split(","))):
+    parsed = []
+    for word in filter(None, (entry.strip() for entry in words.split(","))):
         try:
-            found.append(ipaddress.ip_network(word))
+            parsed.append(ipaddress.ip_network(word))
         except ValueError:
             accepted = "addresses or networks, as 10.0.0.7,10.1.0.0/16"
             raise InvalidInput(setting, repr(word[:80]), accepted) from None
-    return tuple(found)
+    return tuple(parsed)
 
 
 def within(address: str, trusted: tuple[Network, ...]) -> bool:

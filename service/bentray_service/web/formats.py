@@ -25,7 +25,7 @@ REQUIRED = (
 def formats_page(version: str) -> str:
     """The formats of scans with their variables, and those of volumes and meshes, as one HTML page."""
     own = table(("Place", "Content"), REQUIRED)
-    readers = "".join(_reader(one.title, one.about, _variables(one.variables)) for one in READERS)
+    readers = "".join(_reader(reader.title, reader.about, _variables(reader.variables)) for reader in READERS)
     return document(
         "file formats",
         version,
@@ -44,4 +44,4 @@ def _reader(title: str, about: str, content: str) -> str:
 
 def _variables(variables: tuple[Variable, ...]) -> str:
     head = ("Variable", "Shape, type", "Unit", "Content", "Required")
-    return table(head, [(one.name, one.shape, one.unit, one.meaning, one.required) for one in variables])
+    return table(head, [(row.name, row.shape, row.unit, row.meaning, row.required) for row in variables])

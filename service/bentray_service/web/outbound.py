@@ -160,13 +160,13 @@ def _variable(kind: str) -> str:
 def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
     """The address that a host is, also in short or decimal form; None for a name."""
     try:
-        found = ipaddress.ip_address(host)
+        address = ipaddress.ip_address(host)
     except ValueError:
         try:
             return ipaddress.IPv4Address(socket.inet_aton(host))
         except (OSError, UnicodeError):
             return None
-    return getattr(found, "ipv4_mapped", None) or found
+    return getattr(address, "ipv4_mapped", None) or address
 
 
 def _is_this_machine(host: str) -> bool:
@@ -211,8 +211,8 @@ def _certificates(file: str, folders: str) -> ssl.SSLContext:
             ssl.create_default_context(cafile=file)
         except OSError as error:
             reason = "no certificate in it" if isinstance(error, ssl.SSLError) else error.strerror
-            found = f"{file} ({reason})"
-            raise InvalidInput("SSL_CERT_FILE", found, ACCEPTED_FILE) from None
+            given = f"{file} ({reason})"
+            raise InvalidInput("SSL_CERT_FILE", given, ACCEPTED_FILE) from None
     if folders and not any(Path(folder).is_dir() for folder in folders.split(os.pathsep)):
         raise InvalidInput("SSL_CERT_DIR", f"{folders} (no such folder)", ACCEPTED_FOLDER)
     # OpenSSL reads both variables itself; without them httpx brings the authorities of certifi.

@@ -43,8 +43,8 @@ UNICAST = ipaddress.ip_network("2000::/3")
 # Source: the IANA registries of special-purpose addresses for IPv4 and IPv6 (RFC 6890), as of 2025, whole:
 # also what is globally reachable there is infrastructure, as anycast relays and AS112, and no receiver.
 RESERVED = tuple(
-    ipaddress.ip_network(one)
-    for one in (
+    ipaddress.ip_network(network)
+    for network in (
         # This network, private use, shared (carriers), loopback, link-local.
         *("0.0.0.0/8", "10.0.0.0/8", "100.64.0.0/10", "127.0.0.0/8", "169.254.0.0/16", "172.16.0.0/12"),
         # IETF protocols, documentation, AS112, AMT, 6to4 relays, private use, AS112.
@@ -87,21 +87,21 @@ def check_url(url: str, permitted: Sequence[Network]) -> SplitResult:
     """
     shown = repr(url[:100])
     try:
-        parts = urlsplit(url)
-        port = parts.port
+        address = urlsplit(url)
+        port = address.port
     except ValueError:
         raise InvalidInput("webhook", shown, ACCEPTED) from None
-    host = parts.hostname or ""
+    host = address.hostname or ""
     plain = url.isascii() and url.isprintable() and " " not in url and len(url) <= LONGEST_URL
-    if not (plain and host and parts.scheme in ("http", "https") and port != 0):
+    if not (plain and host and address.scheme in ("http", "https") and port != 0):
         raise InvalidInput("webhook", shown, f"{ACCEPTED}, at most {LONGEST_URL} characters")
-    if parts.username is not None or parts.fragment:
+    if address.username is not None or address.fragment:
         raise InvalidInput("webhook", "an address with user or fragment", ACCEPTED)
-    if parts.scheme == "http" and not permitted:
+    if address.scheme == "http" and not permitted:
         raise InvalidInput("webhook", shown, f"{ACCEPTED} (http only within BENTRAY_WEBHOOK_NETWORKS)")
-    if _is_address(host) and not _is_permitted(host, parts.scheme, permitted):
+    if _is_address(host) and not _is_permitted(host, address.scheme, permitted):
         raise InvalidInput("webhook", shown, f"{ACCEPTED}, or within BENTRAY_WEBHOOK_NETWORKS")
-    return parts
+    return address
 
 
 def _is_address(host: str) -> bool:
@@ -117,8 +117,8 @@ def post(url: str, headers: Mapping[str, str], body: bytes, permitted: Sequence[
     begun = time.monotonic()
     status, error = None, ""
     try:
-        parts = check_url(url, permitted)
-        status = _exchange(parts, headers, body, permitted, begun + EXCHANGE_S)
+        address = check_url(url, permitted)
+        status = _exchange(address, headers, body, permitted, begun + EXCHANGE_S)
         if 300 <= status < 400:
             error = "redirects are not followed"
         elif not 200 <= status < 300:
@@ -141,25 +141,25 @@ def post(url: str, headers: Mapping[str, str], body: bytes, permitted: Sequence[
 
 
 def _exchange(
-    parts: SplitResult, headers: Mapping[str, str], body: bytes, permitted: Sequence[Network], end: float
+    receiver: SplitResult, headers: Mapping[str, str], body: bytes, permitted: Sequence[Network], end: float
 ) -> int:
     """Send a request to a checked address; returns the status of the response, whose body is not read.
 
     Args:
         end: of the exchange, on the monotonic clock.
     """
-    host = parts.hostname or ""
-    family, address = _permitted_address(host, parts, permitted)
+    host = receiver.hostname or ""
+    family, address = _permitted_address(host, receiver, permitted)
     shown = f"[{host}]" if ":" in host else host
-    if address[1] != (443 if parts.scheme == "https" else 80):
+    if address[1] != (443 if receiver.scheme == "https" else 80):
         shown += f":{address[1]}"
-    target = f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/"
+    target = f"{receiver.path or '/'}?{receiver.query}" if receiver.query else receiver.path or "/"
     lines = [("Host", shown), ("Content-Length", str(len(body))), ("Connection", "close"), *headers.items()]
     request = h11.Request(method="POST", target=target, headers=lines)
     with socket.socket(family, socket.SOCK_STREAM) as connection:
         connection.settimeout(min(CONNECT_S, _left(end)))
         connection.connect(address)
-        if parts.scheme != "https":
+        if receiver.scheme != "https":
             return _answer(connection, request, body, end)
         with certificates().wrap_socket(connection, server_hostname=host) as secured:
             return _answer(secured, request, body, end)
@@ -180,8 +180,8 @@ def _answer(connection: socket.socket, request: h11.Request, body: bytes, end: f
         piece = connection.recv(LONGEST_HEADERS)
         came += len(piece)
         if not piece or came > LONGEST_HEADERS:
-            found = f"more than {LONGEST_HEADERS} bytes of headers" if piece else "the connection was closed"
-            raise OSError(errno.EPROTO, found)
+            cause = f"more than {LONGEST_HEADERS} bytes of headers" if piece else "the connection was closed"
+            raise OSError(errno.EPROTO, cause)
         protocol.receive_data(piece)
     return event.status_code
 
@@ -199,18 +199,18 @@ def _left(end: float) -> float:
 
 
 def _permitted_address(
-    host: str, parts: SplitResult, permitted: Sequence[Network]
+    host: str, receiver: SplitResult, permitted: Sequence[Network]
 ) -> tuple[socket.AddressFamily, Any]:
     """The first permitted address of a host, as the functions of sockets take it."""
-    port = parts.port or (443 if parts.scheme == "https" else 80)
+    port = receiver.port or (443 if receiver.scheme == "https" else 80)
     try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        addresses = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
         raise InvalidInput("webhook", "a host name that is not known", ACCEPTED) from None
-    for family, _, _, _, address in found:
+    for family, _, _, _, address in addresses:
         text = str(address[0])
         # A zone belongs to an address of the local link only.
-        if "%" not in text and _is_permitted(text, parts.scheme, permitted):
+        if "%" not in text and _is_permitted(text, receiver.scheme, permitted):
             return family, address
     # The addresses themselves are not shown: names of the inner network are not for tenants.
     raise InvalidInput("webhook", "a host without a permitted address", ACCEPTED)

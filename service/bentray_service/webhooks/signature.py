@@ -60,8 +60,8 @@ def verify_webhook(
     try:
         timestamp = int(given.get("webhook-timestamp", ""))
     except ValueError:
-        found = repr(given.get("webhook-timestamp", "")[:40])
-        raise InvalidInput("webhook-timestamp", found, "seconds since 1970") from None
+        given_time = repr(given.get("webhook-timestamp", "")[:40])
+        raise InvalidInput("webhook-timestamp", given_time, "seconds since 1970") from None
     age = (time.time() if now is None else now) - timestamp
     if abs(age) > tolerance_s:
         raise InvalidInput("webhook-timestamp", f"{age:.0f} s ago", f"within {tolerance_s:g} s")
@@ -71,9 +71,9 @@ def verify_webhook(
         raise InvalidInput("body", "bytes that are not UTF-8", "a message as it was received") from None
     # Not ``Webhook.verify``, whose tolerance is fixed and whose errors name no field.
     expected = _signature(secret, given.get("webhook-id", ""), timestamp, text).encode()
-    signatures = [one for one in given.get("webhook-signature", "").split() if one.startswith("v1,")]
+    signatures = [word for word in given.get("webhook-signature", "").split() if word.startswith("v1,")]
     # All are compared, in constant time.
-    equal = [hmac.compare_digest(one.encode(), expected) for one in signatures]
+    equal = [hmac.compare_digest(signature.encode(), expected) for signature in signatures]
     if not any(equal):
         raise InvalidInput(
             "webhook-signature", f"{len(equal)} of version v1, none valid", "one by the secret"

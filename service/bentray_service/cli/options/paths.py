@@ -16,8 +16,8 @@ def input_file(path: Path, accepted: str = "the path of a dataset in HDF5") -> P
         InvalidInput: otherwise.
     """
     if not path.is_file():
-        found = "a folder" if path.is_dir() else "no such file"
-        raise InvalidInput("file", f"{path} ({found})", accepted)
+        reason = "a folder" if path.is_dir() else "no such file"
+        raise InvalidInput("file", f"{path} ({reason})", accepted)
     return path
 
 
@@ -61,8 +61,8 @@ def output_file(path: Path, *, force: bool, suffix: str = "") -> Path:
     try:
         _try_writing(path.parent)
     except OSError as error:
-        found = f"{path} (its folder: {error.strerror})"
-        raise InvalidInput("output", found, "a path in a writable folder") from error
+        given = f"{path} (its folder: {error.strerror})"
+        raise InvalidInput("output", given, "a path in a writable folder") from error
     return path
 
 

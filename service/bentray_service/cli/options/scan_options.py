@@ -64,13 +64,13 @@ def input_scan(path: Path) -> Path:
 
 
 @contextmanager
-def dataset_file(source: Path, given: ScanMetadata, beside: Path) -> Iterator[Path]:
+def dataset_file(source: Path, given: ScanMetadata, folder_of: Path) -> Iterator[Path]:
     """A dataset file with the scan: the file itself, or a temporary conversion of a foreign one.
 
     Args:
         source: of the scan.
         given: values of the options.
-        beside: existing folder for the temporary file.
+        folder_of: existing folder for the temporary file.
 
     Raises:
         InvalidInput: naming the first missing or wrong field.
@@ -80,7 +80,7 @@ def dataset_file(source: Path, given: ScanMetadata, beside: Path) -> Iterator[Pa
     if is_upload_format(source) and not given:
         yield source
         return
-    with TemporaryDirectory(dir=beside, prefix=".converted-") as folder:
+    with TemporaryDirectory(dir=folder_of, prefix=".converted-") as folder:
         converted = Path(folder) / f"{source.stem}.h5"
         convert_dataset(source, converted, given=given)
         yield converted

@@ -63,8 +63,8 @@ def live_table(entries: Sequence[Entry], height: int) -> Table:
 
 def cells(entry: Entry) -> tuple[str, ...]:
     """One row of the table."""
-    part = 100 * entry.done // entry.total if entry.total else 0
-    progress = f"{part} %" if entry.state in ("running", "failed") else ""
+    percent = 100 * entry.done // entry.total if entry.total else 0
+    progress = f"{percent} %" if entry.state in ("running", "failed") else ""
     misfit = residual_note(entry.residual_rms_s).removeprefix("residual ")
     seconds = "" if entry.state == "waiting" else f"{entry.seconds:.1f}"
     state = f"{entry.state}, doubtful" if entry.doubt else entry.state
@@ -81,10 +81,10 @@ def report(folder: Path, results: Path, entries: Sequence[Entry], *, as_json: bo
     failed = [entry for entry in entries if entry.state == "failed"]
     if as_json:
         states = {state: counts[state] for state in ("succeeded", "skipped", "failed")}
-        print_json({"folder": str(folder), **states, "datasets": [_figures(results, one) for one in entries]})
+        print_json({"folder": str(folder), **states, "datasets": [_figures(results, row) for row in entries]})
     else:
         print_table(f"Batch of {folder.name}", COLUMNS, [cells(entry) for entry in entries], NUMBERS)
-        print_lines(f"{one.name}: {one.reason or one.doubt}" for one in entries if one.reason or one.doubt)
+        print_lines(f"{row.name}: {row.reason or row.doubt}" for row in entries if row.reason or row.doubt)
         print_lines([str(results)])
     if failed:
         raise WorkFailed(f"{len(failed)} of {len(entries)} datasets failed: the reasons are above")

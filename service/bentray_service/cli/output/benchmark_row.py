@@ -95,10 +95,10 @@ class Row:
         if self.baselines:
             error = self.value if self.error is None else self.error
             row["error"] = None if error is None else float(error)
-            row["baselines"] = {name: float(one) for name, one in self.baselines.items()}
+            row["baselines"] = {name: float(value) for name, value in self.baselines.items()}
             row["tuned"] = self.tuned
         if self.figures:
-            row["figures"] = {name: float(one) for name, one in self.figures.items()}
+            row["figures"] = {name: float(value) for name, value in self.figures.items()}
         return row
 
     @property
@@ -106,7 +106,7 @@ class Row:
         """The detail, followed by the baselines."""
         if not self.baselines:
             return self.detail
-        beside = ", ".join(f"{name} {error:.3g}" for name, error in self.baselines.items())
+        baselines = ", ".join(f"{name} {error:.3g}" for name, error in self.baselines.items())
         kind = "tuned; " if self.tuned else ""
         lost = "; worse than a constant" if self.loses_to_constant else ""
-        return f"{kind}{self.detail}; beside {beside}{lost}"
+        return f"{kind}{self.detail}; beside {baselines}{lost}"

@@ -39,7 +39,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
     """
     return {
         "doubt": result.doubt,
-        "cautions": [asdict(one) for one in result.cautions],
+        "cautions": [asdict(caution) for caution in result.cautions],
         "seconds": round(seconds, 3),
         "slices": dataset.slices,
         "shape": list(result.speed.shape),
@@ -103,29 +103,29 @@ def _uncertainty_rms(result: Reconstruction) -> float | None:
     return float(np.sqrt((inside**2).mean())) if inside.size else 0.0
 
 
-def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
+def summary(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """Rows (name, value) of the summary table, from the result of ``figures``."""
-    low, high = found["speed_range_mps"]
+    low, high = facts["speed_range_mps"]
     rows = [
-        ("rays", found["settings"]["rays"]),
-        ("method", found["settings"]["method"]),
-        ("image", " by ".join(map(str, found["shape"])) + f" nodes of {found['spacing_m'][0] * 1e3:.3g} mm"),
-        ("speed", f"{low:.0f} to {high:.0f} m/s, in water of {found['water_speed_mps']:.1f} m/s"),
-        ("time", f"{found['seconds']:.1f} s"),
+        ("rays", facts["settings"]["rays"]),
+        ("method", facts["settings"]["method"]),
+        ("image", " by ".join(map(str, facts["shape"])) + f" nodes of {facts['spacing_m'][0] * 1e3:.3g} mm"),
+        ("speed", f"{low:.0f} to {high:.0f} m/s, in water of {facts['water_speed_mps']:.1f} m/s"),
+        ("time", f"{facts['seconds']:.1f} s"),
     ]
-    if found["residual_rms_s"] is not None:
-        rows.insert(4, ("residual", f"{found['residual_rms_s'] * 1e9:.0f} ns rms"))
-    if found["recovery_mean"] is not None:
-        rows.append(("resolution check", f"{100 * found['recovery_mean']:.0f} % of a checkerboard recovered"))
-    if found["uncertainty_rms_mps"] is not None:
-        width = 1e3 * float(np.median(found["resolution_width_m"]))
-        text = f"{found['uncertainty_rms_mps']:.1f} m/s rms, at a resolution width of {width:.1f} mm"
+    if facts["residual_rms_s"] is not None:
+        rows.insert(4, ("residual", f"{facts['residual_rms_s'] * 1e9:.0f} ns rms"))
+    if facts["recovery_mean"] is not None:
+        rows.append(("resolution check", f"{100 * facts['recovery_mean']:.0f} % of a checkerboard recovered"))
+    if facts["uncertainty_rms_mps"] is not None:
+        width = 1e3 * float(np.median(facts["resolution_width_m"]))
+        text = f"{facts['uncertainty_rms_mps']:.1f} m/s rms, at a resolution width of {width:.1f} mm"
         rows.append(("uncertainty", text))
-    if "pulse" in found["provenance"]:
-        rows.append(("pulse", found["provenance"]["pulse"]))
-    if found["provenance"].get("quality", NOTHING_FOUND) != NOTHING_FOUND:
-        rows.append(("scan", found["provenance"]["quality"]))
-    truth = found["truth"]
+    if "pulse" in facts["provenance"]:
+        rows.append(("pulse", facts["provenance"]["pulse"]))
+    if facts["provenance"].get("quality", NOTHING_FOUND) != NOTHING_FOUND:
+        rows.append(("scan", facts["provenance"]["quality"]))
+    truth = facts["truth"]
     if truth is not None:
         if truth.get("mean_absolute_error_of_range") is not None:
             rows.append(
@@ -134,8 +134,8 @@ def summary(found: dict[str, Any]) -> list[tuple[str, str]]:
         if "rmse_mps" in truth:
             rows.append(("rms error", f"{truth['rmse_mps']:.1f} m/s"))
             similarities = {"SSIM": truth["ssim"], "correlation": truth["correlation"]}
-            known = [f"{name} {value:.3f}" for name, value in similarities.items() if math.isfinite(value)]
-            if known:
-                rows.append(("similarity", ", ".join(known)))
+            finite = [f"{name} {value:.3f}" for name, value in similarities.items() if math.isfinite(value)]
+            if finite:
+                rows.append(("similarity", ", ".join(finite)))
         rows.append(("error region", truth["region"]))
     return rows

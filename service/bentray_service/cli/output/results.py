@@ -34,7 +34,7 @@ def write_results(
     from .figures import figures
 
     paths = {kind: folder / f"reconstruction.{kind}" for kind in ("h5", "png", "json")}
-    found = {
+    facts = {
         **more,
         **figures(result, dataset, seconds),
         "outputs": {kind: str(path) for kind, path in paths.items()},
@@ -42,11 +42,11 @@ def write_results(
     write_reconstruction(paths["h5"], result)
     png = report_png(result, dataset.truth, dataset.roi) if draw is None else draw()
     write_bytes(paths["png"], png)
-    write_bytes(paths["json"], (json.dumps(without_nan(found), indent=2, allow_nan=False) + "\n").encode())
-    return found
+    write_bytes(paths["json"], (json.dumps(without_nan(facts), indent=2, allow_nan=False) + "\n").encode())
+    return facts
 
 
-def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
+def show_results(title: str, facts: dict[str, Any], *, as_json: bool) -> None:
     """Print the summary table, the choice of ``auto`` and the paths; or all metrics as JSON.
 
     What makes the image doubtful comes first, then what offsets all speeds or blurs it: an assumption about
@@ -55,12 +55,12 @@ def show_results(title: str, found: dict[str, Any], *, as_json: bool) -> None:
     from .figures import summary
 
     if as_json:
-        print_json(found)
+        print_json(facts)
         return
-    print_lines(filter(None, [found["doubt"]]))
-    print_lines(found["provenance"][name] for name in ("water", "geometry") if name in found["provenance"])
-    print_lines(one["text"] for one in found["cautions"] if not one["doubtful"])
-    print_table(title, ("figure", "value"), summary(found))
-    if found["candidates"]:
-        print_table("", ("candidate", "held-out misfit", "result"), found["candidates"], {"held-out misfit"})
-    print_lines([*([found["reason"]] if found["reason"] else []), *found["outputs"].values()])
+    print_lines(filter(None, [facts["doubt"]]))
+    print_lines(facts["provenance"][name] for name in ("water", "geometry") if name in facts["provenance"])
+    print_lines(caution["text"] for caution in facts["cautions"] if not caution["doubtful"])
+    print_table(title, ("figure", "value"), summary(facts))
+    if facts["candidates"]:
+        print_table("", ("candidate", "held-out misfit", "result"), facts["candidates"], {"held-out misfit"})
+    print_lines([*([facts["reason"]] if facts["reason"] else []), *facts["outputs"].values()])

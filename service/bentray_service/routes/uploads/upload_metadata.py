@@ -142,7 +142,7 @@ def _numbers(
         return None
     if not re.fullmatch(form, text):
         raise InvalidInput(field, repr(text[:80]), accepted)
-    numbers = [kind(part) for part in text.split(",")]
+    numbers = [kind(number) for number in text.split(",")]
     for number in numbers:
         within.check(field, number)
     return numbers
