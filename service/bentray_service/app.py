@@ -18,7 +18,6 @@ from bentray_workers.cluster.connection import open_cluster
 
 from . import __version__
 from .access.audit import Audit
-from .access.key_watch import KeyWatch
 from .access.quota import Quota
 from .access.sign_in import SignIn
 from .compute import Cluster, Compute
@@ -31,11 +30,9 @@ from .files.orphans import Orphans
 from .files.private import private_files
 from .guard import Guard
 from .housekeeping import Housekeeper
-from .ingest.append import UploadLocks
 from .ingest.canonical import IngestLimits
 from .ingest.fair_queue import FairQueue, readers_at_once
 from .ingest.upload_ingest import UploadIngest
-from .ingest.upload_limits import UploadLimits
 from .jobs.feed import EventFeed
 from .jobs.kinds import KINDS
 from .jobs.runner import Runner
@@ -68,7 +65,6 @@ from .rows.ages import ExpiryMarks, ObservedTime
 from .rows.batches import Batches
 from .rows.checksums import Checksums
 from .rows.claims import ClaimedTenants
-from .rows.deliveries import Deliveries
 from .rows.job_queue import Queue
 from .rows.jobs import Jobs
 from .rows.keys import Keys
@@ -83,7 +79,7 @@ from .web.headers import SecurityHeaders
 from .web.request_id import RequestIds
 from .web.tus_headers import TusHeaders
 from .webhooks.sender import Webhooks
-from .wiring import Parts
+from .wiring import AccessParts, BackgroundParts, StoreParts
 
 DESCRIPTION = (
     "Refraction-corrected ultrasound computed tomography: upload a scan, start a reconstruction, "
@@ -111,10 +107,11 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         stack = ExitStack()
         try:
-            app.state.parts = await run_in_threadpool(_open, settings, cluster, stack, app.state.leaving)
-            app.state.metrics.watch(app.state.parts)
+            parts = await run_in_threadpool(_open, settings, cluster, stack, app.state.leaving)
+            app.state.stores, app.state.background, app.state.access = parts
+            app.state.metrics.watch(*parts)
             yield
-            await app.state.parts.pictures.close()
+            await app.state.background.pictures.close()
         finally:
             await run_in_threadpool(stack.close)
 
@@ -175,7 +172,7 @@ def _routes() -> tuple[BaseRoute, ...]:
 
 def _open(
     settings: ServiceSettings, cluster: Cluster | None, stack: ExitStack, leaving: threading.Event
-) -> Parts:
+) -> tuple[StoreParts, BackgroundParts, AccessParts]:
     """Open all parts; ``stack`` closes them, also when a later part fails."""
     stack.enter_context(private_files())
     files = Files(settings.data_dir)
@@ -236,7 +233,7 @@ def _open(
     )
     runner.start()
     stack.callback(runner.stop)
-    pieces, deletion, hold = Uploads(database), Deletion(database, files), UploadLocks()
+    pieces, deletion = Uploads(database), Deletion(database, files)
     stores: dict[str, UploadedTable[Any]] = {
         "dataset": Datasets(database),
         "volume": UploadedVolumes(database),
@@ -264,7 +261,7 @@ def _open(
         pieces,
         files,
         deletion,
-        hold,
+        upload_ingest.locks,
         quota,
         ExpiryMarks(database),
         ObservedTime(database),
@@ -290,36 +287,18 @@ def _open(
     }
     readiness = Readiness(database, files, compute, threads, settings.min_free_bytes)
     stack.callback(readiness.stop)
-    return Parts(
-        settings=settings,
-        database=database,
-        files=files,
-        datasets=Datasets(database),
-        jobs=Jobs(database),
-        batches=Batches(database),
-        projects=tenant_projects,
-        queue=queue,
-        volumes=Volumes(database),
-        meshes=Meshes(database),
-        uploads=pieces,
-        direct_uploads=store.direct_uploads,
-        quota=quota,
-        upload_limits=UploadLimits(accounts),
-        ingest_queue=ingest_queue,
-        deletion=deletion,
-        hold=hold,
-        upload_ingest=upload_ingest,
-        housekeeper=housekeeper,
-        geometry_fields=GeometryFields(database),
-        compute=compute,
-        pictures=pictures,
-        runner=runner,
-        sign_in=access_control,
-        key_watch=KeyWatch(Keys(database), Sessions(database), tenant_projects),
-        feed=EventFeed(Jobs(database), accounts, leaving.is_set),
-        audit=audit,
-        readiness=readiness,
-        threads=threads,
-        webhooks=webhooks,
-        deliveries=Deliveries(database),
+    store_parts = StoreParts(
+        database,
+        files,
+        quota,
+        deletion,
+        Datasets(database),
+        Volumes(database),
+        Meshes(database),
+        GeometryFields(database),
+        Jobs(database),
+        Batches(database),
     )
+    feed = EventFeed(store_parts.jobs, accounts, leaving.is_set)
+    background = BackgroundParts(runner, pictures, upload_ingest, housekeeper, webhooks, feed, readiness)
+    return store_parts, background, AccessParts(settings, access_control, audit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from typing import Any, cast
+from typing import Any
 
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
@@ -16,7 +16,7 @@ from .access.caller import Caller
 from .access.key_watch import answer_while_valid
 from .errors import PackedBody
 from .web.errors import problem_response
-from .wiring import Parts
+from .wiring import access_of
 
 log = logging.getLogger("bentray.access")
 
@@ -64,7 +64,7 @@ class Guard:
         else:
             arguments = scope, seen.receiving(receive), seen.sending(send)
             if caller is not None and caller.ends:
-                await answer_while_valid(self.app, *arguments, _parts(scope).key_watch, caller.ends)
+                await answer_while_valid(self.app, *arguments, access_of(scope).sign_in.watch, caller.ends)
             else:
                 await self.app(*arguments)
         finally:
@@ -72,7 +72,7 @@ class Guard:
 
 
 def _authenticate(scope: Scope, seen: _RequestLog) -> Caller:
-    sign_in = _parts(scope).sign_in
+    sign_in = access_of(scope).sign_in
     headers, peer = Headers(scope=scope), scope.get("client")
     seen.caller = sign_in.caller(headers, peer[0] if peer else "", scope["method"])
     seen.caller = sign_in.in_project(seen.caller, headers)
@@ -92,10 +92,6 @@ def _check_codings(headers: Headers) -> None:
 
 def _public(path: str) -> bool:
     return path in PUBLIC or path.startswith(PUBLIC_FOLDERS)
-
-
-def _parts(scope: Scope) -> Parts:
-    return cast(Parts, scope["app"].state.parts)
 
 
 class _RequestLog:
@@ -143,7 +139,7 @@ class _RequestLog:
             who = {"tenant": self.caller.home, "how": self.caller.how, "who": self.caller.who}
             figures |= who | ({"project": self.caller.project} if self.caller.project else {})
             number = self._scope["state"]["request_id"]
-            _parts(self._scope).audit.append({"request": number, **figures, "ids": self._ids()})
+            access_of(self._scope).audit.append({"request": number, **figures, "ids": self._ids()})
         seconds = round(time.perf_counter() - self._begun, 4)
         words = "%s %s %d in %.3f s"
         log.info(

@@ -27,7 +27,7 @@ from .rows.keys import Keys
 from .rows.tables import STATES
 
 if TYPE_CHECKING:
-    from .wiring import Parts
+    from .wiring import AccessParts, BackgroundParts, StoreParts
 
 # From a status poll to a rendered image.
 BUCKETS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
@@ -66,9 +66,9 @@ class Metrics:
         # Memory, processor time and open files of this process; empty except on Linux.
         self.registry.register(_Sentences(ProcessCollector("bentray", registry=None)))
 
-    def watch(self, parts: Parts) -> None:
+    def watch(self, stores: StoreParts, background: BackgroundParts, access: AccessParts) -> None:
         """Add metrics of an open service, collected on request."""
-        self.registry.register(_ServiceCollector(parts))
+        self.registry.register(_ServiceCollector(stores, background, access))
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """ASGI middleware that counts and times requests."""
@@ -117,33 +117,33 @@ def _route(scope: Scope) -> str:
 class _ServiceCollector(Collector):
     """Collects the metrics of the parts of a service; unavailable ones are omitted."""
 
-    def __init__(self, parts: Parts) -> None:
-        self._parts = parts
+    def __init__(self, stores: StoreParts, background: BackgroundParts, access: AccessParts) -> None:
+        self._stores, self._background, self._access = stores, background, access
 
     def describe(self) -> list[Metric]:
         return []
 
     def collect(self) -> Iterator[Metric]:
-        parts = self._parts
+        files, settings = self._stores.files, self._access.settings
         yield from self._from_database()
         yield from self._from_cluster()
-        yield from parts.runner.metrics.collect()
-        up = float(parts.files.store.fault() is None)
+        yield from self._background.runner.metrics.collect()
+        up = float(files.store.fault() is None)
         yield _gauge("bentray_storage_up", "Whether the store is available.", up)
-        disk, least = shutil.disk_usage(parts.files.root), parts.settings.min_free_bytes
+        disk, least = shutil.disk_usage(files.root), settings.min_free_bytes
         yield _gauge("bentray_disk_free_bytes", "Free space in the data folder.", disk.free)
         yield _gauge("bentray_disk_total_bytes", "Size of the disk of the data folder.", disk.total)
         yield _gauge("bentray_disk_needed_bytes", "Free space without which no job starts.", least)
         threads = GaugeMetricFamily(
             "bentray_threads_up", "Whether all threads of a part are alive.", labels=["part"]
         )
-        for name, part in parts.threads.items():
+        for name, part in self._background.readiness.threads.items():
             threads.add_metric([name], float(part.alive()))
         yield threads
         lost = CounterMetricFamily("bentray_audit_lost_total", "Entries missing from the audit log.")
-        lost.add_metric([], parts.audit.lost)
+        lost.add_metric([], self._access.audit.lost)
         yield lost
-        newest = newest_backup(parts.files.root)
+        newest = newest_backup(files.root)
         if newest is not None:
             yield _gauge(
                 "bentray_backup_timestamp_seconds", "End of the newest backup, since 1970 UTC.", newest
@@ -151,7 +151,7 @@ class _ServiceCollector(Collector):
 
     def _from_cluster(self) -> Iterator[Metric]:
         """The metrics of scheduler and workers; workers are added up, since there may be hundreds."""
-        compute = self._parts.compute
+        compute = self._background.runner.compute
         workers = compute.health()
         memory = [(one.memory_bytes or 0, one.memory_limit_bytes) for one in workers]
         yield from _gauges(
@@ -178,7 +178,7 @@ class _ServiceCollector(Collector):
                 ("bentray_scheduler_waiting_tasks", "Tasks that no worker can run now.", load.waiting_tasks),
                 ("bentray_scheduler_memory_bytes", "Memory of its process.", load.memory_bytes),
             )
-        folder = self._parts.settings.tls_dir
+        folder = self._access.settings.tls_dir
         if folder is not None and (end := _end_of(folder / "certificate.pem")) is not None:
             yield _gauge(
                 "bentray_certificate_expiry_timestamp_seconds",
@@ -188,17 +188,17 @@ class _ServiceCollector(Collector):
 
     def _from_database(self) -> Iterator[Metric]:
         """The metrics of stored jobs, files, tenants and keys."""
-        parts = self._parts
-        in_use, most = parts.database.connections()
+        database, queue = self._stores.database, self._background.runner.queue
+        in_use, most = database.connections()
         yield _gauge("bentray_database_connections", "Connections to the database in use.", in_use)
         yield _gauge("bentray_database_connections_limit", "Maximum number of these.", most)
         try:
-            counts, oldest = parts.queue.load()
-            damaged = Checksums(parts.database).count_damaged()
-            sent = parts.deliveries.counts()
-            queues = parts.queue.longest(TENANTS)
-            expiry = Keys(parts.database).next_expiry()
-            with parts.database.read() as connection:
+            counts, oldest = queue.load()
+            damaged = Checksums(database).count_damaged()
+            sent = self._background.webhooks.deliveries.counts()
+            queues = queue.longest(TENANTS)
+            expiry = Keys(database).next_expiry()
+            with database.read() as connection:
                 sizes = usage.largest(connection, TENANTS)
         except SQLAlchemyError:
             return
@@ -210,7 +210,9 @@ class _ServiceCollector(Collector):
         for tenant, size in sizes.items():
             stored.add_metric([tenant], size)
         yield stored
-        yield _gauge("bentray_tenant_quota_bytes", "Quota of each tenant.", parts.settings.max_tenant_bytes)
+        yield _gauge(
+            "bentray_tenant_quota_bytes", "Quota of each tenant.", self._access.settings.max_tenant_bytes
+        )
         unfinished = GaugeMetricFamily(
             "bentray_tenant_jobs",
             f"Unfinished jobs by state, of the {TENANTS} tenants that have most.",

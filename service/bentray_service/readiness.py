@@ -61,7 +61,7 @@ class Readiness:
         min_free_bytes: minimum free disk space.
         """
         self._database, self._files, self._compute = database, files, compute
-        self._threads, self._min_free_bytes = threads, min_free_bytes
+        self.threads, self._min_free_bytes = threads, min_free_bytes
         self._pool = ThreadPoolExecutor(1, "readiness")
         self._inspecting: asyncio.Future[ReadinessReport] | None = None
         # The part that is being checked.
@@ -107,7 +107,7 @@ class Readiness:
         workers = self._compute.workers()
         if workers == 0:
             faults.append(("workers", "0 connected", "at least one Dask worker"))
-        for part, owner in self._threads.items():
+        for part, owner in self.threads.items():
             if not owner.alive():
                 faults.append((part, "a thread has ended", "all threads alive; restart the service"))
         return ReadinessReport(tuple(faults), workers, free)

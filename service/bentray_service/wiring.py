@@ -1,84 +1,80 @@
-"""The parts of a running service, and the dependencies that give routes access to them."""
+"""Three records of what a running service consists of, and the dependencies that give them to routes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, cast
 
 from fastapi import Depends, Request
+from starlette.types import Scope
 
 from .access.audit import Audit
 from .access.caller import Caller
-from .access.key_watch import KeyWatch
 from .access.quota import Quota
 from .access.sign_in import SignIn
-from .compute import Compute
 from .files.data_folder import Files
 from .files.deletion import Deletion
-from .files.direct_uploads import DirectUploads
 from .housekeeping import Housekeeper
-from .ingest.append import UploadLocks
-from .ingest.fair_queue import FairQueue
 from .ingest.upload_ingest import UploadIngest
-from .ingest.upload_limits import UploadLimits
 from .jobs.feed import EventFeed
 from .jobs.runner import Runner
 from .pictures import Pictures
-from .readiness import Readiness, Threaded
+from .readiness import Readiness
 from .rows.batches import Batches
 from .rows.database import Database
-from .rows.deliveries import Deliveries
-from .rows.job_queue import Queue
 from .rows.jobs import Jobs
-from .rows.projects import Projects
 from .rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
 from .rows.tenants import Tenant
-from .rows.uploads import Uploads
 from .settings import ServiceSettings
 from .webhooks.sender import Webhooks
 
 
 @dataclass(frozen=True)
-class Parts:
-    """All parts of a running service; ``threads`` are those with threads, by name."""
+class StoreParts:
+    """Rows and files, with what limits and deletes them."""
 
-    settings: ServiceSettings
     database: Database
     files: Files
+    quota: Quota
+    deletion: Deletion
     datasets: Datasets
-    jobs: Jobs
-    batches: Batches
-    projects: Projects
-    queue: Queue
     volumes: Volumes
     meshes: Meshes
     geometry_fields: GeometryFields
-    uploads: Uploads
-    direct_uploads: DirectUploads | None
-    quota: Quota
-    upload_limits: UploadLimits
-    ingest_queue: FairQueue
-    deletion: Deletion
-    hold: UploadLocks
-    upload_ingest: UploadIngest
-    housekeeper: Housekeeper
-    compute: Compute
-    pictures: Pictures
+    jobs: Jobs
+    batches: Batches
+
+
+@dataclass(frozen=True)
+class BackgroundParts:
+    """What works beside the requests: jobs, pictures, uploads, messages and clean-up."""
+
     runner: Runner
-    sign_in: SignIn
-    key_watch: KeyWatch
-    feed: EventFeed
-    audit: Audit
-    readiness: Readiness
-    threads: Mapping[str, Threaded]
+    pictures: Pictures
+    ingest: UploadIngest
+    housekeeper: Housekeeper
     webhooks: Webhooks
-    deliveries: Deliveries
+    feed: EventFeed
+    readiness: Readiness
 
 
-def parts_of(request: Request) -> Parts:
-    """The parts of the service of a request."""
-    return cast(Parts, request.app.state.parts)
+@dataclass(frozen=True)
+class AccessParts:
+    """What decides on requests, and notes them."""
+
+    settings: ServiceSettings
+    sign_in: SignIn
+    audit: Audit
+
+
+def background_of(request: Request) -> BackgroundParts:
+    """What works beside the requests."""
+    return cast(BackgroundParts, request.app.state.background)
+
+
+def access_of(scope: Scope) -> AccessParts:
+    """What decides on a request."""
+    return cast(AccessParts, scope["app"].state.access)
 
 
 def caller_of(request: Request) -> Caller:
@@ -87,8 +83,16 @@ def caller_of(request: Request) -> Caller:
 
 
 # Coroutines, since FastAPI runs plain functions in the thread pool.
-async def _service(request: Request) -> Parts:
-    return parts_of(request)
+async def _stores(request: Request) -> StoreParts:
+    return cast(StoreParts, request.app.state.stores)
+
+
+async def _background(request: Request) -> BackgroundParts:
+    return background_of(request)
+
+
+async def _access(request: Request) -> AccessParts:
+    return access_of(request.scope)
 
 
 async def _caller(request: Request) -> Caller:
@@ -99,7 +103,9 @@ async def _tenant(request: Request) -> Tenant:
     return caller_of(request).tenant
 
 
-Service = Annotated[Parts, Depends(_service)]
+Stores = Annotated[StoreParts, Depends(_stores)]
+Background = Annotated[BackgroundParts, Depends(_background)]
+Access = Annotated[AccessParts, Depends(_access)]
 CurrentCaller = Annotated[Caller, Depends(_caller)]
 # The tenant of the caller, for queries.
 CallerTenant = Annotated[Tenant, Depends(_tenant)]

@@ -8,9 +8,9 @@ from bentray_workers.files.volume import Volume, write_volume
 
 def store_volume(http, values=None, spacing=(1e-3,) * 3):
     """Store it for the tenant of the service, by default a ball with a hole; returns its id."""
-    parts, volume_id = http.app.state.parts, new_id("volume")
+    state, volume_id = http.app.state, new_id("volume")
     volume = Volume.from_values(sampled(ONE_HOLE, 12) if values is None else values, spacing)
-    write_volume(parts.files.of(LOCAL).volume(volume_id), volume)
+    write_volume(state.stores.files.of(LOCAL).volume(volume_id), volume)
     summary = {
         "title": "a ball",
         "shape": list(volume.values.shape),
@@ -18,5 +18,5 @@ def store_volume(http, values=None, spacing=(1e-3,) * 3):
         "origin_m": [0.0] * 3,
         "value_range": list(volume.range()),
     }
-    parts.volumes.uploaded.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
+    state.stores.volumes.uploaded.add(LOCAL, volume_id, size=1, sha256="0" * 64, summary=summary)
     return volume_id

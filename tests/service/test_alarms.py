@@ -123,9 +123,9 @@ def test_every_metric_and_label_of_alarms_and_dashboard_exists(
     until(http, submitted(http, dataset)["id"])
     work.hold.clear()
     submitted(http, dataset)
-    parts, token = http.app.state.parts, ApiKey.new()
-    back_up(parts.settings, tmp_path / "backup")
-    Keys(parts.database).add(token, LOCAL, "metrics", ["metrics"], time.time() + 99.0)
+    state, token = http.app.state, ApiKey.new()
+    back_up(state.access.settings, tmp_path / "backup")
+    Keys(state.stores.database).add(token, LOCAL, "metrics", ["metrics"], time.time() + 99.0)
     http.headers["Authorization"] = f"Bearer {token.shown()}"
     there = exported(http) | ITS_OWN
     work.hold.set()

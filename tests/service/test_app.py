@@ -66,13 +66,13 @@ def test_clean_stop_puts_a_running_job_back(tmp_path, cluster, uploaded, submitt
     app = create_app(settings, cluster)
     with TestClient(app, base_url="http://localhost") as http:
         assert until(http, job["id"])["state"] == "succeeded"
-        states = [event.state for event in app.state.parts.jobs.events(LOCAL, job["id"])]
+        states = [event.state for event in app.state.stores.jobs.events(LOCAL, job["id"])]
     assert states == ["queued", "running", "queued", "running", "succeeded"]
     assert len(work.calls) == 2
 
 
 def left_running(app, job_id, state="running", attempts=1):
-    with app.state.parts.database.write() as connection:
+    with app.state.stores.database.write() as connection:
         connection.execute(
             update(JobRow)
             .where(JobRow.id == job_id)
@@ -101,7 +101,7 @@ def test_jobs_of_a_dead_process(tmp_path, cluster, uploaded, submitted, until, w
 
 
 def test_two_services_cannot_share_a_folder(start):
-    files = start("one").app.state.parts.files.of(LOCAL)
+    files = start("one").app.state.stores.files.of(LOCAL)
     arriving = files.incoming(new_id("dataset"))
     arriving.write_bytes(b"half an upload")
     with pytest.raises(InvalidInput, match="in use by another service"):

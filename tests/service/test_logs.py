@@ -98,8 +98,8 @@ def test_connections_that_close_at_a_stop_show_no_traceback(form, capsys):
 
 def test_logs_contain_ids_and_no_keys(start, uploaded, submitted, until, work, lines):
     http, token = start(), ApiKey.new()
-    Keys(http.app.state.parts.database).add(token, Tenant("local"), "one", ("read", "write"))
-    http.app.state.parts.sign_in._no_keys_until = 0.0
+    Keys(http.app.state.stores.database).add(token, Tenant("local"), "one", ("read", "write"))
+    http.app.state.access.sign_in._no_keys_until = 0.0
     http.headers["Authorization"] = f"Bearer {token.shown()}"
     dataset = uploaded(http)
     work.error = RuntimeError("a fault")

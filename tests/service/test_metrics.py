@@ -110,24 +110,24 @@ def test_an_operator_sees_who_waits_what_repeats_and_how_long_it_takes(
     ended = {"kind": "reconstruction", "state": "succeeded"}
     assert value(http, "bentray_job_duration_seconds_count", **ended) == 3
     assert value(http, "bentray_tenant_jobs", tenant="local", state="queued") == 0
-    parts = http.app.state.parts
-    parts.queue.load()
+    state = http.app.state
+    state.background.runner.queue.load()
     assert 1 <= value(http, "bentray_database_connections_limit") <= 32
-    with parts.database.read() as connection:
+    with state.stores.database.read() as connection:
         connection.execute(text("SELECT 1"))
         assert value(http, "bentray_database_connections") == 1
     assert value(http, "bentray_keys_next_expiry_timestamp_seconds") == 0, "no key expires"
     for number, expires in enumerate((9e9, 8e9, 1.0, None)):
-        Keys(parts.database).add(ApiKey.new(), LOCAL, f"key {number}", ["metrics"], expires)
+        Keys(state.stores.database).add(ApiKey.new(), LOCAL, f"key {number}", ["metrics"], expires)
     token = ApiKey.new()
-    Keys(parts.database).add(token, LOCAL, "metrics", ["metrics"])
+    Keys(state.stores.database).add(token, LOCAL, "metrics", ["metrics"])
     http.headers["Authorization"] = f"Bearer {token.shown()}"
     assert value(http, "bentray_keys_next_expiry_timestamp_seconds") == 8e9
 
 
 def test_only_the_tenants_that_use_most_have_labels(http):
-    parts = http.app.state.parts
-    with parts.database.write() as connection:
+    state = http.app.state
+    with state.stores.database.write() as connection:
         for number in range(TENANTS + 5):
             usage.store(connection, Tenant(f"tenant-{number:02d}"), "x", 100 + number)
     found = [s.labels["tenant"] for s in read(http)["bentray_tenant_used_bytes"].samples]
@@ -148,7 +148,7 @@ def test_metrics_without_the_database(http, monkeypatch):
     def away():
         raise OperationalError("select", {}, Exception("gone"))
 
-    monkeypatch.setattr(http.app.state.parts.queue, "load", away)
+    monkeypatch.setattr(http.app.state.background.runner.queue, "load", away)
     families = read(http)
     assert "bentray_jobs" not in families
     assert "bentray_workers" in families
@@ -165,18 +165,18 @@ def test_each_application_has_its_own(start, work):
 def test_threads_and_damage_are_seen(http, uploaded):
     dataset = uploaded(http)
     assert value(http, "bentray_threads_up", part="housekeeping") == 1
-    http.app.state.parts.runner.stop()
+    http.app.state.background.runner.stop()
     assert value(http, "bentray_threads_up", part="runner") == 0
     assert value(http, "bentray_threads_up", part="ingest") == 1
     assert value(http, "bentray_files_damaged") == 0
-    path = next(http.app.state.parts.files.root.glob("tenants/local/datasets/*.h5"))
+    path = next(http.app.state.stores.files.root.glob("tenants/local/datasets/*.h5"))
     path.write_bytes(path.read_bytes()[:-1])
     assert http.get(f"/v1/datasets/{dataset}/geometry").status_code == 500
     assert value(http, "bentray_files_damaged") == 1
 
 
 def test_lost_audit_entries_are_counted(http):
-    folder = http.app.state.parts.files.audit
+    folder = http.app.state.stores.files.audit
     assert value(http, "bentray_audit_lost_total") == 0
     for path in folder.iterdir():
         path.unlink()

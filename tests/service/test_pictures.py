@@ -68,10 +68,10 @@ class HeldCluster(FakeCluster):
         return self.futures[-1]
 
 
-def put(parts, tenant, values, shape=None):
+def put(state, tenant, values, shape=None):
     """A volume as an upload leaves it; its row may tell of another shape."""
     volume, volume_id = Volume.from_values(values, (1e-3,) * 3), new_id("volume")
-    path = parts.files.of(tenant).volume(volume_id)
+    path = state.stores.files.of(tenant).volume(volume_id)
     write_volume(path, volume)
     nodes = int(np.prod(shape or values.shape))
     summary = {
@@ -81,7 +81,7 @@ def put(parts, tenant, values, shape=None):
         "origin_m": [0.0] * 3,
         "value_range": list(volume.range()),
     }
-    parts.volumes.uploaded.add(tenant, volume_id, size=4 * nodes, sha256="0" * 64, summary=summary)
+    state.stores.volumes.uploaded.add(tenant, volume_id, size=4 * nodes, sha256="0" * 64, summary=summary)
     return f"/v1/volumes/{volume_id}"
 
 
@@ -109,7 +109,7 @@ async def service(folder, cluster):
             ) as bert,
         ):
             who = [(await one.get("/v1/access")).json()["tenant"] for one in (anna, bert)]
-            there = [put(app.state.parts, Tenant(name), sampled(ONE_HOLE, 12)) for name in who]
+            there = [put(app.state, Tenant(name), sampled(ONE_HOLE, 12)) for name in who]
             yield app, (anna, there[0]), (bert, there[1])
 
 
@@ -137,7 +137,7 @@ def test_pictures_do_not_block_request_threads(tmp_path, held):
             # One worker has one task; the others have not been handed out.
             assert len(held.futures) == 1
             late = asyncio.create_task(bert.get(f"{there}/slice.png"))
-            await until(lambda: len(app.state.parts.pictures._queue.waiting()) == 2)
+            await until(lambda: len(app.state.background.pictures._queue.waiting()) == 2)
             held.gate.set()
             assert (await late).status_code == 200
             # Only the one that had begun already came before.
@@ -198,7 +198,7 @@ def test_rejects_pictures_larger_than_worker_memory(start, cluster, what):
     http = start()
     cluster.memory_bytes = 2**29 + 2**28
     shape = (340, 340, 340)
-    here = put(http.app.state.parts, Tenant("local"), sampled(ONE_HOLE, 12), shape)
+    here = put(http.app.state, Tenant("local"), sampled(ONE_HOLE, 12), shape)
     answer = http.get(f"{here}/{what}")
     body = answer.json()
     assert (answer.status_code, body["type"]) == (422, "/problems/invalid-input"), body
@@ -213,9 +213,9 @@ def test_rejects_pictures_larger_than_worker_memory(start, cluster, what):
 def test_a_large_picture_has_its_worker_to_itself(start, cluster):
     http = start()
     cluster.memory_bytes = 2**30
-    here = put(http.app.state.parts, Tenant("local"), sampled(ONE_HOLE, 12), (180, 180, 180))
+    here = put(http.app.state, Tenant("local"), sampled(ONE_HOLE, 12), (180, 180, 180))
     assert http.get(f"{here}/refraction.png", params=SMALL).status_code == 200
     assert cluster.submitted[-1]["resources"] == {"render": 1, "recon": 1}
-    small = put(http.app.state.parts, Tenant("local"), sampled(ONE_HOLE, 12))
+    small = put(http.app.state, Tenant("local"), sampled(ONE_HOLE, 12))
     assert http.get(f"{small}/refraction.png", params=SMALL).status_code == 200
     assert cluster.submitted[-1]["resources"] == {"render": 1}

@@ -23,6 +23,7 @@ from ..settings import ServiceSettings
 from ..web.addresses import is_loopback, names_loopback, networks, within
 from .browser_sessions import BrowserSessions
 from .caller import ANYONE, SCOPES, USUAL, Caller, scope_of
+from .key_watch import KeyWatch
 from .openid_claims import LONGEST_USER
 from .rate_limits import RateLimits
 
@@ -56,6 +57,8 @@ class SignIn:
     proxy or a session.
 
     Attributes:
+        projects: of all tenants.
+        watch: the requests in progress, which end with their key or session.
         browsers: sessions of users who signed in at the OpenID provider; None without one.
     """
 
@@ -71,8 +74,9 @@ class SignIn:
         """Raises:
         InvalidInput: if the service would be open to other machines, or for an invalid setting.
         """
-        self._keys = keys
-        self._projects, self._accounts, self._claimed = projects, accounts, claimed
+        self._keys, self.projects = keys, projects
+        self.watch = KeyWatch(keys, sessions, projects)
+        self._accounts, self._claimed = accounts, claimed
         self._trusted = networks(settings.trusted_proxies or "")
         self._forwarding = networks(settings.behind_proxy or "", "BENTRAY_BEHIND_PROXY")
         self._user_header = settings.proxy_user_header
@@ -150,7 +154,7 @@ class SignIn:
         name = headers.get(PROJECT_HEADER)
         if name is None:
             return caller
-        project = self._projects.get(caller.tenant, name, caller.member)
+        project = self.projects.get(caller.tenant, name, caller.member)
         ends = () if caller.member is None else (membership(project.id, caller.member),)
         return replace(
             caller,

@@ -143,7 +143,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, unused: list[str],
                 _announce(
                     settings, f"Bentray runs at {url} (data in {settings.data_dir}); stop it with Ctrl-C."
                 )
-                _announce(settings, _reachability(required=made.state.parts.sign_in.required()))
+                _announce(settings, _reachability(required=made.state.access.sign_in.required()))
 
         def handle_exit(self, sig: int, frame: FrameType | None) -> None:
             super().handle_exit(sig, frame)

@@ -31,9 +31,10 @@ from ..rows.tenants import Tenant
 from ..rows.uploads import Uploads
 from ..web.errors import INTERNAL, make_problem, problem_of
 from ..web.problem import Problem
-from .append import discard_unverified, received_bytes
+from .append import UploadLocks, discard_unverified, received_bytes
 from .canonical import IngestLimits, make_canonical
 from .fair_queue import FairQueue
+from .upload_limits import UploadLimits
 
 log = logging.getLogger("bentray.ingest")
 
@@ -73,17 +74,18 @@ class UploadIngest:
         quota: of the tenants.
         direct: uploads in the bucket, if there is one.
         """
-        self._uploads = uploads
+        self.uploads, self.queue = uploads, queue
+        self.locks, self.upload_limits = UploadLocks(), UploadLimits(accounts)
         self._direct = direct
         self._files = files
         self._stores = stores
         self._limits = limits
         self._keep_s = keep_s
-        self._queue, self._accounts = queue, accounts
+        self._accounts = accounts
         self._quota = quota
         self._lock = threading.Lock()
         # Queued uploads, and the process ids of those being read.
-        self._queued: dict[str, Account] = {}
+        self.queued: dict[str, Account] = {}
         self._children: dict[str, int] = {}
         self._put_off = False
         self._wake = threading.Event()
@@ -92,12 +94,12 @@ class UploadIngest:
 
     def start(self) -> None:
         """Continue the uploads of a dead service, then start the thread."""
-        for row in self._uploads.receiving():
+        for row in self.uploads.receiving():
             path = self._files.of(row.tenant).upload(row.id)
             discard_unverified(path)
             # The service died before it marked the upload as complete.
             if received_bytes(path) == row.length:
-                self._uploads.mark_complete(row.id)
+                self.uploads.mark_complete(row.id)
         self._thread.start()
 
     def notify(self) -> None:
@@ -134,21 +136,21 @@ class UploadIngest:
     def _submit(self) -> None:
         """Queue complete uploads, at most ``FairQueue.share`` of each account."""
         with self._lock:
-            queued = set(self._queued)
-            room = Counter({account: -count for account, count in Counter(self._queued.values()).items()})
-        for row in self._uploads.unread():
+            queued = set(self.queued)
+            room = Counter({account: -count for account, count in Counter(self.queued.values()).items()})
+        for row in self.uploads.unread():
             account = self._accounts.of(row.tenant)
-            if row.id in queued or room[account] + self._queue.share <= 0 or not self._is_local(row):
+            if row.id in queued or room[account] + self.queue.share <= 0 or not self._is_local(row):
                 continue
             room[account] -= 1
             with self._lock:
-                self._queued[row.id] = account
-            future = self._queue.submit(row.tenant, partial(self._read, row))
+                self.queued[row.id] = account
+            future = self.queue.submit(row.tenant, partial(self._read, row))
             future.add_done_callback(partial(self._ended, row.id))
 
     def _ended(self, upload_id: str, future: Future[None]) -> None:
         with self._lock:
-            del self._queued[upload_id]
+            del self.queued[upload_id]
         error = None if future.cancelled() else future.exception()
         if error is not None:
             self._wait(error)
@@ -175,11 +177,11 @@ class UploadIngest:
             if problem is not None:
                 if not self._leaving.is_set():
                     self._drop(row)
-                    self._uploads.mark_rejected(row.id, problem.model_dump(exclude_none=True), self._keep_s)
+                    self.uploads.mark_rejected(row.id, problem.model_dump(exclude_none=True), self._keep_s)
                     path.unlink(missing_ok=True)
                 return
         self._drop(row)
-        self._uploads.mark_done(row.id, self._keep_s)
+        self.uploads.mark_done(row.id, self._keep_s)
         path.unlink(missing_ok=True)
 
     def _drop(self, row: UploadRow) -> None:

@@ -66,9 +66,6 @@ class Sources(Protocol):
     @property
     def files(self) -> Files: ...
 
-    @property
-    def compute(self) -> Compute: ...
-
 
 @dataclass(frozen=True)
 class Order:
@@ -127,7 +124,7 @@ class Kind(ABC, Generic[R]):
     lane: ClassVar[str]
 
     @abstractmethod
-    def plan(self, request: R, tenant: Tenant, sources: Sources) -> Order:
+    def plan(self, request: R, tenant: Tenant, sources: Sources, compute: Compute) -> Order:
         """Validate a request against the stored inputs and the connected workers.
 
         Raises:

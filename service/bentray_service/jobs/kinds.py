@@ -25,7 +25,7 @@ from bentray_workers.rendering.turntable import Turntable, draw_turntable
 from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
-from ..compute import check_renderable
+from ..compute import Compute, check_renderable
 from ..files.tenant_files import TenantFiles
 from ..rows.ids import dataset_of, field_of, volume_of
 from ..rows.tables import DatasetRow, FieldRow, JobRow, Plain, ResultVolumeRow
@@ -56,11 +56,13 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
         },
     }
 
-    def plan(self, request: ReconstructionRequest, tenant: Tenant, sources: Sources) -> Order:
+    def plan(
+        self, request: ReconstructionRequest, tenant: Tenant, sources: Sources, compute: Compute
+    ) -> Order:
         dataset = sources.datasets.get(tenant, request.dataset)
         path = sources.files.of(tenant).dataset(dataset.id)
         settings = in_stated_water(request.settings, dataset)
-        plan = sources.compute.plan(dataset.counts, path, settings)
+        plan = compute.plan(dataset.counts, path, settings)
         return Order(settings.to_dict(), plan["stored_bytes"], {"dataset_id": dataset.id}, plan)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
@@ -113,8 +115,8 @@ class SimulationKind(Kind[SimulationRequest]):
         "value": {"kind": "simulation", "settings": {"nodes": 64, "elements": 64, "noise_s": 2e-8}},
     }
 
-    def plan(self, request: SimulationRequest, tenant: Tenant, sources: Sources) -> Order:
-        plan = sources.compute.plan_simulation(request.settings)
+    def plan(self, request: SimulationRequest, tenant: Tenant, sources: Sources, compute: Compute) -> Order:
+        plan = compute.plan_simulation(request.settings)
         # The parts, and the file assembled from them.
         return Order(request.settings.plain(), 2 * plan["result_bytes"], plan=plan)
 
@@ -152,10 +154,10 @@ class RefractionKind(Kind[RefractionRequest]):
         "value": {"kind": "refraction", "volume": "vol-0123456789abcdef0123", "settings": {"format": "zip"}},
     }
 
-    def plan(self, request: RefractionRequest, tenant: Tenant, sources: Sources) -> Order:
+    def plan(self, request: RefractionRequest, tenant: Tenant, sources: Sources, compute: Compute) -> Order:
         volume, settings = sources.volumes.get(tenant, request.volume), request.settings
         check_renderable(volume)
-        plan = sources.compute.plan_turntable(volume.shape, settings)
+        plan = compute.plan_turntable(volume.shape, settings)
         low, high = volume.value_range
         stored = settings.within(low, high).plain()
         return Order(stored, settings.largest_bytes, {"volume_id": volume.id}, plan)
@@ -193,7 +195,9 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
         "value": {"kind": "geometry-field", "mesh": "mesh-0123456789abcdef0123"},
     }
 
-    def plan(self, request: GeometryFieldRequest, tenant: Tenant, sources: Sources) -> Order:
+    def plan(
+        self, request: GeometryFieldRequest, tenant: Tenant, sources: Sources, compute: Compute
+    ) -> Order:
         mesh, settings = sources.meshes.get(tenant, request.mesh), request.settings
         check_faces(mesh.faces)
         references = {"mesh_id": mesh.id, "field_id": field_of(settings.content(mesh.content))}

@@ -92,9 +92,9 @@ class Runner:
         tenants: the same including one job of each tenant without another.
         """
         self.metrics, self._traces = JobMetrics(), JobTraces()
-        self._queue, self._accounts = queue, accounts
+        self.queue, self._accounts = queue, accounts
         self._files = files
-        self._compute = compute
+        self.compute = compute
         self._min_free_bytes = min_free_bytes
         self._most = max(at_once, tenants)
         self._at_once = max(1, min(at_once, self._most - 1))
@@ -110,13 +110,13 @@ class Runner:
     def start(self) -> None:
         """Take over jobs of a dead service, then start the threads."""
         self._recover()
-        self._files.keep_work(self._queue.unfinished())
+        self._files.keep_work(self.queue.unfinished())
         for thread in self._threads:
             thread.start()
 
     def _recover(self) -> None:
         crashed = CRASHED.model_dump(exclude_none=True)
-        again = self._queue.recover(crashed, held=self._held())
+        again = self.queue.recover(crashed, held=self._held())
         if again:
             log.warning("%d jobs of a dead service are queued again", again)
             self.metrics.count_retries("service", again)
@@ -129,7 +129,7 @@ class Runner:
     def _keep_leases(self) -> None:
         while not self._leaving.wait(LEASE_CHECK_SECONDS):
             try:
-                self._queue.renew(self._held())
+                self.queue.renew(self._held())
                 self._recover()
             except DatabaseUnavailable as error:
                 log.warning("the leases could not be renewed: %s", error)
@@ -179,7 +179,7 @@ class Runner:
         running = len(self._running)
         if running >= self._most or not self._has_free_space() or self._files.store.fault() is not None:
             return False
-        job = self._queue.claim(idle_only=running >= self._at_once)
+        job = self.queue.claim(idle_only=running >= self._at_once)
         if job is None:
             return False
         thread = threading.Thread(target=self._run_to_end, args=(job,), name=job.id, daemon=True)
@@ -211,7 +211,7 @@ class Runner:
     def _run_logged(self, job: JobRow) -> None:
         job_id, files = job.id, self._files.of(job.tenant)
         reporter = Reporter(
-            self._queue, job_id, self._leaving.is_set, taken=lambda: bytes_in(files.work(job_id))
+            self.queue, job_id, self._leaving.is_set, taken=lambda: bytes_in(files.work(job_id))
         )
         kind = KINDS[job.kind]
         target = kind.target(files, job)
@@ -225,7 +225,7 @@ class Runner:
             except Damaged:
                 # The damaged file is replaced.
                 self._files.store.remove([target])
-            client = self._compute.client
+            client = self.compute.client
             plan, lane = job.plan or {}, kind.lane
             if is_short(plan, _seconds(plan), capacities_of(client)):
                 lane = SHORT_LANE
@@ -268,7 +268,7 @@ class Runner:
     def _count_end(self, job: JobRow) -> None:
         """Count a job in the metrics in the state that was stored; it may have been queued again."""
         try:
-            state = self._queue.state(job.id)
+            state = self.queue.state(job.id)
         except (SQLAlchemyError, DatabaseUnavailable):
             return
         if state in ENDED:
@@ -279,7 +279,7 @@ class Runner:
     def _requeue(self, job_id: str, reason: str, error: BaseException) -> None:
         """Queue a job again for a reason outside of the job."""
         log.warning("%s waits: %s (%s)", job_id, reason, error)
-        self._store_outcome(job_id, lambda: self._queue.release(job_id, reason))
+        self._store_outcome(job_id, lambda: self.queue.release(job_id, reason))
 
     def _publish_result(self, target: Path, reporter: Reporter) -> None:
         """Publish a result in the store; repeated while the store is unavailable.
@@ -298,15 +298,15 @@ class Runner:
     def _stopped(self, job_id: str, files: TenantFiles, reporter: Reporter) -> None:
         reporter.flush()
         if self._leaving.is_set():
-            self._queue.release(job_id, "the service was stopped")
+            self.queue.release(job_id, "the service was stopped")
         else:
-            self._queue.mark_cancelled(job_id)
-        if self._queue.state(job_id) in ENDED:
+            self.queue.mark_cancelled(job_id)
+        if self.queue.state(job_id) in ENDED:
             files.drop_work(job_id)
 
     def _failed(self, job_id: str, files: TenantFiles, reporter: Reporter, problem: dict[str, Any]) -> None:
         reporter.flush()
-        self._queue.fail(job_id, problem)
+        self.queue.fail(job_id, problem)
         files.drop_work(job_id)
 
     def _succeeded(
@@ -321,14 +321,14 @@ class Runner:
         reporter.flush()
         # A result without a row is one file.
         size = target.stat().st_size if result is None else 0
-        if not self._queue.succeed(job_id, result, kind.table, size):
-            if self._queue.held_state(job_id) is None:
+        if not self.queue.succeed(job_id, result, kind.table, size):
+            if self.queue.held_state(job_id) is None:
                 # Another service runs it now and writes the same file.
                 return
             with suppress(StorageUnavailable):
                 # A remaining file is removed as an orphan.
                 kind.discard(files, target)
-            self._queue.mark_cancelled(job_id)
+            self.queue.mark_cancelled(job_id)
         files.drop_work(job_id)
 
     def _store_outcome(self, job_id: str, write_the_end: Callable[[], None]) -> None:
@@ -348,7 +348,7 @@ class Runner:
                 log.exception("the outcome of %s could not be stored", job_id)
                 if refused >= REFUSALS:
                     problem = explain(job_id, error).model_dump(exclude_none=True)
-                    self._queue.fail(job_id, problem)
+                    self.queue.fail(job_id, problem)
                     return None
                 if self._leaving.wait(IDLE_SECONDS):
                     raise

@@ -16,7 +16,7 @@ from ..jobs.kinds import KINDS, ReconstructionRequest
 from ..rows.jobs import NewJob, Submission
 from ..rows.tables import ENDED
 from ..web.errors import problems
-from ..wiring import CallerTenant, CurrentCaller, Service
+from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
 from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types
 from .models.batch_records import BatchList, BatchRecord, BatchRequest
 from .record_conversion import batch_record
@@ -47,7 +47,9 @@ router = APIRouter(prefix="/v1/batches", tags=["batches"], route_class=SmallBody
 def start_batch(
     batch_request: Annotated[BatchRequest, Body(openapi_examples=EXAMPLES)],
     response: Response,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     caller: CurrentCaller,
     idempotency_key: IdempotencyKey = None,
 ) -> BatchRecord:
@@ -59,7 +61,7 @@ def start_batch(
     new = []
     for dataset in datasets:
         one = ReconstructionRequest(kind=KIND, dataset=dataset, settings=settings)
-        order = KINDS[KIND].plan(one, caller.tenant, service)
+        order = KINDS[KIND].plan(one, caller.tenant, stores, background.runner.compute)
         new.append(
             NewJob(
                 KIND,
@@ -70,44 +72,44 @@ def start_batch(
             )
         )
     webhook = batch_request.webhook
-    service.webhooks.check(caller.tenant, webhook)
-    limits = service.quota.most_bytes, service.settings.max_queued_jobs
+    background.webhooks.check(caller.tenant, webhook)
+    limits = stores.quota.most_bytes, access.settings.max_queued_jobs
     how = Submission(*limits, idempotency_key, caller.who, webhook)
-    row = service.batches.add(caller.tenant, batch_request.name, settings.to_dict(), new, how)
+    row = stores.batches.add(caller.tenant, batch_request.name, settings.to_dict(), new, how)
     log.info("%s queued, %d jobs", row.id, row.size, extra={"figures": {"batch": row.id}})
-    service.runner.notify(row.id)
+    background.runner.notify(row.id)
     batch = batch_record(row)
     response.headers["Location"] = batch.links["self"]
     return batch
 
 
 @router.get("", responses=problems(422))
-def list_batches(service: Service, tenant: CallerTenant, limit: Limit = 100) -> BatchList:
+def list_batches(stores: Stores, tenant: CallerTenant, limit: Limit = 100) -> BatchList:
     """List batches, newest first."""
-    return BatchList(batches=[batch_record(row) for row in service.batches.newest(tenant, limit)])
+    return BatchList(batches=[batch_record(row) for row in stores.batches.newest(tenant, limit)])
 
 
 @router.get("/{batch_id}", responses=problems(404))
-def show_batch(batch_id: str, service: Service, tenant: CallerTenant) -> BatchRecord:
+def show_batch(batch_id: str, stores: Stores, tenant: CallerTenant) -> BatchRecord:
     """Show one batch: state, progress and jobs."""
-    return batch_record(service.batches.get(tenant, batch_id))
+    return batch_record(stores.batches.get(tenant, batch_id))
 
 
 @router.post("/{batch_id}/cancel", status_code=status.HTTP_202_ACCEPTED, responses=problems(404, 409))
-def cancel_batch(batch_id: str, service: Service, tenant: CallerTenant) -> BatchRecord:
+def cancel_batch(batch_id: str, stores: Stores, tenant: CallerTenant) -> BatchRecord:
     """Cancel the jobs that have not ended; results of the others stay."""
-    return batch_record(service.batches.request_cancel(tenant, batch_id))
+    return batch_record(stores.batches.request_cancel(tenant, batch_id))
 
 
 @router.delete("/{batch_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
-def delete_batch(batch_id: str, service: Service, tenant: CallerTenant) -> None:
+def delete_batch(batch_id: str, stores: Stores, tenant: CallerTenant) -> None:
     """Delete a batch that has ended, with its jobs and their volumes; the scans stay.
 
     If the service dies in between, the remaining jobs keep the batch, and it can be deleted again.
     """
-    batch = service.batches.get(tenant, batch_id)
+    batch = stores.batches.get(tenant, batch_id)
     busy = next((job for job in batch.jobs if job.state not in ENDED), None)
     if busy is not None:
         raise InUse("batch", f"{batch.id} with {busy.id} ({busy.state})", "a batch that has ended")
     for job in batch.jobs:
-        service.deletion.delete(StoredItem(tenant, "job", job.id))
+        stores.deletion.delete(StoredItem(tenant, "job", job.id))

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service
+from ..wiring import Background, CallerTenant
 
 router = APIRouter(prefix="/v1/cluster", tags=["cluster"])
 
@@ -48,10 +48,10 @@ class ClusterRecord(BaseModel):
 
 
 @router.get("", responses=problems(503))
-async def show_cluster(service: Service, tenant: CallerTenant) -> ClusterRecord:
+async def show_cluster(background: Background, tenant: CallerTenant) -> ClusterRecord:
     """Show the health of the workers and the lengths of the queues."""
-    workers = await run_in_threadpool(service.compute.health)
-    lengths = await run_in_threadpool(service.queue.lengths, tenant)
+    workers = await run_in_threadpool(background.runner.compute.health)
+    lengths = await run_in_threadpool(background.runner.queue.lengths, tenant)
     (queued, all_queued), (running, all_running) = lengths["queued"], lengths["running"]
     return ClusterRecord(
         workers=[WorkerRecord.model_validate(one) for one in workers],
@@ -60,6 +60,6 @@ async def show_cluster(service: Service, tenant: CallerTenant) -> ClusterRecord:
             running=running,
             all_queued=all_queued,
             all_running=all_running,
-            waiting_images=service.pictures.waiting(tenant),
+            waiting_images=background.pictures.waiting(tenant),
         ),
     )

@@ -16,7 +16,7 @@ from bentray_workers.rendering.refraction_view import RefractionView
 from .. import __version__
 from ..compute import check_renderable
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service, caller_of, parts_of
+from ..wiring import Background, CallerTenant, Stores, access_of, caller_of
 from .downloads import headers_of, unchanged
 from .pictures import while_connected
 
@@ -42,7 +42,8 @@ router = APIRouter()
 async def show_coefficients(
     volume_id: str,
     request: Request,
-    service: Service,
+    stores: Stores,
+    background: Background,
     tenant: CallerTenant,
     filter: Annotated[  # noqa: A002 - the name of the query parameter
         Literal["bspline3", "catmull-rom"], Query(description="As of refraction.png.")
@@ -53,7 +54,7 @@ async def show_coefficients(
     ] = None,
 ) -> Response:
     """Filter a volume on a worker, and return its coefficients as a NumPy file."""
-    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
+    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
     check_renderable(volume)
     check_nodes(tuple(volume.shape))
     view = RefractionView(filter=filter, smoothing=smoothing)
@@ -61,7 +62,7 @@ async def show_coefficients(
     tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
     if (response := unchanged(request, tag)) is not None:
         return response
-    parts_of(request).sign_in.check_render(caller_of(request))
-    path = service.files.of(tenant).volume(volume.id)
-    work = service.pictures.coefficients(tenant, volume, path, view)
+    access_of(request.scope).sign_in.check_render(caller_of(request))
+    path = stores.files.of(tenant).volume(volume.id)
+    work = background.pictures.coefficients(tenant, volume, path, view)
     return Response(await while_connected(request, work), media_type=NPY, headers=headers_of(tag))

@@ -13,7 +13,7 @@ from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
 
 from ..files.deletion import StoredItem
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service
+from ..wiring import Access, Background, CallerTenant, Stores
 from . import quality, scan_views
 from .bodies import Limit, accept_media_types
 from .downloads import download, download_of
@@ -45,7 +45,9 @@ router.include_router(scan_views.router)
 async def upload_dataset(
     request: Request,
     response: Response,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: CallerTenant,
     map: Annotated[  # noqa: A002 - the name of the query parameter
         list[Annotated[str, Field(max_length=300, json_schema_extra={"pattern": PAIR})]],
@@ -76,7 +78,7 @@ async def upload_dataset(
     The parameters state properties that a file of another program lacks.
     """
     given = scan_metadata(map, unit, temperature_c, sound_speed_mps, frequency_hz)
-    row = await receive_upload(request, service, tenant, service.datasets, given)
+    row = await receive_upload(request, stores, background, access, tenant, stores.datasets, given)
     record = dataset_record(row)
     response.headers["Location"] = record.links["self"]
     return record
@@ -84,7 +86,7 @@ async def upload_dataset(
 
 @router.get("", responses=problems(404, 422))
 def list_datasets(
-    service: Service,
+    stores: Stores,
     tenant: CallerTenant,
     limit: Limit = 100,
     before: Annotated[str | None, Query(description="Only datasets older than this one.")] = None,
@@ -99,7 +101,7 @@ def list_datasets(
     ] = None,
 ) -> DatasetList:
     """List datasets, newest first; `next` is the address of the next page."""
-    rows = service.datasets.found(tenant, limit + 1, before, text)
+    rows = stores.datasets.found(tenant, limit + 1, before, text)
     shown = [dataset_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
         return DatasetList(datasets=shown, next=None)
@@ -108,9 +110,9 @@ def list_datasets(
 
 
 @router.get("/{dataset_id}", responses=problems(404))
-def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> DatasetRecord:
+def show_dataset(dataset_id: str, stores: Stores, tenant: CallerTenant) -> DatasetRecord:
     """Show one dataset."""
-    return dataset_record(service.datasets.get(tenant, dataset_id))
+    return dataset_record(stores.datasets.get(tenant, dataset_id))
 
 
 @router.head("/{dataset_id}/file", include_in_schema=False)
@@ -119,17 +121,17 @@ def show_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> Dat
     response_class=Response,
     responses={**download_of(HDF5), **problems(404, 503)},
 )
-def dataset_file(dataset_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
+def dataset_file(dataset_id: str, request: Request, stores: Stores, tenant: CallerTenant) -> Response:
     """Download a scan as HDF5 in the upload format.
 
     Interrupted downloads can be resumed with Range and If-Range.
     """
-    row = service.datasets.get(tenant, dataset_id)
-    path = service.files.store.fetch(service.files.of(tenant).dataset(row.id))
+    row = stores.datasets.get(tenant, dataset_id)
+    path = stores.files.store.fetch(stores.files.of(tenant).dataset(row.id))
     return download(request, path, repr((row.id, row.sha256)), HDF5)
 
 
 @router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
-def delete_dataset(dataset_id: str, service: Service, tenant: CallerTenant) -> None:
+def delete_dataset(dataset_id: str, stores: Stores, tenant: CallerTenant) -> None:
     """Delete a scan with its jobs and their volumes; rejected while an unfinished job needs it."""
-    service.deletion.delete(StoredItem(tenant, "dataset", dataset_id))
+    stores.deletion.delete(StoredItem(tenant, "dataset", dataset_id))

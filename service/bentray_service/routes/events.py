@@ -18,7 +18,7 @@ from ..jobs.watched import Watched, WatchedJob, WatchedTenant
 from ..rows.jobs import JobProgress
 from ..rows.tables import ENDED
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service
+from ..wiring import Background, CallerTenant, Stores
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -35,7 +35,7 @@ Seen = TypeVar("Seen", bound=Watched)
 
 @router.get("/events", response_class=StreamingResponse, responses={200: STREAM, **problems(404, 422, 429)})
 def all_events(
-    service: Service,
+    background: Background,
     tenant: CallerTenant,
     seconds: Annotated[int, Query(ge=1, le=3600, description="The stream ends after this time, s.")] = 600,
 ) -> Response:
@@ -44,7 +44,7 @@ def all_events(
     A `job` event has the id, the state and the progress of a job. The limits are those of the events of one
     job.
     """
-    feed = service.feed
+    feed = background.feed
     return _Stream(
         lambda: feed.watch_tenant(tenant), lambda jobs: _of_tenant(feed, jobs, time.monotonic() + seconds)
     )
@@ -57,7 +57,8 @@ def all_events(
 )
 def job_events(
     job_id: str,
-    service: Service,
+    stores: Stores,
+    background: Background,
     tenant: CallerTenant,
     last_event_id: Annotated[
         int, Header(ge=0, le=2**63 - 1, description="Only later events; set by browsers automatically.")
@@ -68,8 +69,8 @@ def job_events(
     `state` events are changes of state with increasing ids; `progress` events have no id. A tenant may have
     64 open streams; further ones are rejected with 429.
     """
-    service.jobs.get(tenant, job_id)
-    feed = service.feed
+    stores.jobs.get(tenant, job_id)
+    feed = background.feed
     return _Stream(lambda: feed.watch(tenant, job_id), lambda job: _of_job(feed, job, last_event_id))
 
 

@@ -8,7 +8,7 @@ from starlette.concurrency import run_in_threadpool
 from ..rows.tenants import Tenant
 from ..view_parameters import FieldViewParameters
 from ..web.errors import problems
-from ..wiring import CallerTenant, Parts, Service
+from ..wiring import Background, CallerTenant, Stores
 from .bodies import Limit
 from .models.surface_records import FieldList, FieldRecord
 from .pictures import PICTURE, picture
@@ -19,57 +19,69 @@ router = APIRouter(prefix="/v1/geometry-fields", tags=["geometry-fields"])
 
 @router.get("", responses=problems(422))
 def list_fields(
-    service: Service,
+    stores: Stores,
     tenant: CallerTenant,
     limit: Limit = 100,
 ) -> FieldList:
     """List geometry fields, newest first."""
-    rows = service.geometry_fields.newest(tenant, limit)
+    rows = stores.geometry_fields.newest(tenant, limit)
     return FieldList(geometry_fields=[field_record(row) for row in rows])
 
 
 @router.get("/{field_id}", responses=problems(404))
-def show_field(field_id: str, service: Service, tenant: CallerTenant) -> FieldRecord:
+def show_field(field_id: str, stores: Stores, tenant: CallerTenant) -> FieldRecord:
     """Show one geometry field: sizes, errors and computing times."""
-    return field_record(service.geometry_fields.get(tenant, field_id))
+    return field_record(stores.geometry_fields.get(tenant, field_id))
 
 
 @router.head("/{field_id}/image.png", include_in_schema=False)
 @router.get("/{field_id}/image.png", response_class=Response, responses=PICTURE)
 async def image_png(
-    field_id: str, request: Request, service: Service, tenant: CallerTenant, view: FieldViewParameters
+    field_id: str,
+    request: Request,
+    stores: Stores,
+    background: Background,
+    tenant: CallerTenant,
+    view: FieldViewParameters,
 ) -> Response:
     """Render a scene with the mesh as mirror, glass or clay, using the geometry field for secondary rays.
 
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
-    field = await run_in_threadpool(service.geometry_fields.get, tenant, field_id)
+    field = await run_in_threadpool(stores.geometry_fields.get, tenant, field_id)
     view.check_samples(field.settings["samples"])
-    folder = service.files.of(tenant).field(field.id)
+    folder = stores.files.of(tenant).field(field.id)
     return await picture(
-        request, field, view.plain(), lambda: service.pictures.field_png(tenant, field, folder, view)
+        request, field, view.plain(), lambda: background.pictures.field_png(tenant, field, folder, view)
     )
 
 
 @router.head("/{field_id}/geometry-image.png", include_in_schema=False)
 @router.get("/{field_id}/geometry-image.png", response_class=Response, responses=PICTURE)
 async def geometry_image_png(
-    field_id: str, request: Request, service: Service, tenant: CallerTenant
+    field_id: str, request: Request, stores: Stores, background: Background, tenant: CallerTenant
 ) -> Response:
     """The geometry image: surface positions as colours over the unit square."""
-    return await _map(field_id, request, service, tenant, "positions")
+    return await _map(field_id, request, stores, background, tenant, "positions")
 
 
 @router.head("/{field_id}/normal-map.png", include_in_schema=False)
 @router.get("/{field_id}/normal-map.png", response_class=Response, responses=PICTURE)
-async def normal_map_png(field_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
+async def normal_map_png(
+    field_id: str, request: Request, stores: Stores, background: Background, tenant: CallerTenant
+) -> Response:
     """The normal map: surface normals as colours over the unit square."""
-    return await _map(field_id, request, service, tenant, "normals")
+    return await _map(field_id, request, stores, background, tenant, "normals")
 
 
-async def _map(field_id: str, request: Request, service: Parts, tenant: Tenant, which: str) -> Response:
-    field = await run_in_threadpool(service.geometry_fields.get, tenant, field_id)
-    folder = service.files.of(tenant).field(field.id)
+async def _map(
+    field_id: str, request: Request, stores: Stores, background: Background, tenant: Tenant, which: str
+) -> Response:
+    field = await run_in_threadpool(stores.geometry_fields.get, tenant, field_id)
+    folder = stores.files.of(tenant).field(field.id)
     return await picture(
-        request, field, {"map": which}, lambda: service.pictures.field_map_png(tenant, field, folder, which)
+        request,
+        field,
+        {"map": which},
+        lambda: background.pictures.field_map_png(tenant, field, folder, which),
     )

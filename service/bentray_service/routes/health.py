@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 
 from ..errors import NotReady
 from ..web.errors import problems
-from ..wiring import parts_of
+from ..wiring import background_of
 
 router = APIRouter(prefix="/health", tags=["health"])
 metrics_router = APIRouter(tags=["health"])
@@ -39,7 +39,7 @@ async def live() -> Alive:
 @router.get("/ready", responses=problems(503))
 async def ready(request: Request) -> Ready:
     """Readiness: whether uploads and jobs can be processed now; otherwise each fault is named."""
-    seen = await parts_of(request).readiness.report()
+    seen = await background_of(request).readiness.report()
     if seen.faults:
         raise NotReady(seen.faults)
     return Ready(workers=seen.workers, free_bytes=seen.free_bytes)

@@ -12,7 +12,7 @@ from bentray_workers.files.quantities import QUANTITIES, QuantityName
 from bentray_workers.rendering.histogram import BINS, DEFAULT_BINS
 
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service
+from ..wiring import Background, CallerTenant, Stores
 from .models.job_records import HistogramRecord
 from .pictures import while_connected
 from .quality import check_render_rate
@@ -28,7 +28,8 @@ router = APIRouter()
 async def show_histogram(
     volume_id: str,
     request: Request,
-    service: Service,
+    stores: Stores,
+    background: Background,
     tenant: CallerTenant,
     quantity: Annotated[
         Literal[QuantityName, "value"] | None,
@@ -46,12 +47,12 @@ async def show_histogram(
     ] = DEFAULT_BINS,
 ) -> HistogramRecord:
     """Count the nodes of a volume by value, on a worker; and the surface that a picture shows by default."""
-    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
+    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
     uploaded = volume.job_id is None
     chosen = quantity or ("value" if uploaded else "speed")
     if (chosen == "value") != uploaded:
         accepted = "value: this is an uploaded volume" if uploaded else "one of " + ", ".join(QUANTITIES)
         raise InvalidInput("quantity", repr(quantity), accepted)
-    path = service.files.of(tenant).volume(volume.id)
-    work = service.pictures.histogram(tenant, volume, path, chosen, bins)
+    path = stores.files.of(tenant).volume(volume.id)
+    work = background.pictures.histogram(tenant, volume, path, chosen, bins)
     return HistogramRecord.model_validate(await while_connected(request, work))

@@ -14,7 +14,7 @@ from ..jobs.estimate import READ, estimate
 from ..jobs.kinds import KINDS
 from ..rows.tables import ENDED, JobRow
 from ..web.errors import problems
-from ..wiring import CallerTenant, CurrentCaller, Parts, Service
+from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
 from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types
 from .downloads import download, download_of
 from .models.job_records import JobList, JobRecord, State
@@ -51,37 +51,39 @@ else:
 def start_job(
     job_request: JobRequest,
     response: Response,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     caller: CurrentCaller,
     idempotency_key: IdempotencyKey = None,
 ) -> JobRecord:
     """Queue a job. It is stored before the response and survives a restart of the service."""
     kind: str = job_request.kind
     tenant = caller.tenant
-    service.webhooks.check(tenant, job_request.webhook)
-    order = KINDS[kind].plan(job_request, tenant, service)
-    row = service.jobs.add(
+    background.webhooks.check(tenant, job_request.webhook)
+    order = KINDS[kind].plan(job_request, tenant, stores, background.runner.compute)
+    row = stores.jobs.add(
         tenant,
         kind,
         order.settings,
         **order.references,
         plan=order.plan,
-        reserve=(order.largest_bytes, service.quota.most_bytes),
-        most_queued=service.settings.max_queued_jobs,
+        reserve=(order.largest_bytes, stores.quota.most_bytes),
+        most_queued=access.settings.max_queued_jobs,
         key=idempotency_key,
         started_by=caller.who,
         webhook=job_request.webhook,
     )
-    job = _shown(service, row)
+    job = _shown(stores, background, row)
     log.info("%s queued, kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
-    service.runner.notify(job.id)
+    background.runner.notify(job.id)
     response.headers["Location"] = job.links["self"]
     return job
 
 
 @router.get("", responses=problems(404, 422))
 def list_jobs(
-    service: Service,
+    stores: Stores,
     tenant: CallerTenant,
     limit: Limit = 100,
     state: Annotated[State | None, Query(description="Only these.")] = None,
@@ -99,7 +101,7 @@ def list_jobs(
     ] = None,
 ) -> JobList:
     """List jobs, newest first; `next` is the address of the next page."""
-    rows = service.jobs.newest(tenant, limit + 1, state, kind, before, text, batch)
+    rows = stores.jobs.newest(tenant, limit + 1, state, kind, before, text, batch)
     shown = [job_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
         return JobList(jobs=shown, next=None)
@@ -116,20 +118,20 @@ def list_jobs(
 
 
 @router.get("/{job_id}", responses=problems(404))
-def show_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
+def show_job(job_id: str, stores: Stores, background: Background, tenant: CallerTenant) -> JobRecord:
     """Show one job: state, progress, and the residual after every iteration."""
-    return _shown(service, service.jobs.get(tenant, job_id))
+    return _shown(stores, background, stores.jobs.get(tenant, job_id))
 
 
-def _shown(service: Parts, row: JobRow) -> JobRecord:
+def _shown(stores: Stores, background: Background, row: JobRow) -> JobRecord:
     """The record of one job, with its place in the queue, its estimate and its webhook."""
     minutes = None
     if row.state == "queued":
-        minutes = estimate(row.plan, service.jobs.durations(row.tenant, row.kind, READ)).minutes
+        minutes = estimate(row.plan, stores.jobs.durations(row.tenant, row.kind, READ)).minutes
     delivery = None
     if row.webhook is not None and row.state in ENDED:
-        delivery = service.deliveries.of_job(row.tenant, row.id)
-    return job_record(row, service.jobs.place(row), minutes, delivery)
+        delivery = background.webhooks.deliveries.of_job(row.tenant, row.id)
+    return job_record(row, stores.jobs.place(row), minutes, delivery)
 
 
 @router.post(
@@ -137,18 +139,18 @@ def _shown(service: Parts, row: JobRow) -> JobRecord:
     status_code=status.HTTP_202_ACCEPTED,
     responses=problems(404, 409),
 )
-def cancel_job(job_id: str, service: Service, tenant: CallerTenant) -> JobRecord:
+def cancel_job(job_id: str, stores: Stores, tenant: CallerTenant) -> JobRecord:
     """Cancel a job. A queued job ends at once, a running one within a second or so."""
-    return job_record(service.jobs.request_cancel(tenant, job_id))
+    return job_record(stores.jobs.request_cancel(tenant, job_id))
 
 
 @router.delete("/{job_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
-def delete_job(job_id: str, service: Service, tenant: CallerTenant) -> None:
+def delete_job(job_id: str, stores: Stores, tenant: CallerTenant) -> None:
     """Delete a job that has ended, with the volume, animation or geometry field that it made.
 
     A simulated scan stays, and so does a geometry field that another job made too.
     """
-    service.deletion.delete(StoredItem(tenant, "job", job_id))
+    stores.deletion.delete(StoredItem(tenant, "job", job_id))
 
 
 @router.head("/{job_id}/animation", include_in_schema=False)
@@ -157,14 +159,14 @@ def delete_job(job_id: str, service: Service, tenant: CallerTenant) -> None:
     response_class=Response,
     responses={**download_of(*ANIMATIONS.values()), **problems(404, 409, 503)},
 )
-def animation(job_id: str, request: Request, service: Service, tenant: CallerTenant) -> Response:
+def animation(job_id: str, request: Request, stores: Stores, tenant: CallerTenant) -> Response:
     """Download the animation of a successful refraction job.
 
     Interrupted downloads can be resumed with Range and If-Range.
     """
-    job = service.jobs.get(tenant, job_id)
+    job = stores.jobs.get(tenant, job_id)
     if job.kind != "refraction" or job.state != "succeeded":
         raise NoAnimation(job.id, job.kind, job.state)
     extension = job.settings["format"]
-    path = service.files.store.fetch(service.files.of(tenant).animation(job.id, extension))
+    path = stores.files.store.fetch(stores.files.of(tenant).animation(job.id, extension))
     return download(request, path, repr((job.id, job.finished)), ANIMATIONS[extension])

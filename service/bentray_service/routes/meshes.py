@@ -18,7 +18,7 @@ from ..files.deletion import StoredItem
 from ..rows.ids import new_id
 from ..rows.tables import MeshRow
 from ..web.errors import problems
-from ..wiring import CallerTenant, CurrentCaller, Service
+from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
 from .bodies import Limit, accept_media_types
 from .models.surface_records import MeshList, MeshRecord
 from .pictures import while_connected
@@ -46,12 +46,14 @@ router = APIRouter(prefix="/v1", tags=["meshes"])
 async def upload_mesh(
     request: Request,
     response: Response,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: CallerTenant,
     title: Annotated[str, Query(max_length=200, description="Title.")] = "",
 ) -> MeshRecord:
     """Upload a mesh. A separate process validates and repairs it."""
-    row = await receive_upload(request, service, tenant, service.meshes, {"title": title})
+    row = await receive_upload(request, stores, background, access, tenant, stores.meshes, {"title": title})
     record = mesh_record(row)
     response.headers["Location"] = record.links["self"]
     return record
@@ -59,24 +61,24 @@ async def upload_mesh(
 
 @router.get("/meshes", responses=problems(422))
 def list_meshes(
-    service: Service,
+    stores: Stores,
     tenant: CallerTenant,
     limit: Limit = 100,
 ) -> MeshList:
     """List meshes, newest first."""
-    return MeshList(meshes=[mesh_record(row) for row in service.meshes.newest(tenant, limit)])
+    return MeshList(meshes=[mesh_record(row) for row in stores.meshes.newest(tenant, limit)])
 
 
 @router.get("/meshes/{mesh_id}", responses=problems(404))
-def show_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> MeshRecord:
+def show_mesh(mesh_id: str, stores: Stores, tenant: CallerTenant) -> MeshRecord:
     """Show one mesh: size, genus, holes and repairs."""
-    return mesh_record(service.meshes.get(tenant, mesh_id))
+    return mesh_record(stores.meshes.get(tenant, mesh_id))
 
 
 @router.delete("/meshes/{mesh_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
-def delete_mesh(mesh_id: str, service: Service, tenant: CallerTenant) -> None:
+def delete_mesh(mesh_id: str, stores: Stores, tenant: CallerTenant) -> None:
     """Delete a mesh with its geometry fields and their jobs; rejected while an unfinished job needs it."""
-    service.deletion.delete(StoredItem(tenant, "mesh", mesh_id))
+    stores.deletion.delete(StoredItem(tenant, "mesh", mesh_id))
 
 
 @router.post(
@@ -88,7 +90,9 @@ async def mesh_of_volume(
     volume_id: str,
     request: Request,
     response: Response,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: CallerTenant,
     caller: CurrentCaller,
     iso: Annotated[
@@ -97,28 +101,28 @@ async def mesh_of_volume(
     step: Annotated[int, Query(ge=1, le=MAX_STEP, description="Use every n-th node: fewer faces.")] = 1,
 ) -> MeshRecord:
     """Extract an iso-surface of a volume as a mesh: the largest component, closed at the boundary."""
-    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
+    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
     check_renderable(volume)
     check_nodes(tuple(volume.shape), step)
     low, high = volume.value_range
     # NaN fails both comparisons.
     if iso is not None and not (math.isfinite(iso) and low <= iso < high):
         raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
-    mesh_id, files = new_id("mesh"), service.files.of(tenant)
-    service.sign_in.check_render(caller)
+    mesh_id, files = new_id("mesh"), stores.files.of(tenant)
+    access.sign_in.check_render(caller)
     path = files.volume(volume.id)
 
     def store(made: Path, summary: dict[str, Any]) -> MeshRow:
-        service.quota.resize(tenant, mesh_id, made.stat().st_size)
+        stores.quota.resize(tenant, mesh_id, made.stat().st_size)
         content = files.adopt(mesh_id).read_bytes()
         digest = hashlib.sha256(content).hexdigest()
         columns = summary | {"title": volume.title, "volume_id": volume.id}
-        return service.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=columns)
+        return stores.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=columns)
 
-    async with service.quota.reserved(tenant, mesh_id, largest_bytes(volume.shape, step)):
+    async with stores.quota.reserved(tenant, mesh_id, largest_bytes(volume.shape, step)):
         try:
             made = files.candidate(mesh_id)
-            work = service.pictures.mesh_volume(tenant, volume, path, iso, step, made)
+            work = background.pictures.mesh_volume(tenant, volume, path, iso, step, made)
             row = await run_in_threadpool(store, made, await while_connected(request, work))
         finally:
             files.discard_candidate(mesh_id)

@@ -18,7 +18,7 @@ from ..rows.ids import new_id
 from ..rows.tables import DatasetRow
 from ..rows.tenants import Tenant
 from ..web.errors import problems
-from ..wiring import CallerTenant, Parts, Service
+from ..wiring import Access, Background, CallerTenant, Stores
 from .bodies import IdempotencyKey, SmallBody, accept_media_types
 from .models.job_records import DatasetRecord, JobRecord
 from .models.name_changes import DatasetChanges, JobChanges, ScanCorrection
@@ -54,7 +54,7 @@ router = APIRouter(prefix="/v1", route_class=SmallBody)
 def change_dataset(
     dataset_id: str,
     changes: Annotated[DatasetChanges, Body(openapi_examples=OF_A_SCAN)],
-    service: Service,
+    stores: Stores,
     tenant: CallerTenant,
 ) -> DatasetRecord:
     """Change the name, the notes or the stated water of a scan; its file stays as it is."""
@@ -62,7 +62,7 @@ def change_dataset(
     given: dict[str, str | float | None] = {k: value for k, value in words.items() if value is not None}
     if "water_temperature_c" in changes.model_fields_set:
         given["water_temperature_c"] = changes.water_temperature_c
-    return dataset_record(service.datasets.describe(tenant, dataset_id, **given))
+    return dataset_record(stores.datasets.describe(tenant, dataset_id, **given))
 
 
 @router.post(
@@ -77,7 +77,9 @@ async def correct_dataset(
     correction: Annotated[ScanCorrection, Body(openapi_examples=CORRECTIONS)],
     request: Request,
     response: Response,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: CallerTenant,
     idempotency_key: IdempotencyKey = None,
 ) -> DatasetRecord:
@@ -90,39 +92,46 @@ async def correct_dataset(
     # A correction that changes nothing is rejected before any work.
     Correction(**given)
     key = RequestKey.from_header(idempotency_key, ["correction", dataset_id, given])
-    made = await run_in_threadpool(service.datasets.made_by, tenant, key)
+    made = await run_in_threadpool(stores.datasets.made_by, tenant, key)
     if made is None:
-        made = await _corrected(dataset_id, given, key, request, service, tenant)
+        made = await _corrected(dataset_id, given, key, request, stores, background, access, tenant)
     record = dataset_record(made)
     response.headers["Location"] = record.links["self"]
     return record
 
 
 async def _corrected(
-    dataset_id: str, given: dict[str, Any], key: RequestKey, request: Request, service: Parts, tenant: Tenant
+    dataset_id: str,
+    given: dict[str, Any],
+    key: RequestKey,
+    request: Request,
+    stores: Stores,
+    background: Background,
+    access: Access,
+    tenant: Tenant,
 ) -> DatasetRow:
     """The row of a corrected copy, which is made in the ingest queue."""
-    scan = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
-    copy_id, settings, files = new_id("dataset"), service.settings, service.files.of(tenant)
-    reserve = partial(service.quota.resize, tenant, copy_id)
-    limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
+    scan = await run_in_threadpool(stores.datasets.get, tenant, dataset_id)
+    copy_id, settings, files = new_id("dataset"), access.settings, stores.files.of(tenant)
+    reserve = partial(stores.quota.resize, tenant, copy_id)
+    limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, stores.files.scratch)
 
     def work() -> DatasetRow:
-        service.files.store.fetch(files.dataset(scan.id))
-        return add_corrected(tenant, scan, given, key, copy_id, service.datasets, files, limits, reserve)
+        stores.files.store.fetch(files.dataset(scan.id))
+        return add_corrected(tenant, scan, given, key, copy_id, stores.datasets, files, limits, reserve)
 
-    with service.upload_limits(tenant):
-        async with service.quota.reserved(tenant, copy_id, scan.bytes):
-            return await run_in_turn(request, service.ingest_queue, tenant, work)
+    with background.ingest.upload_limits(tenant):
+        async with stores.quota.reserved(tenant, copy_id, scan.bytes):
+            return await run_in_turn(request, background.ingest.queue, tenant, work)
 
 
 @router.patch("/jobs/{job_id}", tags=["jobs"], dependencies=JSON, responses=REFUSALS)
 def change_job(
     job_id: str,
     changes: Annotated[JobChanges, Body(openapi_examples=OF_A_JOB)],
-    service: Service,
+    stores: Stores,
     tenant: CallerTenant,
 ) -> JobRecord:
     """Change the name or the notes of a job in any state."""
-    row = service.jobs.describe(tenant, job_id, **changes.model_dump(exclude_none=True))
-    return job_record(row, service.jobs.place(row))
+    row = stores.jobs.describe(tenant, job_id, **changes.model_dump(exclude_none=True))
+    return job_record(row, stores.jobs.place(row))

@@ -14,7 +14,7 @@ from starlette.requests import ClientDisconnect
 from .. import __version__
 from ..rows.tables import StoredRow
 from ..web.errors import problems
-from ..wiring import caller_of, parts_of
+from ..wiring import access_of, caller_of
 from .downloads import headers_of, unchanged, without_length
 
 Made = TypeVar("Made")
@@ -48,7 +48,7 @@ async def picture(
         return response
     if request.method == "HEAD":
         return without_length("image/png", headers_of(tag))
-    parts_of(request).sign_in.check_render(caller_of(request), _share(how))
+    access_of(request.scope).sign_in.check_render(caller_of(request), _share(how))
     return Response(await while_connected(request, draw()), media_type="image/png", headers=headers_of(tag))
 
 

@@ -12,7 +12,7 @@ from ..errors import Forbidden
 from ..rows.projects import OWNER
 from ..rows.tables import ProjectRow
 from ..web.errors import problems
-from ..wiring import CurrentCaller, Service
+from ..wiring import Access, CurrentCaller
 from .bodies import SmallBody, accept_media_types
 from .models.project_records import (
     MemberList,
@@ -43,68 +43,68 @@ router = APIRouter(prefix="/v1/projects", tags=["projects"], route_class=SmallBo
 def create_project(
     project: Annotated[ProjectRequest, Body(openapi_examples=NAMES)],
     response: Response,
-    service: Service,
+    access: Access,
     caller: CurrentCaller,
 ) -> ProjectDetails:
     """Create a project; the caller becomes its owner."""
-    made = _details(service, service.projects.add(caller.home, project.name, caller.member))
+    made = _details(access, access.sign_in.projects.add(caller.home, project.name, caller.member))
     response.headers["Location"] = made.links["self"]
     return made
 
 
 @router.get("", responses=problems(503))
-def list_projects(service: Service, caller: CurrentCaller) -> ProjectList:
+def list_projects(access: Access, caller: CurrentCaller) -> ProjectList:
     """List the projects that the caller is a member of."""
-    found = service.projects.all(caller.home, caller.member)
+    found = access.sign_in.projects.all(caller.home, caller.member)
     return ProjectList(projects=[_record(ProjectRecord, row) for row in found])
 
 
 @router.get("/{project_id}", responses=problems(404))
-def show_project(project_id: str, service: Service, caller: CurrentCaller) -> ProjectDetails:
+def show_project(project_id: str, access: Access, caller: CurrentCaller) -> ProjectDetails:
     """Show a project with its members, to its members."""
-    return _details(service, service.projects.get(caller.home, project_id, caller.member))
+    return _details(access, access.sign_in.projects.get(caller.home, project_id, caller.member))
 
 
 @router.patch("/{project_id}", dependencies=JSON, responses=problems(400, 404, 413, 415, 422))
 def rename_project(
     project_id: str,
     project: Annotated[ProjectRequest, Body(openapi_examples=NAMES)],
-    service: Service,
+    access: Access,
     caller: CurrentCaller,
 ) -> ProjectDetails:
     """Rename a project; owners only."""
-    service.projects.rename(_owned(service, caller, project_id), project.name)
-    return show_project(project_id, service, caller)
+    access.sign_in.projects.rename(_owned(access, caller, project_id), project.name)
+    return show_project(project_id, access, caller)
 
 
 @router.delete("/{project_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409))
-def delete_project(project_id: str, service: Service, caller: CurrentCaller) -> None:
+def delete_project(project_id: str, access: Access, caller: CurrentCaller) -> None:
     """Delete an empty project; owners only."""
-    service.projects.delete(_owned(service, caller, project_id))
+    access.sign_in.projects.delete(_owned(access, caller, project_id))
 
 
 @router.put("/{project_id}/members", dependencies=JSON, responses=problems(400, 404, 413, 415, 422))
 def put_member(
     project_id: str,
     member: Annotated[MemberRequest, Body(openapi_examples=MEMBERS)],
-    service: Service,
+    access: Access,
     caller: CurrentCaller,
 ) -> MemberList:
     """Add a member, change their role or remove them; owners only, but all members may remove themselves."""
-    project = service.projects.get(caller.home, project_id, caller.member)
+    project = access.sign_in.projects.get(caller.home, project_id, caller.member)
     if member.role is None:
         if member.member != caller.member:
             _check_owner(project)
-        service.projects.remove_member(project, member.member)
+        access.sign_in.projects.remove_member(project, member.member)
     else:
         _check_owner(project)
-        service.projects.put_member(project, member.member, member.role)
-    found = service.projects.members(project)
+        access.sign_in.projects.put_member(project, member.member, member.role)
+    found = access.sign_in.projects.members(project)
     return MemberList(members=[record_of(MemberRecord, row) for row in found])
 
 
-def _owned(service: Service, caller: Caller, project_id: str) -> ProjectRow:
-    project = service.projects.get(caller.home, project_id, caller.member)
+def _owned(access: Access, caller: Caller, project_id: str) -> ProjectRow:
+    project = access.sign_in.projects.get(caller.home, project_id, caller.member)
     _check_owner(project)
     return project
 
@@ -114,8 +114,8 @@ def _check_owner(project: ProjectRow) -> None:
         raise Forbidden("role", project.role, f"{OWNER} of the project")
 
 
-def _details(service: Service, project: ProjectRow) -> ProjectDetails:
-    members = [record_of(MemberRecord, row) for row in service.projects.members(project)]
+def _details(access: Access, project: ProjectRow) -> ProjectDetails:
+    members = [record_of(MemberRecord, row) for row in access.sign_in.projects.members(project)]
     return _record(ProjectDetails, project, members=members)
 
 

@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from bentray_kernels.picker_names import DEFAULT_PICKER, PickerName
 
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service, caller_of, parts_of
+from ..wiring import Background, CallerTenant, Stores, access_of, caller_of
 from .models.quality_records import QualityRecord
 from .pictures import PICTURE, picture, while_connected
 
@@ -24,7 +24,7 @@ Picker = Annotated[
 
 async def check_render_rate(request: Request) -> None:
     """Limit the rate of quality reports like that of rendered images."""
-    parts_of(request).sign_in.check_render(caller_of(request))
+    access_of(request.scope).sign_in.check_render(caller_of(request))
 
 
 @router.get(
@@ -33,24 +33,34 @@ async def check_render_rate(request: Request) -> None:
     dependencies=[Depends(check_render_rate)],
 )
 async def show_quality(
-    dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = DEFAULT_PICKER
+    dataset_id: str,
+    request: Request,
+    stores: Stores,
+    background: Background,
+    tenant: CallerTenant,
+    picker: Picker = DEFAULT_PICKER,
 ) -> QualityRecord:
     """Check the quality of a scan on a worker: faulty elements and times, and the action taken for each."""
-    dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
-    path = service.files.of(tenant).dataset(dataset.id)
-    work = service.pictures.quality(tenant, dataset, path, picker)
+    dataset = await run_in_threadpool(stores.datasets.get, tenant, dataset_id)
+    path = stores.files.of(tenant).dataset(dataset.id)
+    work = background.pictures.quality(tenant, dataset, path, picker)
     return QualityRecord.model_validate(await while_connected(request, work))
 
 
 @router.head("/{dataset_id}/quality.png", include_in_schema=False)
 @router.get("/{dataset_id}/quality.png", response_class=Response, responses={**PICTURE, **problems(404, 422)})
 async def quality_png(
-    dataset_id: str, request: Request, service: Service, tenant: CallerTenant, picker: Picker = DEFAULT_PICKER
+    dataset_id: str,
+    request: Request,
+    stores: Stores,
+    background: Background,
+    tenant: CallerTenant,
+    picker: Picker = DEFAULT_PICKER,
 ) -> Response:
     """The quality report as an image: gathers with picks, matrix of times, findings."""
-    dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
-    path = service.files.of(tenant).dataset(dataset.id)
+    dataset = await run_in_threadpool(stores.datasets.get, tenant, dataset_id)
+    path = stores.files.of(tenant).dataset(dataset.id)
     how = {"picker": picker, "what": "quality", "water_temperature_c": dataset.water_temperature_c}
     return await picture(
-        request, dataset, how, lambda: service.pictures.quality_png(tenant, dataset, path, picker)
+        request, dataset, how, lambda: background.pictures.quality_png(tenant, dataset, path, picker)
     )

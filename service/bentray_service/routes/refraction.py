@@ -7,7 +7,7 @@ from starlette.concurrency import run_in_threadpool
 
 from ..compute import check_renderable
 from ..view_parameters import ViewParameters
-from ..wiring import CallerTenant, Service
+from ..wiring import Background, CallerTenant, Stores
 from .pictures import PICTURE, picture
 
 router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
@@ -18,7 +18,8 @@ router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 async def refraction_png(
     volume_id: str,
     request: Request,
-    service: Service,
+    stores: Stores,
+    background: Background,
     tenant: CallerTenant,
     view: ViewParameters,
 ) -> Response:
@@ -27,10 +28,10 @@ async def refraction_png(
     Requires a 3-D volume with uniform spacing. HEAD returns the ETag without rendering, so Content-Length is
     absent.
     """
-    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
+    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
     check_renderable(volume)
     view = view.within(*volume.value_range)
-    path = service.files.of(tenant).volume(volume.id)
+    path = stores.files.of(tenant).volume(volume.id)
     return await picture(
-        request, volume, view.plain(), lambda: service.pictures.refraction_png(tenant, volume, path, view)
+        request, volume, view.plain(), lambda: background.pictures.refraction_png(tenant, volume, path, view)
     )

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request
 from starlette.concurrency import run_in_threadpool
 
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service
+from ..wiring import Background, CallerTenant, Stores
 from .models.quality_records import EmissionRecord, GeometryRecord
 from .pictures import while_connected
 from .quality import check_render_rate
@@ -22,12 +22,12 @@ router = APIRouter()
     dependencies=[Depends(check_render_rate)],
 )
 async def show_geometry(
-    dataset_id: str, request: Request, service: Service, tenant: CallerTenant
+    dataset_id: str, request: Request, stores: Stores, background: Background, tenant: CallerTenant
 ) -> GeometryRecord:
     """Show the elements, the acquisition and the water of a scan, read by a worker."""
-    dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
-    path = service.files.of(tenant).dataset(dataset.id)
-    work = service.pictures.scan_geometry(tenant, dataset, path)
+    dataset = await run_in_threadpool(stores.datasets.get, tenant, dataset_id)
+    path = stores.files.of(tenant).dataset(dataset.id)
+    work = background.pictures.scan_geometry(tenant, dataset, path)
     return GeometryRecord.model_validate(await while_connected(request, work))
 
 
@@ -37,7 +37,8 @@ async def show_geometry(
 async def show_traces(
     dataset_id: str,
     request: Request,
-    service: Service,
+    stores: Stores,
+    background: Background,
     tenant: CallerTenant,
     emission: Annotated[int, Query(ge=0, description="Index of the emission, from 0.")] = 0,
     slice: Annotated[int, Query(ge=0, description="Index of the slice, from 0.")] = 0,  # noqa: A002
@@ -46,8 +47,8 @@ async def show_traces(
     ] = "object",
 ) -> EmissionRecord:
     """Show the traces of one emission, at most 512 receivers and 1024 samples, and their picks."""
-    dataset = await run_in_threadpool(service.datasets.get, tenant, dataset_id)
-    path = service.files.of(tenant).dataset(dataset.id)
+    dataset = await run_in_threadpool(stores.datasets.get, tenant, dataset_id)
+    path = stores.files.of(tenant).dataset(dataset.id)
     how = {"emission": emission, "index": slice, "what": quantity}
-    work = service.pictures.emission_traces(tenant, dataset, path, how)
+    work = background.pictures.emission_traces(tenant, dataset, path, how)
     return EmissionRecord.model_validate(await while_connected(request, work))

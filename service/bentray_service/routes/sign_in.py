@@ -19,7 +19,7 @@ from ..access.browser_sessions import CALLBACK, START, BrowserSessions, Cookie
 from ..errors import NoSignIn
 from ..web.documents import document
 from ..web.errors import problem_of
-from ..wiring import Service
+from ..wiring import Access
 
 log = logging.getLogger("bentray.access")
 
@@ -32,26 +32,26 @@ NO_STORE = {"Cache-Control": "no-store"}
 
 
 @router.get("/sign-in/provider")
-def provider(service: Service) -> JSONResponse:
+def provider(access: Access) -> JSONResponse:
     """The name of the OpenID provider for the page; null without one."""
-    browsers = service.sign_in.browsers
+    browsers = access.sign_in.browsers
     return JSONResponse({"name": None if browsers is None else browsers.name})
 
 
 @router.get("/sign-in")
-async def begin(request: Request, service: Service, address: str = START) -> Response:
+async def begin(request: Request, access: Access, address: str = START) -> Response:
     """Redirect to the provider."""
     peer = request.client
-    service.sign_in.check_sign_in(peer.host if peer else "")
-    browsers = _browsers(service)
+    access.sign_in.check_sign_in(peer.host if peer else "")
+    browsers = _browsers(access)
     url, cookie = await _in_thread(request, lambda: browsers.begin(address))
     return _redirect(url, [cookie])
 
 
 @router.get(CALLBACK)
-async def finish(request: Request, service: Service) -> Response:
+async def finish(request: Request, access: Access) -> Response:
     """Start a session with the response of the provider, and return to the page; else say why not."""
-    browsers = _browsers(service)
+    browsers = _browsers(access)
     try:
         address, caller, cookies = await _in_thread(
             request, lambda: browsers.finish(request.query_params, request.headers)
@@ -70,9 +70,9 @@ async def finish(request: Request, service: Service) -> Response:
 
 
 @router.post("/sign-out")
-async def sign_out(request: Request, service: Service) -> Response:
+async def sign_out(request: Request, access: Access) -> Response:
     """End the session; returns the address at which the user signs out at the provider, or null."""
-    browsers = _browsers(service)
+    browsers = _browsers(access)
     caller, url, cookie = await _in_thread(request, lambda: browsers.sign_out(request.headers))
     request.state.caller = caller
     return JSONResponse({"address": url}, headers={**NO_STORE, "Set-Cookie": cookie.header()})
@@ -86,8 +86,8 @@ async def _in_thread(request: Request, work: Callable[[], Result]) -> Result:
     return await anyio.to_thread.run_sync(work, limiter=state.sign_in_threads)
 
 
-def _browsers(service: Service) -> BrowserSessions:
-    browsers = service.sign_in.browsers
+def _browsers(access: Access) -> BrowserSessions:
+    browsers = access.sign_in.browsers
     if browsers is None:
         raise NoSignIn()
     return browsers

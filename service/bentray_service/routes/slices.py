@@ -20,7 +20,7 @@ from bentray_workers.images.slice_style import (
     SliceStyle,
 )
 
-from ..wiring import CallerTenant, Service
+from ..wiring import Background, CallerTenant, Stores
 from .pictures import PICTURE, picture
 
 router = APIRouter()
@@ -63,7 +63,8 @@ async def read_style(
 async def slice_png(
     volume_id: str,
     request: Request,
-    service: Service,
+    stores: Stores,
+    background: Background,
     tenant: CallerTenant,
     style: Annotated[SliceStyle, Depends(read_style)],
     axis: Annotated[Literal["x", "y", "z"], Query(description="Axis perpendicular to the slice.")] = "z",
@@ -90,7 +91,7 @@ async def slice_png(
 
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
-    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
+    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
     check_plane(volume.shape, volume.spacing_m, axis, index)
     for name, value in (("low", low), ("high", high)):
         if value is not None:
@@ -103,5 +104,7 @@ async def slice_png(
         how["quantity"] = quantity or "speed"
     elif quantity not in (None, "value"):
         raise InvalidInput("quantity", repr(quantity), "value: this is an uploaded volume")
-    path = service.files.of(tenant).volume(volume.id)
-    return await picture(request, volume, how, lambda: service.pictures.slice_png(tenant, volume, path, how))
+    path = stores.files.of(tenant).volume(volume.id)
+    return await picture(
+        request, volume, how, lambda: background.pictures.slice_png(tenant, volume, path, how)
+    )

@@ -17,7 +17,7 @@ from bentray_workers.files.volume_export import REVISION, Selection, largest_byt
 from .. import __version__
 from ..errors import UnknownId
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service, caller_of, parts_of
+from ..wiring import Background, CallerTenant, Stores, access_of, caller_of
 from .downloads import download, download_of, file_status, headers_of, tag_of, unchanged, without_length
 from .pictures import while_connected
 from .volume_summaries import scan_of
@@ -41,7 +41,8 @@ router = APIRouter()
 async def volume_data(
     volume_id: str,
     request: Request,
-    service: Service,
+    stores: Stores,
+    background: Background,
     tenant: CallerTenant,
     format: Annotated[  # noqa: A002 - the name of the query parameter
         Literal[FormatName, "h5"],
@@ -75,10 +76,10 @@ async def volume_data(
     worker on the first request; before, HEAD returns no Content-Length.
     """
     kind: FormatName = "hdf5" if format == "h5" else format
-    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
-    files = service.files.of(tenant)
+    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
+    files = stores.files.of(tenant)
     # Exports are deleted together with the volume.
-    path = await run_in_threadpool(service.files.store.fetch, files.volume(volume.id))
+    path = await run_in_threadpool(stores.files.store.fetch, files.volume(volume.id))
     seed = repr((volume.id, volume.created, kind))
     of_truth = quantity == "truth"
     selection = Selection(
@@ -109,29 +110,29 @@ async def volume_data(
         if request.method == "HEAD":
             headers = {"Accept-Ranges": "bytes", "Content-Disposition": f'attachment; filename="{name}"'}
             return without_length(chosen.media_type, headers_of(tag) | headers)
-        parts_of(request).sign_in.check_render(caller_of(request))
+        access_of(request.scope).sign_in.check_render(caller_of(request))
         uploaded, held = volume.job_id is None, "speed" if of_truth else quantity
         shape = await run_in_threadpool(shape_of_quantity, path, held, tuple(volume.shape))
         most = largest_bytes(shape, uploaded=uploaded)
-        async with service.quota.reserved(tenant, made.name, most):
+        async with stores.quota.reserved(tenant, made.name, most):
             try:
                 if of_truth:
-                    dataset, scan = await run_in_threadpool(scan_of, service, tenant, volume)
-                    work = service.pictures.export_truth(tenant, volume, dataset, path, scan, made, kind)
+                    dataset, scan = await run_in_threadpool(scan_of, stores, tenant, volume)
+                    work = background.pictures.export_truth(tenant, volume, dataset, path, scan, made, kind)
                 else:
-                    work = service.pictures.export(tenant, volume, path, made, kind, selection)
+                    work = background.pictures.export(tenant, volume, path, made, kind, selection)
                 await while_connected(request, work)
             except InvalidInput:
                 # Report a volume that was deleted in the meantime as unknown.
-                await run_in_threadpool(service.volumes.get, tenant, volume.id)
+                await run_in_threadpool(stores.volumes.get, tenant, volume.id)
                 raise
-            await run_in_threadpool(service.quota.stored, tenant, made.name, file_status(made).st_size)
+            await run_in_threadpool(stores.quota.stored, tenant, made.name, file_status(made).st_size)
     response = download(request, made, seed, chosen.media_type, name, tag)
     try:
-        await run_in_threadpool(service.volumes.get, tenant, volume.id)
+        await run_in_threadpool(stores.volumes.get, tenant, volume.id)
     except UnknownId:
         # The export was written after the files of the volume had been deleted.
         made.unlink(missing_ok=True)
-        await run_in_threadpool(service.quota.gone, tenant, made.name)
+        await run_in_threadpool(stores.quota.gone, tenant, made.name)
         raise
     return response

@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from ..rows.tables import DatasetRow, VolumeRow
 from ..rows.tenants import Tenant
 from ..web.errors import problems
-from ..wiring import CallerTenant, Parts, Service
+from ..wiring import Background, CallerTenant, Stores
 from .models.summary_records import SummaryRecord
 from .pictures import while_connected
 from .quality import check_render_rate
@@ -20,7 +20,7 @@ from .quality import check_render_rate
 router = APIRouter()
 
 
-def scan_of(service: Parts, tenant: Tenant, volume: VolumeRow) -> tuple[DatasetRow, Path]:
+def scan_of(stores: Stores, tenant: Tenant, volume: VolumeRow) -> tuple[DatasetRow, Path]:
     """The scan of a reconstruction: its row, and its file, fetched from the store.
 
     Raises:
@@ -28,8 +28,8 @@ def scan_of(service: Parts, tenant: Tenant, volume: VolumeRow) -> tuple[DatasetR
     """
     if volume.job_id is None:
         raise InvalidInput("volume", f"{volume.id}, an upload", "the result of a reconstruction")
-    dataset = service.datasets.get(tenant, volume.dataset_id)
-    return dataset, service.files.store.fetch(service.files.of(tenant).dataset(dataset.id))
+    dataset = stores.datasets.get(tenant, volume.dataset_id)
+    return dataset, stores.files.store.fetch(stores.files.of(tenant).dataset(dataset.id))
 
 
 @router.get(
@@ -38,11 +38,11 @@ def scan_of(service: Parts, tenant: Tenant, volume: VolumeRow) -> tuple[DatasetR
     dependencies=[Depends(check_render_rate)],
 )
 async def show_summary(
-    volume_id: str, request: Request, service: Service, tenant: CallerTenant
+    volume_id: str, request: Request, stores: Stores, background: Background, tenant: CallerTenant
 ) -> SummaryRecord:
     """Summarise a reconstruction on a worker: quantities, what auto compared, errors against the truth."""
-    volume = await run_in_threadpool(service.volumes.get, tenant, volume_id)
-    dataset, scan = await run_in_threadpool(scan_of, service, tenant, volume)
-    path = service.files.of(tenant).volume(volume.id)
-    work = service.pictures.summary(tenant, volume, dataset, path, scan)
+    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
+    dataset, scan = await run_in_threadpool(scan_of, stores, tenant, volume)
+    path = stores.files.of(tenant).volume(volume.id)
+    work = background.pictures.summary(tenant, volume, dataset, path, scan)
     return SummaryRecord.model_validate(await while_connected(request, work))

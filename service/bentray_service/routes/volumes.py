@@ -10,7 +10,7 @@ from bentray_workers.files.volume_formats import RAW_TYPES
 
 from ..files.deletion import StoredItem
 from ..web.errors import problems
-from ..wiring import CallerTenant, Service
+from ..wiring import Access, Background, CallerTenant, Stores
 from . import coefficients, histograms, slices, volume_data, volume_summaries
 from .bodies import Limit, accept_media_types
 from .models.job_records import VolumeList, VolumeRecord
@@ -38,7 +38,9 @@ router.include_router(volume_summaries.router)
 async def upload_volume(
     request: Request,
     response: Response,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: CallerTenant,
     title: Annotated[str, Query(max_length=200, description="Title; default: that in the file.")] = "",
     spacing_m: Annotated[
@@ -68,7 +70,7 @@ async def upload_volume(
 ) -> VolumeRecord:
     """Upload a volume. The format is detected from the content; a separate process validates it."""
     given = volume_metadata(title, spacing_m, shape, dtype)
-    row = await receive_upload(request, service, tenant, service.volumes.uploaded, given)
+    row = await receive_upload(request, stores, background, access, tenant, stores.volumes.uploaded, given)
     record = volume_record(row)
     response.headers["Location"] = record.links["self"]
     return record
@@ -76,21 +78,21 @@ async def upload_volume(
 
 @router.get("", responses=problems(422))
 def list_volumes(
-    service: Service,
+    stores: Stores,
     tenant: CallerTenant,
     limit: Limit = 100,
 ) -> VolumeList:
     """List volumes, reconstructed and uploaded, newest first."""
-    return VolumeList(volumes=[volume_record(row) for row in service.volumes.newest(tenant, limit)])
+    return VolumeList(volumes=[volume_record(row) for row in stores.volumes.newest(tenant, limit)])
 
 
 @router.get("/{volume_id}", responses=problems(404))
-def show_volume(volume_id: str, service: Service, tenant: CallerTenant) -> VolumeRecord:
+def show_volume(volume_id: str, stores: Stores, tenant: CallerTenant) -> VolumeRecord:
     """Show one volume: shape, axes, spacing, origin and range."""
-    return volume_record(service.volumes.get(tenant, volume_id))
+    return volume_record(stores.volumes.get(tenant, volume_id))
 
 
 @router.delete("/{volume_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
-def delete_volume(volume_id: str, service: Service, tenant: CallerTenant) -> None:
+def delete_volume(volume_id: str, stores: Stores, tenant: CallerTenant) -> None:
     """Delete a volume with its job and turntables; rejected while an unfinished job needs it."""
-    service.deletion.delete(StoredItem(tenant, "volume", volume_id))
+    stores.deletion.delete(StoredItem(tenant, "volume", volume_id))

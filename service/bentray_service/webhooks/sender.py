@@ -55,7 +55,7 @@ class Webhooks:
         Raises:
             InvalidInput: for invalid networks.
         """
-        self._deliveries, self._secrets = Deliveries(database), WebhookSecrets(database)
+        self.deliveries, self._secrets = Deliveries(database), WebhookSecrets(database)
         self._on, self._alone = settings.webhooks, alone
         self._permitted = networks(settings.webhook_networks or "", "BENTRAY_WEBHOOK_NETWORKS")
         self._leaving = threading.Event()
@@ -83,7 +83,7 @@ class Webhooks:
     def start(self) -> None:
         """Begin to send, also what a service that died has left."""
         if self._alone:
-            self._deliveries.take_over()
+            self.deliveries.take_over()
         self._thread.start()
 
     def alive(self) -> bool:
@@ -114,7 +114,7 @@ class Webhooks:
             return True
         delivery = None
         try:
-            delivery = self._deliveries.claim()
+            delivery = self.deliveries.claim()
         finally:
             if delivery is None:
                 self._free.release()
@@ -148,7 +148,7 @@ class Webhooks:
         state = "delivered" if not outcome.error else "failed" if last else "waiting"
         pause = 0.0 if last else PAUSES_S[attempt - 1] * random.uniform(1 - JITTER, 1 + JITTER)  # noqa: S311
         entry = {"time": now, **outcome._asdict()}
-        self._deliveries.settle(delivery, state, entry, time.time() + pause)
+        self.deliveries.settle(delivery, state, entry, time.time() + pause)
         # The address is not logged, since it may contain a secret of the receiver.
         words = "%s of %s, attempt %d: %s"
         level = logging.WARNING if state == "failed" else logging.INFO

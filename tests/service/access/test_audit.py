@@ -15,7 +15,7 @@ ENTRY = {"method": "GET", "route": "/v1/datasets/{dataset_id}", "ids": ["ds-1"],
 
 
 def told(http):
-    return list(entries(http.app.state.parts.files.audit))
+    return list(entries(http.app.state.stores.files.audit))
 
 
 def test_a_file_a_day_only_appended_to_and_closed_to_others(tmp_path):
@@ -48,13 +48,13 @@ def test_entries_that_cannot_be_stored_are_logged(tmp_path, caplog):
 def key(start):
     """A service, and the headers of a caller of acme."""
     http, token = start(), ApiKey.new()
-    Keys(http.app.state.parts.database).add(token, Tenant("acme"), "one", ("read", "write"))
+    Keys(http.app.state.stores.database).add(token, Tenant("acme"), "one", ("read", "write"))
     return http, {"Authorization": f"Bearer {token.shown()}"}, token
 
 
 def test_reads_and_writes_are_audited_with_ids(key, scan, monkeypatch):
     http, auth, token = key
-    http.app.state.parts.sign_in._no_keys_until = 0.0
+    http.app.state.access.sign_in._no_keys_until = 0.0
     content, media = scan().read_bytes(), {"Content-Type": "application/x-hdf5"}
     made = http.post("/v1/datasets", content=content, headers={**auth, **media, "X-Request-ID": "from-me"})
     dataset = made.json()["id"]

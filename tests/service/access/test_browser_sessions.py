@@ -87,7 +87,7 @@ def app(folder, provider):
 def http(app, monkeypatch):
     """A browser without cookies."""
     app.cookies.clear()
-    app.app.state.parts.sign_in._sign_ins._buckets.clear()
+    app.app.state.access.sign_in._sign_ins._buckets.clear()
     monkeypatch.setattr(openid_provider, "ROTATION_S", 0.0)
     return app
 
@@ -197,7 +197,7 @@ def test_a_sign_in_ends_the_session_before(http, provider):
 
 def test_sessions_expire_and_end_their_streams(http, provider):
     signed_in(http, provider)
-    database = http.app.state.parts.database
+    database = http.app.state.stores.database
     with http.stream("GET", "/v1/events", params={"seconds": 20}) as stream:
         assert stream.status_code == 200
         begun = time.monotonic()
@@ -233,7 +233,7 @@ def test_a_response_counts_once_and_in_its_browser(http, provider):
 
 def test_a_pending_sign_in_expires(http, provider):
     address = back(http, provider)
-    with http.app.state.parts.database.write() as connection:
+    with http.app.state.stores.database.write() as connection:
         connection.execute(text("UPDATE pending_sign_ins SET expires = 1.0"))
     refused(http.get(address), 401, "expired")
 
@@ -358,7 +358,7 @@ def test_a_provider_that_is_away(tmp_path, provider):
 
 
 def test_sign_ins_of_one_address_are_limited(http, monkeypatch):
-    monkeypatch.setattr(http.app.state.parts.sign_in._sign_ins, "_clock", lambda: 0.0)
+    monkeypatch.setattr(http.app.state.access.sign_in._sign_ins, "_clock", lambda: 0.0)
     answers = [http.get("/sign-in").status_code for _ in range(61)]
     assert set(answers[:-1]) == {303}
     assert answers[-1] == 429

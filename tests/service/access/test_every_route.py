@@ -68,8 +68,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     )
     app = create_app(settings, FakeCluster())
     with TestClient(app, base_url="http://localhost", raise_server_exceptions=False) as http:
-        parts = app.state.parts
-        keys = Keys(parts.database)
+        state = app.state
+        keys = Keys(state.stores.database)
         auth: dict[str, dict[str, str]] = {}
         for name, tenant, scopes in (
             ("acme", ACME, ("read", "write")),
@@ -87,27 +87,27 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
 
 def one_of_each(app: FastAPI, http: TestClient, owner: Tenant, auth: dict[str, str]) -> dict[str, str]:
     """One of everything of a tenant or a project, by the name that paths give its id."""
-    parts = app.state.parts
-    files = parts.files.of(owner)
+    state = app.state
+    files = state.stores.files.of(owner)
     dataset, mesh, field = new_id("dataset"), new_id("mesh"), new_id("field")
     scan = dict.fromkeys(("dimension", "elements", "ntx", "nrx", "slices", "water_speed_mps"), 0)
     scan |= dict.fromkeys(("title", "source", "license"), "")
     scan |= dict.fromkeys(("has_traces", "has_travel_times", "has_truth"), False)
-    parts.datasets.add(owner, dataset, size=1, sha256="0" * 64, summary=scan)
+    state.stores.datasets.add(owner, dataset, size=1, sha256="0" * 64, summary=scan)
     surface = {"vertices": 4, "faces": 4, "genus": 0, "holes": 0, "coloured": False}
     surface["repairs"] = dict.fromkeys(Repairs.model_fields, 0)
     surface |= {"title": "", "format": "ply", "content": "0" * 64}
-    parts.meshes.add(owner, mesh, size=1, sha256="0" * 64, summary=surface)
-    job = parts.jobs.add(owner, "reconstruction", {}, dataset).id
+    state.stores.meshes.add(owner, mesh, size=1, sha256="0" * 64, summary=surface)
+    job = state.stores.jobs.add(owner, "reconstruction", {}, dataset).id
     cube = {"axes": "x,y,z", "shape": [4, 4, 4], "spacing_m": [1.0] * 3, "origin_m": [0.0] * 3}
     cube |= {"speed_range_mps": [1.0, 2.0], "water_speed_mps": 1.0, "provenance": {}, "bytes": 1}
     # At its end, so that its events have one too.
-    parts.jobs.request_cancel(owner, job)
-    batch = parts.batches.add(owner, "", {}, [NewJob("reconstruction", {}, dataset)], Submission()).id
-    parts.batches.request_cancel(owner, batch)
+    state.stores.jobs.request_cancel(owner, job)
+    batch = state.stores.batches.add(owner, "", {}, [NewJob("reconstruction", {}, dataset)], Submission()).id
+    state.stores.batches.request_cancel(owner, batch)
     figures = dict.fromkeys((*FieldSizes.model_fields, *FieldErrors.model_fields), 1)
     figures |= {f"{name}_seconds": 1.0 for name in FieldSeconds.model_fields}
-    with parts.database.write() as connection:
+    with state.stores.database.write() as connection:
         made = {"tenant": owner, "job_id": job, "created": 1.0}
         connection.execute(insert(ResultVolumeRow).values(id=volume_of(job), **made, **cube))
         made |= {"mesh_id": mesh, "bytes": 1, "settings": {}, "figures": figures}

@@ -145,7 +145,7 @@ def running_jobs(world: World, at_once: int = 2) -> tuple[int, Use]:
     def run(tenant: Tenant) -> None:
         job = rows.add(tenant, "simulation", {})
         count = len(running)
-        if count >= runner._most or runner._queue.claim(idle_only=count >= runner._at_once) is None:
+        if count >= runner._most or runner.queue.claim(idle_only=count >= runner._at_once) is None:
             rows.request_cancel(tenant, job.id)
             raise RateLimited("jobs", "waits", "later", 1.0)
         running.append(job.id)

@@ -47,7 +47,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
         auth, keys = {}, {}
         for name in ("owner", "contributor", "reader", "outsider"):
             token = ApiKey.new()
-            Keys(app.state.parts.database).add(token, LAB, name, ("read", "write"))
+            Keys(app.state.stores.database).add(token, LAB, name, ("read", "write"))
             auth[name], keys[name] = {"Authorization": f"Bearer {token.shown()}"}, f"key:{token.id}"
         made = [
             http.post("/v1/projects", json={"name": name}, headers=auth[who]).json()["id"]

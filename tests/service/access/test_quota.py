@@ -28,7 +28,7 @@ def used(http):
 
 
 def kept(http):
-    return bytes_in(http.app.state.parts.files.of(LOCAL).root)
+    return bytes_in(http.app.state.stores.files.of(LOCAL).root)
 
 
 def refused(answer):
@@ -151,7 +151,7 @@ def test_geometry_fields_reserve_their_tables(start):
     corners = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
     answer = http.post("/v1/meshes", content=f"OFF\n4 4 0\n{corners}".encode(), headers=BYTES)
     # They stay queued.
-    http.app.state.parts.runner.stop()
+    http.app.state.background.runner.stop()
     asked = {"kind": "geometry-field", "mesh": answer.json()["id"]}
     small = {"samples": 8, "inner_samples": 4, "image_size": 33}
     told = [http.post("/v1/jobs", json={**asked, "settings": {**small, "divisions": k}}) for k in range(1, 9)]
@@ -164,7 +164,7 @@ def test_geometry_fields_reserve_their_tables(start):
 
 def test_reservations_of_a_killed_service_are_released_at_start(start):
     http = start(max_tenant_bytes=QUOTA_BYTES)
-    http.app.state.parts.quota.resize(LOCAL, new_id("dataset"), QUOTA_BYTES)
+    http.app.state.stores.quota.resize(LOCAL, new_id("dataset"), QUOTA_BYTES)
     assert used(http) == (0, QUOTA_BYTES)
     http.__exit__()
     assert used(start(max_tenant_bytes=QUOTA_BYTES)) == (0, 0)
@@ -173,7 +173,7 @@ def test_reservations_of_a_killed_service_are_released_at_start(start):
 def test_a_reservation_is_released_later_if_the_database_is_away(start, monkeypatch, caplog):
     """An expected state: one line in the log, without a traceback."""
     http = start()
-    quota = http.app.state.parts.quota
+    quota = http.app.state.stores.quota
     with monkeypatch.context() as away:
 
         def refuse():

@@ -70,7 +70,7 @@ def used(start, work, uploaded, submitted, until):
 
     def go(folder="data", **settings):
         http = start(folder, **settings)
-        members, keys = {}, Keys(http.app.state.parts.database)
+        members, keys = {}, Keys(http.app.state.stores.database)
         for tenant in TENANTS:
             token = ApiKey.new()
             keys.add(token, Tenant(tenant), "test", ("read", "write"))
@@ -123,7 +123,7 @@ def keys_of(members):
 
 
 def settings_of(member):
-    return member.app.state.parts.settings
+    return member.app.state.access.settings
 
 
 def seen(member):

@@ -140,8 +140,8 @@ def test_deletion_and_expiry_empty_the_bucket(service, objects):
         send(http, one, b"x" * 10)
     assert len(objects()) == 2
     assert http.delete(upload["links"]["self"], headers={"Tus-Resumable": "1.0.0"}).status_code == 204
-    parts = http.app.state.parts
-    parts.housekeeper.forget(parts.uploads.get("local", other["id"]))
+    state = http.app.state
+    state.background.housekeeper.forget(state.background.ingest.uploads.get("local", other["id"]))
     assert objects() == []
     assert http.get(other["links"]["self"]).status_code == 404
 
@@ -165,7 +165,7 @@ def test_a_bucket_that_is_away_is_waited_for(service, scan, s3_server, monkeypat
     data = scan().read_bytes()
     upload = begun(http, data)
     send(http, upload, data)
-    direct = http.app.state.parts.direct_uploads
+    direct = http.app.state.stores.files.store.direct_uploads
     fetch, calls = direct.fetch, []
 
     def away_once(row, path):

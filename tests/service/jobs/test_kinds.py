@@ -86,7 +86,7 @@ def test_three_pictures(serving, until, form, media):
         else:
             assert Image.open(io.BytesIO(found.content)).n_frames == 3
         assert [one["id"] for one in http.get("/v1/volumes").json()["volumes"]] == [volume]
-        assert not list(http.app.state.parts.files.scratch.iterdir())
+        assert not list(http.app.state.stores.files.scratch.iterdir())
 
 
 def test_without_an_iso_value_the_middle_of_the_range_once_the_smoothing_is_known(
@@ -114,7 +114,7 @@ def test_cancel_between_pictures(serving, until):
         done = until(http, job["id"])
         assert (done["state"], done["progress"]["total"]) == ("cancelled", 720)
         assert done["progress"]["done"] < 720
-        assert not list((http.app.state.parts.files.of(LOCAL).root / "animations").iterdir())
+        assert not list((http.app.state.stores.files.of(LOCAL).root / "animations").iterdir())
         answer = http.get(f"/v1/jobs/{job['id']}/animation")
         assert (answer.status_code, answer.json()["type"]) == (409, "/problems/no-animation")
 
@@ -133,7 +133,7 @@ def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch)
     monkeypatch.undo()
     with serving() as http:
         assert until(http, job["id"])["state"] == "succeeded"
-        states = [event.state for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
+        states = [event.state for event in http.app.state.stores.jobs.events(LOCAL, job["id"])]
     # On a loaded machine the workers of the second service may connect late; the job then waits again.
     assert states[:4] == ["queued", "running", "queued", "running"]
     assert states[-1] == "succeeded"
@@ -191,11 +191,11 @@ COARSE = {"samples": 6, "inner_samples": 4, "divisions": 4, "image_size": 33}
 
 def put_mesh(http, mesh=None):
     """A mesh as an upload leaves it; its id."""
-    parts, mesh_id = http.app.state.parts, new_id("mesh")
+    state, mesh_id = http.app.state, new_id("mesh")
     stored = StoredMesh(torus(16, 10) if mesh is None else mesh)
-    write_mesh(parts.files.of(LOCAL).mesh(mesh_id), stored)
+    write_mesh(state.stores.files.of(LOCAL).mesh(mesh_id), stored)
     summary = summary_of(stored, sound(stored.mesh.vertices, stored.mesh.faces), "ply")
-    parts.meshes.add(LOCAL, mesh_id, size=1, sha256="0" * 64, summary={**summary, "title": "a ring"})
+    state.stores.meshes.add(LOCAL, mesh_id, size=1, sha256="0" * 64, summary={**summary, "title": "a ring"})
     return mesh_id
 
 
@@ -227,12 +227,12 @@ def test_a_cancelled_field_leaves_nothing(serving, until, monkeypatch):
         assert (done["state"], done["field"]) == ("cancelled", None)
         assert "field" not in done["links"]
         assert http.get("/v1/geometry-fields").json() == {"geometry_fields": []}
-        wait_until_empty(http.app.state.parts.files.of(LOCAL).root / "work")
+        wait_until_empty(http.app.state.stores.files.of(LOCAL).root / "work")
 
 
 def test_a_field_that_is_cancelled_at_its_end_stays_for_others(start):
-    parts = start().app.state.parts
-    files = parts.files.of(LOCAL)
+    state = start().app.state
+    files = state.stores.files.of(LOCAL)
     kept = files.field(new_id("field"))
     kept.mkdir()
     kinds.KINDS["geometry-field"].discard(files, kept)
@@ -241,14 +241,14 @@ def test_a_field_that_is_cancelled_at_its_end_stays_for_others(start):
 
 @pytest.mark.parametrize("kind", ["reconstruction", "simulation"])
 def test_cancelled_fields_leave_no_files(start, kind):
-    parts = start().app.state.parts
-    files = parts.files.of(LOCAL)
+    state = start().app.state
+    files = state.stores.files.of(LOCAL)
     written = kinds.KINDS[kind].target(files, JobRow(id=new_id("job")))
     written.write_bytes(b"x")
-    parts.files.store.publish(written)
+    state.stores.files.store.publish(written)
     kinds.KINDS[kind].discard(files, written)
     assert not written.exists()
-    assert Checksums(parts.database).all() == []
+    assert Checksums(state.stores.database).all() == []
 
 
 def test_other_refusals_of_a_field(start, monkeypatch):

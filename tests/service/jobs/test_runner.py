@@ -31,7 +31,7 @@ def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
 
 
 def states_of(http, jobs):
-    return [http.app.state.parts.queue.state(job) for job in jobs]
+    return [http.app.state.background.runner.queue.state(job) for job in jobs]
 
 
 def until_states(http, jobs, *wanted):
@@ -44,19 +44,19 @@ def until_states(http, jobs, *wanted):
 def test_job_of_another_tenant_starts_during_long_jobs(start, uploaded, work):
     """Of one tenant as many run as may at a time, of each other one in any case, up to so many in all."""
     http = start(jobs_at_once=2, tenants_at_once=4)
-    dataset, parts = uploaded(http), http.app.state.parts
+    dataset, state = uploaded(http), http.app.state
     settings, mine = (
         Settings(method="sart", nodes=16, iterations=1).to_dict(),
-        parts.files.of(LOCAL).dataset(dataset),
+        state.stores.files.of(LOCAL).dataset(dataset),
     )
     for tenant in "abcd":
-        its = parts.files.of(Tenant(tenant)).dataset(dataset)
+        its = state.stores.files.of(Tenant(tenant)).dataset(dataset)
         shutil.copy(mine, its)
-        parts.files.store.publish(its)
+        state.stores.files.store.publish(its)
 
     def add(tenant):
-        job = parts.jobs.add(Tenant(tenant), "reconstruction", settings, dataset).id
-        parts.runner.notify()
+        job = state.stores.jobs.add(Tenant(tenant), "reconstruction", settings, dataset).id
+        state.background.runner.notify()
         return job
 
     work.hold.clear()
@@ -66,8 +66,8 @@ def test_job_of_another_tenant_starts_during_long_jobs(start, uploaded, work):
     until_states(http, jobs, "running", "running", "queued", "running", "queued")
     jobs += [add("c"), add("d")]
     until_states(http, jobs, "running", "running", "queued", "running", "queued", "running", "queued")
-    assert parts.runner.alive()
-    parts.jobs.request_cancel(Tenant("c"), jobs[5])
+    assert state.background.runner.alive()
+    state.stores.jobs.request_cancel(Tenant("c"), jobs[5])
     until_states(http, jobs, "running", "running", "queued", "running", "queued", "cancelled", "running")
     work.hold.set()
     until_states(http, jobs, *["succeeded"] * 5, "cancelled", "succeeded")
@@ -83,14 +83,14 @@ def test_new_job_starts_at_once(start, uploaded, submitted, until, work, monkeyp
 
 def test_a_job_that_begins_while_the_service_stops_is_put_back(start, uploaded, submitted, work, monkeypatch):
     http = start()
-    parts, claimed, claim = http.app.state.parts, threading.Event(), Queue.claim
+    state, claimed, claim = http.app.state, threading.Event(), Queue.claim
 
     def late(self, *args, **kwargs):
         job = claim(self, *args, **kwargs)
         if job is not None:
             claimed.set()
             # Until the service has begun to stop.
-            parts.runner._leaving.wait(60.0)
+            state.background.runner._leaving.wait(60.0)
             time.sleep(0.1)
         return job
 
@@ -99,8 +99,8 @@ def test_a_job_that_begins_while_the_service_stops_is_put_back(start, uploaded, 
     monkeypatch.setattr(Queue, "claim", late)
     job = submitted(http, dataset)
     assert claimed.wait(60.0)
-    parts.runner.stop()
-    assert parts.queue.state(job["id"]) == "queued"
+    state.background.runner.stop()
+    assert state.background.runner.queue.state(job["id"]) == "queued"
 
 
 def test_cancel_a_running_job(start, uploaded, submitted, until, work):
@@ -113,7 +113,7 @@ def test_cancel_a_running_job(start, uploaded, submitted, until, work):
     assert answer.json()["state"] in ("cancelling", "cancelled")
     done = until(http, job["id"])
     assert (done["state"], done["volume"]) == ("cancelled", None)
-    assert not list((http.app.state.parts.files.of(LOCAL).root / "volumes").iterdir())
+    assert not list((http.app.state.stores.files.of(LOCAL).root / "volumes").iterdir())
 
 
 def test_a_refused_job_says_why(start, uploaded, submitted, until, work):
@@ -136,7 +136,7 @@ def test_the_next_job_runs_after_a_failure(start, uploaded, submitted, until, wo
 
 def test_the_end_is_stored_once_the_database_is_back(start, uploaded, submitted, until, work, monkeypatch):
     http = start()
-    queue, store = http.app.state.parts.queue, Queue.succeed
+    queue, store = http.app.state.background.runner.queue, Queue.succeed
     tries = []
 
     def away_at_first(*given):
@@ -166,7 +166,7 @@ def test_progress_is_seen_while_it_runs(start, uploaded, submitted, until, work)
 def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monkeypatch):
     http = start(jobs_at_once=1)
     dataset = uploaded(http)
-    runner = http.app.state.parts.runner
+    runner = http.app.state.background.runner
     room, answers = [True], []
 
     def has_room():
@@ -192,7 +192,7 @@ def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monk
     work.error, room[0] = None, True
     runner.notify()
     assert until(http, job["id"])["state"] == "succeeded"
-    notes = [event.note for event in http.app.state.parts.jobs.events(LOCAL, job["id"])]
+    notes = [event.note for event in http.app.state.stores.jobs.events(LOCAL, job["id"])]
     assert notes[2] == "the disk is full; the job continues once there is space"
 
 
@@ -207,13 +207,13 @@ def test_lost_scheduler_fails_no_job(start, uploaded, submitted, until, work, er
     until(http, job["id"], "queued")
     work.error = None
     assert until(http, job["id"])["state"] == "succeeded"
-    notes = {event.note for event in http.app.state.parts.jobs.events(LOCAL, job["id"])}
+    notes = {event.note for event in http.app.state.stores.jobs.events(LOCAL, job["id"])}
     assert "no answer from the workers; the job continues when available" in notes
 
 
 def test_finished_jobs_leave_no_temporary_files(start, uploaded, submitted, until, work):
     http = start()
-    folder = http.app.state.parts.files.of(LOCAL).root / "work"
+    folder = http.app.state.stores.files.of(LOCAL).root / "work"
     work.hold.clear()
     job = submitted(http, uploaded(http))
     deadline = time.monotonic() + 60.0
@@ -251,7 +251,7 @@ def test_unrecordable_result_fails_the_job(start, uploaded, submitted, until, wo
 
     dataset = uploaded(http)
     with monkeypatch.context() as patch:
-        patch.setattr(http.app.state.parts.queue, "succeed", refused)
+        patch.setattr(http.app.state.background.runner.queue, "succeed", refused)
         done = until(http, submitted(http, dataset)["id"])
     assert (done["state"], done["error"]["type"]) == ("failed", "/problems/internal")
     assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded", "the slot is free again"

@@ -102,7 +102,7 @@ def test_from_settings_to_an_image(serving, until, tmp_path):
         path = tmp_path / "scan.h5"
         words = ["--nodes", "16", "--elements", "16", "--noise-ns", "20", "--seed", "7", "-o", str(path)]
         assert CliRunner().invoke(command_line, ["simulate", *words]).exit_code == 0
-        files = http.app.state.parts.files.of(LOCAL)
+        files = http.app.state.stores.files.of(LOCAL)
         assert http.get(made["links"]["file"]).content == path.read_bytes()
         assert hashlib.sha256(path.read_bytes()).hexdigest() == made["sha256"]
         sent = {"content": path.read_bytes(), "headers": {"Content-Type": "application/x-hdf5"}}
@@ -130,7 +130,7 @@ def test_wave_simulation_and_deletion_of_its_job(serving, until):
         assert http.delete(done["links"]["dataset"]).status_code == 204
         assert http.get(done["links"]["self"]).status_code == 404
         assert http.get("/v1/datasets").json() == {"datasets": [], "next": None}
-        assert not list((http.app.state.parts.files.of(LOCAL).root / "datasets").iterdir())
+        assert not list((http.app.state.stores.files.of(LOCAL).root / "datasets").iterdir())
 
 
 def test_cancel_while_a_task_is_at_work(serving, until, held):
@@ -143,7 +143,7 @@ def test_cancel_while_a_task_is_at_work(serving, until, held):
         assert (done["state"], done["dataset"], done["progress"]["total"]) == ("cancelled", None, 5)
         assert done["progress"]["done"] <= 1
         held.set()
-        files = http.app.state.parts.files.of(LOCAL)
+        files = http.app.state.stores.files.of(LOCAL)
         assert not list((files.root / "datasets").iterdir())
     # What was still at work has found no folder to leave anything in.
     with serving() as http:
@@ -154,14 +154,14 @@ def test_stopped_service_resumes(serving, until, held):
     with serving() as http:
         job = ask(http, **WAVES).json()["id"]
         until(http, job, "running")
-        work = http.app.state.parts.files.of(LOCAL).work(job)
+        work = http.app.state.stores.files.of(LOCAL).work(job)
         wait_until(lambda: list(work.rglob("*.npz")))
     held.set()
     with serving() as http:
         done = until(http, job)
         assert done["state"] == "succeeded", done["error"]
         assert done["progress"] == {"done": 5, "total": 5, "phase": ""}
-        events = [event.state for event in http.app.state.parts.jobs.events(LOCAL, job)]
+        events = [event.state for event in http.app.state.stores.jobs.events(LOCAL, job)]
         assert events == ["queued", "running", "queued", "running", "succeeded"]
         fresh = until(http, ask(http, **WAVES).json()["id"])
         both = [http.get(one["links"]["dataset"]).json()["sha256"] for one in (done, fresh)]

@@ -19,7 +19,7 @@ def http(start):
 @pytest.fixture
 def tenants(http):
     """Headers by tenant, and the keys."""
-    store, made = Keys(http.app.state.parts.database), {}
+    store, made = Keys(http.app.state.stores.database), {}
     for tenant in ("acme", "other"):
         token = ApiKey.new()
         store.add(token, Tenant(tenant), f"scanner of {tenant}", ("read", "write"), time.time() + 3600.0)
@@ -42,7 +42,7 @@ def test_storage_by_kind_is_that_of_the_tenant(http, tenants, scan):
 
 def test_keys_are_listed_without_secrets(http, tenants):
     headers, token = tenants["acme"]
-    store = Keys(http.app.state.parts.database)
+    store = Keys(http.app.state.stores.database)
     store.revoke(store.add(ApiKey.new(), Tenant("acme"), "old", ("read",)).id)
     answer = http.get("/v1/access/keys", headers=headers)
     scanner, old = answer.json()["keys"]

@@ -16,7 +16,7 @@ def http(start, work):
 
 def test_the_queue_of_others_is_a_number(http, work, scan, until):
     """Three queued jobs of one tenant behind a running one, seen by that tenant and by another."""
-    store, auth = Keys(http.app.state.parts.database), {}
+    store, auth = Keys(http.app.state.stores.database), {}
     for tenant in ("acme", "other"):
         token = ApiKey.new()
         store.add(token, Tenant(tenant), tenant, ("read", "write"))

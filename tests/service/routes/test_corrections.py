@@ -95,7 +95,7 @@ def test_refusals_name_field_and_accepted_values_and_leave_nothing(http, here, w
     assert (answer.status_code, answer.json()["field"]) == (422, field), answer.text
     assert accepted in answer.json()["accepted"]
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1
-    folder = http.app.state.parts.files.of(Tenant("local")).root
+    folder = http.app.state.stores.files.of(Tenant("local")).root
     assert len(list((folder / "datasets").iterdir())) == 1
     assert list((folder / "incoming").iterdir()) == []
 
@@ -147,10 +147,10 @@ def test_equal_requests_at_once_make_one_copy(http, here, monkeypatch):
     assert [one.status_code for one in answers] == [201, 201]
     (made,) = copies_of(http, here)
     assert {one.json()["id"] for one in answers} == {made["id"]}
-    folder = http.app.state.parts.files.of(Tenant("local")).root
+    folder = http.app.state.stores.files.of(Tenant("local")).root
     sizes = [path.stat().st_size for path in (folder / "datasets").iterdir()]
     assert len(sizes) == 2
-    usage = http.app.state.parts.quota.of(Tenant("local"))
+    usage = http.app.state.stores.quota.of(Tenant("local"))
     assert (usage.stored, usage.reserved) == (sum(sizes), 0)
 
 
@@ -160,7 +160,7 @@ def test_corrections_are_audited(http, here):
     http.post(f"{here}/corrections", json={"times_in": "min"})
     brief = [
         (one["method"], one["route"], one["ids"], one["status"])
-        for one in entries(http.app.state.parts.files.audit)
+        for one in entries(http.app.state.stores.files.audit)
     ]
     route, scan = "/v1/datasets/{dataset_id}/corrections", here.rpartition("/")[2]
     assert [one for one in brief if one[1] == route] == [

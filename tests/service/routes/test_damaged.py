@@ -31,7 +31,7 @@ def spoiled(start):
     first = start()
     volume = first.post("/v1/volumes", content=packed(), headers=STREAM).json()["id"]
     tag = first.get(f"/v1/volumes/{volume}/data").headers["etag"]
-    (path,) = first.app.state.parts.files.root.glob("tenants/*/volumes/*.h5")
+    (path,) = first.app.state.stores.files.root.glob("tenants/*/volumes/*.h5")
     first.__exit__(None, None, None)
     flip(path)
     return start(), volume, tag
@@ -87,5 +87,5 @@ def test_readers_during_a_deletion_get_410(start):
             asked.append(pool.submit(http.delete, f"/v1/volumes/{volume}"))
             result = [request.result().status_code for request in asked]
             assert set(result) <= {200, 204, 404}, result
-    root = http.app.state.parts.files.root
+    root = http.app.state.stores.files.root
     assert [path.name for path in root.glob("tenants/**/*") if path.is_file()] == []

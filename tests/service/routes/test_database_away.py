@@ -43,7 +43,7 @@ def test_every_route_while_postgresql_is_dead(start, scan, postgresql_server, ke
     if keyed:
         # The door needs the database, too.
         token = ApiKey.new()
-        Keys(http.app.state.parts.database).add(token, LOCAL, "", ("read", "write"))
+        Keys(http.app.state.stores.database).add(token, LOCAL, "", ("read", "write"))
         http.headers["Authorization"] = f"Bearer {token.shown()}"
     content = scan().read_bytes()
     dataset = http.post("/v1/datasets", content=content, headers=HDF5).json()["id"]

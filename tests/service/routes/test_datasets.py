@@ -43,7 +43,7 @@ def test_upload_answers_with_the_record(start, scan):
 def test_only_the_canonical_file_is_kept(start, scan):
     http = start()
     dataset = upload(http, scan().read_bytes()).json()
-    root = http.app.state.parts.files.of(LOCAL).root
+    root = http.app.state.stores.files.of(LOCAL).root
     assert [path.name for path in (root / "datasets").iterdir()] == [f"{dataset['id']}.h5"]
     assert not list((root / "incoming").iterdir())
     assert h5py.is_hdf5(root / "datasets" / f"{dataset['id']}.h5")
@@ -105,7 +105,7 @@ def test_bad_contents_are_named(start, scan, spoil, field):
     assert body["found"]
     assert body["accepted"]
     assert http.get("/v1/datasets").json() == {"datasets": [], "next": None}
-    root = http.app.state.parts.files.of(LOCAL).root
+    root = http.app.state.stores.files.of(LOCAL).root
     assert not list((root / "incoming").iterdir())
     assert not list((root / "datasets").iterdir())
 
@@ -141,7 +141,7 @@ def test_too_large(start, content):
     body = problem(upload(http, content))
     assert (body["status"], body["type"]) == (413, "/problems/too-large")
     assert "50000" in body["accepted"]
-    assert not list((http.app.state.parts.files.of(LOCAL).root / "incoming").iterdir())
+    assert not list((http.app.state.stores.files.of(LOCAL).root / "incoming").iterdir())
 
 
 def test_a_file_larger_than_a_batch_arrives_whole(start, scan):
@@ -156,7 +156,7 @@ def test_a_file_larger_than_a_batch_arrives_whole(start, scan):
 
 def test_a_thousand_scans_are_searched_and_read_in_pages(start, uploaded):
     http = start()
-    stored = http.app.state.parts.datasets
+    stored = http.app.state.stores.datasets
     first = uploaded(http)
     row = {name: value for name, value in stored.get(LOCAL, first).values().items() if name != "number"}
     copies = [

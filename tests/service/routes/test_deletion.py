@@ -9,7 +9,7 @@ def test_a_scan_and_its_result_are_gone(start, uploaded, submitted, until, work)
     assert http.delete(f"/v1/datasets/{dataset}").status_code == 204
     for place in (f"/v1/datasets/{dataset}", done["links"]["self"], done["links"]["volume"]):
         assert http.get(place).status_code == 404
-    root = http.app.state.parts.files.root
+    root = http.app.state.stores.files.root
     assert [path.name for path in root.glob("tenants/**/*") if path.is_file()] == []
 
 

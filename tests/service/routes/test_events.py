@@ -26,7 +26,7 @@ def parsed(text):
 
 def once_watched(http, then, pause_s=0.0):
     """Do something, in a thread, once the feed has read the job of a stream, and after a pause."""
-    watched = http.app.state.parts.feed._watched
+    watched = http.app.state.background.feed._watched
 
     def wait():
         wait_until(lambda: any(one.row for one in tuple(watched.values())))
@@ -95,8 +95,8 @@ def test_a_wrong_place_is_rejected(start, uploaded, submitted, work, last):
 
 def test_event_streams_share_one_query(start, uploaded, submitted, until, work, monkeypatch):
     http = start()
-    parts, looks, threads = http.app.state.parts, [], set()
-    news = parts.jobs.__class__.updates
+    state, looks, threads = http.app.state, [], set()
+    news = state.stores.jobs.__class__.updates
 
     def counted(self, known):
         looks.append(set(known))
@@ -165,7 +165,7 @@ def test_unavailable_database_ends_no_stream(start, uploaded, submitted, until, 
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
-    news, failures = http.app.state.parts.jobs.__class__.updates, iter(range(5))
+    news, failures = http.app.state.stores.jobs.__class__.updates, iter(range(5))
 
     def fails_at_first(self, known):
         if next(failures, None) is not None:
@@ -195,7 +195,7 @@ class Clock:
 @contextmanager
 def all_events(http, monkeypatch):
     """What a stream of all jobs tells in the block, and what the feed knows, which has read once before."""
-    clock, told, watched = Clock(), {}, http.app.state.parts.feed._tenants
+    clock, told, watched = Clock(), {}, http.app.state.background.feed._tenants
     with monkeypatch.context() as patch:
         patch.setattr(events, "time", clock)
         patch.setattr(events, "SILENCE_SECONDS", 0.05)
@@ -251,7 +251,7 @@ def test_jobs_of_another_tenant_are_not_in_the_stream(start, uploaded, submitted
     http = start()
     work.hold.clear()
     job = submitted(http, uploaded(http))["id"]
-    parts = http.app.state.parts
-    assert [row.id for row in parts.jobs.changes(LOCAL, None, [])[1]] == [job]
-    assert parts.jobs.changes(Tenant("other"), None, [job]) == (0, [])
+    state = http.app.state
+    assert [row.id for row in state.stores.jobs.changes(LOCAL, None, [])[1]] == [job]
+    assert state.stores.jobs.changes(Tenant("other"), None, [job]) == (0, [])
     work.hold.set()

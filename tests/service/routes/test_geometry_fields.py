@@ -46,15 +46,15 @@ def http(start):
 @pytest.fixture
 def here(http, made):
     """The address of a field in a service, as a job leaves it."""
-    parts, field, mesh = http.app.state.parts, field_of("a" * 64), new_id("mesh")
+    state, field, mesh = http.app.state, field_of("a" * 64), new_id("mesh")
     source, figures = made
-    target = parts.files.of(LOCAL).field(field)
+    target = state.stores.files.of(LOCAL).field(field)
     target.mkdir()
     for file in source.iterdir():
         (target / file.name).write_bytes(file.read_bytes())
-    job = parts.jobs.add(LOCAL, "reconstruction", {}).id
+    job = state.stores.jobs.add(LOCAL, "reconstruction", {}).id
     row = {"mesh_id": mesh, "bytes": bytes_of(target), "settings": COARSE, "figures": figures}
-    with parts.database.write() as connection:
+    with state.stores.database.write() as connection:
         connection.execute(insert(FieldRow).values(id=field, job_id=job, created=1.0, **row))
     return f"/v1/geometry-fields/{field}"
 

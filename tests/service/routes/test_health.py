@@ -32,7 +32,7 @@ def test_disk_full(start):
 
 def test_database_that_cannot_be_written(start):
     http = start()
-    with http.app.state.parts.database.write() as connection:
+    with http.app.state.stores.database.write() as connection:
         connection.execute(text("DROP TABLE about"))
     assert faults(http.get("/health/ready")) == ["database"]
     assert http.get("/health/live").status_code == 200
@@ -40,7 +40,7 @@ def test_database_that_cannot_be_written(start):
 
 def test_stalled_ingestion_is_reported(start):
     http = start()
-    http.app.state.parts.upload_ingest.stop()
+    http.app.state.background.ingest.stop()
     assert faults(http.get("/health/ready")) == ["ingest"]
 
 
@@ -57,7 +57,7 @@ def test_a_part_that_hangs_is_named_in_time(start, monkeypatch):
         looks.append(1)
         assert going_on.wait(60.0)
 
-    monkeypatch.setattr(http.app.state.parts.database, "probe", probe)
+    monkeypatch.setattr(http.app.state.stores.database, "probe", probe)
     for _ in range(3):
         answer = http.get("/health/ready")
         assert faults(answer) == ["database"]

@@ -38,7 +38,7 @@ def test_a_job_is_stored_before_the_answer(http, dataset, work, until):
     body = answer.json()
     assert answer.status_code == 202
     assert answer.headers["location"] == f"/v1/jobs/{body['id']}"
-    assert http.app.state.parts.jobs.get(LOCAL, body["id"]).settings == body["settings"]
+    assert http.app.state.stores.jobs.get(LOCAL, body["id"]).settings == body["settings"]
     assert body["settings"]["nodes"] == 16
     assert body["settings"]["rays"] == "curved"
     assert body["volume"] is None

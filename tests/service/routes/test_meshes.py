@@ -57,7 +57,7 @@ def test_every_format(http, kind):
     assert (made["volume"], made["iso"], made["bytes"]) == (None, None, len(content))
     assert http.get(made["links"]["self"]).json() == made
     assert [one["id"] for one in http.get("/v1/meshes").json()["meshes"]] == [made["id"]]
-    stored = load_mesh(http.app.state.parts.files.of(LOCAL).mesh(made["id"])).mesh
+    stored = load_mesh(http.app.state.stores.files.of(LOCAL).mesh(made["id"])).mesh
     assert stored.faces.shape == (192, 3)
 
 
@@ -109,7 +109,7 @@ def test_a_broken_mesh_is_rejected_by_name(http, name):
     assert found in body["found"], body
     assert body["accepted"]
     assert http.get("/v1/meshes").json() == {"meshes": []}
-    assert not list((http.app.state.parts.files.of(LOCAL).root / "incoming").iterdir())
+    assert not list((http.app.state.stores.files.of(LOCAL).root / "incoming").iterdir())
 
 
 def test_a_surface_with_one_side_is_rejected(http):
@@ -162,7 +162,7 @@ def test_the_surface_of_a_volume(http, cluster):
     coarse = http.post(f"{here}/mesh", params={"iso": 0.4, "step": 2}).json()
     assert coarse["faces"] < 0.5 * made["faces"]
     assert {one["id"] for one in http.get("/v1/meshes").json()["meshes"]} == {made["id"], coarse["id"]}
-    assert not list((http.app.state.parts.files.of(LOCAL).root / "incoming").iterdir())
+    assert not list((http.app.state.stores.files.of(LOCAL).root / "incoming").iterdir())
 
 
 @pytest.mark.parametrize(
@@ -178,7 +178,7 @@ def test_a_surface_that_is_too_large(http, monkeypatch):
     answer = http.post(f"{volume(http)}/mesh")
     assert (answer.status_code, answer.json()["field"]) == (422, "iso")
     assert "a larger step" in answer.json()["accepted"]
-    assert not list((http.app.state.parts.files.of(LOCAL).root / "incoming").iterdir())
+    assert not list((http.app.state.stores.files.of(LOCAL).root / "incoming").iterdir())
 
 
 def test_a_coloured_mesh(http):

@@ -28,7 +28,7 @@ def submit(http, dataset, **more):
 
 def done_in(http, job, seconds):
     """Let a job have taken this long."""
-    with http.app.state.parts.database.write() as connection:
+    with http.app.state.stores.database.write() as connection:
         connection.execute(text(f"UPDATE jobs SET finished = started + {seconds} WHERE id = '{job}'"))
 
 
@@ -75,11 +75,11 @@ def test_no_number_without_a_sound_estimate(start, uploaded):
 
 def test_a_tenant_learns_nothing_of_the_jobs_of_another(start, scan, until, work):
     http = start()
-    parts = http.app.state.parts
+    state = http.app.state
     auth = {}
     for name in ("acme", "other"):
         token = ApiKey.new()
-        Keys(parts.database).add(token, Tenant(name), name, ("read", "write"))
+        Keys(state.stores.database).add(token, Tenant(name), name, ("read", "write"))
         auth[name] = {"Authorization": f"Bearer {token.shown()}"}
     content = scan().read_bytes()
     scans = {

@@ -18,10 +18,10 @@ from bentray_workers.reconstruction import reconstruction_run
 
 def test_values_of_the_checkpoint_for_its_owner_alone(start, uploaded, submitted, until, work):
     http = start()
-    parts, auth = http.app.state.parts, {}
+    state, auth = http.app.state, {}
     for tenant in ("acme", "other"):
         token = ApiKey.new()
-        Keys(parts.database).add(token, Tenant(tenant), tenant, ("read", "write"))
+        Keys(state.stores.database).add(token, Tenant(tenant), tenant, ("read", "write"))
         auth[tenant] = {"Authorization": f"Bearer {token.shown()}"}
     http.headers.update(auth["acme"])
     work.hold.clear()
@@ -33,7 +33,7 @@ def test_values_of_the_checkpoint_for_its_owner_alone(start, uploaded, submitted
     assert "before its first image" in none_yet.json()["found"]
     speed = 1500.0 + np.arange(20.0).reshape(5, 4)
     checkpoint = ReconstructionCheckpoint(0, 0, (), sart_step.begin(1.0 / speed), (), 2e-3, (-0.01, 0.0))
-    Checkpoints(parts.files.of(Tenant("acme")).checkpoints(job)).save("0-00000", checkpoint)
+    Checkpoints(state.stores.files.of(Tenant("acme")).checkpoints(job)).save("0-00000", checkpoint)
     answer = http.get(here)
     assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
     body = answer.json()

@@ -273,7 +273,7 @@ def test_a_picture_that_no_worker_takes_is_503(tmp_path, monkeypatch):
 
 def test_previews_count_less_in_the_rate_limit(http, monkeypatch):
     shares = []
-    sign_in = http.app.state.parts.sign_in
+    sign_in = http.app.state.access.sign_in
     monkeypatch.setattr(sign_in, "check_render", lambda caller, share: shares.append(share))
     here, side = put(http), {"iso": 0.5, "width": 64, "height": 64}
     monkeypatch.setattr(routes_of_pictures, "WHOLE_RAYS", 2 * 64 * 64)

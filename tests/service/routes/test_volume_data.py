@@ -116,14 +116,14 @@ class OtherProcess(FakeCluster):
 
 @pytest.mark.slow
 def test_export_of_a_volume_deleted_meanwhile(http, upload, monkeypatch):
-    parts = http.app.state.parts
-    export = parts.pictures.export
+    state = http.app.state
+    export = state.background.pictures.export
 
     async def delete_then(tenant, volume, *given):
         await export(tenant, volume, *given)
-        parts.deletion.delete(StoredItem(tenant, "volume", volume.id))
+        state.stores.deletion.delete(StoredItem(tenant, "volume", volume.id))
 
-    monkeypatch.setattr(parts.pictures, "export", delete_then)
+    monkeypatch.setattr(state.background.pictures, "export", delete_then)
     answer = http.get(f"{upload}?format=npy")
     assert (answer.status_code, answer.json()["type"]) == (404, "/problems/deleted")
 
@@ -131,9 +131,9 @@ def test_export_of_a_volume_deleted_meanwhile(http, upload, monkeypatch):
 def test_files_are_not_made_in_the_memory_of_the_service(start):
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         http = start(cluster=OtherProcess(pool))
-        parts, volume_id = http.app.state.parts, new_id("volume")
+        state, volume_id = http.app.state, new_id("volume")
         values = np.zeros((200, 200, 200), np.float32)
-        write_volume(parts.files.of(LOCAL).volume(volume_id), Volume.from_values(values, (1e-3,) * 3))
+        write_volume(state.stores.files.of(LOCAL).volume(volume_id), Volume.from_values(values, (1e-3,) * 3))
         summary = {
             "title": "large",
             "shape": list(values.shape),
@@ -141,7 +141,9 @@ def test_files_are_not_made_in_the_memory_of_the_service(start):
             "origin_m": [0.0] * 3,
             "value_range": [0.0, 0.0],
         }
-        parts.volumes.uploaded.add(LOCAL, volume_id, size=values.nbytes, sha256="0" * 64, summary=summary)
+        state.stores.volumes.uploaded.add(
+            LOCAL, volume_id, size=values.nbytes, sha256="0" * 64, summary=summary
+        )
         del values
         for asked in ("npy", "nifti", "metaimage", "mat"):
             here = f"/v1/volumes/{volume_id}/data?format={asked}"
@@ -161,7 +163,7 @@ def test_files_are_not_made_in_the_memory_of_the_service(start):
 def test_an_export_of_an_earlier_version_is_made_again(http, result, name):
     """Those of NRRD, MetaImage and DICOM lay turned."""
     volume_id = result.split("/")[3]
-    stored = http.app.state.parts.files.of(LOCAL).export(volume_id, name)
+    stored = http.app.state.stores.files.of(LOCAL).export(volume_id, name)
     stored.write_bytes(b"earlier")
     assert len(http.get(f"{result}?format={name}").content) > len(b"earlier")
     stored.unlink()

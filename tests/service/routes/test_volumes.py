@@ -140,7 +140,7 @@ def test_an_uploaded_volume_is_stored(start):
     assert (body["job"], body["dataset"], body["provenance"]) == (None, None, {})
     assert (body["bytes"], body["sha256"]) == (len(npy(RAMP)), hashlib.sha256(npy(RAMP)).hexdigest())
     assert http.get(answer.headers["location"]).json() == body
-    root = http.app.state.parts.files.of(LOCAL).root
+    root = http.app.state.stores.files.of(LOCAL).root
     assert [path.name for path in (root / "volumes").iterdir()] == [f"{body['id']}.h5"]
     assert not list((root / "incoming").iterdir())
 
@@ -205,7 +205,7 @@ def test_rejected_volume_leaves_no_files(start):
         assert body["found"]
         assert body["accepted"]
     assert http.get("/v1/volumes").json() == {"volumes": []}
-    root = http.app.state.parts.files.of(LOCAL).root
+    root = http.app.state.stores.files.of(LOCAL).root
     assert not list((root / "incoming").iterdir())
     assert not list((root / "volumes").iterdir())
 

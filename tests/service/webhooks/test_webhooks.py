@@ -43,7 +43,7 @@ def receiver():
 def called(start, work, uploaded):
     """Start a service whose tenant has a secret, and a scan; returns both and a function that submits."""
     http = start(**NETWORKS)
-    secret = WebhookSecrets(http.app.state.parts.database).create(LOCAL)
+    secret = WebhookSecrets(http.app.state.stores.database).create(LOCAL)
     dataset = uploaded(http)
 
     def submit(webhook, **headers):
@@ -131,7 +131,7 @@ def test_it_is_sent_again_until_it_is_accepted(called, receiver):
 
 def test_it_is_given_up_and_sent_by_hand(called, receiver, command):
     http, _, submit = called
-    data = http.app.state.parts.settings.data_dir
+    data = http.app.state.access.settings.data_dir
     receiver.answers = [500] * 3
     failed = settled(http, submit(receiver.url).json()["id"])
     assert (failed["state"], len(failed["attempts"])) == ("failed", 3)
@@ -172,7 +172,7 @@ def test_what_is_refused_at_once(called, receiver, start, work, uploaded):
         assert answer.status_code == 422
         assert "bentray webhooks create-secret --tenant local" in answer.json()["detail"]
     silent = start("silent", webhooks=False)
-    WebhookSecrets(silent.app.state.parts.database).create(LOCAL)
+    WebhookSecrets(silent.app.state.stores.database).create(LOCAL)
     answer = silent.post("/v1/jobs", json={**request, "dataset": uploaded(silent)})
     assert "BENTRAY_WEBHOOKS" in answer.json()["detail"]
 
@@ -190,7 +190,7 @@ def test_a_deleted_job_takes_its_message_along(called, receiver):
     job = submit(receiver.url).json()["id"]
     settled(http, job)
     assert http.delete(f"/v1/jobs/{job}").status_code == 204
-    assert Deliveries(http.app.state.parts.database).newest(None, None, 9) == []
+    assert Deliveries(http.app.state.stores.database).newest(None, None, 9) == []
 
 
 def test_every_job_of_a_batch(called, receiver):
@@ -218,8 +218,8 @@ time.sleep(600)
 def test_killed_while_it_sends(called, receiver, monkeypatch):
     """Killed after the message arrived and before its answer: it is sent again, under the same id."""
     http, _, submit = called
-    settings = http.app.state.parts.settings
-    http.app.state.parts.webhooks.stop()
+    settings = http.app.state.access.settings
+    http.app.state.background.webhooks.stop()
     job = submit(receiver.url).json()["id"]
     Receiver.until(lambda: http.get(f"/v1/jobs/{job}").json()["webhook"]["state"] == "waiting")
     receiver.hold.clear()
@@ -241,7 +241,7 @@ def test_killed_while_it_sends(called, receiver, monkeypatch):
 
 def test_a_new_secret_and_the_one_before_both_sign(called, receiver, command):
     http, old, submit = called
-    data = http.app.state.parts.settings.data_dir
+    data = http.app.state.access.settings.data_dir
     new = command("webhooks", "create-secret", "--data", data).stdout.strip()
     assert new.startswith("whsec_")
     settled(http, submit(receiver.url).json()["id"])
@@ -252,7 +252,7 @@ def test_a_new_secret_and_the_one_before_both_sign(called, receiver, command):
 
 def test_slow_receivers_of_one_tenant_delay_no_other(called, receiver):
     http, _, submit = called
-    database = http.app.state.parts.database
+    database = http.app.state.stores.database
     slow = Receiver()
     slow.hold.clear()
     jobs = [submit(slow.url).json()["id"] for _ in range(4)]

@@ -15,7 +15,7 @@ from ...files.direct_uploads import DirectUploads, part_sizes
 from ...rows.tables import UploadRow
 from ...rows.tenants import Tenant
 from ...web.errors import problems
-from ...wiring import CallerTenant, Parts, Service
+from ...wiring import Access, Background, CallerTenant, Stores
 from ..bodies import SmallBody, accept_media_types
 from ..models.upload_records import (
     DirectUploadRecord,
@@ -49,22 +49,24 @@ router = APIRouter(prefix="/v1/direct-uploads", tags=["uploads"], route_class=Sm
 def create_direct_upload(
     upload: Annotated[DirectUploadRequest, Body(openapi_examples=FILES)],
     response: Response,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: CallerTenant,
 ) -> DirectUploadRecord:
     """Create an upload; send its parts to the addresses of `parts`, then `complete` it."""
-    _direct(service)
+    _direct(stores)
     said = {**upload.metadata, "kind": upload.kind}
     header = ",".join(f"{name} {base64.b64encode(text.encode()).decode()}" for name, text in said.items())
     what, given = read_metadata(header)
-    most = service.settings.max_upload_bytes
+    most = access.settings.max_upload_bytes
     if upload.length > most:
         accepted = f"at most {most} bytes (BENTRAY_MAX_UPLOAD_BYTES)"
         raise TooLarge("length", f"{upload.length} bytes", accepted)
-    service.upload_limits.check_begin(tenant)
-    keep_s, most_bytes = service.settings.upload_keep_s, service.quota.most_bytes
-    row = service.uploads.add(tenant, what, upload.length, given, header, keep_s, most_bytes)
-    row = service.uploads.set_direct(row)
+    background.ingest.upload_limits.check_begin(tenant)
+    keep_s, most_bytes = access.settings.upload_keep_s, stores.quota.most_bytes
+    row = background.ingest.uploads.add(tenant, what, upload.length, given, header, keep_s, most_bytes)
+    row = background.ingest.uploads.set_direct(row)
     record = _record(row)
     response.headers["Location"] = record.links["self"]
     return record
@@ -74,20 +76,22 @@ def create_direct_upload(
 def show_parts(
     upload_id: str,
     parts: Annotated[PartsRequest, Body(openapi_examples=NUMBERS)],
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: CallerTenant,
 ) -> PartAddresses:
     """Show addresses for parts, valid for an hour: PUT each, with exactly `bytes` and without a key.
 
     A part may be sent again. Those with the size in `received` are in the bucket.
     """
-    row, direct = _receiving(service, tenant, upload_id)
+    row, direct = _receiving(stores, background, tenant, upload_id)
     sizes = part_sizes(row.length)
     for number in parts.numbers:
         if number > len(sizes):
             raise InvalidInput("numbers", number, f"1 to {len(sizes)}")
     received = direct.received(row)
-    service.uploads.keep(row.id, service.settings.upload_keep_s)
+    background.ingest.uploads.keep(row.id, access.settings.upload_keep_s)
     return PartAddresses(
         parts=[
             PartRecord(number=one, bytes=sizes[one - 1], url=direct.part_url(row, one))
@@ -102,38 +106,42 @@ def show_parts(
 @router.post(
     "/{upload_id}/complete", status_code=status.HTTP_202_ACCEPTED, responses=problems(404, 409, 423, 503)
 )
-def complete_direct_upload(upload_id: str, service: Service, tenant: CallerTenant) -> DirectUploadRecord:
+def complete_direct_upload(
+    upload_id: str, stores: Stores, background: Background, tenant: CallerTenant
+) -> DirectUploadRecord:
     """Complete an upload. It is ingested in the background; poll it with `GET /v1/uploads/{id}`."""
-    service.uploads.get(tenant, upload_id)
-    with service.hold(upload_id):
-        row = service.uploads.get(tenant, upload_id)
+    background.ingest.uploads.get(tenant, upload_id)
+    with background.ingest.locks(upload_id):
+        row = background.ingest.uploads.get(tenant, upload_id)
         if row.multipart_id is None or row.state == "receiving":
-            row, direct = _receiving(service, tenant, upload_id)
+            row, direct = _receiving(stores, background, tenant, upload_id)
             # In the order of the numbers, and nothing beside them.
             found = [size for _, size in sorted(direct.received(row).items())]
             if found != part_sizes(row.length):
                 accepted = f"{len(part_sizes(row.length))} parts, {row.length} bytes in total"
                 raise WrongOffset("parts", f"{len(found)} parts, {sum(found)} bytes", accepted)
             # The mark of this service, which ingests it.
-            service.files.of(tenant).upload(upload_id).touch()
-            service.uploads.mark_complete(upload_id)
-            service.upload_ingest.notify()
-        return _record(service.uploads.get(tenant, upload_id))
+            stores.files.of(tenant).upload(upload_id).touch()
+            background.ingest.uploads.mark_complete(upload_id)
+            background.ingest.notify()
+        return _record(background.ingest.uploads.get(tenant, upload_id))
 
 
-def _direct(service: Parts) -> DirectUploads:
-    if service.direct_uploads is None:
+def _direct(stores: Stores) -> DirectUploads:
+    if stores.files.store.direct_uploads is None:
         raise NoBucket()
-    return service.direct_uploads
+    return stores.files.store.direct_uploads
 
 
-def _receiving(service: Parts, tenant: Tenant, upload_id: str) -> tuple[UploadRow, DirectUploads]:
-    row = service.uploads.get(tenant, upload_id)
+def _receiving(
+    stores: Stores, background: Background, tenant: Tenant, upload_id: str
+) -> tuple[UploadRow, DirectUploads]:
+    row = background.ingest.uploads.get(tenant, upload_id)
     if row.multipart_id is None:
         raise WrongOffset("upload", f"{row.id}, sent to the service", "a direct upload")
     if row.state != "receiving":
         raise WrongOffset("state", row.state, "receiving")
-    return row, _direct(service)
+    return row, _direct(stores)
 
 
 def _record(row: UploadRow) -> DirectUploadRecord:

@@ -20,7 +20,7 @@ from ...rows.ids import new_id
 from ...rows.stored_tables import UploadedTable
 from ...rows.tables import DatasetRow, MeshRow, UploadedVolumeRow
 from ...rows.tenants import Tenant
-from ...wiring import Parts
+from ...wiring import Access, Background, Stores
 
 # Longest wait of a request in the ingest queue, s; proxies rarely wait longer.
 LONGEST_WAIT_S = 300.0
@@ -38,7 +38,9 @@ def body_of(what: str, media_types: tuple[str, ...]) -> dict[str, Any]:
 
 async def receive_upload(
     request: Request,
-    service: Parts,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: Tenant,
     table: UploadedTable[Record],
     given: Mapping[str, Any],
@@ -47,7 +49,7 @@ async def receive_upload(
 
     Args:
         request: with the file as its body.
-        service: parts of the service.
+        stores, background, access: of the service.
         tenant: owner.
         table: of the result.
         given: metadata.
@@ -55,24 +57,24 @@ async def receive_upload(
     what, upload_id = table.what, new_id(table.what)
     announced = request.headers.get("content-length")
     length = int(announced) if announced else None
-    check_announced(length, service.settings.max_upload_bytes, ACCEPTED[what])
-    files, settings, quota = service.files.of(tenant), service.settings, service.quota
+    check_announced(length, access.settings.max_upload_bytes, ACCEPTED[what])
+    files, settings, quota = stores.files.of(tenant), access.settings, stores.quota
     path = files.incoming(upload_id)
     resize = partial(quota.resize, tenant, upload_id)
 
     def check_and_store(received: Received) -> Record:
-        limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, service.files.scratch)
+        limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, stores.files.scratch)
         summary = make_canonical(what, path, upload_id, files, limits, given, resize)
         return table.add(tenant, upload_id, size=received.size, sha256=received.sha256, summary=summary)
 
-    with service.upload_limits(tenant):
+    with background.ingest.upload_limits(tenant):
         async with quota.reserved(tenant, upload_id, length or 1):
             try:
                 received = await receive(
                     request.stream(), length, path, settings.max_upload_bytes, ACCEPTED[what], resize
                 )
                 work = partial(check_and_store, received)
-                return await run_in_turn(request, service.ingest_queue, tenant, work)
+                return await run_in_turn(request, background.ingest.queue, tenant, work)
             finally:
                 await run_in_threadpool(path.unlink, missing_ok=True)
 

@@ -20,7 +20,7 @@ from ...rows.tables import UploadRow
 from ...rows.tenants import Tenant
 from ...web.errors import problems
 from ...web.tus_headers import PLACE, VERSION
-from ...wiring import CallerTenant, Parts, Service
+from ...wiring import Access, Background, CallerTenant, Stores
 from ..bodies import accept_media_types
 from ..models.upload_records import UploadRecord
 from ..record_conversion import result_link, upload_record
@@ -52,13 +52,13 @@ BODY = {"requestBody": {"required": True, "content": {MEDIA_TYPE: BYTES}}}
 
 
 @router.options("", status_code=status.HTTP_204_NO_CONTENT)
-def show_upload_options(service: Service) -> Response:
+def show_upload_options(access: Access) -> Response:
     """Show the supported options of tus."""
     return Response(
         status_code=status.HTTP_204_NO_CONTENT,
         headers={
             "Tus-Extension": EXTENSIONS,
-            "Tus-Max-Size": str(service.settings.max_upload_bytes),
+            "Tus-Max-Size": str(access.settings.max_upload_bytes),
             "Tus-Checksum-Algorithm": ",".join(ALGORITHMS),
         },
     )
@@ -72,7 +72,9 @@ def show_upload_options(service: Service) -> Response:
 )
 def create_upload(
     response: Response,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: CallerTenant,
     upload_length: Annotated[int, Header(ge=1, le=2**63 - 1, description="Total size, bytes.")],
     upload_metadata: Annotated[
@@ -88,17 +90,19 @@ def create_upload(
 ) -> UploadRecord:
     """Create an upload; send its data with PATCH to the Location of the response."""
     what, given = read_metadata(upload_metadata)
-    most = service.settings.max_upload_bytes
+    most = access.settings.max_upload_bytes
     if upload_length > most:
         raise TooLarge(
             "Upload-Length", f"{upload_length} bytes", f"at most {most} bytes (BENTRAY_MAX_UPLOAD_BYTES)"
         )
-    free = shutil.disk_usage(service.files.root).free
+    free = shutil.disk_usage(stores.files.root).free
     if upload_length > free:
         raise StorageFull("Upload-Length", f"{upload_length} bytes", f"at most {free} bytes, the free space")
-    service.upload_limits.check_begin(tenant)
-    keep_s, most_bytes = service.settings.upload_keep_s, service.quota.most_bytes
-    row = service.uploads.add(tenant, what, upload_length, given, upload_metadata, keep_s, most_bytes)
+    background.ingest.upload_limits.check_begin(tenant)
+    keep_s, most_bytes = access.settings.upload_keep_s, stores.quota.most_bytes
+    row = background.ingest.uploads.add(
+        tenant, what, upload_length, given, upload_metadata, keep_s, most_bytes
+    )
     record = upload_record(row, 0)
     response.headers["Location"] = record.links["self"]
     response.headers["Upload-Expires"] = http_date(row.expires)
@@ -106,11 +110,13 @@ def create_upload(
 
 
 @router.head("/{upload_id}", dependencies=[TusVersion], responses=problems(404, 412), include_in_schema=False)
-def show_upload_offset(upload_id: str, service: Service, tenant: CallerTenant) -> Response:
+def show_upload_offset(
+    upload_id: str, stores: Stores, background: Background, tenant: CallerTenant
+) -> Response:
     """Show the offset and the state of an upload."""
-    row = service.uploads.get(tenant, upload_id)
+    row = background.ingest.uploads.get(tenant, upload_id)
     headers = {
-        "Upload-Offset": str(offset_of(service, tenant, row)),
+        "Upload-Offset": str(offset_of(stores, tenant, row)),
         "Upload-Length": str(row.length),
         "Upload-Expires": http_date(row.expires),
         "Cache-Control": "no-store",
@@ -124,10 +130,10 @@ def show_upload_offset(upload_id: str, service: Service, tenant: CallerTenant) -
 
 
 @router.get("/{upload_id}", responses=problems(404))
-def show_upload(upload_id: str, service: Service, tenant: CallerTenant) -> UploadRecord:
+def show_upload(upload_id: str, stores: Stores, background: Background, tenant: CallerTenant) -> UploadRecord:
     """Show one upload: offset, state, and its result or problem."""
-    row = service.uploads.get(tenant, upload_id)
-    return upload_record(row, offset_of(service, tenant, row))
+    row = background.ingest.uploads.get(tenant, upload_id)
+    return upload_record(row, offset_of(stores, tenant, row))
 
 
 @router.patch(
@@ -140,7 +146,9 @@ def show_upload(upload_id: str, service: Service, tenant: CallerTenant) -> Uploa
 async def append_upload(
     upload_id: str,
     request: Request,
-    service: Service,
+    stores: Stores,
+    background: Background,
+    access: Access,
     tenant: CallerTenant,
     upload_offset: Offset,
     upload_checksum: Annotated[
@@ -158,27 +166,27 @@ async def append_upload(
     """
     checksum = None if upload_checksum is None else Checksum.from_header(upload_checksum)
     # First check the owner, so that uploads of other tenants are not reported as locked.
-    await run_in_threadpool(service.uploads.get, tenant, upload_id)
-    with service.hold(upload_id):
-        row = await run_in_threadpool(service.uploads.get, tenant, upload_id)
-        offset, expires = await run_in_threadpool(offset_of, service, tenant, row), row.expires
+    await run_in_threadpool(background.ingest.uploads.get, tenant, upload_id)
+    with background.ingest.locks(upload_id):
+        row = await run_in_threadpool(background.ingest.uploads.get, tenant, upload_id)
+        offset, expires = await run_in_threadpool(offset_of, stores, tenant, row), row.expires
         if upload_offset != offset:
             raise WrongOffset("Upload-Offset", upload_offset, f"{offset}, of {row.length} bytes")
         if row.multipart_id is not None:
             raise WrongOffset("upload", f"{row.id}, sent to the bucket", "an upload to the service")
         if row.state == "receiving":
-            length, path = row.length, service.files.of(tenant).upload(upload_id)
+            length, path = row.length, stores.files.of(tenant).upload(upload_id)
             announced = int(request.headers.get("content-length", 0))
             if announced > length - offset:
                 raise TooLarge("body", f"{announced} bytes", f"at most {length - offset} bytes")
             try:
                 offset = await append(request.stream(), path, offset, length, checksum)
             finally:
-                keep_s = service.settings.upload_keep_s
-                expires = await run_in_threadpool(service.uploads.keep, upload_id, keep_s)
+                keep_s = access.settings.upload_keep_s
+                expires = await run_in_threadpool(background.ingest.uploads.keep, upload_id, keep_s)
             if offset == length:
-                await run_in_threadpool(service.uploads.mark_complete, upload_id)
-                service.upload_ingest.notify()
+                await run_in_threadpool(background.ingest.uploads.mark_complete, upload_id)
+                background.ingest.notify()
     headers = {"Upload-Offset": str(offset), "Upload-Expires": http_date(expires)}
     return Response(status_code=status.HTTP_204_NO_CONTENT, headers=headers)
 
@@ -189,21 +197,21 @@ async def append_upload(
     dependencies=[TusVersion],
     responses=problems(404, 409, 412, 422, 423),
 )
-def delete_upload(upload_id: str, service: Service, tenant: CallerTenant) -> None:
+def delete_upload(upload_id: str, background: Background, tenant: CallerTenant) -> None:
     """Delete an upload and its data; a stored result is kept."""
-    service.uploads.get(tenant, upload_id)
-    with service.hold(upload_id):
-        service.housekeeper.forget(service.uploads.get(tenant, upload_id))
+    background.ingest.uploads.get(tenant, upload_id)
+    with background.ingest.locks(upload_id):
+        background.housekeeper.forget(background.ingest.uploads.get(tenant, upload_id))
 
 
-def offset_of(service: Parts, tenant: Tenant, row: UploadRow) -> int:
+def offset_of(stores: Stores, tenant: Tenant, row: UploadRow) -> int:
     """The offset of an upload.
 
     Data with a checksum counts after it has been verified.
     """
     if row.state != "receiving":
         return int(row.length)
-    return received_bytes(service.files.of(tenant).upload(row.id))
+    return received_bytes(stores.files.of(tenant).upload(row.id))
 
 
 def http_date(seconds: float) -> str:

@@ -62,7 +62,7 @@ def test_nothing_is_left_of_a_hostile_file(start, hostile):
     assert http.get("/health/live").status_code == 200
     assert here.memory_info().rss - before < MAX_GROWTH
     assert set(here.children()) <= children
-    root = http.app.state.parts.files.root
+    root = http.app.state.stores.files.root
     # The audit tells of the requests; it holds nothing of the files.
     left = {path.name for path in root.rglob("*") if path.is_file() and path.parent.name != "audit"}
     assert left <= {

@@ -83,7 +83,7 @@ def test_a_job_is_planned_without_its_file(start, uploaded, submitted, work, mon
     assert plan["tasks"] > 0
     monkeypatch.undo()
     # Of one from before counts were kept the file is read.
-    with http.app.state.parts.datasets._database.write() as connection:
+    with http.app.state.stores.datasets._database.write() as connection:
         connection.execute(text("UPDATE datasets SET counts = NULL"))
     assert submitted(http, dataset)["plan"] == plan
 

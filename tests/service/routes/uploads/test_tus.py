@@ -5,7 +5,6 @@ import hashlib
 import io
 import os
 import time
-from dataclasses import replace
 from email.utils import parsedate_to_datetime
 
 import numpy as np
@@ -51,7 +50,7 @@ def problem(answer, status):
 
 
 def left_in(http):
-    root = http.app.state.parts.files.root
+    root = http.app.state.stores.files.root
     return sorted(path.name for name in ("uploads", "incoming") for path in root.glob(f"tenants/*/{name}/*"))
 
 
@@ -141,7 +140,7 @@ def test_chunk_offset_must_match(start, cuts, wrong):
         assert piece(http, location, at, content[at:end]).status_code == 204
         at = end
         assert offset(http, location) == at
-    files = http.app.state.parts.files
+    files = http.app.state.stores.files
     stored = next(files.root.glob("tenants/*/uploads/*"), None)
     assert (b"" if stored is None else stored.read_bytes()) == content[:at]
 
@@ -255,24 +254,24 @@ def test_dataset_survives_its_upload(start, scan):
 
 def test_expired_uploads_are_swept(start):
     http = start(upload_keep_s=1000.0)
-    parts = http.app.state.parts
+    state = http.app.state
     old, young, held = (begin(http, 10) for _ in range(3))
     for place in (old, young, held):
         answer = piece(http, place, 0, b"123")
         left = parsedate_to_datetime(answer.headers["upload-expires"]).timestamp() - time.time()
         assert 900 < left <= 1001
-    with parts.database.write() as connection:
+    with state.stores.database.write() as connection:
         connection.execute(
             update(UploadRow)
             .where(UploadRow.id.in_([old.rpartition("/")[2], held.rpartition("/")[2]]))
             .values(expires=time.time() - 1)
         )
-    parts.housekeeper.sweep()
+    state.background.housekeeper.sweep()
     assert http.get(old).status_code == 200, "it is marked first: the clock may be wrong"
-    with parts.database.write() as connection:
+    with state.stores.database.write() as connection:
         connection.execute(update(ExpiredRow).values(noticed_s=-1001.0))
-    with parts.hold(held.rpartition("/")[2]):
-        parts.housekeeper.sweep()
+    with state.background.ingest.locks(held.rpartition("/")[2]):
+        state.background.housekeeper.sweep()
     assert [http.get(place).status_code for place in (old, young, held)] == [404, 200, 200]
     assert len(left_in(http)) == 2
 
@@ -280,7 +279,7 @@ def test_expired_uploads_are_swept(start):
 def test_one_writer_at_a_time(start):
     http = start()
     location = begin(http, 10)
-    with http.app.state.parts.hold(location.rpartition("/")[2]):
+    with http.app.state.background.ingest.locks(location.rpartition("/")[2]):
         assert problem(piece(http, location, 0, b"x"), 423)["type"] == "/problems/locked"
         problem(http.delete(location, headers=TUS), 423)
         assert offset(http, location) == 0
@@ -313,13 +312,13 @@ def test_complete_uploads_are_ingested_at_the_next_start(start, scan, state):
     content = scan().read_bytes()
     http = start()
     location = begin(http, len(content))
-    row = http.app.state.parts.uploads.receiving()[0]
-    files = http.app.state.parts.files.of("local")
-    http.app.state.parts.upload_ingest.stop()
+    row = http.app.state.background.ingest.uploads.receiving()[0]
+    files = http.app.state.stores.files.of("local")
+    http.app.state.background.ingest.stop()
     files.upload(row.id).write_bytes(content)
     files.candidate(row.result_id).write_bytes(content[:500])
     if state == "reading":
-        http.app.state.parts.uploads.mark_complete(row.id)
+        http.app.state.background.ingest.uploads.mark_complete(row.id)
     http.__exit__()
     http = start()
     assert settled(http, location)["result"] == row.result_id
@@ -336,8 +335,8 @@ def test_stored_uploads_are_not_ingested_twice(start, scan):
     upload = location.rpartition("/")[2]
     http.__exit__()
     http = start()
-    http.app.state.parts.uploads.mark_complete(upload)
-    http.app.state.parts.upload_ingest.notify()
+    http.app.state.background.ingest.uploads.mark_complete(upload)
+    http.app.state.background.ingest.notify()
     assert settled(http, location)["result"] == done["result"]
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1
 
@@ -346,7 +345,7 @@ def test_unverified_bytes_are_dropped_after_a_kill(start):
     http = start()
     location = begin(http, 100)
     piece(http, location, 0, b"verified")
-    stored = http.app.state.parts.files.of("local").upload(location.rpartition("/")[2])
+    stored = http.app.state.stores.files.of("local").upload(location.rpartition("/")[2])
     http.__exit__()
     # As a kill within a piece with a checksum leaves it.
     stored.write_bytes(b"verified" + b"not verified")
@@ -360,9 +359,7 @@ def test_unverified_bytes_are_dropped_after_a_kill(start):
 
 def test_uploads_are_begun_no_faster_than_allowed(start):
     http = start()
-    http.app.state.parts = replace(
-        http.app.state.parts, upload_limits=UploadLimits(NoProjects(), begun_per_minute=2)
-    )
+    http.app.state.background.ingest.upload_limits = UploadLimits(NoProjects(), begun_per_minute=2)
     answers = [http.post("/v1/uploads", headers={**TUS, "Upload-Length": "9"}) for _ in range(3)]
     assert [answer.status_code for answer in answers] == [201, 201, 429]
     assert problem(answers[2], 429)["field"] == "uploads"

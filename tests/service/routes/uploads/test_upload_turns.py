@@ -52,7 +52,7 @@ def queue():
 
 def test_an_upload_is_read_while_another_tenant_has_four_large_ones(start, uploaded):
     http = start()
-    blockers = Blockers(http.app.state.parts.ingest_queue, 4)
+    blockers = Blockers(http.app.state.background.ingest.queue, 4)
     try:
         uploaded(http)
     finally:
@@ -97,7 +97,7 @@ def test_long_wait_is_rejected_with_503(queue, monkeypatch):
 
 def test_too_many_uploads_get_retry_after(start, scan, uploaded):
     http = start()
-    limits = http.app.state.parts.upload_limits
+    limits = http.app.state.background.ingest.upload_limits
     with ExitStack() as stack:
         for _ in range(MAX_PER_ACCOUNT):
             stack.enter_context(limits(LOCAL))
