@@ -1,4 +1,4 @@
-"""Bounded reading of foreign volumes: declared sizes are checked first, and no more is read."""
+"""Bounded reading of foreign arrays: declared sizes are checked first, and no more is read."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import numpy as np
 
 from bentray_kernels.errors import InvalidInput
 
+from .complex_numbers import check_real
 from .volume import check_shape, check_type
 
 # Declared values of one volume, uncompressed.
 LARGEST_BYTES = 2 * 2**30
-# Header before the values of a file.
-LONGEST_HEADER = 2**20
+# Of one row of an array that is read by rows; of all declared arrays of a file; of axes.
+LARGEST_ROW = 256 * 2**20
+LARGEST_TOTAL = 32 * 2**30
+MAX_AXES = 4
 
 # Padding after the values of a compressed file: some writers align its end.
 LONGEST_TAIL = 2**16
@@ -66,3 +69,40 @@ def at_end(file: Any, tail: int = 0) -> None:
     if len(file.read(tail + 1)) > tail:
         excess = "more data after the values than its header declares"
         raise InvalidInput("file", excess, "the values and nothing more")
+
+
+def check_declared(
+    name: str, shape: Sequence[int], dtype: np.dtype[Any], stored: int, packing: float
+) -> None:
+    """Reject arrays of other types, with many axes, or larger than their stored data.
+
+    Args:
+        name: of the array.
+        shape, dtype: as declared.
+        stored: size of the stored data, compressed, bytes.
+        packing: largest compression ratio.
+
+    Raises:
+        InvalidInput: naming it.
+    """
+    check_real(name, dtype, "real numbers")
+    if dtype.kind not in "iufb" or dtype.itemsize > 8:
+        raise InvalidInput(name, f"{dtype}", "real numbers of at most 8 bytes, or booleans")
+    if len(shape) > MAX_AXES or any(n < 0 for n in shape):
+        raise InvalidInput(name, f"shape {tuple(shape)}", f"at most {MAX_AXES} axes")
+    size = math.prod(int(n) for n in shape) * dtype.itemsize
+    if size > LARGEST_TOTAL:
+        raise InvalidInput(name, f"{size} bytes unpacked", f"at most {LARGEST_TOTAL} bytes")
+    if size > packing * stored + 4096:
+        raise InvalidInput(name, f"{size} bytes, of which {stored} are stored", "data that are in the file")
+
+
+def check_row(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
+    """Reject rows that are too large for the memory.
+
+    Raises:
+        InvalidInput: naming the array.
+    """
+    size = math.prod(shape[1:]) * dtype.itemsize
+    if size > LARGEST_ROW:
+        raise InvalidInput(name, f"{size} bytes in an emission", f"at most {LARGEST_ROW} bytes")

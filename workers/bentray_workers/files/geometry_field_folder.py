@@ -15,7 +15,7 @@ from bentray_kernels.meshes.mesh import Chart, TriangleMesh
 from .atomic import atomic_replace, write_bytes
 from .hdf5_reading import Limits, opened
 from .hdf5_writing import atomic_hdf5
-from .npy_headers import PARSING
+from .npy_headers import PARSING, read_header
 
 
 class FieldFiles:
@@ -81,9 +81,7 @@ def mapped(path: Path, mode: Literal["c", "r+"] = "c") -> NDArray[Any]:
 def fill_rows(path: Path, first: int, rows: NDArray[Any]) -> None:
     """Write rows into a table and synchronise them; other processes may write other rows."""
     with path.open("r+b") as file:
-        with PARSING:
-            np.lib.format.read_magic(file)
-            np.lib.format.read_array_header_1_0(file)
+        read_header(file)
         # Written in place, not through a map: hosts that share a folder do not share memory.
         file.seek(file.tell() + first * rows[0].nbytes)
         file.write(np.ascontiguousarray(rows).tobytes())

@@ -12,7 +12,6 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
 from .bounded_reading import (
-    LONGEST_HEADER,
     LONGEST_TAIL,
     UNITS_M,
     ShapeCheck,
@@ -22,6 +21,7 @@ from .bounded_reading import (
     whole,
 )
 from .damage import rejecting_damage
+from .npy_headers import LONGEST_HEADER
 from .volume import Volume
 from .volume_axes import PositionedImage, reorient
 

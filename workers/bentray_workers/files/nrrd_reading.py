@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 
-from .bounded_reading import LONGEST_HEADER, UNITS_M, ShapeCheck, any_shape, at_end, declared, whole
+from .bounded_reading import UNITS_M, ShapeCheck, any_shape, at_end, declared, whole
 from .damage import rejecting_damage
+from .npy_headers import LONGEST_HEADER
 from .volume import Volume
 from .volume_axes import PositionedImage, reorient
 

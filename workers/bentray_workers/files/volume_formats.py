@@ -6,9 +6,10 @@ import gzip
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
@@ -16,9 +17,9 @@ from .bounded_reading import LARGEST_BYTES, ShapeCheck, any_shape, declared
 from .damage import first_bytes, rejecting_damage
 from .hdf5_reading import SIGNATURE, Limits, opened, printable
 from .nifti_reading import nifti_image
-from .npy_headers import PARSING
-from .npz_reading import START as NPZ
-from .npz_reading import read_npz
+from .npy_headers import read_header
+from .npz import START as NPZ
+from .npz import WHOLE, Npz
 from .nrrd_reading import nrrd_image
 from .reconstruction_format import FORMAT as RECONSTRUCTION
 from .volume import FORMAT, Volume, volume_in
@@ -86,7 +87,7 @@ def _read(path: Path, file: IO[bytes], start: bytes, given: VolumeMetadata, chec
     if start.startswith(b"\x93NUMPY"):
         return _numpy(path, file, given, check)
     if start.startswith(NPZ):
-        return Volume.from_values(read_npz(file, check), _spacing(given))
+        return Volume.from_values(_npz(file, check), _spacing(given))
     if given.spacing_m is not None:
         raise InvalidInput(
             "spacing_m", given.spacing_m, "nothing: this file contains it, or has no known format"
@@ -140,22 +141,26 @@ def _raw(path: Path, given: VolumeMetadata, check: ShapeCheck) -> Volume:
 
 def _numpy(path: Path, file: IO[bytes], given: VolumeMetadata, check: ShapeCheck) -> Volume:
     with rejecting_damage("file", "a whole NumPy file of numbers"):
-        version = np.lib.format.read_magic(file)
-        if version not in {(1, 0), (2, 0)}:
-            raise InvalidInput(
-                "file", f"NumPy's format {version}", "1.0 or 2.0, as numpy.save writes numbers"
-            )
-        with PARSING:
-            if version == (1, 0):
-                shape, columns_first, dtype = np.lib.format.read_array_header_1_0(file)
-            else:
-                shape, columns_first, dtype = np.lib.format.read_array_header_2_0(file)
+        shape, columns_first, dtype = read_header(file)
         count = declared("values", shape, dtype, check)
         left = path.stat().st_size - file.tell()
         if left < count:
             raise InvalidInput("file", f"{left} bytes of values", f"{count}, as its header says")
         values = np.memmap(path, dtype, "r", file.tell(), shape, "F" if columns_first else "C")
         return Volume.from_values(values, _spacing(given))
+
+
+def _npz(file: IO[bytes], check: ShapeCheck) -> NDArray[Any]:
+    """The 3-D array of an archive; other arrays, as of a spacing, are not read."""
+    archive = Npz(file)
+    headers = {name: archive.header(name) for name in archive.names()}
+    volumes = [name for name, (shape, _) in headers.items() if len(shape) == 3]
+    if len(volumes) != 1:
+        shapes = ", ".join(str(shape) for shape, _ in headers.values())[:200]
+        found = f"{len(volumes)} arrays with three dimensions (shapes {shapes or 'none'})"
+        raise InvalidInput("file", found, f"{WHOLE}, one of them with three dimensions")
+    declared("values", *headers[volumes[0]], check)
+    return archive.whole(volumes[0])
 
 
 def _hdf5(path: Path, check: ShapeCheck) -> Volume:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,16 +12,8 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import COUNTED, OVER_PAIRS, check_size
 
-from ..files.complex_numbers import check_real
-
-# Of an array that is read whole, and of one row of an array that is read by rows.
+# Of an array that is read whole.
 LARGEST_WHOLE = 256 * 2**20
-LARGEST_ROW = 256 * 2**20
-
-# Of all declared arrays of a file.
-LARGEST_TOTAL = 32 * 2**30
-
-MAX_AXES = 4
 
 # Fields of the upload format by names without groups, and by foreign names.
 PLACES = {path.rpartition("/")[2]: path for path in (*COUNTED, *OVER_PAIRS)} | {
@@ -74,40 +66,3 @@ def read_small(arrays: Arrays, name: str, accepted: str) -> NDArray[Any] | None:
         raise InvalidInput(name, f"shape {shape}, {size} bytes", accepted)
     array = arrays.whole(name)
     return array.T if arrays.reversed_axes else array
-
-
-def check_declared(
-    name: str, shape: Sequence[int], dtype: np.dtype[Any], stored: int, packing: float
-) -> None:
-    """Reject arrays of other types, with many axes, or larger than their stored data.
-
-    Args:
-        name: of the array.
-        shape, dtype: as declared.
-        stored: size of the stored data, compressed, bytes.
-        packing: largest compression ratio.
-
-    Raises:
-        InvalidInput: naming it.
-    """
-    check_real(name, dtype, "real numbers")
-    if dtype.kind not in "iufb" or dtype.itemsize > 8:
-        raise InvalidInput(name, f"{dtype}", "real numbers of at most 8 bytes, or booleans")
-    if len(shape) > MAX_AXES or any(n < 0 for n in shape):
-        raise InvalidInput(name, f"shape {tuple(shape)}", f"at most {MAX_AXES} axes")
-    size = math.prod(int(n) for n in shape) * dtype.itemsize
-    if size > LARGEST_TOTAL:
-        raise InvalidInput(name, f"{size} bytes unpacked", f"at most {LARGEST_TOTAL} bytes")
-    if size > packing * stored + 4096:
-        raise InvalidInput(name, f"{size} bytes, of which {stored} are stored", "data that are in the file")
-
-
-def check_row(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
-    """Reject rows that are too large for the memory.
-
-    Raises:
-        InvalidInput: naming the array.
-    """
-    size = math.prod(shape[1:]) * dtype.itemsize
-    if size > LARGEST_ROW:
-        raise InvalidInput(name, f"{size} bytes in an emission", f"at most {LARGEST_ROW} bytes")

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .arrays import LARGEST_ROW, read_small
+from ..files.bounded_reading import LARGEST_ROW
+from .arrays import read_small
 from .kit_signals import RATE_HZ, UNDERSAMPLING, compress, decode_float16, reconstruct_undersampled
 from .layouts import named_layout
 from .matlab5 import Matlab5

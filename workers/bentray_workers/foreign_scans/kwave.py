@@ -22,14 +22,15 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
+from ..files.bounded_reading import LARGEST_ROW, LARGEST_TOTAL
 from ..files.damage import rejecting_damage
 from ..files.hdf5_reading import Limits, Reader, opened, rejecting_hdf5_damage
-from .arrays import LARGEST_ROW, LARGEST_TOTAL, LARGEST_WHOLE
+from ..files.npz import Npz
+from ..files.zip_checks import WHOLE, check_zip
+from .arrays import LARGEST_WHOLE
 from .layouts import named_layout
-from .npz import Npz
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
-from .zip_checks import WHOLE, check_zip
 
 GEOMETRY = "geometry.npz"
 OUTPUT = re.compile(r"(object|water)/[^/]+\.(h5|hdf5)")

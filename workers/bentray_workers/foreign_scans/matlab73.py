@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
+from ..files.bounded_reading import check_row
 from ..files.dataset.counts import BLOCK_BYTES
 from ..files.hdf5_reading import Reader, rejecting_hdf5_damage
-from .arrays import check_row
 
 NUMBERS = "a plain array of real numbers"
 

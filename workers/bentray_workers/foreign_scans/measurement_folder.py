@@ -11,11 +11,11 @@ from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 
+from ..files.bounded_reading import LARGEST_ROW
 from ..files.damage import rejecting_damage
-from .arrays import LARGEST_ROW
+from ..files.zip_checks import WHOLE, check_zip
 from .matlab5 import Matlab5
 from .open_scan import OpenScan
-from .zip_checks import WHOLE, check_zip
 
 MAX_FILES = 65_536
 # Of a file with descriptions, of which single variables are read whole.

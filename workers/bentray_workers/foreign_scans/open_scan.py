@@ -13,10 +13,11 @@ import h5py
 
 from bentray_kernels.errors import InvalidInput
 
+from ..files import npz
 from ..files.damage import first_bytes, rejecting_damage
 from ..files.dataset.format import FORMAT
 from ..files.hdf5_reading import SIGNATURE, Limits, Reader, opened
-from . import matlab5, npz
+from . import matlab5
 from .arrays import Arrays
 from .matlab73 import Matlab73
 

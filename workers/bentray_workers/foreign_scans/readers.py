@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bentray_kernels.errors import InvalidInput
 
+from ..files.zip_checks import plain_name
 from . import kit, kwave, layouts, openusct, zea
 from .open_scan import OpenScan
 from .scan_reader import ScanReader
-from .zip_checks import plain_name
 
 # The first that detects a file reads it.
 READERS: tuple[ScanReader, ...] = (

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import check_row
+from ..files.bounded_reading import check_row
 
 
 class Traces(NamedTuple):

@@ -22,7 +22,7 @@ from bentray_kernels.tomography.waveform.inversion_state import RefinementCheckp
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
 from ..cluster.checkpoints import UNREADABLE
-from ..files.npy_headers import PARSING
+from ..files.npy_headers import PARSING, read_header
 from .blocks.block_files import BLOCKS, SLOWNESS, BlockFiles
 
 # Nodes along a side; of more, every n-th is taken.
@@ -139,9 +139,7 @@ def _middle_plane(member: IO[bytes]) -> tuple[Floats, int]:
     Raises:
         ValueError: for an array that is no image.
     """
-    version = npy.read_magic(member)
-    header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    shape, fortran, dtype = header(member)
+    shape, fortran, dtype = read_header(member)
     if len(shape) not in (2, 3) or dtype.kind != "f" or 0 in shape:
         raise ValueError(f"an image, not an array of shape {shape} and type {dtype}")
     every = math.ceil(max(shape[:2]) / MAX_NODES)

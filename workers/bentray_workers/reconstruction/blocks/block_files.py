@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from bentray_kernels.arrays import Floats
 from bentray_kernels.rays.block_tracing import BlockPlanes
 
 from ...files.atomic import atomic_replace
-from ...files.npy_headers import PARSING
+from ...files.npy_headers import read_header
 
 # Folder of the files in that of the job.
 BLOCKS = "blocks"
@@ -152,9 +151,7 @@ def read_planes(path: Path, low: int = 0, high: int | None = None) -> NDArray[An
         OSError, ValueError: for a file that ``write_array`` has not written.
     """
     with path.open("rb") as file:
-        with PARSING:
-            npy.read_magic(file)
-            shape, fortran, dtype = npy.read_array_header_1_0(file)
+        shape, fortran, dtype = read_header(file)
         if fortran:
             raise ValueError(f"{path}: an array in C order")
         planes: NDArray[Any] = np.empty(((shape[0] if high is None else high) - low, *shape[1:]), dtype)

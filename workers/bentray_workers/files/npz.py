@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..files.bounded_reading import LONGEST_HEADER, at_end
-from ..files.damage import rejecting_damage
-from ..files.npy_headers import PARSING
-from .arrays import check_declared, check_row
+from .bounded_reading import at_end, check_declared, check_row
+from .damage import rejecting_damage
+from .npy_headers import read_header
 from .zip_checks import PACKING, check_zip
 
 START = b"PK\x03\x04"
@@ -26,7 +25,7 @@ WHOLE = "a whole .npz of plain arrays"
 
 
 class Npz:
-    """The arrays of one archive; see ``Arrays``.
+    """The arrays of one archive; see ``foreign_scans.arrays.Arrays``.
 
     Args:
         archive: open archive, or a file with one.
@@ -50,6 +49,12 @@ class Npz:
 
     def names(self) -> tuple[str, ...]:
         return tuple(self._members)
+
+    def header(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+        """Shape and type of any array, unchecked."""
+        with rejecting_damage(name, WHOLE), self._open(name) as file:
+            shape, _, dtype = read_header(file)
+        return shape, dtype
 
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
         if name not in self._members:
@@ -92,18 +97,11 @@ class Npz:
             raise InvalidInput(name, f"{file.tell()} bytes, {declared} in the directory", WHOLE)
 
     def _header(self, name: str, file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-        version = np.lib.format.read_magic(file)
-        with PARSING:
-            read = (
-                np.lib.format.read_array_header_1_0
-                if version == (1, 0)
-                else np.lib.format.read_array_header_2_0
-            )
-            shape, fortran, dtype = read(file, max_header_size=LONGEST_HEADER)
+        shape, fortran, dtype = read_header(file)
         if dtype.hasobject:
             raise InvalidInput(name, "Python objects", "plain numbers; nothing is unpickled")
         check_declared(name, shape, dtype, self._members[name].compress_size, PACKING)
-        return tuple(int(n) for n in shape), bool(fortran), dtype
+        return shape, fortran, dtype
 
 
 def _exactly(name: str, file: IO[bytes], count: int) -> bytes:

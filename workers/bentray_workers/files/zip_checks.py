@@ -8,7 +8,7 @@ import zipfile
 
 from bentray_kernels.errors import InvalidInput
 
-from .arrays import LARGEST_TOTAL
+from .bounded_reading import LARGEST_TOTAL
 
 WHOLE = "a zip as numpy.savez or savez_compressed writes it"
 
