@@ -200,7 +200,7 @@ class Pictures:
         await self._one(tenant, ("quantity", "truth", cost), path, export_truth, how)
 
     async def summary(
-        self, tenant: Tenant, volume: VolumeRow, dataset: DatasetRow, path: Path, scan: Path
+        self, tenant: Tenant, volume: VolumeRow, path: Path, dataset: DatasetRow, scan: Path
     ) -> dict[str, Any]:
         """Summarise a reconstruction, see ``images.result_summary``."""
         cost = picture_cost.truth_cost(VolumeFile.of(volume.values()), dataset.values())

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, cast
+from pathlib import Path
+from typing import Annotated, Generic, NamedTuple, TypeVar, cast
 
 from fastapi import Depends, Request
 from starlette.types import Scope
@@ -24,6 +25,7 @@ from .rows.batches import Batches
 from .rows.database import Database
 from .rows.jobs import Jobs
 from .rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
+from .rows.tables import DatasetRow, FieldRow, VolumeRow
 from .rows.tenants import Tenant
 from .settings import ServiceSettings
 from .webhooks.sender import Webhooks
@@ -109,3 +111,34 @@ Access = Annotated[AccessParts, Depends(_access)]
 CurrentCaller = Annotated[Caller, Depends(_caller)]
 # The tenant of the caller, for queries.
 CallerTenant = Annotated[Tenant, Depends(_tenant)]
+
+
+Row = TypeVar("Row", DatasetRow, FieldRow, VolumeRow)
+
+
+class Requested(NamedTuple, Generic[Row]):
+    """The item that the path of a request names: its owner, its row, and its file or folder."""
+
+    tenant: Tenant
+    row: Row
+    path: Path
+
+
+def _dataset(dataset_id: str, stores: Stores, tenant: CallerTenant) -> Requested[DatasetRow]:
+    row = stores.datasets.get(tenant, dataset_id)
+    return Requested(tenant, row, stores.files.of(tenant).dataset(row.id))
+
+
+def _volume(volume_id: str, stores: Stores, tenant: CallerTenant) -> Requested[VolumeRow]:
+    row = stores.volumes.get(tenant, volume_id)
+    return Requested(tenant, row, stores.files.of(tenant).volume(row.id))
+
+
+def _field(field_id: str, stores: Stores, tenant: CallerTenant) -> Requested[FieldRow]:
+    row = stores.geometry_fields.get(tenant, field_id)
+    return Requested(tenant, row, stores.files.of(tenant).field(row.id))
+
+
+RequestedDataset = Annotated[Requested[DatasetRow], Depends(_dataset)]
+RequestedVolume = Annotated[Requested[VolumeRow], Depends(_volume)]
+RequestedField = Annotated[Requested[FieldRow], Depends(_field)]

@@ -6,7 +6,6 @@ import hashlib
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
-from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.ranges import Range
 from bentray_kernels.rendering_limits import MAX_SMOOTHING
@@ -16,7 +15,7 @@ from bentray_workers.rendering.refraction_view import RefractionView
 from .. import __version__
 from ..compute import check_renderable
 from ..web.errors import problems
-from ..wiring import Background, CallerTenant, Stores, access_of, caller_of
+from ..wiring import Background, RequestedVolume, access_of, caller_of
 from .downloads import headers_of, unchanged
 from .pictures import while_connected
 
@@ -40,11 +39,9 @@ router = APIRouter()
     },
 )
 async def show_coefficients(
-    volume_id: str,
+    volume: RequestedVolume,
     request: Request,
-    stores: Stores,
     background: Background,
-    tenant: CallerTenant,
     filter: Annotated[  # noqa: A002 - the name of the query parameter
         Literal["bspline3", "catmull-rom"], Query(description="As of refraction.png.")
     ] = "bspline3",
@@ -54,15 +51,13 @@ async def show_coefficients(
     ] = None,
 ) -> Response:
     """Filter a volume on a worker, and return its coefficients as a NumPy file."""
-    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
-    check_renderable(volume)
-    check_nodes(tuple(volume.shape))
+    check_renderable(volume.row)
+    check_nodes(tuple(volume.row.shape))
     view = RefractionView(filter=filter, smoothing=smoothing)
-    seed = repr((__version__, volume.id, volume.created, filter, smoothing))
+    seed = repr((__version__, volume.row.id, volume.row.created, filter, smoothing))
     tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
     if (response := unchanged(request, tag)) is not None:
         return response
     access_of(request.scope).sign_in.check_render(caller_of(request))
-    path = stores.files.of(tenant).volume(volume.id)
-    work = background.pictures.coefficients(tenant, volume, path, view)
+    work = background.pictures.coefficients(*volume, view)
     return Response(await while_connected(request, work), media_type=NPY, headers=headers_of(tag))

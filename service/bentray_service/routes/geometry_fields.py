@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
-from starlette.concurrency import run_in_threadpool
+from functools import partial
 
-from ..rows.tenants import Tenant
+from fastapi import APIRouter, Request, Response
+
 from ..view_parameters import FieldViewParameters
 from ..web.errors import problems
-from ..wiring import Background, CallerTenant, Stores
+from ..wiring import Background, CallerTenant, RequestedField, Stores
 from .bodies import Limit
 from .models.surface_records import FieldList, FieldRecord
 from .pictures import PICTURE, picture
@@ -37,51 +37,32 @@ def show_field(field_id: str, stores: Stores, tenant: CallerTenant) -> FieldReco
 @router.head("/{field_id}/image.png", include_in_schema=False)
 @router.get("/{field_id}/image.png", response_class=Response, responses=PICTURE)
 async def image_png(
-    field_id: str,
-    request: Request,
-    stores: Stores,
-    background: Background,
-    tenant: CallerTenant,
-    view: FieldViewParameters,
+    field: RequestedField, request: Request, background: Background, view: FieldViewParameters
 ) -> Response:
     """Render a scene with the mesh as mirror, glass or clay, using the geometry field for secondary rays.
 
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
-    field = await run_in_threadpool(stores.geometry_fields.get, tenant, field_id)
-    view.check_samples(field.settings["samples"])
-    folder = stores.files.of(tenant).field(field.id)
+    view.check_samples(field.row.settings["samples"])
     return await picture(
-        request, field, view.plain(), lambda: background.pictures.field_png(tenant, field, folder, view)
+        request, field.row, view.plain(), lambda: background.pictures.field_png(*field, view)
     )
 
 
 @router.head("/{field_id}/geometry-image.png", include_in_schema=False)
 @router.get("/{field_id}/geometry-image.png", response_class=Response, responses=PICTURE)
-async def geometry_image_png(
-    field_id: str, request: Request, stores: Stores, background: Background, tenant: CallerTenant
-) -> Response:
+async def geometry_image_png(field: RequestedField, request: Request, background: Background) -> Response:
     """The geometry image: surface positions as colours over the unit square."""
-    return await _map(field_id, request, stores, background, tenant, "positions")
+    return await _map(field, request, background, "positions")
 
 
 @router.head("/{field_id}/normal-map.png", include_in_schema=False)
 @router.get("/{field_id}/normal-map.png", response_class=Response, responses=PICTURE)
-async def normal_map_png(
-    field_id: str, request: Request, stores: Stores, background: Background, tenant: CallerTenant
-) -> Response:
+async def normal_map_png(field: RequestedField, request: Request, background: Background) -> Response:
     """The normal map: surface normals as colours over the unit square."""
-    return await _map(field_id, request, stores, background, tenant, "normals")
+    return await _map(field, request, background, "normals")
 
 
-async def _map(
-    field_id: str, request: Request, stores: Stores, background: Background, tenant: Tenant, which: str
-) -> Response:
-    field = await run_in_threadpool(stores.geometry_fields.get, tenant, field_id)
-    folder = stores.files.of(tenant).field(field.id)
-    return await picture(
-        request,
-        field,
-        {"map": which},
-        lambda: background.pictures.field_map_png(tenant, field, folder, which),
-    )
+async def _map(field: RequestedField, request: Request, background: Background, which: str) -> Response:
+    draw = partial(background.pictures.field_map_png, *field, which)
+    return await picture(request, field.row, {"map": which}, draw)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
-from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.quantities import QUANTITIES, QuantityName
 from bentray_workers.rendering.histogram import BINS, DEFAULT_BINS
 
 from ..web.errors import problems
-from ..wiring import Background, CallerTenant, Stores
+from ..wiring import Background, RequestedVolume
 from .models.job_records import HistogramRecord
 from .pictures import while_connected
 from .quality import check_render_rate
@@ -26,11 +25,9 @@ router = APIRouter()
     dependencies=[Depends(check_render_rate)],
 )
 async def show_histogram(
-    volume_id: str,
+    volume: RequestedVolume,
     request: Request,
-    stores: Stores,
     background: Background,
-    tenant: CallerTenant,
     quantity: Annotated[
         Literal[QuantityName, "value"] | None,
         Query(
@@ -47,12 +44,10 @@ async def show_histogram(
     ] = DEFAULT_BINS,
 ) -> HistogramRecord:
     """Count the nodes of a volume by value, on a worker; and the surface that a picture shows by default."""
-    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
-    uploaded = volume.job_id is None
+    uploaded = volume.row.job_id is None
     chosen = quantity or ("value" if uploaded else "speed")
     if (chosen == "value") != uploaded:
         accepted = "value: this is an uploaded volume" if uploaded else "one of " + ", ".join(QUANTITIES)
         raise InvalidInput("quantity", repr(quantity), accepted)
-    path = stores.files.of(tenant).volume(volume.id)
-    work = background.pictures.histogram(tenant, volume, path, chosen, bins)
+    work = background.pictures.histogram(*volume, chosen, bins)
     return HistogramRecord.model_validate(await while_connected(request, work))

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request, Response
-from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.picker_names import DEFAULT_PICKER, PickerName
 
 from ..web.errors import problems
-from ..wiring import Background, CallerTenant, Stores, access_of, caller_of
+from ..wiring import Background, RequestedDataset, access_of, caller_of
 from .models.quality_records import QualityRecord
 from .pictures import PICTURE, picture, while_connected
 
@@ -33,34 +32,24 @@ async def check_render_rate(request: Request) -> None:
     dependencies=[Depends(check_render_rate)],
 )
 async def show_quality(
-    dataset_id: str,
+    dataset: RequestedDataset,
     request: Request,
-    stores: Stores,
     background: Background,
-    tenant: CallerTenant,
     picker: Picker = DEFAULT_PICKER,
 ) -> QualityRecord:
     """Check the quality of a scan on a worker: faulty elements and times, and the action taken for each."""
-    dataset = await run_in_threadpool(stores.datasets.get, tenant, dataset_id)
-    path = stores.files.of(tenant).dataset(dataset.id)
-    work = background.pictures.quality(tenant, dataset, path, picker)
+    work = background.pictures.quality(*dataset, picker)
     return QualityRecord.model_validate(await while_connected(request, work))
 
 
 @router.head("/{dataset_id}/quality.png", include_in_schema=False)
 @router.get("/{dataset_id}/quality.png", response_class=Response, responses={**PICTURE, **problems(404, 422)})
 async def quality_png(
-    dataset_id: str,
+    dataset: RequestedDataset,
     request: Request,
-    stores: Stores,
     background: Background,
-    tenant: CallerTenant,
     picker: Picker = DEFAULT_PICKER,
 ) -> Response:
     """The quality report as an image: gathers with picks, matrix of times, findings."""
-    dataset = await run_in_threadpool(stores.datasets.get, tenant, dataset_id)
-    path = stores.files.of(tenant).dataset(dataset.id)
-    how = {"picker": picker, "what": "quality", "water_temperature_c": dataset.water_temperature_c}
-    return await picture(
-        request, dataset, how, lambda: background.pictures.quality_png(tenant, dataset, path, picker)
-    )
+    how = {"picker": picker, "what": "quality", "water_temperature_c": dataset.row.water_temperature_c}
+    return await picture(request, dataset.row, how, lambda: background.pictures.quality_png(*dataset, picker))

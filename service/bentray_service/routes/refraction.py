@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
-from starlette.concurrency import run_in_threadpool
 
 from ..compute import check_renderable
 from ..view_parameters import ViewParameters
-from ..wiring import Background, CallerTenant, Stores
+from ..wiring import Background, RequestedVolume
 from .pictures import PICTURE, picture
 
 router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
@@ -16,11 +15,9 @@ router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 @router.head("/{volume_id}/refraction.png", include_in_schema=False)
 @router.get("/{volume_id}/refraction.png", response_class=Response, responses=PICTURE)
 async def refraction_png(
-    volume_id: str,
+    volume: RequestedVolume,
     request: Request,
-    stores: Stores,
     background: Background,
-    tenant: CallerTenant,
     view: ViewParameters,
 ) -> Response:
     """Render a volume as refracting glass before a backdrop, or its surface, on a worker.
@@ -28,10 +25,8 @@ async def refraction_png(
     Requires a 3-D volume with uniform spacing. HEAD returns the ETag without rendering, so Content-Length is
     absent.
     """
-    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
-    check_renderable(volume)
-    view = view.within(*volume.value_range)
-    path = stores.files.of(tenant).volume(volume.id)
+    check_renderable(volume.row)
+    view = view.within(*volume.row.value_range)
     return await picture(
-        request, volume, view.plain(), lambda: background.pictures.refraction_png(tenant, volume, path, view)
+        request, volume.row, view.plain(), lambda: background.pictures.refraction_png(*volume, view)
     )

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
-from starlette.concurrency import run_in_threadpool
 
 from ..web.errors import problems
-from ..wiring import Background, CallerTenant, Stores
+from ..wiring import Background, RequestedDataset
 from .models.quality_records import EmissionRecord, GeometryRecord
 from .pictures import while_connected
 from .quality import check_render_rate
@@ -22,12 +21,10 @@ router = APIRouter()
     dependencies=[Depends(check_render_rate)],
 )
 async def show_geometry(
-    dataset_id: str, request: Request, stores: Stores, background: Background, tenant: CallerTenant
+    dataset: RequestedDataset, request: Request, background: Background
 ) -> GeometryRecord:
     """Show the elements, the acquisition and the water of a scan, read by a worker."""
-    dataset = await run_in_threadpool(stores.datasets.get, tenant, dataset_id)
-    path = stores.files.of(tenant).dataset(dataset.id)
-    work = background.pictures.scan_geometry(tenant, dataset, path)
+    work = background.pictures.scan_geometry(*dataset)
     return GeometryRecord.model_validate(await while_connected(request, work))
 
 
@@ -35,11 +32,9 @@ async def show_geometry(
     "/{dataset_id}/traces", responses=problems(404, 422, 429, 503), dependencies=[Depends(check_render_rate)]
 )
 async def show_traces(
-    dataset_id: str,
+    dataset: RequestedDataset,
     request: Request,
-    stores: Stores,
     background: Background,
-    tenant: CallerTenant,
     emission: Annotated[int, Query(ge=0, description="Index of the emission, from 0.")] = 0,
     slice: Annotated[int, Query(ge=0, description="Index of the slice, from 0.")] = 0,  # noqa: A002
     quantity: Annotated[
@@ -47,8 +42,6 @@ async def show_traces(
     ] = "object",
 ) -> EmissionRecord:
     """Show the traces of one emission, at most 512 receivers and 1024 samples, and their picks."""
-    dataset = await run_in_threadpool(stores.datasets.get, tenant, dataset_id)
-    path = stores.files.of(tenant).dataset(dataset.id)
     how = {"emission": emission, "index": slice, "what": quantity}
-    work = background.pictures.emission_traces(tenant, dataset, path, how)
+    work = background.pictures.emission_traces(*dataset, how)
     return EmissionRecord.model_validate(await while_connected(request, work))

@@ -6,7 +6,6 @@ from dataclasses import asdict
 from typing import Annotated, Any, Literal, cast
 
 from fastapi import APIRouter, Depends, Query, Request, Response
-from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.quantities import QUANTITIES, QuantityName
@@ -20,7 +19,7 @@ from bentray_workers.images.slice_style import (
     SliceStyle,
 )
 
-from ..wiring import Background, CallerTenant, Stores
+from ..wiring import Background, RequestedVolume
 from .pictures import PICTURE, picture
 
 router = APIRouter()
@@ -61,11 +60,9 @@ async def read_style(
 @router.head("/{volume_id}/slice.png", include_in_schema=False)
 @router.get("/{volume_id}/slice.png", response_class=Response, responses=PICTURE)
 async def slice_png(
-    volume_id: str,
+    volume: RequestedVolume,
     request: Request,
-    stores: Stores,
     background: Background,
-    tenant: CallerTenant,
     style: Annotated[SliceStyle, Depends(read_style)],
     axis: Annotated[Literal["x", "y", "z"], Query(description="Axis perpendicular to the slice.")] = "z",
     index: Annotated[
@@ -91,20 +88,16 @@ async def slice_png(
 
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
-    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
-    check_plane(volume.shape, volume.spacing_m, axis, index)
+    check_plane(volume.row.shape, volume.row.spacing_m, axis, index)
     for name, value in (("low", low), ("high", high)):
         if value is not None:
             COLOUR_VALUE.check(name, value)
     how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(style)}
-    if volume.job_id is not None:
+    if volume.row.job_id is not None:
         if quantity == "value":
             accepted = "one of " + ", ".join(QUANTITIES)
             raise InvalidInput("quantity", "'value'", accepted)
         how["quantity"] = quantity or "speed"
     elif quantity not in (None, "value"):
         raise InvalidInput("quantity", repr(quantity), "value: this is an uploaded volume")
-    path = stores.files.of(tenant).volume(volume.id)
-    return await picture(
-        request, volume, how, lambda: background.pictures.slice_png(tenant, volume, path, how)
-    )
+    return await picture(request, volume.row, how, lambda: background.pictures.slice_png(*volume, how))

@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from ..rows.tables import DatasetRow, VolumeRow
 from ..rows.tenants import Tenant
 from ..web.errors import problems
-from ..wiring import Background, CallerTenant, Stores
+from ..wiring import Background, RequestedVolume, Stores
 from .models.summary_records import SummaryRecord
 from .pictures import while_connected
 from .quality import check_render_rate
@@ -38,11 +38,9 @@ def scan_of(stores: Stores, tenant: Tenant, volume: VolumeRow) -> tuple[DatasetR
     dependencies=[Depends(check_render_rate)],
 )
 async def show_summary(
-    volume_id: str, request: Request, stores: Stores, background: Background, tenant: CallerTenant
+    volume: RequestedVolume, request: Request, stores: Stores, background: Background
 ) -> SummaryRecord:
     """Summarise a reconstruction on a worker: quantities, what auto compared, errors against the truth."""
-    volume = await run_in_threadpool(stores.volumes.get, tenant, volume_id)
-    dataset, scan = await run_in_threadpool(scan_of, stores, tenant, volume)
-    path = stores.files.of(tenant).volume(volume.id)
-    work = background.pictures.summary(tenant, volume, dataset, path, scan)
+    dataset, scan = await run_in_threadpool(scan_of, stores, volume.tenant, volume.row)
+    work = background.pictures.summary(*volume, dataset, scan)
     return SummaryRecord.model_validate(await while_connected(request, work))
