@@ -109,7 +109,7 @@ class Reader:
             self.seen[kind] = f"{kind}-{number}"
 
     def _filled(self, text: str) -> str:
-        return re.sub(r"\b(ds|job|vol|mesh|field|up)-…", lambda found: self.seen[found[1]], text)
+        return re.sub(r"\b(ds|job|vol|mesh|field|up)-…", lambda match: self.seen[match[1]], text)
 
     def follow_line(self, line: str) -> str:
         if line.startswith("bentray submit"):

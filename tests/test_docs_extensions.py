@@ -37,9 +37,9 @@ def formulas() -> list[tuple[str, str, bool]]:
 
 
 def test_every_formula_is_converted() -> None:
-    known = formulas()
-    assert len(known) > 200
-    for page, text, block in known:
+    listed = formulas()
+    assert len(listed) > 200
+    for page, text, block in listed:
         assert "<math" in mathml.converted(text, block=block), (page, text)
 
 
@@ -58,8 +58,8 @@ def test_pages_have_nothing_inline(tmp_path: Path) -> None:
     content = [(tmp_path / name).read_bytes() for name in files]
     assert b"let a = 1;" in content
     assert b"p { color: red; }" in content
-    assert any(one.startswith(b"\x89PNG") for one in content)
-    assert any(b"width: 3%" in one for one in content)
+    assert any(part_of.startswith(b"\x89PNG") for part_of in content)
+    assert any(b"width: 3%" in part_of for part_of in content)
     assert parts.separated(result, "../") == result, "a page that was not built again stays as it is"
 
 

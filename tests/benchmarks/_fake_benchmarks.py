@@ -28,11 +28,11 @@ class Fakes:
     def load(self, name: str) -> Callable[[BenchmarkContext], Iterable[Row]]:
         def rows(context: BenchmarkContext) -> Iterable[Row]:
             self.ran.append(name)
-            sources = [(item, one) for item in items() for one in item.sources if one.benchmark == name]
+            sources = [(item, entry) for item in items() for entry in item.sources if entry.benchmark == name]
             for file in {file for item, _ in sources for file in item.pictures}:
                 context.save_picture(file, lambda: PNG)
             context.progress(1, 2, "half")
-            for target in dict.fromkeys(target for _, one in sources for target in one.targets):
+            for target in dict.fromkeys(target for _, source in sources for target in source.targets):
                 yield Row(f"{target} <first>", 0.1, 0.2, "<=", "of range", "a & b", baselines=IMAGE)
                 yield Row(f"{target} second", 2.0, 1.0, "<=", "", "missed")
             if name in self.stops:
@@ -56,7 +56,7 @@ def by_name(name: str):
 
 
 def of(made: dict, name: str) -> dict:
-    return next(item for one in made["chapters"] for item in one["items"] if item["name"] == name)
+    return next(item for chapter in made["chapters"] for item in chapter["items"] if item["name"] == name)
 
 
 def state_of(made: dict, name: str) -> str:

@@ -14,7 +14,7 @@ def test_the_octree_leaves_few_evaluations_and_nodes():
     ball = subjects()[0]
     scene = Scene.build(Spline(ball.volume), Layers((ball.iso,), (1.0, 1.5)))
     compiled = crossing.leave_interval
-    result = {one: operations(scene, ball, one, 6) for one in ("steps", "dda", "octree")}
+    result = {search: operations(scene, ball, search, 6) for search in ("steps", "dda", "octree")}
     assert crossing.leave_interval is compiled
     # About 64 nodes along each ray, in steps of a tenth.
     assert 600 < result["steps"][0] < 700

@@ -28,11 +28,11 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     """Merge by the rules of compose: mappings key by key, secrets are joined, all else is replaced."""
     result = dict(below)
     for name, value in above.items():
-        known = below.get(name)
-        if isinstance(value, dict) and isinstance(known, dict):
-            result[name] = _merged(known, value)
+        base = below.get(name)
+        if isinstance(value, dict) and isinstance(base, dict):
+            result[name] = _merged(base, value)
         else:
-            result[name] = [*known, *value] if name == "secrets" and isinstance(known, list) else value
+            result[name] = [*base, *value] if name == "secrets" and isinstance(base, list) else value
     return result
 
 

@@ -67,7 +67,7 @@ def test_the_files_in_the_image_give_the_same_wheel(dist: Path, tmp_path: Path) 
     for names, folder in re.findall(
         r"^COPY (?!--from|requirements|deploy/\w+\.sh)(.+) (\S+)$", text, re.MULTILINE
     ):
-        for name in (one for one in names.split() if one != "buil[d]"):
+        for name in (name_of for name_of in names.split() if name_of != "buil[d]"):
             if (ROOT / name).is_dir():
                 shutil.copytree(ROOT / name, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
             else:
@@ -107,7 +107,7 @@ for address in {ADDRESSES}:
 print(bentray.__version__)
 """
     said = run("-c", code, folder=tmp_path).splitlines()
-    assert said == [*(f"{one} 200 True" for one in ADDRESSES), PROJECT["version"]]
+    assert said == [*(f"{address} 200 True" for address in ADDRESSES), PROJECT["version"]]
 
 
 def test_the_bill_lists_every_locked_package() -> None:
@@ -118,15 +118,15 @@ def test_the_bill_lists_every_locked_package() -> None:
     assert bill["metadata"]["timestamp"] == "2026-01-01T00:00:00Z"
     assert bill["metadata"]["component"]["purl"] == f"pkg:pypi/bentray@{PROJECT['version']}"
     locked = re.findall(r"^([\w.-]+)==(\S+)", (ROOT / "requirements.lock").read_text(), re.MULTILINE)
-    names = [(one["name"], one["version"]) for one in bill["components"]]
+    names = [(part["name"], part["version"]) for part in bill["components"]]
     assert names == [(re.sub(r"[-_.]+", "-", name).lower(), version) for name, version in locked]
-    references = [one["bom-ref"] for one in bill["components"]]
+    references = [part["bom-ref"] for part in bill["components"]]
     assert len(set(references)) == len(references)
     (direct,) = bill["dependencies"]
     # A lock for several versions of Python pins some packages twice.
-    pinned = {re.fullmatch(r"pkg:pypi/(.+)@.+", one)[1] for one in direct["dependsOn"]}  # type: ignore[index]
-    assert pinned == {re.split(r"[^A-Za-z0-9._-]", one)[0].lower() for one in PROJECT["dependencies"]}
-    licensed = [one for one in bill["components"] if "licenses" in one]
+    pinned = {re.fullmatch(r"pkg:pypi/(.+)@.+", ref)[1] for ref in direct["dependsOn"]}  # type: ignore[index]
+    assert pinned == {re.split(r"[^A-Za-z0-9._-]", dep)[0].lower() for dep in PROJECT["dependencies"]}
+    licensed = [part for part in bill["components"] if "licenses" in part]
     assert len(licensed) > 0.9 * len(names)
 
 

@@ -58,8 +58,8 @@ def measured(service: LiveService) -> Footprint:
     return Footprint(
         service_mib=own.memory_info().rss / MIB,
         workers_mib=sum(worker.memory_info().rss for worker in workers) / MIB,
-        descriptors=sum(one.num_fds() for one in family),
-        threads=sum(one.num_threads() for one in family),
+        descriptors=sum(process.num_fds() for process in family),
+        threads=sum(process.num_threads() for process in family),
         processes=len(family),
         rows=rows(service.data),
         bytes=sum(path.stat().st_size for path in stored(service.data)),

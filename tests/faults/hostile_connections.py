@@ -42,11 +42,11 @@ class HostileConnections:
     def slow_heads(self) -> None:
         """Thirty heads, each a byte at a time, which never end."""
         with ExitStack() as open_ones:
-            mine = [open_ones.enter_context(self._connected()) for _ in range(30)]
+            own = [open_ones.enter_context(self._connected()) for _ in range(30)]
             for byte in b"GET /v1/datasets HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ":
-                for one in mine:
+                for held in own:
                     with suppress(OSError):
-                        one.sendall(bytes([byte]))
+                        held.sendall(bytes([byte]))
                 time.sleep(0.05)
 
     def tiny_chunks(self) -> None:
@@ -95,10 +95,10 @@ class HostileConnections:
         own = b"Authorization: Bearer " + self._key
         return "\r\n".join(lines).encode() + b"\r\n" + own + b"\r\n\r\n"
 
-    def _note(self, one: socket.socket, what: str) -> None:
+    def _note(self, connection: socket.socket, what: str) -> None:
         """Take down the status that comes; a connection may also be closed without a word."""
         with suppress(OSError):
-            words = one.recv(4096).split(b" ", 2)
+            words = connection.recv(4096).split(b" ", 2)
             if len(words) == 3 and words[0].startswith(b"HTTP/"):
                 status = int(words[1])
                 self._ledger.count("nobody", what, status)

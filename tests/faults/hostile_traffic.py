@@ -97,9 +97,9 @@ class HostileTraffic:
                 self._ask("POST", f"/v1/jobs/{job['id']}/cancel")
         deadline = time.monotonic() + PATIENCE_S
         for listed in ("datasets", "volumes", "meshes"):
-            for one in self._ask("GET", f"/v1/{listed}").json()[listed]:
-                while self._ask("DELETE", f"/v1/{listed}/{one['id']}").status_code not in (204, 404):
-                    assert time.monotonic() < deadline, f"{one['id']} cannot be deleted"
+            for entry in self._ask("GET", f"/v1/{listed}").json()[listed]:
+                while self._ask("DELETE", f"/v1/{listed}/{entry['id']}").status_code not in (204, 404):
+                    assert time.monotonic() < deadline, f"{entry['id']} cannot be deleted"
                     time.sleep(0.5)
 
     def close(self) -> None:
@@ -182,10 +182,10 @@ class HostileTraffic:
                 self._ledger.fault(f"{given[:40]} was answered {answer.status_code}")
 
     def _ids_of_others(self) -> None:
-        known = [item for victim in self._victims for item in self._ledger.ids(victim)]
-        for one in self._chance.sample(sorted(known), min(8, len(known))):
+        ids = [item for victim in self._victims for item in self._ledger.ids(victim)]
+        for other_id in self._chance.sample(sorted(ids), min(8, len(ids))):
             kinds = {"ds": "datasets", "vol": "volumes", "mesh": "meshes", "job": "jobs", "up": "uploads"}
-            path = f"/v1/{kinds[one.partition('-')[0]]}/{one}"
+            path = f"/v1/{kinds[other_id.partition('-')[0]]}/{other_id}"
             further = {"volumes": "/data", "datasets": "/file", "jobs": "/events"}
             asked = [("GET", path, {}), ("GET", path + further.get(path.split("/")[2], ""), {})]
             if "jobs" in path:
@@ -259,9 +259,9 @@ class HostileTraffic:
             return self._volume(self._quota_volume)
 
         with ThreadPoolExecutor(QUOTA_UPLOADS) as pool:
-            made = [one for one in pool.map(send, range(QUOTA_UPLOADS)) if one is not None]
-        for one in made:
-            self._ask("DELETE", f"/v1/volumes/{one}")
+            made = [upload for upload in pool.map(send, range(QUOTA_UPLOADS)) if upload is not None]
+        for upload in made:
+            self._ask("DELETE", f"/v1/volumes/{upload}")
 
     def _volume(self, content: bytes) -> str | None:
         """Upload a volume; its id, or nothing where it is refused."""
@@ -297,7 +297,7 @@ def _files(sound: bytes, folder: Path) -> Iterator[tuple[str, bytes]]:
         [("mesh", content) for content, _ in hostile_meshes.REFUSED.values()],
         [(what, content) for what, content, _, _ in hostile_variants.REFUSED.values()],
     ]
-    mixed = [one for several in itertools.zip_longest(*kinds) for one in several if one is not None]
+    mixed = [attack for several in itertools.zip_longest(*kinds) for attack in several if attack is not None]
     random.Random(3).shuffle(mixed)
     return iter(mixed)
 

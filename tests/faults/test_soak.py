@@ -158,8 +158,8 @@ def test_honest_jobs_finish_and_resources_stay_bounded(service, soak_scan, tmp_p
     finally:
         probe.stop()
         report(samples, probe, ledger, honest, (time.monotonic() - begun) / 60.0)
-        for one in (*honest, hostile):
-            one.close()
+        for actor in (*honest, hostile):
+            actor.close()
 
 
 def parties(
@@ -206,10 +206,10 @@ def at_rest(service: LiveService) -> Footprint:
 def check_flat(samples: list[Footprint]) -> None:
     """Nothing grows after the warm-up, and nothing is left of what was deleted."""
     warm = samples[int(len(samples) * WARM_UP) :]
-    assert rise([one.service_mib for one in warm]) < MAX_SERVICE_MIB
-    assert rise([one.workers_mib for one in warm]) < MAX_WORKERS_MIB
-    assert rise([one.descriptors for one in warm]) < MAX_DESCRIPTORS
-    assert rise([one.threads for one in warm]) < MAX_THREADS
+    assert rise([use.service_mib for use in warm]) < MAX_SERVICE_MIB
+    assert rise([use.workers_mib for use in warm]) < MAX_WORKERS_MIB
+    assert rise([use.descriptors for use in warm]) < MAX_DESCRIPTORS
+    assert rise([use.threads for use in warm]) < MAX_THREADS
     assert {sample.processes for sample in samples} == {samples[0].processes}
     assert [sample.rows for sample in samples] == [{}] * len(samples)
     assert [sample.bytes for sample in samples] == [0] * len(samples)
@@ -231,7 +231,7 @@ def report(
     log.info("live: median %.3f s, worst %.3f s", statistics.median(probe.seconds), max(probe.seconds))
     for who in (*HONEST, HOSTILE, "nobody"):
         log.info("%s: %s", who, ledger.statuses(who))
-    for one in honest:
-        log.info("honest: %d rounds, told to wait for %.0f s", one.rounds, one.waits_s)
+    for actor in honest:
+        log.info("honest: %d rounds, told to wait for %.0f s", actor.rounds, actor.waits_s)
     for number, sample in enumerate(samples):
         log.info("%3d %s", number, sample)

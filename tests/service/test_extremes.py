@@ -111,7 +111,7 @@ def test_every_number_of_a_query_or_header_has_bounds(http, volume):
     for path, operations in json.loads(description())["paths"].items():
         parameters = operations.get("get", {}).get("parameters", ())
         # A picture takes as long as it is large.
-        small = {one["name"]: "16" for one in parameters if one["name"] in ("width", "height")}
+        small = {query["name"]: "16" for query in parameters if query["name"] in ("width", "height")}
         for parameter in parameters:
             types = [parameter["schema"], *parameter["schema"].get("anyOf", ())]
             if parameter["in"] != "query" or not {"integer", "number"} & {item.get("type") for item in types}:

@@ -57,7 +57,7 @@ def operations():
 def test_every_operation_has_a_description():
     named = dict(operations())
     assert all(one["summary"] and one["description"] and one["tags"] for one in named.values())
-    assert len({one["operationId"] for one in named.values()}) == len(named)
+    assert len({operation["operationId"] for operation in named.values()}) == len(named)
 
 
 def test_every_parameter_but_ids_is_explained():

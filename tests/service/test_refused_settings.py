@@ -68,17 +68,17 @@ def test_values_out_of_range_and_words_that_are_no_choice(kind: type) -> None:
 
 def requests_of(kind: type, path: str) -> list[Any]:
     """Values of a field that ask for something."""
-    known = {one.place: one for one in declared(kind).values()}[path]
+    setting = {item.place: item for item in declared(kind).values()}[path]
     (record,) = (record for outer, record in records(kind) if path.rpartition(".")[0] == outer.rstrip("."))
     name = path.rpartition(".")[2]
-    if isinstance(known.default, bool) or get_type_hints(record)[name] == bool | None:
-        result: tuple[Any, ...] = (not known.default,)
+    if isinstance(setting.default, bool) or get_type_hints(record)[name] == bool | None:
+        result: tuple[Any, ...] = (not setting.default,)
     elif name in choices_of(record):
         result = choices_of(record)[name]
     else:
         within = ranges_of(record).get(name)
         result = () if within is None else (within.least + min(1, (within.most - within.least) / 2),)
-    return [value for value in result if value not in (known.default, *known.neutral)]
+    return [value for value in result if value not in (setting.default, *setting.neutral)]
 
 
 def states_without(kind: type, uses: Uses) -> Iterator[Any]:
@@ -107,14 +107,14 @@ def holds(value: Any, accepted: tuple[Any, ...] | Range) -> bool:
 @pytest.mark.parametrize("kind", REQUESTS)
 def test_what_has_no_effect_is_refused(kind: type) -> None:
     """In every state of the other fields in which a field is not used, as its declaration says."""
-    conditional = [one for one in declared(kind).values() if all(one.uses)]
-    for one in conditional:
-        states = list(states_without(kind, one.uses))
-        assert states or all(name in FACTS for use in one.uses for name in use), one.place
-        for record, value in product(states, requests_of(kind, one.place)):
+    conditional = [setting for setting in declared(kind).values() if all(setting.uses)]
+    for setting in conditional:
+        states = list(states_without(kind, setting.uses))
+        assert states or all(name in FACTS for use in setting.uses for name in use), setting.place
+        for record, value in product(states, requests_of(kind, setting.place)):
             with pytest.raises(InvalidInput, match="unless") as refused:
-                check_used(with_value(record, one.place, value))
-            assert refused.value.field == one.place
+                check_used(with_value(record, setting.place, value))
+            assert refused.value.field == setting.place
     assert conditional or kind is FieldSettings
 
 
@@ -133,7 +133,7 @@ def test_jobs_name_the_place_of_what_they_refuse(start, kind) -> None:
             for outer in reversed(place.split(".")[:-1]):
                 told = {outer: told}
             answer = http.post("/v1/plans", json={"kind": kind, "settings": told})
-            named = {one["field"]: one for one in answer.json()["errors"]}
+            named = {error["field"]: error for error in answer.json()["errors"]}
             result = [field for field in named if field.startswith(f"settings.{place}{name}")]
             assert (answer.status_code, len(result) > 0) == (422, True), (place, name, answer.text)
             assert all(named[field]["accepted"] for field in result)

@@ -35,7 +35,7 @@ def on_ring(count, arc=2.0 * np.pi, jitter=0.0):
 def scan(position, tx=None, rx=None, of="small"):
     """Times along straight rays through a disk or a cylinder, absolute and as differences."""
     every = np.arange(len(position))
-    tx, rx = (every if one is None else np.asarray(one) for one in (tx, rx))
+    tx, rx = (every if side is None else np.asarray(side) for side in (tx, rx))
     x, y, radius, speed = OBJECTS[of]
     start, way = position[tx][:, None], position[rx][None] - position[tx][:, None]
     length = np.linalg.norm(way, axis=-1)

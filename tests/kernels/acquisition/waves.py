@@ -32,7 +32,7 @@ def wave_scan() -> Dataset:
 
     def traces(speed: np.ndarray) -> np.ndarray:
         medium, at = Medium.from_speed(speed, SPACING_M, STEP_S, edge_nodes=20), position + SPACING_M * HALF
-        clean = np.stack([simulate(medium, one, at, pulse)[:, ::SKIP] for one in at])
+        clean = np.stack([simulate(medium, source, at, pulse)[:, ::SKIP] for source in at])
         usual = float(np.median(np.abs(clean).max(axis=-1)))
         return (clean / usual + NOISE * random.standard_normal(clean.shape)).astype(np.float32)
 

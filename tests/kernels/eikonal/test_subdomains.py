@@ -66,8 +66,8 @@ def test_earlier_faces_lower_the_times_as_if_all_had_arrived_at_once(seed, shape
     at_once.sweep(given, None)
     for number, face in enumerate(given):
         # A later face comes first, and part of it never.
-        known = np.where(rng.uniform(size=face.shape) < 0.7, face, np.inf)
-        for arriving in (known + 1.0, known, face):
+        arrived = np.where(rng.uniform(size=face.shape) < 0.7, face, np.inf)
+        for arriving in (arrived + 1.0, arrived, face):
             one_by_one.sweep([arriving if n == number else None for n in range(len(given))], None)
     assert np.allclose(one_by_one.times(), at_once.times(), rtol=1e-11, atol=0.0)
 

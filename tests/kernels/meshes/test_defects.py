@@ -89,13 +89,13 @@ def test_zeros_of_either_sign_are_one_place():
 BALL = sphere(9, 8)
 
 
-def same_surface(found, surface):
+def same_surface(repaired, surface):
     """Closed, with the same area and volume, and without flat faces."""
-    areas = [np.linalg.norm(one.face_normals, axis=1) for one in (found.mesh, surface)]
+    areas = [np.linalg.norm(mesh.face_normals, axis=1) for mesh in (repaired.mesh, surface)]
     assert areas[0].min() > 1e-6 * areas[1].min()
     assert areas[0].sum() == pytest.approx(areas[1].sum(), rel=1e-4)
-    assert volume_of(found.mesh) == pytest.approx(volume_of(surface), rel=1e-4)
-    assert (found.holes, found.genus) == (0, 0)
+    assert volume_of(repaired.mesh) == pytest.approx(volume_of(surface), rel=1e-4)
+    assert (repaired.holes, repaired.genus) == (0, 0)
 
 
 def with_junctions(surface, divided, parts):
@@ -201,7 +201,7 @@ DEFECTS = {
 @pytest.mark.parametrize("defect", DEFECTS)
 def test_defects_with_one_repair_are_repaired_and_counted(defect):
     spoil, repairs = DEFECTS[defect]
-    vertices, faces = (np.asarray(one) for one in spoil(BALL.vertices, BALL.faces))
+    vertices, faces = (np.asarray(array) for array in spoil(BALL.vertices, BALL.faces))
     repaired = sound(vertices, faces)
     names = ("merged", "unused", "flat", "repeated", "turned", "parted")
     assert {name: getattr(repaired, name) for name in names} == dict.fromkeys(names, 0) | repairs

@@ -46,8 +46,8 @@ def test_places_that_are_known():
         (0.1, 0.2, 0.0),
         (9.0, 0.0, 0.0),
     ]
-    known = [3.0, np.sqrt(3.0), 2.0, 2.0 / np.sqrt(3.0), 0.0, 8.0]
-    assert grid.distance(np.array(points)) == pytest.approx(known, abs=1e-12)
+    exact = [3.0, np.sqrt(3.0), 2.0, 2.0 / np.sqrt(3.0), 0.0, 8.0]
+    assert grid.distance(np.array(points)) == pytest.approx(exact, abs=1e-12)
 
 
 def test_a_ball():

@@ -25,7 +25,7 @@ def child_of(fault="", ending="ended with exit code 0"):
 
     def child(device, engine, time_out_s):
         calls.append((engine, time_out_s))
-        timings = [] if fault else [list(one) for one in SLOW_START]
+        timings = [] if fault else [list(row) for row in SLOW_START]
         answers = [{"driver": "a remark"}, {"engine": engine, "fault": fault, "timings": timings}]
         return answers if ending == "ended with exit code 0" else [], ending
 

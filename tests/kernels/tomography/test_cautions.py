@@ -136,7 +136,7 @@ def test_the_measured_trunk_and_the_small_radar_profile_are_doubted() -> None:
     radar = loadmat(DATA / "arrenaes_am13.mat")
     ends = 0.1 * np.stack([radar["S"], radar["R"]])
     points, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
-    (tx, rows), (rx, columns) = (np.unique(one, return_inverse=True) for one in index.reshape(2, -1))
+    (tx, rows), (rx, columns) = (np.unique(side, return_inverse=True) for side in index.reshape(2, -1))
     times = np.full((tx.size, rx.size), np.nan)
     times[rows, columns] = 0.1 * 1e-9 * 1.4e8 / 1500.0 * radar["d_obs"].ravel()
     profile = Dataset(points - points.mean(axis=0), tx, rx, 1500.0, tof_s=times)

@@ -74,7 +74,7 @@ def test_wide_times_select_wide_rays():
     delta[np.isfinite(problem.delta_tof)] = -rows.residual
     wide = reconstruct(scan(delta), plan)
     thin = reconstruct(scan(delta), plan.changed(ray_width_m=0.0))
-    errors = [rmse(one.speed, true, problem.region) for one in (wide, thin)]
+    errors = [rmse(image.speed, true, problem.region) for image in (wide, thin)]
     assert errors[0] < 0.75 * errors[1]
 
 

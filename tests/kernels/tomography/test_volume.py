@@ -106,11 +106,11 @@ def test_a_region_of_interest_keeps_the_rest_water(scan):
     problem = problem_of(dataset)
     roi = np.abs(speed - WATER) > 1.0
     truth = Truth(speed, (problem.spacing,) * 3, problem.origin, axes="x,y,z")
-    known = replace(dataset, roi=roi, truth=truth)
-    result = reconstruct(known, replace(PLAN, iterations=1, roi=True))
+    complete = replace(dataset, roi=roi, truth=truth)
+    result = reconstruct(complete, replace(PLAN, iterations=1, roi=True))
     assert np.allclose(result.speed[~roi], WATER)
     assert not np.allclose(result.speed[roi], WATER)
-    slices = reconstruct(known, replace(PLAN, iterations=1, roi=True, decomposition="slices"))
+    slices = reconstruct(complete, replace(PLAN, iterations=1, roi=True, decomposition="slices"))
     assert (np.abs(slices.speed - WATER) > 1e-6).any()
     with pytest.raises(InvalidInput) as refusal:
         reconstruct(dataset, replace(PLAN, roi=True))

@@ -109,10 +109,10 @@ def test_scattering_and_the_gradient_are_transposes(dtype, bound):
 
     runs = {factor: traces(factor) for factor in (-2, -1, 1, 2)}
     result = gradients(medium(dtype), correlated, "opencl")
-    for k, one in enumerate(result):
+    for k, shot in enumerate(result):
         born = (8.0 * (runs[1][k] - runs[-1][k]) - (runs[2][k] - runs[-2][k])) / (12.0 * small)
         size = np.linalg.norm(born) * np.linalg.norm(residual[k])
-        assert abs((born * residual[k]).sum() - (one.gradient * way).sum()) < max(bound, 1e-8) * size
+        assert abs((born * residual[k]).sum() - (shot.gradient * way).sum()) < max(bound, 1e-8) * size
 
 
 @pytest.mark.opencl

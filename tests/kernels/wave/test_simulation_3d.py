@@ -125,7 +125,7 @@ def test_traces_are_reciprocal_in_any_object():
     time = np.arange(120) * STEP
     a, b = np.array([3.3, 15.4, 5.2]) * SPACING, np.array([10.1, 2.7, 9.6]) * SPACING
     there, back = (
-        simulate(medium, one, other[None], pulse(time, 1.8e5))[0] for one, other in ((a, b), (b, a))
+        simulate(medium, sender, other[None], pulse(time, 1.8e5))[0] for sender, other in ((a, b), (b, a))
     )
     assert np.abs(there - back).max() < 1e-5 * np.abs(there).max()
 
@@ -151,15 +151,15 @@ def test_symmetric_media_give_symmetric_traces(axis):
 
 def test_memory_is_known_before_and_refused_beyond_the_room():
     speed, loss = np.full((30, 24, 20), WATER), np.full((30, 24, 20), 3.0)
-    known = emission_bytes(speed.shape, 16)
+    planned = emission_bytes(speed.shape, 16)
     tracemalloc.start()
-    medium = Medium.from_speed(speed, SPACING, STEP, attenuation=loss, edge_nodes=16, memory_bytes=known)
+    medium = Medium.from_speed(speed, SPACING, STEP, attenuation=loss, edge_nodes=16, memory_bytes=planned)
     simulate(medium, np.full(3, 8e-3), np.full((1, 3), 9e-3), pulse(np.arange(130) * STEP, 1.8e5))
     _, taken = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert 0.7 * known < taken < known
-    with pytest.raises(InvalidInput, match=str(known)):
-        Medium.from_speed(speed, SPACING, STEP, edge_nodes=16, memory_bytes=known - 1)
+    assert 0.7 * planned < taken < planned
+    with pytest.raises(InvalidInput, match=str(planned)):
+        Medium.from_speed(speed, SPACING, STEP, edge_nodes=16, memory_bytes=planned - 1)
 
 
 def test_rejects_unsupported_3d_settings():

@@ -139,7 +139,7 @@ FORGED: dict[str, Tamper] = {
     "header parameter that must be understood": head(crit=["exp2"], exp2=1),
     "payload that is not encoded": head(crit=["b64"], b64=False),
     **{
-        f"alg {one}": unsigned(one) for one in ("none", "None", "NONE", "nOnE", "", None, 0, ["RS256"], "RS1")
+        f"alg {alg}": unsigned(alg) for alg in ("none", "None", "NONE", "nOnE", "", None, 0, ["RS256"], "RS1")
     },
     **{
         f"{algorithm} by the public key, {name}": shared(secret, algorithm)
@@ -158,7 +158,7 @@ EXPIRED: dict[str, Tamper] = {
     "expired": edit(exp=NOW - HOUR),
     "expired long ago": edit(exp=0),
     "no exp": edit(exp=None),
-    **{f"exp {one!r}": edit(exp=one) for one in ("9999999999", "", True, [9999999999], {}, float("nan"))},
+    **{f"exp {end!r}": edit(exp=end) for end in ("9999999999", "", True, [9999999999], {}, float("nan"))},
     "exp Infinity": edit(exp=float("inf")),
     "not yet valid": edit(nbf=NOW + HOUR),
     "nbf that is no time": edit(nbf="now"),

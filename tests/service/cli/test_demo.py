@@ -25,7 +25,7 @@ def test_the_whole_path_ends_with_bent_rays_ahead_and_a_picture(
     result = bentray("demo", *SMALL, "-o", tmp_path / "out", "--json")
     assert result.exit_code == 0, result.stderr
     said = json.loads(result.stdout)
-    errors = {name: found["truth"]["mean_absolute_error_of_range"] for name, found in said["jobs"].items()}
+    errors = {name: job["truth"]["mean_absolute_error_of_range"] for name, job in said["jobs"].items()}
     assert errors["bent"] < errors["straight"]
     for name, computed in said["jobs"].items():
         shown = f"{100 * errors[name]:.1f} % of range, {computed['truth']['rmse_mps']:.1f} m/s rms"

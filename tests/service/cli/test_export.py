@@ -21,9 +21,9 @@ from ...workers.files.reconstructions import made
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    one = made(nodes=6)
-    provenance = {**one.provenance, "frequency_hz": "1e6"}
-    write_reconstruction(tmp_path / "reconstruction.h5", replace(one, provenance=provenance))
+    result = made(nodes=6)
+    provenance = {**result.provenance, "frequency_hz": "1e6"}
+    write_reconstruction(tmp_path / "reconstruction.h5", replace(result, provenance=provenance))
     return tmp_path
 
 

@@ -13,7 +13,7 @@ def test_created_listed_and_changed(bentray, tmp_path):
     gone = bentray("projects", "member", project, "key:0123456789ab", "none", "--json", *data)
     assert json.loads(gone.stdout)["members"] == {"user:alice": "owner"}
     listed = json.loads(bentray("projects", "list", "--json", *data).stdout)
-    assert [(one["id"], one["name"], one["tenant"]) for one in listed] == [(project, "Trial 7", "clinic")]
+    assert [(row["id"], row["name"], row["tenant"]) for row in listed] == [(project, "Trial 7", "clinic")]
     assert "user:alice (owner)" in bentray("projects", "list", *data).stdout
     assert json.loads(bentray("projects", "list", "--json", "--data", tmp_path).stdout) == []
 

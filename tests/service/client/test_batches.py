@@ -34,6 +34,6 @@ def test_one_progress_for_many_scans(serve, scan, work):
 
     async def go():
         async with AsyncClient(address) as client:
-            return [one.state for one in await client.batches(1)]
+            return [batch.state for batch in await client.batches(1)]
 
     assert asyncio.run(go()) == ["cancelled"]

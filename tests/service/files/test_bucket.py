@@ -15,9 +15,9 @@ def test_lists_and_removals_go_beyond_a_page(bucket_url):
     names = [f"a/{number:04d}" for number in range(1003)]
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(lambda name: bucket.put_metadata(name, {}), [*names, "b"]))
-    assert sorted(one.key for one in bucket.listed("a/")) == names
+    assert sorted(item.key for item in bucket.listed("a/")) == names
     bucket.remove([*names, "c"])
-    assert [one.key for one in bucket.listed()] == ["b"]
+    assert [item.key for item in bucket.listed()] == ["b"]
 
 
 def test_two_prefixes_of_a_bucket_do_not_meet(bucket_url):

@@ -40,13 +40,13 @@ def datasets(folder, sound) -> dict[str, Read]:
 @pytest.fixture(scope="module")
 def volumes(folder) -> dict[str, Read]:
     written = hostile_volumes.files(folder)
-    return dict(zip(written, read_all([("volume", *one) for one in written.values()], folder), strict=True))
+    return dict(zip(written, read_all([("volume", *file) for file in written.values()], folder), strict=True))
 
 
 @pytest.fixture(scope="module")
 def meshes(folder) -> dict[str, Read]:
     written = hostile_meshes.files(folder)
-    return dict(zip(written, read_all([("mesh", *one) for one in written.values()], folder), strict=True))
+    return dict(zip(written, read_all([("mesh", *file) for file in written.values()], folder), strict=True))
 
 
 def check_refused(read: Read, field: str) -> None:

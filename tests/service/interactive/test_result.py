@@ -52,10 +52,10 @@ def test_arrays_have_places_and_units(result: Result) -> None:
 
 def test_the_uncertainty_has_a_resolution_width(result: Result) -> None:
     spread = np.linspace(0.0, 9.0, 144).reshape(12, 12)
-    known = result_of(replace(made(nodes=12), uncertainty=spread, resolution_width_m=(0.002,)), {})
-    np.testing.assert_array_equal(known.uncertainty, spread)
-    assert known.units["uncertainty"] == "m/s"
-    assert known.resolution_width_m == (0.002,)
+    certain = result_of(replace(made(nodes=12), uncertainty=spread, resolution_width_m=(0.002,)), {})
+    np.testing.assert_array_equal(certain.uncertainty, spread)
+    assert certain.units["uncertainty"] == "m/s"
+    assert certain.resolution_width_m == (0.002,)
     assert result.resolution_width_m == ()
     with pytest.raises(bentray.InvalidInput, match="uncertainty"):
         _ = result.uncertainty
@@ -115,23 +115,23 @@ def test_a_volume_is_cut_across_any_axis() -> None:
 def test_figures_of_a_comparison(result: Result) -> None:
     image = made(nodes=12)
     shifted = result_of(replace(image, speed=image.speed + np.where(image.speed > 1520.0, 4.0, 0.0)), {})
-    found = shifted.compare(result)
+    compared = shifted.compare(result)
     share = float((image.speed > 1520.0).mean())
-    assert found.region.all()
-    assert found.rms == pytest.approx(4.0 * share**0.5)
-    assert found.mean_absolute == pytest.approx(4.0 * share)
-    assert found.bias == pytest.approx(4.0 * share)
-    assert found.largest == pytest.approx(4.0)
-    assert 0.9 < found.correlation < 1.0
+    assert compared.region.all()
+    assert compared.rms == pytest.approx(4.0 * share**0.5)
+    assert compared.mean_absolute == pytest.approx(4.0 * share)
+    assert compared.bias == pytest.approx(4.0 * share)
+    assert compared.largest == pytest.approx(4.0)
+    assert 0.9 < compared.correlation < 1.0
     assert result.compare(result).rms == 0.0
     assert result.compare(result).correlation == pytest.approx(1.0)
-    assert "rms" in repr(found)
+    assert "rms" in repr(compared)
 
 
 def test_a_file_is_a_truth(result: Result, tmp_path: Path) -> None:
     np.save(tmp_path / "true.npy", result.speed - 3.0)
-    found = result.compare(str(tmp_path / "true.npy"))
-    assert found.rms == pytest.approx(3.0)
+    compared = result.compare(str(tmp_path / "true.npy"))
+    assert compared.rms == pytest.approx(3.0)
     assert result.compare(tmp_path / "true.npy", spacing_m=SPACING_M).rms == pytest.approx(3.0)
     with pytest.raises(bentray.InvalidInput, match="truth"):
         result.compare(tmp_path / "none.npy")
@@ -155,9 +155,9 @@ def test_nodes_without_rays_do_not_count(result: Result) -> None:
     coverage[:6] = 0.0
     speed = image.speed.copy()
     speed[:6] += 100.0
-    found = result_of(replace(image, speed=speed, coverage=coverage), {}).compare(result)
-    assert found.rms == 0.0
-    assert found.region_choice == "nodes that rays of both images cross"
+    compared = result_of(replace(image, speed=speed, coverage=coverage), {}).compare(result)
+    assert compared.rms == 0.0
+    assert compared.region_choice == "nodes that rays of both images cross"
 
 
 def test_another_grid_is_interpolated() -> None:
@@ -167,20 +167,20 @@ def test_another_grid_is_interpolated() -> None:
     fine_places = np.meshgrid(*(np.arange(3) * 5e-4 + 1e-3 for _ in range(3)), indexing="ij")
     exact = 1.0 + 2e3 * fine_places[0] - 1e3 * fine_places[1] + 5e2 * fine_places[2]
     fine = result_of(Volume.from_values(exact, (5e-4,) * 3, (1e-3,) * 3), {})
-    found = fine.compare(coarse, "value")
-    assert found.region.all()
-    np.testing.assert_allclose(found.difference, 0.0, atol=1e-5)
+    compared = fine.compare(coarse, "value")
+    assert compared.region.all()
+    np.testing.assert_allclose(compared.difference, 0.0, atol=1e-5)
     outside = result_of(Volume.from_values(exact, (5e-4,) * 3, (1.0,) * 3), {})
     with pytest.raises(bentray.InvalidInput, match="without a common node"):
         outside.compare(coarse, "value")
 
 
 def test_the_truth_of_a_scan(result: Result, simulated: bentray.Scan) -> None:
-    found = result.compare()
-    inside = made(nodes=12).speed - found.other
-    assert found.rms == pytest.approx(np.sqrt(np.mean(inside[found.region] ** 2)))
-    assert 0.5 < found.rms < 2.0, "noise of 1 m/s"
-    assert found.names == ("reconstruction", "truth")
+    compared = result.compare()
+    inside = made(nodes=12).speed - compared.other
+    assert compared.rms == pytest.approx(np.sqrt(np.mean(inside[compared.region] ** 2)))
+    assert 0.5 < compared.rms < 2.0, "noise of 1 m/s"
+    assert compared.names == ("reconstruction", "truth")
     assert result.compare(simulated).region_choice == "mask/roi of the file"
     with pytest.raises(bentray.InvalidInput, match="other: found no other image, of a scan without a truth"):
         replace(result, truth=None).compare()
@@ -190,7 +190,7 @@ def test_the_truth_of_a_scan(result: Result, simulated: bentray.Scan) -> None:
 
 def test_a_comparison_is_drawn(result: Result) -> None:
     first, second, third = result.compare().plot()
-    assert [one.get_title() for one in (first, second)] == ["Reconstruction", "Truth"]
+    assert [axes.get_title() for axes in (first, second)] == ["Reconstruction", "Truth"]
     assert third.get_title().startswith("Difference: ")
     assert first.get_images()[0].get_clim() == second.get_images()[0].get_clim()
 
@@ -210,7 +210,7 @@ def test_every_suffix_is_a_file(tmp_path: Path, suffix: str) -> None:
     image = replace(image, provenance={**image.provenance, "frequency_hz": "1e6"})
     path = result_of(image, {}).save(tmp_path / f"image{suffix}")
     assert path.exists()
-    assert [one.name for one in tmp_path.iterdir()] == [f"image{suffix}"]
+    assert [path.name for path in tmp_path.iterdir()] == [f"image{suffix}"]
 
 
 def test_compressed_nifti_holds_the_image_and_hdf5_everything(result: Result, tmp_path: Path) -> None:
@@ -250,10 +250,10 @@ def test_a_scan_is_no_result_and_is_told_who_reads_it(tmp_path: Path) -> None:
 
 
 def test_xarray_finds_a_place(result: Result) -> None:
-    found = result.to_xarray()
-    assert found.speed.dims == ("x", "y")
-    assert (found.speed.attrs, found.x.attrs) == ({"units": "m/s"}, {"units": "m"})
-    assert float(found.speed.sel(x=-0.011, y=0.011, method="nearest")) == result.speed[0, -1]
+    data = result.to_xarray()
+    assert data.speed.dims == ("x", "y")
+    assert (data.speed.attrs, data.x.attrs) == ({"units": "m/s"}, {"units": "m"})
+    assert float(data.speed.sel(x=-0.011, y=0.011, method="nearest")) == result.speed[0, -1]
 
 
 def test_missing_xarray_is_reported(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:

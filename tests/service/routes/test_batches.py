@@ -44,7 +44,7 @@ def test_many_scans_as_one(start, scans, work, until):
     listed = http.get(done["links"]["jobs"]).json()["jobs"]
     assert {job["id"] for job in listed} == {job["id"] for job in batch["jobs"]}
     assert {job["batch"] for job in listed} == {batch["id"]}
-    assert [one["id"] for one in http.get("/v1/batches").json()["batches"]] == [batch["id"]]
+    assert [row["id"] for row in http.get("/v1/batches").json()["batches"]] == [batch["id"]]
     # Its deletion takes the results along, not the scans.
     assert http.delete(batch["links"]["self"]).status_code == 204
     assert http.get(batch["links"]["self"]).status_code == 404

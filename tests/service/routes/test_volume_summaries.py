@@ -52,7 +52,7 @@ def test_the_truth_is_read_at_the_nodes_of_the_result(http, result):
 def test_a_summary_names_quantities_candidates_and_errors(http, result):
     record = http.get(f"{result}/summary").json()
     assert record["quantities"] == ["speed", "coverage", "truth"]
-    assert [(one["label"], one["chosen"]) for one in record["candidates"]] == [
+    assert [(row["label"], row["chosen"]) for row in record["candidates"]] == [
         ("bent rays, SART", True),
         ("straight rays, SART", False),
     ]

@@ -11,9 +11,9 @@ SIGMA, CUT, K1, K2, RANGE = 1.5, 3.5, 0.01, 0.03, 255.0
 GREY = (0.299, 0.587, 0.114)
 
 
-def structural_similarity(one: ArrayLike, other: ArrayLike) -> float:
+def structural_similarity(image: ArrayLike, other: ArrayLike) -> float:
     """Mean SSIM of the grey values of two pictures (rows, columns, 3), 8-bit RGB."""
-    a, b = (np.asarray(picture, dtype=np.float64) @ GREY for picture in (one, other))
+    a, b = (np.asarray(picture, dtype=np.float64) @ GREY for picture in (image, other))
     mean_a, mean_b = _blurred(a), _blurred(b)
     var_a, var_b = _blurred(a * a) - mean_a**2, _blurred(b * b) - mean_b**2
     both = _blurred(a * b) - mean_a * mean_b

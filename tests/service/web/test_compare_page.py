@@ -17,7 +17,7 @@ FIRST, SECOND = known((24, 16)), 20.0 + known((24, 16), seed=1)
 @pytest.fixture(scope="module")
 def both(shared_service):
     address, scan, work, monkeypatch, _ = shared_service
-    ids = [finished(address, scan, work, monkeypatch, one) for one in (FIRST, SECOND)]
+    ids = [finished(address, scan, work, monkeypatch, mps) for mps in (FIRST, SECOND)]
     return f"{address}/#/compare/{','.join(ids)}"
 
 
@@ -41,7 +41,7 @@ def test_both_images_have_one_range_and_one_cursor(page, both):
 @pytest.mark.nightly
 def test_four_images_have_one_range(page, both, shared_service):
     address, scan, work, monkeypatch, _ = shared_service
-    more = [finished(address, scan, work, monkeypatch, 3.0 * FIRST - one) for one in (3000.0, 2990.0)]
+    more = [finished(address, scan, work, monkeypatch, 3.0 * FIRST - mps) for mps in (3000.0, 2990.0)]
     ready(page, ",".join([both, *more]) + "?ellipse=-8,-15,0,-5")
     expect(page.locator("canvas.plane")).to_have_count(4)
     expect(page.locator(".statistics tr").first.locator("th")).to_have_count(5)
@@ -86,8 +86,8 @@ def test_a_way_that_is_chosen_before_the_values_are_read_is_shown(page, both):
     page.get_by_role("button", name="Difference", exact=True).click()
     while len(held) < 2:
         page.wait_for_timeout(20)
-    for one in held:
-        one.continue_()
+    for route in held:
+        route.continue_()
     expect(page.locator("canvas.plane")).to_have_count(1)
     page.locator(".readout").filter(has_text="mm").wait_for()
 

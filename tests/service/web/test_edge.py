@@ -189,11 +189,11 @@ def test_invalid_headers_get_a_problem(front, sent, status, slug):
 
 
 def test_every_problem_of_the_file_is_known():
-    known = {(kind.status, kind.slug, kind.title) for kind in (*EDGE, *PROBLEMS.values())}
+    kinds = {(kind.status, kind.slug, kind.title) for kind in (*EDGE, *PROBLEMS.values())}
     texts = re.findall(r"^ +\d+ '(\{.*\})';$", CONFIGURATION.read_text(), re.M)
     problems = [json.loads(text) for text in texts]
-    result = {(one["status"], one["type"].rpartition("/")[2], one["title"]) for one in problems}
-    assert result - known == {(405, "method-not-allowed", "Method Not Allowed")}
+    result = {(entry["status"], entry["type"].rpartition("/")[2], entry["title"]) for entry in problems}
+    assert result - kinds == {(405, "method-not-allowed", "Method Not Allowed")}
     assert {(kind.status, kind.slug, kind.title) for kind in EDGE} <= result
 
 

@@ -73,7 +73,7 @@ def test_a_refusal_has_the_status_of_the_table(http):
 def test_every_wrong_parameter_is_listed(http):
     body = http.get("/number?n=many").json()
     assert (body["status"], body["type"]) == (422, "/problems/invalid-request")
-    assert [one["field"] for one in body["errors"]] == ["n", "m"]
+    assert [error["field"] for error in body["errors"]] == ["n", "m"]
     assert body["errors"][0]["found"] == "'many'"
     assert "integer" in body["errors"][0]["accepted"]
     assert body["errors"][1] == {"field": "m", "found": "nothing", "accepted": "a value; it is required"}

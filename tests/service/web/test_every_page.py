@@ -106,11 +106,11 @@ def serious(page, path, scheme):
     report = Axe().run(page, options=RULES[scheme]).response
     assert report["passes"], path
     return {
-        f"{path.partition('?')[0]} {scheme} {page.viewport_size['width']} {one['id']}": [
-            node["html"][:120] for node in one["nodes"][:3]
+        f"{path.partition('?')[0]} {scheme} {page.viewport_size['width']} {rule['id']}": [
+            node["html"][:120] for node in rule["nodes"][:3]
         ]
-        for one in report["violations"]
-        if one["impact"] in SERIOUS
+        for rule in report["violations"]
+        if rule["impact"] in SERIOUS
     }
 
 

@@ -175,7 +175,7 @@ def test_two_requests_at_most_and_the_newest_view_wins(ball):
     for _ in range(60):
         page.keyboard.press("ArrowRight")
     whole(page, mode="refract", azimuth_deg="330")
-    views = [settings_of(one) for one in requested]
+    views = [settings_of(request) for request in requested]
     previews = [view for view in views if view["width"] == "256"]
     assert max(most) <= 2
     assert 0 < len(previews) < 60

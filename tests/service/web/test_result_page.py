@@ -21,8 +21,8 @@ from .finished_results import ORIGIN_M, SPACING_M, finished, known
 pytestmark = pytest.mark.browser
 
 SPEED = known((24, 16))
-DX, DY = (1e3 * one for one in SPACING_M[:2])
-X0, Y0 = (1e3 * one for one in ORIGIN_M[:2])
+DX, DY = (1e3 * step for step in SPACING_M[:2])
+X0, Y0 = (1e3 * start for start in ORIGIN_M[:2])
 
 
 MORE = {
@@ -205,7 +205,7 @@ def test_a_link_restores_the_view(page, result, browser):
         expect(again.get_by_role("button", name="Coverage")).to_have_attribute("aria-pressed", "true")
         expect(again.locator("select[name=map]")).to_have_value("inferno")
         assert window_of(again) == [150.0, 260.0]
-        shots = [one.locator("canvas.plane").evaluate("one => one.toDataURL()") for one in (page, again)]
+        shots = [tab.locator("canvas.plane").evaluate("one => one.toDataURL()") for tab in (page, again)]
         assert shots[0] == shots[1]
 
 
@@ -253,7 +253,7 @@ def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result,
         page.locator(".measure.region").get_by_role("button", name="Save as CSV").click()
     head, row = table_of(download)
     said = dict(zip(head, row, strict=True))
-    x0, y0, x1, y1 = (float(said[f"{one}_mm"]) for one in ("x0", "y0", "x1", "y1"))
+    x0, y0, x1, y1 = (float(said[f"{edge}_mm"]) for edge in ("x0", "y0", "x1", "y1"))
     x, y = X0 + DX * np.arange(24)[:, None], Y0 + DY * np.arange(16)[None, :]
     u, v = (2 * x - x0 - x1) / (x1 - x0), (2 * y - y0 - y1) / (y1 - y0)
     inside = (u**2 + v**2 <= 1) if shape == "Ellipse" else (abs(u) <= 1) & (abs(v) <= 1)
@@ -326,8 +326,8 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
     expect(table.locator("tr").first).to_have_text("ResultTruth")
     expect(table).to_contain_text("Uncertainty of the mean (m/s)")
     rows = {
-        one.locator("th").inner_text(): one.locator("td").all_inner_texts()
-        for one in table.locator("tr:has(td)").all()
+        row.locator("th").inner_text(): row.locator("td").all_inner_texts()
+        for row in table.locator("tr:has(td)").all()
     }
     a, b = X0 + DX * np.arange(24)[:, None], Y0 + DY * np.arange(16)[None, :]
     away = np.hypot((a - 0.0) / 4.0, (b + 5.0) / 7.0)

@@ -124,8 +124,8 @@ def resolving(monkeypatch, *answers):
         result = left.pop(0)
         kinds = {4: socket.AF_INET, 6: socket.AF_INET6}
         return [
-            (kinds[ipaddress.ip_address(one).version], socket.SOCK_STREAM, 6, "", (one, port))
-            for one in result
+            (kinds[ipaddress.ip_address(address).version], socket.SOCK_STREAM, 6, "", (address, port))
+            for address in result
         ]
 
     monkeypatch.setattr(socket, "getaddrinfo", resolve)

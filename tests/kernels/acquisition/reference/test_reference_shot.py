@@ -22,7 +22,7 @@ def estimated(dataset):
 
 
 @pytest.mark.parametrize(
-    "start_s", [*(pytest.param(one, marks=pytest.mark.nightly) for one in (0.0, 1e-6)), -1e-6]
+    "start_s", [*(pytest.param(start, marks=pytest.mark.nightly) for start in (0.0, 1e-6)), -1e-6]
 )
 def test_estimate_matches_the_omitted_water_shot(start_s):
     dataset, emission, reception = with_elements(

@@ -51,10 +51,10 @@ def test_an_object_that_fills_the_ring_leaves_no_chord():
         find_water_chords(BARE, arrival, PERIOD_S)
 
 
-@pytest.mark.parametrize("known", [0, 20])
-def test_too_few_arrivals_are_rejected(known):
+@pytest.mark.parametrize("count", [0, 20])
+def test_too_few_arrivals_are_rejected(count):
     arrival = BARE.distance_m() / WATER_MPS
-    arrival.ravel()[known:] = np.nan
+    arrival.ravel()[count:] = np.nan
     with pytest.raises(InvalidInput, match="waveform/water"):
         find_water_chords(BARE, arrival, PERIOD_S)
 

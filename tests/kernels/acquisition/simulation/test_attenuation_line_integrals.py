@@ -39,11 +39,11 @@ def test_amplitudes_are_reciprocal():
 
 def test_ratios_are_linear_in_the_attenuation():
     random = np.random.default_rng(3)
-    one, two = random.uniform(0.0, 60.0, (2, 41, 41))
+    this, two = random.uniform(0.0, 60.0, (2, 41, 41))
     source, receivers = np.array([0.01, 0.05]), np.array([(0.09, 0.02), (0.05, 0.09)])
     tof = solve(random.uniform(1400.0, 1600.0, (41, 41)), 0.0025, source)
     both, first, second = (
-        log_ratios(tof, field, 0.0025, receivers, source) for field in (one + 2.0 * two, one, two)
+        log_ratios(tof, field, 0.0025, receivers, source) for field in (this + 2.0 * two, this, two)
     )
     assert both == pytest.approx(first + 2.0 * second, rel=1e-12)
     assert (first > 0.0).all()

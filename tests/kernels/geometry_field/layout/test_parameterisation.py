@@ -17,21 +17,21 @@ from bentray_kernels.meshes.topology import topology_of
 from ...meshes.examples import ball_with_holes, bunny, flat_patch, mesh, tetrahedron, two_handles, without
 
 
-def check(found, surface):
+def check(made, surface):
     """Every chart is an embedding of the whole surface in the unit square."""
-    uv = found.chart.uv
+    uv = made.chart.uv
     assert uv.shape == (len(surface.faces), 3, 2)
     assert uv.min() >= 0.0
     assert uv.max() <= 1.0
     assert (signed_areas(uv) > 0.0).all()
-    opened = cut_open(topology_of(surface.faces), found.cut)
+    opened = cut_open(topology_of(surface.faces), made.cut)
     flat = np.full((len(opened.origin), 2), np.nan)
     flat[opened.faces] = uv
     # Corners that were not cut apart share a place.
     np.testing.assert_array_equal(flat[opened.faces], uv)
     (loop,) = topology_of(opened.faces).boundary_loops
     assert not crosses_itself(flat[opened.faces.ravel()[loop]])
-    assert np.ptp(found.chart.mesh.vertices[np.unique(surface.faces)], axis=0).max() == pytest.approx(1.0)
+    assert np.ptp(made.chart.mesh.vertices[np.unique(surface.faces)], axis=0).max() == pytest.approx(1.0)
 
 
 SURFACES = {

@@ -119,8 +119,8 @@ def test_a_walk_over_an_open_patch_ends_below_the_ray_or_nowhere(side):
     for x, y in low[:2] + random.uniform(-0.4, 1.4, (60, 2)) * (high - low)[:2]:
         a, b, c = np.moveaxis(corners[..., :2], 1, 0)
         system = np.stack([a - c, b - c], axis=-1)
-        one, two = np.linalg.solve(system, (np.array([x, y]) - c)[..., None])[..., 0].T
-        below = np.flatnonzero((one >= 0.0) & (two >= 0.0) & (one + two <= 1.0))
+        this, two = np.linalg.solve(system, (np.array([x, y]) - c)[..., None])[..., 0].T
+        below = np.flatnonzero((this >= 0.0) & (two >= 0.0) & (this + two <= 1.0))
         expected = below[0] if len(below) else -1
         for first in range(len(corners)):
             face, away, _, _ = settle(surface, first, side, 60, x, y, low[2] + up, 0.0, 0.0, -up)

@@ -11,7 +11,7 @@ from ..shapes import dented, field_of, over_the_poles
 
 def test_agreement_is_that_of_the_sixteen():
     field = field_of(surface_of(over_the_poles(dented(3))), 3)
-    known = agreement(field)
+    agreeing = agreement(field)
     row, seen = 18, set()
     for entry in range(36):
         for exit_ in range(36):
@@ -22,7 +22,7 @@ def test_agreement_is_that_of_the_sixteen():
             expected = NONE if not meets.any() else MIXED
             if meets.all() and np.ptp(points) <= np.float32(APART / 3):
                 expected = AGREE
-            assert known[entry, exit_] == expected
+            assert agreeing[entry, exit_] == expected
             seen.add(expected)
     assert seen == {NONE, AGREE, MIXED}
 
@@ -33,7 +33,7 @@ def test_the_lowest_and_the_highest_of_the_sixteen_decide():
     random = np.random.default_rng(1)
     spread = np.float32(1.1 * APART / n)
     fractions = random.uniform(-1.0, -1.0 + spread, (54, 54)).astype(np.float32) + np.float32(1.0)
-    known = agreement(OuterField(n, np.zeros((54, 54), np.int32), fractions))
+    agreeing = agreement(OuterField(n, np.zeros((54, 54), np.int32), fractions))
     counts = {AGREE: 0, MIXED: 0}
     for entry in range(36):
         for exit_ in range(36):
@@ -41,6 +41,6 @@ def test_the_lowest_and_the_highest_of_the_sixteen_decide():
                 continue
             at = np.ix_(entry + np.array([0, 1, row, row + 1]), exit_ + np.array([0, 1, row, row + 1]))
             expected = AGREE if np.ptp(fractions[at]) <= np.float32(APART / n) else MIXED
-            assert known[entry, exit_] == expected
+            assert agreeing[entry, exit_] == expected
             counts[expected] += 1
     assert min(counts.values()) > 50

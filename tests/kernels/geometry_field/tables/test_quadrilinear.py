@@ -15,7 +15,7 @@ def table(n, value):
     number = np.arange(6 * n * n)
     face, x, y = number % (6 * n) // n, (number % n + 0.5) / n, (number // (6 * n) + 0.5) / n
     entries = np.zeros((6 * n * n, 6 * n * n, 2), np.float32)
-    entries[..., 1] = value(*(np.meshgrid(one, one, indexing="ij") for one in (face, x, y)))
+    entries[..., 1] = value(*(np.meshgrid(axis, axis, indexing="ij") for axis in (face, x, y)))
     return entries.ravel()
 
 

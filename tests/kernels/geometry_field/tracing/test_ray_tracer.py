@@ -340,7 +340,7 @@ def test_rays_that_leave_the_surface_use_the_published_inner_field(way):
     plain, walked = drawn(), drawn(inner_uv=None)
     exact = picture(scene, way="exact")
     # Coarser than the walk, but a picture of the same refraction.
-    off = [(np.abs(one - exact).max(axis=2) > 16).mean() for one in (plain, walked)]
+    off = [(np.abs(drawn - exact).max(axis=2) > 16).mean() for drawn in (plain, walked)]
     assert off[1] < off[0] < 0.5
     # Each ray ends at the recorded point: one and the same for all rays, and none at all.
     body = (picture(scene, depth=0) != picture(replace(scene, instances=(AWAY,)), depth=0)).any(axis=2)

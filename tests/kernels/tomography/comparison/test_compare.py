@@ -25,9 +25,9 @@ def test_a_constant_error_is_read_as_it_is(offset: float) -> None:
 
 
 def test_statistics_have_the_uncertainty_of_the_nodes_in_the_region() -> None:
-    known = np.where(disc() == WATER, 90.0, 4.0)
+    speed = np.where(disc() == WATER, 90.0, 4.0)
     comparison = compare(
-        replace(image(disc() + 2.0), uncertainty=known, resolution_width_m=(3e-3,)), truth(disc())
+        replace(image(disc() + 2.0), uncertainty=speed, resolution_width_m=(3e-3,)), truth(disc())
     )
     image_there, true_there = comparison.statistics()
     assert image_there.uncertainty == pytest.approx(4.0)

@@ -29,8 +29,8 @@ def made(slices: int | None = None) -> Reconstruction:
     return replace(solid, spacing_m=(STEP, STEP, np.nan))
 
 
-def speed_on_grid(known: Truth, result: Reconstruction) -> np.ndarray:
-    return on_grid(known.sound_speed_mps, known, result)
+def speed_on_grid(truth: Truth, result: Reconstruction) -> np.ndarray:
+    return on_grid(truth.sound_speed_mps, truth, result)
 
 
 def test_on_the_same_grid_the_truth_is_itself():

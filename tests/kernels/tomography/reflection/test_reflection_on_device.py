@@ -21,7 +21,7 @@ ON_DEVICE = SETTINGS.changed(device="opencl")
 
 @pytest.mark.opencl
 def test_the_image_on_a_device_is_that_of_compiled_code():
-    here, there = (reconstruct(scan(), one) for one in (SETTINGS, ON_DEVICE))
+    here, there = (reconstruct(scan(), plan) for plan in (SETTINGS, ON_DEVICE))
     assert here.reflection.db.min() == -100.0
     loud = here.reflection.db > -60.0
     assert np.abs(there.reflection.db - here.reflection.db)[loud].max() < 0.05
@@ -50,7 +50,7 @@ def test_a_device_that_fails_leaves_the_sums_to_compiled_code(monkeypatch):
 def test_only_a_reflection_image_on_opencl_needs_the_device():
     plain = Settings(method="gauss-newton", device="opencl")
     assert (echo_engine(ON_DEVICE), needs_device(ON_DEVICE)) == ("opencl", True)
-    for one in (SETTINGS, ON_DEVICE.changed(device="auto"), ON_DEVICE.changed(device="cpu"), plain):
-        assert echo_engine(one) == "compiled"
+    for plan_of in (SETTINGS, ON_DEVICE.changed(device="auto"), ON_DEVICE.changed(device="cpu"), plain):
+        assert echo_engine(plan_of) == "compiled"
     assert not needs_device(SETTINGS)
     assert replace(plain, device="cpu").device == "cpu"

@@ -72,11 +72,11 @@ def test_a_slice_has_the_same_bits_alone_and_in_parts(opencl_session, rings):
     settings = plan(iterations=2)
     together, again = advanced(rings, settings), advanced(rings, settings, emitters=7)
     alone = advanced(rings[:1], settings)
-    for one, other in [*zip(together, again, strict=True), (together[0], alone[0])]:
-        assert np.array_equal(one.slowness, other.slowness)
-        assert np.array_equal(one.coverage, other.coverage)
-        assert np.array_equal(one.residuals, other.residuals)
-        assert one.history == other.history
+    for state, other in [*zip(together, again, strict=True), (together[0], alone[0])]:
+        assert np.array_equal(state.slowness, other.slowness)
+        assert np.array_equal(state.coverage, other.coverage)
+        assert np.array_equal(state.residuals, other.residuals)
+        assert state.history == other.history
 
 
 def test_tiles_of_slices_change_no_bit(opencl_session, rings, monkeypatch):

@@ -49,7 +49,7 @@ def test_rays_that_gather_where_the_image_is_flat_are_no_layer():
 
 def test_a_misfit_above_the_noise_enlarges_all_of_it():
     squares = np.full(SPEED.shape, 9.0)
-    sizes = [errors(misfit_s=one * 5e-8).added_to(squares) for one in (1.0, 1.5, 3.0, 30.0)]
+    sizes = [errors(misfit_s=times * 5e-8).added_to(squares) for times in (1.0, 1.5, 3.0, 30.0)]
     for less, more in pairwise(sizes):
         assert (more > less).all()
     flat = REGION & (np.hypot(X, Y) < 0.2)

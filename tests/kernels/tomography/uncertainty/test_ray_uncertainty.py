@@ -98,10 +98,10 @@ def test_straight_rays_are_less_certain_than_bent_ones(times, image):
 
 def test_sart_has_an_uncertainty_too_and_slices_have_their_own(times):
     plan = replace(PLAN, method="sart", iterations=2)
-    one = scan(times)
-    alone = reconstruct(one, plan)
+    flat = scan(times)
+    alone = reconstruct(flat, plan)
     stacked = replace(
-        one, delta_tof_s=np.stack([one.delta_tof_s, one.delta_tof_s]), slice_z_m=np.array([0.0, 0.002])
+        flat, delta_tof_s=np.stack([flat.delta_tof_s, flat.delta_tof_s]), slice_z_m=np.array([0.0, 0.002])
     )
     both = reconstruct(stacked, plan)
     assert np.array_equal(both.uncertainty[..., 0], alone.uncertainty)
@@ -116,12 +116,12 @@ def test_sart_has_an_uncertainty_too_and_slices_have_their_own(times):
 def test_the_result_states_why_its_deviations_may_be_too_small(times, monkeypatch):
     monkeypatch.setattr(model_errors, "MISFIT_OVER_NOISE", 0.01)
     monkeypatch.setattr(model_errors, "MISFIT_CROSSING", 0.0)
-    one = scan(times, 6e-8)
+    flat = scan(times, 6e-8)
     plan = replace(PLAN, method="sart", iterations=1)
-    alone = reconstruct(one, plan).caution("uncertainty")
+    alone = reconstruct(flat, plan).caution("uncertainty")
     assert alone.startswith("The standard deviations may be too small: bent rays through the image leave")
     stacked = replace(
-        one, delta_tof_s=np.stack([one.delta_tof_s, one.delta_tof_s]), slice_z_m=np.array([0.0, 0.002])
+        flat, delta_tof_s=np.stack([flat.delta_tof_s, flat.delta_tof_s]), slice_z_m=np.array([0.0, 0.002])
     )
     assert reconstruct(stacked, plan).caution("uncertainty") == f"{alone} (One of 2 of 2 slices.)"
-    assert not reconstruct(one, replace(plan, uncertainty=False)).caution("uncertainty")
+    assert not reconstruct(flat, replace(plan, uncertainty=False)).caution("uncertainty")

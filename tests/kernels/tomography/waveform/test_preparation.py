@@ -77,7 +77,7 @@ def test_no_other_emissions_are_read_than_the_band_uses():
     recorded = data.waveform
     apart = replace(recorded, object=lazily(recorded.object), water=lazily(recorded.water))
     settings = replace(SETTINGS, bands=(replace(SETTINGS.bands[0], emitters=3),), held_out=2)
-    computed, expected = (prepare(replace(data, waveform=one), settings, 0) for one in (apart, recorded))
+    computed, expected = (prepare(replace(data, waveform=wave), settings, 0) for wave in (apart, recorded))
     drawn = {*computed.used.tolist(), *computed.held.tolist()}
     assert set(read) == set(computed.traces) == drawn
     assert len(drawn) == 5

@@ -68,10 +68,10 @@ def test_table_and_pictures_show_the_same_errors(undrawn: Any, wide: bool) -> No
     assert rows["error region"].startswith("mask/roi" if wide else "the outline")
 
 
-def dataset(known: Truth | None) -> Dataset:
+def dataset(truth_of: Truth | None) -> Dataset:
     ring = np.array([[0.0, 0.0], [0.016, 0.0], [0.0, 0.016]])
     everyone = np.arange(3)
-    return Dataset(ring, everyone, everyone, WATER, delta_tof_s=np.zeros((3, 3)), truth=known)
+    return Dataset(ring, everyone, everyone, WATER, delta_tof_s=np.zeros((3, 3)), truth=truth_of)
 
 
 def test_the_residual_is_that_of_the_last_sweep_over_all_slices() -> None:
@@ -116,8 +116,8 @@ def test_missing_values_are_none_or_empty() -> None:
 
 
 def test_summary_shows_findings() -> None:
-    def row(found: str) -> str | None:
-        result = replace(image(disc()), provenance={"quality": found})
+    def row(label: str) -> str | None:
+        result = replace(image(disc()), provenance={"quality": label})
         return dict(summary(figures(result, dataset(None), 1.0))).get("scan")
 
     assert row("dead elements: 1 without a pulse in reception (4), left out").startswith("dead elements: 1")
