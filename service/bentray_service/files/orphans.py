@@ -53,7 +53,7 @@ class Orphans:
         """All files without a row; some may be new."""
         lying = list(self._stored_files())
         # Queried last, so that new files have a row.
-        names = self._known.names()
+        names = self._known.names() if lying else set()
         return [path for path in lying if (path.parts[-3], path.name.partition(".")[0]) not in names]
 
     def begin(self) -> None:

@@ -258,7 +258,7 @@ def _make_or_check(connection: Connection, shown: str, way_back: str | None) -> 
         if way_back is not None or others:
             found = f"with tables of another program ({tables[0]})" if tables else "without tables"
             raise InvalidInput("database_url", f"{shown}, {found}", way_back or "a database of its own")
-        Base.metadata.create_all(connection)
+        Base.metadata.create_all(connection, checkfirst=bool(tables))
         with Session(connection) as session, session.begin():
             session.add(SchemaVersion(version_num=str(VERSION)))
             session.add(About(database=new_mark(), probed=time.time()))
