@@ -1,6 +1,5 @@
 """Task graphs interrupted anywhere and resumed from a checkpoint give the same bits."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +24,7 @@ from bentray_kernels.tomography.reconstruction_graph import (
 from bentray_kernels.tomography.sart.sart_step import begin
 
 from ...effort import effort
+from .graph_runs import run, stored
 
 PLANS = {
     "sart": Settings(method="sart", nodes=32, side_m=TABLE6_SIDE_M, iterations=2, resolution_check=True),
@@ -45,28 +45,6 @@ def dataset():
     scan = TravelTimeScan(table6(1500.0), ring, TABLE6_SIDE_M, nodes=32)
     delta, ratio = scan.medium(attenuation=True).arrivals(scan.elements(), emitters)
     return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta, log_ratio_np=ratio)
-
-
-def stored(graph):
-    """Its checkpoint, written to JSON and arrays and read again."""
-    tree, arrays = pack(graph.checkpoint)
-    return unpack(json.loads(json.dumps(tree)), [array.copy() for array in arrays])
-
-
-def run(make, cuts=()):
-    """Run a graph; before each task whose number is in ``cuts`` it is lost and restored."""
-    graph = make()
-    ready, done = graph.first(), 0
-    while ready:
-        if done in cuts:
-            checkpoint = stored(graph)
-            graph = make()
-            graph.restore(checkpoint)
-            ready = graph.first()
-        done += 1
-        task = ready.pop(0)
-        ready += graph.after(task, task.function(*task.arguments))
-    return graph, done
 
 
 @pytest.mark.parametrize("name", PLANS)

@@ -20,6 +20,7 @@ from bentray_kernels.tomography.reflection.memory_echoes import MemoryEchoScan
 from bentray_kernels.tomography.reflection.reflection_graph import ReflectionGraph, echo_signals
 from bentray_kernels.tomography.reflection.reflection_plan import plan_reflection
 
+from ..graph_runs import run_in_random_order
 from .point_echoes import CENTRE_HZ, RADIUS, RATE_HZ, T0, WATER, pulse, ring, traces
 
 # An eighth of a wavelength.
@@ -52,16 +53,6 @@ def begun(dataset=None, settings=SETTINGS):
     speed = np.full((23, 23), WATER)
     plan = plan_reflection(dataset, settings, speed, None, -corner / 11.0, (corner, corner))
     return ReflectionGraph(MemoryEchoScan(dataset, 0), plan, 400, RATE_HZ)
-
-
-def run_in_random_order(graph, rng, most=None):
-    """Run tasks one at a time in a random order, to the end or until ``most`` tasks have run."""
-    tasks = graph.first()
-    while tasks and most != 0:
-        task = tasks.pop(rng.randrange(len(tasks)))
-        tasks += graph.after(task, task.function(*task.arguments))
-        most = None if most is None else most - 1
-    return graph
 
 
 @pytest.fixture

@@ -18,21 +18,12 @@ from bentray_kernels.tomography.waveform.refinement_graph import (
     update_image,
 )
 
+from ..graph_runs import run_in_random_order
 from .scans import RIM_MPS, SETTINGS, WATER, refined, scan, water, within_rim
 
 
 def begun():
     return RefinementGraph(MemoryWaveScan(scan(), SETTINGS), water())
-
-
-def run_in_random_order(graph, rng, most=None):
-    """Run tasks one at a time in a random order, to the end or until ``most`` tasks have run."""
-    tasks = graph.first()
-    while tasks and most != 0:
-        task = tasks.pop(rng.randrange(len(tasks)))
-        tasks += graph.after(task, task.function(*task.arguments))
-        most = None if most is None else most - 1
-    return graph
 
 
 def test_tasks_may_finish_in_any_order():

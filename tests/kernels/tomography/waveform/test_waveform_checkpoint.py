@@ -1,7 +1,6 @@
 """Waveform refinement resumed from any checkpoint gives the bits of an uninterrupted run."""
 
 import functools
-import json
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from bentray_kernels.tomography.waveform.refinement_graph import RefinementGraph
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
 from ....effort import effort
+from ..graph_runs import run
 from .scans import SETTINGS, refined, scan, water
 
 
@@ -22,32 +22,14 @@ def memory_scan():
     return MemoryWaveScan(scan(), SETTINGS)
 
 
-def stored(graph):
-    """Where it stands, through what a file can hold."""
-    tree, arrays = pack(graph.checkpoint)
-    return unpack(json.loads(json.dumps(tree)), [array.copy() for array in arrays], TYPES)
-
-
-def run(cuts=()):
-    """A graph to its end; before each task whose number is among ``cuts`` it is lost and made anew."""
-    graph = RefinementGraph(memory_scan(), water())
-    ready, done = graph.first(), 0
-    while ready:
-        if done in cuts:
-            checkpoint = stored(graph)
-            graph = RefinementGraph(memory_scan(), water())
-            graph.restore(checkpoint)
-            ready = graph.first()
-        done += 1
-        task = ready.pop(0)
-        ready += graph.after(task, task.function(*task.arguments))
-    return graph
+def begun():
+    return RefinementGraph(memory_scan(), water())
 
 
 @settings(max_examples=effort(2, 12), deadline=None)
 @given(cuts=st.sets(st.integers(0, 140), min_size=1, max_size=5))
 def test_a_refinement_cut_off_anywhere_ends_with_the_same_bits(cuts):
-    resumed, expected = run(cuts), refined()
+    (resumed, _), expected = run(begun, cuts, TYPES), refined()
     assert resumed.over
     assert resumed.done == resumed.total
     assert np.array_equal(resumed.image.speed, expected.image.speed)
@@ -59,7 +41,7 @@ def test_a_refinement_cut_off_anywhere_ends_with_the_same_bits(cuts):
 
 
 def test_its_records_are_not_those_of_rays():
-    graph = run()
+    graph, _ = run(begun)
     tree, arrays = pack(graph.checkpoint)
     with pytest.raises(KeyError):
         unpack(tree, arrays)
