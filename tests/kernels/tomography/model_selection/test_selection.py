@@ -291,6 +291,7 @@ def test_the_table_says_why_a_lower_misfit_of_finite_frequency_rays_was_not_chos
     ]
 
 
+@pytest.mark.nightly
 def test_noise_does_not_select_straight_rays_for_times_of_bent_ones(scan):
     """N1: the image is no worse than the better of straight and bent SART."""
     off = ~np.eye(RING.elements, dtype=bool)

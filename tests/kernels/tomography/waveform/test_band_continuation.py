@@ -19,6 +19,7 @@ def test_the_blob_is_found():
     assert last.held < 0.8 * first.held
 
 
+@pytest.mark.nightly
 def test_it_is_found_through_noise():
     assert error(refine(scan(noise=0.05), SETTINGS, water()).image) < 0.6 * error(water())
 
