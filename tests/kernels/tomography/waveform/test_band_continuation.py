@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from bentray_kernels.acquisition import Waveform
 from bentray_kernels.tomography.waveform.inversion_state import Image
