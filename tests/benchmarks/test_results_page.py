@@ -8,7 +8,6 @@ import pytest
 from benchmarks.shared._results_page import (
     PAGE,
     ROOT,
-    Claim,
     agrees,
     claims,
     contradictions,
@@ -102,70 +101,3 @@ def test_the_errors_in_readme_agree_with_the_recorded_rows() -> None:
                 errors |= {name: row["baselines"][value] for name, value in README_BASELINES.items()}
             for name, error in errors.items():
                 assert agrees(scans[scan][name].strip("*"), unit * error, ""), (scan, name, unit * error)
-
-
-ROW = {
-    "value": 0.3477,
-    "goal": 0.04,
-    "op": "<=",
-    "met": False,
-    "unit": "of range",
-    "error": 0.3477,
-    "baselines": {"best constant": 0.26},
-}
-
-
-def contradicted(**cells: str) -> list[str]:
-    stated = {"result": "**0.35**", "goal": "≤ 0.04", "error": "0.348", "best constant": "0.26", **cells}
-    return contradictions(Claim("volume", "R9", stated), {"volume": {"R9": ROW}})
-
-
-def test_a_line_that_agrees_is_not_contradicted() -> None:
-    assert contradicted() == []
-    assert contradicted(result="**34.8 %**", goal="≤ 4 %") == []
-
-
-@pytest.mark.parametrize(
-    ("column", "text"),
-    [
-        ("result", "**0.34**"),
-        ("result", "0.35"),
-        ("result", "**0.35 s**"),
-        ("result", "**better**"),
-        ("result", "**not measured**"),
-        ("goal", "≤ 0.05"),
-        ("goal", "≥ 0.04"),
-        ("goal", "0.04"),
-        ("error", "0.4"),
-        ("best constant", "0.36"),
-        ("water alone", "0.5"),
-    ],
-)
-def test_a_line_that_differs_is_contradicted(column: str, text: str) -> None:
-    assert len(contradicted(**{column: text})) == 1
-
-
-def test_a_line_about_no_row_is_contradicted() -> None:
-    cells = {"result": "1", "goal": "≤ 2"}
-    assert contradictions(Claim("volume", "R10", cells), {"volume": {"R9": ROW}})
-
-
-def test_figures_are_compared_at_their_own_digits() -> None:
-    assert agrees("2.5", 2.52, "")
-    assert not agrees("2.50", 2.52, "")
-    assert agrees("9.0e-5", 8.99e-5, "")
-    assert not agrees("8.0e-5", 8.99e-5, "")
-    assert agrees("75,408", 75408.4, "faces")
-    assert agrees("0.65 ms", 0.00065, "s")
-    assert agrees("none", None, "")
-    assert not agrees("0", None, "")
-
-
-def test_a_line_about_several_rows_is_split() -> None:
-    head = "| what | result | goal | label |\n| --- | --- | --- | --- |\n"
-    text = head + "| speed | 2; **3** | ≥ 2 | `one` E1; E2 |\n"
-    first, second = claims(text)
-    assert (first.file, first.target, first.cells["result"], first.cells["goal"]) == ("one", "E1", "2", "≥ 2")
-    assert (second.target, second.cells["result"], second.cells["goal"]) == ("E2", "**3**", "≥ 2")
-    with pytest.raises(ValueError, match="2 labels, 3 in result"):
-        list(claims(text.replace("2; **3**", "2; 3; 4")))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from benchmarks.reconstruction._table7_errors import Slices, contrasts, least_contrast, on_phantom_nodes
-from benchmarks.reconstruction._table7_slices import NODES, SliceWaves, varied
+from benchmarks.reconstruction._table7_slices import NODES, varied
 
 from bentray_kernels.phantoms import TABLE7_SIDE_M, table7
 from bentray_kernels.tomography import Reconstruction, Settings
@@ -28,13 +28,6 @@ def test_skin_is_as_thick_as_stated_and_nothing_else_changes(skin, millimetres):
     inner = np.linspace(-0.06, 0.06, 200)
     phantom = varied(WATER_MPS, skin).at(0.0)
     np.testing.assert_array_equal(phantom.speed_at(inner, 0.0), CENTRE.speed_at(inner, 0.0))
-
-
-def test_waves_scan_the_slice_at_the_size_of_the_phantom():
-    asked = SliceWaves(frequency_hz=1e5, elements=32, emissions=8, z_m=0.02)
-    assert asked.side_m == TABLE7_SIDE_M
-    assert asked.phantom.z_m == 0.02
-    assert asked.speed().shape == asked.grid
 
 
 def made(speed, side_m=TABLE7_SIDE_M):
