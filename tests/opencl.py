@@ -10,9 +10,9 @@ from bentray_kernels.opencl import select_device
 
 @cache
 def refusal() -> str:
-    """Why no device can be used here; empty where one passes its trial."""
+    """Why no device can be used here; empty where one passes its self-test."""
     reason = select_device().reason
-    return reason and f"no OpenCL device passes its trial here: {reason}"
+    return reason and f"no OpenCL device passes its self-test here: {reason}"
 
 
 def methods() -> tuple[str, ...]:

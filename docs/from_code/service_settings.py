@@ -40,9 +40,9 @@ OTHERS = (
     (
         "XDG_CACHE_HOME",
         "`~/.cache`",
-        "Cache folder: `bentray` in it holds self-tests and trials of devices, and kernels without another "
-        "place; PoCL and matplotlib use it, too. If it cannot be written, `bentray-UID` in the temporary "
-        "folder takes its place.",
+        "Cache folder: `bentray` in it holds self-tests and benchmarks of devices, and kernels without "
+        "another place; PoCL and matplotlib use it, too. If it cannot be written, `bentray-UID` in the "
+        "temporary folder takes its place.",
     ),
     (
         "POCL_CACHE_DIR",

@@ -8,6 +8,6 @@ DeviceRequest = Literal["auto", "cpu", "opencl"]
 REQUESTS: tuple[str, ...] = get_args(DeviceRequest)
 
 DESCRIPTION = (
-    "Where to compute what exists for OpenCL devices too. auto: on the device where a trial on this machine "
-    "was faster; cpu: never on a device; opencl: on the device, an error without one."
+    "Where to compute what exists for OpenCL devices too. auto: on the device where a benchmark on this "
+    "machine was faster; cpu: never on a device; opencl: on the device, an error without one."
 )

@@ -52,10 +52,10 @@ def select_device() -> DeviceSelection:
     """
     refusals: list[str] = []
     for device in select_devices(find_devices(), os.environ.get(WISH)):
-        verdict = self_test_result(device)
-        if verdict.usable:
+        result = self_test_result(device)
+        if result.usable:
             return DeviceSelection(device, tuple(refusals))
-        refusals.append(f"{device.label} was refused: {verdict.reason}")
+        refusals.append(f"{device.label} was refused: {result.reason}")
     return DeviceSelection(None, tuple(refusals))
 
 

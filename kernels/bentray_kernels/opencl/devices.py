@@ -17,8 +17,8 @@ from .pocl import prepare
 WISH = "BENTRAY_OPENCL_DEVICE"
 NONE = "none"
 
-# The environment variable that decides for this machine whether devices compute, see ``placement``, and its
-# value for never.
+# The environment variable that decides for this machine whether devices compute, see ``engine_selection``,
+# and its value for never.
 VARIABLE = "BENTRAY_DEVICE"
 NEVER = "cpu"
 

@@ -159,10 +159,10 @@ def _passing(devices: tuple[Device, ...]) -> tuple[Device | None, float]:
             break
         if stored_self_test_result(device) is None:
             log.warning("%s is tested once, for at most %.0f s", device.name, left)
-        verdict = self_test_result(device, left)
-        if verdict.usable:
+        result = self_test_result(device, left)
+        if result.usable:
             return device, end - time.monotonic()
-        log.warning("%s was refused: %s; %s=%s skips the test", device.name, verdict.reason, VARIABLE, NEVER)
+        log.warning("%s was refused: %s; %s=%s skips the test", device.name, result.reason, VARIABLE, NEVER)
     return None, 0.0
 
 

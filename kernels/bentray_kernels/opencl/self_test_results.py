@@ -43,21 +43,21 @@ class SelfTestResult:
 
 @cache
 def self_test_result(device: Device, time_out_s: float = TIME_OUT_S) -> SelfTestResult:
-    """The verdict, from the cache or from a self-test in a child process, which has so many seconds."""
+    """The result, from the cache or from a self-test in a child process, which has so many seconds."""
     if not device.double_precision:
         return SelfTestResult("it has no double precision", (), {})
     stored = _kept(device)
     if stored is not None:
         return stored
-    verdict = examine(device, in_a_child, time_out_s)
-    if verdict.usable:
+    result = examine(device, in_a_child, time_out_s)
+    if result.usable:
         # A failure may be due to a busy machine.
-        write_record(_file(device), asdict(verdict))
-    return verdict
+        write_record(_file(device), asdict(result))
+    return result
 
 
 def stored_self_test_result(device: Device) -> SelfTestResult | None:
-    """The verdict in the cache, without a test; None without one."""
+    """The result in the cache, without a test; None without one."""
     return _kept(device) if device.double_precision else None
 
 

@@ -87,7 +87,7 @@ def with_device(scan: ScanSize, settings: Settings) -> Settings:
         check_available("opencl")
         return settings
     session = select_engine(work)
-    # Compiled tasks take all cores of a processor; the trial measured one core beside all of the driver.
+    # Compiled tasks take all cores of a processor; the benchmark measured one core beside all of the driver.
     if session is None or (session.device.kind == "cpu" and requested() == "auto"):
         return settings
     return settings.changed(device="opencl")

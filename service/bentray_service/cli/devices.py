@@ -27,7 +27,7 @@ def devices(
     """List and test the OpenCL devices, and show what computes on the chosen one.
 
     A device that computes wrong results, aborts or hangs is rejected with the reason. On the chosen device a
-    trial measures each engine beside compiled code; `--device auto` follows it. Test and trial are stored
+    benchmark times each engine beside compiled code; `--device auto` follows it. Both results are stored
     until the driver or Bentray changes. GPUs are preferred over CPUs. The variable BENTRAY_OPENCL_DEVICE
     selects a device by index or name, "none" hides all; BENTRAY_DEVICE is auto, cpu or opencl.
 
@@ -142,7 +142,7 @@ def _print_trials(trials: dict[str, DeviceBenchmark]) -> None:
         for one in trial.timings
     ]
     cells += [(engine, "", "", trial.fault, "compiled") for engine, trial in trials.items() if trial.fault]
-    print_table("DeviceBenchmark", ("engine", "size", "compiled", "device", "auto takes"), cells)
+    print_table("Benchmark", ("engine", "size", "compiled", "device", "auto takes"), cells)
 
 
 def _print_compared(compared: list[Comparison], device: Device) -> None:

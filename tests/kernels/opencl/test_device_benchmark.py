@@ -1,4 +1,4 @@
-"""The trial of a device: what it times, which engine it prefers for a size, and its cache."""
+"""The benchmark of a device: what it times, which engine it prefers for a size, and its cache."""
 
 from dataclasses import replace
 

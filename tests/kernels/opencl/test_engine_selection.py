@@ -1,5 +1,6 @@
-"""Where an engine computes: requests, the machine's variable, the trial, and the memory of the device."""
+"""Where an engine computes: requests, the machine's variable, the benchmark, and the memory of the device."""
 
+import re
 import time
 from dataclasses import replace
 
@@ -168,7 +169,8 @@ def test_auto_waits_for_a_slow_trial_ten_seconds_and_says_so(slow_card, caplog, 
     assert select_engine(LARGE) is None
     assert select_engine(LARGE) is None, "once per process"
     assert 0.5 < time.monotonic() - begun < 10.0
-    lines = [record.getMessage() for record in caplog.records]
+    # The seconds left depend on the load.
+    lines = [re.sub(r"in [\d.]+ s;", "in 0.6 s;", record.getMessage()) for record in caplog.records]
     assert lines == [
         "GPU 9000 is tested once, for at most 1 s",
         "GPU 9000 is tried for field once, for at most 1 s",

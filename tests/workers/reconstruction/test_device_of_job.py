@@ -1,4 +1,4 @@
-"""The device of a job: decided once by the trial, kept on a resume, and none where nothing exists for one."""
+"""The device of a job: decided once by the benchmark, kept on a resume, and none where no engine exists."""
 
 from dataclasses import replace
 from types import SimpleNamespace
