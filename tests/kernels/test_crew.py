@@ -21,7 +21,7 @@ def test_each_plane_is_in_one_group(planes, least, groups):
 
 
 def test_threads_work_at_the_same_time_and_end():
-    meeting = threading.Barrier(3, timeout=10.0)
+    meeting = threading.Barrier(3, timeout=120.0)
     before = threading.active_count()
     with crew_of(3) as crew:
         crew.share(lambda _first, _end: meeting.wait(), 3, 1)

@@ -198,13 +198,13 @@ def test_a_sign_in_ends_the_session_before(http, provider):
 def test_sessions_expire_and_end_their_streams(http, provider):
     signed_in(http, provider)
     database = http.app.state.stores.database
-    with http.stream("GET", "/v1/events", params={"seconds": 20}) as stream:
+    with http.stream("GET", "/v1/events", params={"seconds": 300}) as stream:
         assert stream.status_code == 200
         begun = time.monotonic()
         with database.write() as connection:
             connection.execute(text("UPDATE sessions SET expires = 1.0"))
         list(stream.iter_bytes())
-        assert time.monotonic() - begun < 10.0
+        assert time.monotonic() - begun < 200.0
     assert http.get("/v1/access").status_code == 401
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.images.slice import volume_slice_png
 
@@ -28,12 +27,3 @@ def test_requested_slice_is_drawn(path, drawn):
     image = drawn[-1].axes[0].images[0]
     assert (image.get_clim(), image.get_cmap().name) == ((-1.0, 7.0), "gray")
     assert np.asarray(image.get_array()).shape == (5, 6)
-
-
-@pytest.mark.parametrize(
-    ("how", "field"), [({"index": 4}, "index"), ({"index": -1}, "index"), ({"colormap": "x"}, "colormap")]
-)
-def test_refusals(path, how, field):
-    with pytest.raises(InvalidInput) as caught:
-        volume_slice_png(path, **how)
-    assert caught.value.field == field

@@ -8,7 +8,6 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_workers.cluster.capacities import USABLE, WARM_BYTES, WorkerCapacity
-from bentray_workers.cluster.checkpoints import Checkpoints
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.files.reconstruction import read_reconstruction, shape_of_quantity, write_reconstruction
@@ -40,21 +39,6 @@ def path(scan, tmp_path_factory):
 @pytest.fixture(scope="module")
 def result(path):
     return reconstruct(None, path, SETTINGS)
-
-
-def test_saved_job_is_resumed_to_the_same_bits(path, result, tmp_path):
-    saved = []
-    assert np.array_equal(
-        reconstruct(None, path, SETTINGS, work_dir=tmp_path, on_saved=lambda: saved.append(1)).reflection.db,
-        result.reflection.db,
-    )
-    assert saved
-    names = sorted({path.stem.rpartition("-")[0] for path in (tmp_path / "checkpoints").glob("*.npz")})
-    state = Checkpoints(tmp_path / "checkpoints").load(names[-1]).state
-    assert state.batches == 1
-    assert state.echo.shape == result.reflection.db.shape
-    again = reconstruct(None, path, SETTINGS, work_dir=tmp_path)
-    assert np.array_equal(again.reflection.db, result.reflection.db)
 
 
 def test_file_and_exports_hold_the_image_on_its_own_grid(result, path, tmp_path):

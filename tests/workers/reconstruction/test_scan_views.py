@@ -116,20 +116,6 @@ def test_without_a_water_shot_there_are_no_picks(tmp_path):
         emission_traces(path, emission=0, index=0, what="water")
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"emission": 8}, r"emission.*8.*accepted: 0 to 7"),
-        ({"emission": -1}, r"emission.*-1.*accepted: 0 to 7"),
-        ({"index": 1}, r"slice.*1.*accepted: 0 to 0"),
-    ],
-)
-def test_names_the_wrong_argument_and_what_is_accepted(tmp_path, wrong, message):
-    path = stored(tmp_path, scan(elements=8))
-    with pytest.raises(InvalidInput, match=message):
-        emission_traces(path, **{"emission": 0, "index": 0, "what": "object", **wrong})
-
-
 def test_slices_without_a_frequency_have_picks(tmp_path):
     one = scan(blob_delay(16), elements=16, noise=0.01)
     both = [np.stack([t, t]) for t in (one.waveform.object, one.waveform.water)]

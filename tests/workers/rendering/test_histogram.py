@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.rendering.histogram import volume_histogram
@@ -47,11 +46,3 @@ def test_slices_have_no_surface(tmp_path):
     result = made(8, 4)
     write_reconstruction(tmp_path / "r.h5", replace(result, spacing_m=(2e-3, 2e-3, float("nan"))))
     assert volume_histogram(tmp_path / "r.h5", "speed", 16)["iso"] is None
-
-
-def test_rejects_what_there_is_not(tmp_path):
-    write_reconstruction(tmp_path / "r.h5", replace(made(8, 4), attenuation=None, recovery=None))
-    with pytest.raises(InvalidInput, match="quantity: found 'attenuation'; accepted: one of speed, coverage"):
-        volume_histogram(tmp_path / "r.h5", "attenuation", 16)
-    with pytest.raises(InvalidInput, match="bins: found 1"):
-        volume_histogram(tmp_path / "r.h5", "speed", 1)
