@@ -92,13 +92,14 @@ class Reader:
         with rejecting_hdf5_damage("file", "a whole HDF5 file"):
             return tuple(self._file)
 
-    def array(self, path: str, kinds: str, accepted: str) -> NDArray[Any] | None:
+    def array(self, path: str, kinds: str, accepted: str, most: float = math.inf) -> NDArray[Any] | None:
         """An array, or None if it is absent.
 
         Args:
             path: of the array.
             kinds: accepted NumPy kinds: of ``i``, ``u``, ``f``, ``b``.
             accepted: these in words, with the shape.
+            most: values.
 
         Raises:
             InvalidInput: for anything else of that path.
@@ -106,6 +107,8 @@ class Reader:
         stored = self.checked(path, kinds, accepted)
         if stored is None:
             return None
+        if stored.size > most:
+            raise InvalidInput(path, f"shape {stored.shape}", accepted)
         self._read_bytes += stored.size * stored.dtype.itemsize
         with rejecting_hdf5_damage(path, accepted):
             return np.asarray(stored[()])

@@ -1,13 +1,18 @@
-"""Checks of the directories of untrusted zips; ``zipfile`` compares members with them as it reads."""
+"""Untrusted zips: checks of the directory, which ``zipfile`` compares members with; bounded members."""
 
 from __future__ import annotations
 
 import re
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 from bentray_kernels.errors import InvalidInput
 
 from .bounded_reading import LARGEST_TOTAL
+from .damage import rejecting_damage
 
 WHOLE = "a zip as numpy.savez or savez_compressed writes it"
 
@@ -50,6 +55,40 @@ def check_zip(archive: zipfile.ZipFile, most_members: int) -> None:
     for (begin, size), end in zip(places, [*(at for at, _ in places[1:]), archive.start_dir], strict=True):
         if begin + size > end:
             raise InvalidInput("file", "a zip with a member within another, or beyond the end", WHOLE)
+
+
+def read_member(archive: zipfile.ZipFile, name: str, most: int) -> bytes:
+    """A member, decompressed up to ``most`` bytes.
+
+    Raises:
+        InvalidInput: naming it, for more bytes, others than the directory says, or damaged ones.
+    """
+    with rejecting_damage(name, "a whole zip"), archive.open(name) as packed:
+        data = packed.read(most + 1)
+    declared = archive.getinfo(name).file_size
+    if len(data) > most or len(data) != declared:
+        raise InvalidInput(name, f"{len(data)} bytes, {declared} in the directory", f"at most {most}")
+    return data
+
+
+@contextmanager
+def member_file(archive: zipfile.ZipFile, name: str, most: int, scratch: Path) -> Iterator[Path]:
+    """A member as a temporary file in ``scratch``; raises as ``read_member``."""
+    with NamedTemporaryFile(dir=scratch, suffix=Path(name).suffix) as file:
+        file.write(read_member(archive, name, most))
+        file.flush()
+        yield Path(file.name)
+
+
+@contextmanager
+def naming(member: str) -> Iterator[None]:
+    """Add the name of the member to errors."""
+    try:
+        yield
+    except InvalidInput as error:
+        if error.field.startswith(member):
+            raise
+        raise InvalidInput(f"{member}: {error.field}", error.value, error.accepted) from None
 
 
 def plain_name(name: str) -> bool:

@@ -14,7 +14,6 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from ..files.bounded_reading import LARGEST_ROW, LARGEST_TOTAL
 from ..files.damage import rejecting_damage
 from ..files.hdf5_reading import Limits, Reader, opened, rejecting_hdf5_damage
 from ..files.npz import Npz
-from ..files.zip_checks import WHOLE, check_zip
+from ..files.zip_checks import WHOLE, check_zip, member_file, naming, read_member
 from .arrays import LARGEST_WHOLE
 from .layouts import named_layout
 from .open_scan import OpenScan
@@ -68,7 +67,7 @@ class KWave:
             f"waveform/{which}": sorted(n for n in names if OUTPUT.fullmatch(n) and n.startswith(which))
             for which in ("object", "water")
         }
-        self._geometry = Npz(io.BytesIO(self._bytes(GEOMETRY, LARGEST_WHOLE)))
+        self._geometry = Npz(io.BytesIO(read_member(archive, GEOMETRY, LARGEST_WHOLE)))
         first = self._outputs["waveform/object"] or self._outputs["waveform/water"]
         with self._output(first[0]) as reader:
             self._shape = self._pressure(first[0], reader).shape[::-1]
@@ -126,34 +125,16 @@ class KWave:
 
     @contextmanager
     def _output(self, name: str) -> Iterator[Reader]:
-        with NamedTemporaryFile(dir=self._scratch, suffix=".h5") as file:
-            file.write(self._bytes(name, LARGEST_ROW))
-            file.flush()
-            with _of(name), opened(Path(file.name), Limits()) as reader:
-                yield reader
-
-    def _bytes(self, name: str, most: int) -> bytes:
-        """A member, decompressed up to ``most`` bytes."""
-        with rejecting_damage(name, "a whole zip"), self._zip.open(name) as file:
-            data = file.read(most + 1)
-        if len(data) > most:
-            raise InvalidInput(name, f"more than {most} bytes unpacked", f"at most {most}")
-        declared = self._zip.getinfo(name).file_size
-        if len(data) != declared:
-            raise InvalidInput(name, f"{len(data)} bytes, {declared} in the directory", WHOLE)
-        return data
+        member = member_file(self._zip, name, LARGEST_ROW, self._scratch)
+        with member as path, _of(name), opened(path, Limits()) as reader:
+            yield reader
 
 
 @contextmanager
 def _of(output: str) -> Iterator[None]:
-    """Add the name of the output to errors."""
-    try:
-        with rejecting_hdf5_damage(output, "an output of k-Wave"):
-            yield
-    except InvalidInput as error:
-        if error.field.startswith(output):
-            raise
-        raise InvalidInput(f"{output}: {error.field}", error.value, error.accepted) from None
+    """Add the name of the output to errors, also those of HDF5."""
+    with naming(output), rejecting_hdf5_damage(output, "an output of k-Wave"):
+        yield
 
 
 def _detect(scan: OpenScan) -> bool:

@@ -6,14 +6,13 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 
 from ..files.bounded_reading import LARGEST_ROW
 from ..files.damage import rejecting_damage
-from ..files.zip_checks import WHOLE, check_zip
+from ..files.zip_checks import WHOLE, check_zip, member_file, naming
 from .matlab5 import Matlab5
 from .open_scan import OpenScan
 
@@ -44,7 +43,7 @@ class MeasurementFolder:
     @contextmanager
     def opened(self, name: str) -> Iterator[Matlab5]:
         """The plain arrays of a file."""
-        with self._path(name, LARGEST_ROW) as path, _of(name):
+        with self._path(name, LARGEST_ROW) as path, naming(name):
             yield Matlab5(path)
 
     def description(self, name: str, variables: tuple[str, ...]) -> dict[str, Any]:
@@ -66,23 +65,5 @@ class MeasurementFolder:
                 raise InvalidInput(name, f"{path.stat().st_size} bytes", f"at most {most}")
             yield path
             return
-        with NamedTemporaryFile(dir=self._scan.scratch, suffix=".mat") as file:
-            with rejecting_damage(name, "a whole zip"), archive.open(name) as packed:
-                data = packed.read(most + 1)
-            declared = archive.getinfo(name).file_size
-            if len(data) > most or len(data) != declared:
-                raise InvalidInput(name, f"{len(data)} bytes, {declared} in the directory", f"at most {most}")
-            file.write(data)
-            file.flush()
-            yield Path(file.name)
-
-
-@contextmanager
-def _of(name: str) -> Iterator[None]:
-    """Add the name of the file to errors."""
-    try:
-        yield
-    except InvalidInput as error:
-        if error.field.startswith(name):
-            raise
-        raise InvalidInput(f"{name}: {error.field}", error.value, error.accepted) from None
+        with member_file(archive, name, most, self._scan.scratch) as path:
+            yield path

@@ -6,7 +6,6 @@ Source:
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from ..files.hdf5_reading import Reader
 from .layouts import named_layout
 from .matlab73 import rows_of
 from .open_scan import OpenScan
@@ -42,7 +40,7 @@ def _read(scan: OpenScan) -> StreamedScan:
     if data.ndim != 3 or 0 in data.shape:
         raise InvalidInput(DATA, f"shape {data.shape}", DATA_SHAPE)
     emissions, samples, receivers = data.shape
-    position = _small(reader, POSITION, "f", "(N, 2 or 3) numbers in m", 3 * receivers)
+    position = reader.array(POSITION, "f", "(N, 2 or 3) numbers in m", 3 * receivers)
     if position is None or position.ndim != 2 or len(position) != receivers:
         given = "nothing" if position is None else f"shape {position.shape}"
         raise InvalidInput(POSITION, given, f"({receivers}, 2 or 3), as many as receivers in {DATA}")
@@ -50,7 +48,7 @@ def _read(scan: OpenScan) -> StreamedScan:
     if count not in (None, receivers):
         given = f"{count:g}, with {receivers} elements in {POSITION}"
         raise InvalidInput("geometry@n_elements", given, f"{receivers}, or no attribute")
-    emitters = _small(reader, EMITTERS, "iu", "(n_tx,) integers", emissions)
+    emitters = reader.array(EMITTERS, "iu", "(n_tx,) integers", emissions)
     if emitters is not None and emitters.shape != (emissions,):
         raise InvalidInput(EMITTERS, f"shape {emitters.shape}", f"({emissions},), as of {DATA}")
     rate = reader.number("acquisition", "sample_rate_hz", "Hz")
@@ -79,16 +77,6 @@ def _read(scan: OpenScan) -> StreamedScan:
         },
         {"waveform/object": Traces((emissions, receivers, samples), data.dtype, traces)},
     )
-
-
-def _small(reader: Reader, path: str, kinds: str, accepted: str, most: int) -> NDArray[Any] | None:
-    """An array whose size is checked before it is read."""
-    stored = reader.checked(path, kinds, accepted)
-    if stored is None:
-        return None
-    if math.prod(stored.shape) > most:
-        raise InvalidInput(path, f"shape {stored.shape}", accepted)
-    return reader.required(path, kinds, accepted)
 
 
 READER = ScanReader(
