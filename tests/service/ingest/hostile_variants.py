@@ -110,7 +110,7 @@ def face(size: int, corners: str) -> bytes:
 
 def nodes(*children: list[int], **first: Any) -> bytes:
     """A scene whose nodes have these children; the last one has the mesh."""
-    made: list[dict[str, Any]] = [{"children": one} if one else {} for one in children]
+    made: list[dict[str, Any]] = [{"children": process} if process else {} for process in children]
     made[-1]["mesh"] = 0
     made[0] |= first
     return gltf(nodes=made)

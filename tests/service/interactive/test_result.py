@@ -161,8 +161,8 @@ def test_nodes_without_rays_do_not_count(result: Result) -> None:
 
 
 def test_another_grid_is_interpolated() -> None:
-    places = [np.arange(n) * 1e-3 for n in (5, 6, 7)]
-    linear = 1.0 + 2e3 * places[0][:, None, None] - 1e3 * places[1][None, :, None] + 5e2 * places[2]
+    points = [np.arange(n) * 1e-3 for n in (5, 6, 7)]
+    linear = 1.0 + 2e3 * points[0][:, None, None] - 1e3 * points[1][None, :, None] + 5e2 * points[2]
     coarse = volume(linear.astype(np.float32))
     fine_places = np.meshgrid(*(np.arange(3) * 5e-4 + 1e-3 for _ in range(3)), indexing="ij")
     exact = 1.0 + 2e3 * fine_places[0] - 1e3 * fine_places[1] + 5e2 * fine_places[2]

@@ -71,10 +71,10 @@ def test_traces_and_picks(start, cluster, traced):
     np.testing.assert_allclose(body["straight_s"], distance / WATER_MPS, atol=1e-12)
     assert body["picker"] == "aic"
     late = np.array([np.nan if one is None else one for one in body["pick_s"]]) - body["straight_s"]
-    known = np.isfinite(late)
-    assert known.sum() >= 9
+    finite = np.isfinite(late)
+    assert finite.sum() >= 9
     # Picks are good to a fraction of the period of 1 µs.
-    np.testing.assert_allclose(late[known], blob_delay(12)[7][known], atol=0.2e-6)
+    np.testing.assert_allclose(late[finite], blob_delay(12)[7][finite], atol=0.2e-6)
     assert cluster.submitted[-1]["resources"] == {"render": 1}
 
 

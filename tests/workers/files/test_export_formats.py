@@ -36,12 +36,12 @@ DB = Selection(attenuation="dB/cm/MHz", quantity="attenuation")
 
 @pytest.fixture(scope="module", params=[None, 3], ids=["plane", "space"])
 def result(request: pytest.FixtureRequest) -> Reconstruction:
-    one = made(nodes=6, slices=request.param)
+    single = made(nodes=6, slices=request.param)
     spacing = (2e-3, 2e-3) if request.param is None else (2e-3, 2e-3, 5e-3)
-    provenance = {**one.provenance, "frequency_hz": repr(FREQUENCY_HZ)}
+    provenance = {**single.provenance, "frequency_hz": repr(FREQUENCY_HZ)}
     # Different sides, so that confused axes are found.
-    crop = {name: getattr(one, name)[:, :4] for name in ("speed", "coverage", "attenuation", "recovery")}
-    return replace(one, spacing_m=spacing, provenance=provenance, **crop)
+    crop = {name: getattr(single, name)[:, :4] for name in ("speed", "coverage", "attenuation", "recovery")}
+    return replace(single, spacing_m=spacing, provenance=provenance, **crop)
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +82,10 @@ def test_formats_with_one_image(stored, result, tmp_path, name, selection):
 
 
 def test_matlab_has_all_images(stored, result, tmp_path):
-    found = loadmat(exported(stored, tmp_path, "mat", DB))
-    np.testing.assert_array_equal(found["speed_mps"], result.speed)
-    np.testing.assert_allclose(found["attenuation_db_cm_mhz"], in_db(result))
-    assert "attenuation_np_m" not in found
+    arrays = loadmat(exported(stored, tmp_path, "mat", DB))
+    np.testing.assert_array_equal(arrays["speed_mps"], result.speed)
+    np.testing.assert_allclose(arrays["attenuation_db_cm_mhz"], in_db(result))
+    assert "attenuation_np_m" not in arrays
 
 
 def test_dicom_is_a_parametric_map_with_units(stored, result, tmp_path):
@@ -101,8 +101,8 @@ def test_dicom_is_a_parametric_map_with_units(stored, result, tmp_path):
         mapping = group.RealWorldValueMappingSequence[0]
         unit = mapping.MeasurementUnitsCodeSequence[0]
         assert (unit.CodingSchemeDesignator, mapping.RealWorldValueSlope) == ("UCUM", 1.0)
-        place = [float(value) for value in group.PlanePositionSequence[0].ImagePositionPatient]
-        found[unit.CodeValue, place[2]] = values
+        position = [float(value) for value in group.PlanePositionSequence[0].ImagePositionPatient]
+        found[unit.CodeValue, position[2]] = values
     for unit, expected in (("m/s", result.speed), ("dB/(cm.MHz)", in_db(result))):
         for k in range(frames):
             height = 0.0 if len(shape) == 2 else 1e3 * (result.origin_m[2] + k * result.spacing_m[2])
@@ -127,7 +127,7 @@ def test_ome_zarr_has_channels_with_units(stored, result, tmp_path):
     scale, move = scales.datasets[0].coordinateTransformations
     np.testing.assert_allclose(scale.scale[1:], result.spacing_m[::-1])
     np.testing.assert_allclose(move.translation[1:], result.origin_m[::-1])
-    labels = [one["label"] for one in group.attrs["ome"]["omero"]["channels"]]
+    labels = [channel["label"] for channel in group.attrs["ome"]["omero"]["channels"]]
     for label, expected in (
         ("speed_mps (m/s)", result.speed),
         ("attenuation_np_m (Np/m)", result.attenuation),

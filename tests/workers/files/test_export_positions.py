@@ -39,11 +39,11 @@ def turned(*degrees: float) -> np.ndarray:
     """Rotations about x, then y, then z."""
     made = np.eye(3)
     for axis, angle in enumerate(np.radians(degrees)):
-        one, c, s = np.eye(3), np.cos(angle), np.sin(angle)
+        first, c, s = np.eye(3), np.cos(angle), np.sin(angle)
         k, m = (axis + 1) % 3, (axis + 2) % 3
-        one[k, k] = one[m, m] = c
-        one[k, m], one[m, k] = -s, s
-        made = one @ made
+        first[k, k] = first[m, m] = c
+        first[k, m], first[m, k] = -s, s
+        made = first @ made
     return made
 
 
@@ -74,9 +74,9 @@ PLACE = {
 
 def index(values: np.ndarray) -> np.ndarray:
     """Index of the brightest node, in three axes."""
-    found = np.argwhere(values > 0.5 * (WATER + BRIGHT))
-    assert len(found) == 1
-    return np.append(found[0], [0.0] * (3 - values.ndim))
+    nodes = np.argwhere(values > 0.5 * (WATER + BRIGHT))
+    assert len(nodes) == 1
+    return np.append(nodes[0], [0.0] * (3 - values.ndim))
 
 
 def by_nibabel(path: Path) -> np.ndarray:
@@ -89,8 +89,8 @@ def by_nibabel(path: Path) -> np.ndarray:
 def by_itk(path: Path) -> np.ndarray:
     image = SimpleITK.ReadImage(str(path))
     node = index(SimpleITK.GetArrayFromImage(image).T)[: image.GetDimension()]
-    place = image.TransformContinuousIndexToPhysicalPoint(node)
-    return 1e-3 * LPS * np.append(place, [0.0] * (3 - len(node)))
+    position = image.TransformContinuousIndexToPhysicalPoint(node)
+    return 1e-3 * LPS * np.append(position, [0.0] * (3 - len(node)))
 
 
 def by_pynrrd(path: Path) -> np.ndarray:
@@ -112,8 +112,8 @@ def by_pydicom(path: Path) -> np.ndarray:
     shared, own = image.SharedFunctionalGroupsSequence[0], image.PerFrameFunctionalGroupsSequence[frame]
     between_rows, between_columns = shared.PixelMeasuresSequence[0].PixelSpacing
     along = np.array(shared.PlaneOrientationSequence[0].ImageOrientationPatient, float)
-    place = np.array(own.PlanePositionSequence[0].ImagePositionPatient, float)
-    return 1e-3 * LPS * (place + along[:3] * between_columns * column + along[3:] * between_rows * row)
+    position = np.array(own.PlanePositionSequence[0].ImagePositionPatient, float)
+    return 1e-3 * LPS * (position + along[:3] * between_columns * column + along[3:] * between_rows * row)
 
 
 def by_zarr(path: Path) -> np.ndarray:
@@ -124,8 +124,8 @@ def by_zarr(path: Path) -> np.ndarray:
     assert axes == ways[: len(axes)]
     scale, move = scales.datasets[0].coordinateTransformations
     values = np.asarray(group["0"][0]).T
-    place = np.array(move.translation[:0:-1]) + np.array(scale.scale[:0:-1]) * index(values)[: values.ndim]
-    return np.append(place, [0.0] * (3 - len(place)))
+    position = np.array(move.translation[:0:-1]) + np.array(scale.scale[:0:-1]) * index(values)[: values.ndim]
+    return np.append(position, [0.0] * (3 - len(position)))
 
 
 def by_xml(path: Path) -> np.ndarray:

@@ -42,36 +42,36 @@ def gltf(mesh):
 
 @pytest.mark.parametrize("file_type", FORMATS)
 def test_every_format(file_type):
-    found = read_mesh(exported(file_type))
-    assert found.format == file_type.split("_")[0]
-    assert (found.surface.genus, found.surface.holes, found.surface.turned) == (1, 0, 0)
-    assert found.surface.merged == (200 if "stl" in file_type else 0)
+    mesh = read_mesh(exported(file_type))
+    assert mesh.format == file_type.split("_")[0]
+    assert (mesh.surface.genus, mesh.surface.holes, mesh.surface.turned) == (1, 0, 0)
+    assert mesh.surface.merged == (200 if "stl" in file_type else 0)
     surface = torus(8, 5)
-    corners = found.surface.mesh.corners
+    corners = mesh.surface.mesh.corners
 
     def told_apart(faces):
         return np.array(sorted(np.round(np.sort(faces.reshape(-1, 9), axis=1), 3).tolist()))
 
     np.testing.assert_allclose(told_apart(corners), told_apart(surface.corners), atol=2e-3)
-    assert found.colours is None
+    assert mesh.colours is None
 
 
 @pytest.mark.parametrize("file_type", ["ply", "obj", "glb", "gltf"])
 def test_colours_stay_with_their_vertices(file_type):
     surface = torus(8, 5)
     shades = np.random.default_rng(0).integers(0, 256, (40, 4)).astype(np.uint8)
-    found = read_mesh(exported(file_type, shades))
+    mesh = read_mesh(exported(file_type, shades))
     order = [
-        np.linalg.norm(surface.vertices - place, axis=1).argmin() for place in found.surface.mesh.vertices
+        np.linalg.norm(surface.vertices - place, axis=1).argmin() for place in mesh.surface.mesh.vertices
     ]
-    np.testing.assert_allclose(found.colours, shades[order, :3] / 255.0, atol=0.003)
+    np.testing.assert_allclose(mesh.colours, shades[order, :3] / 255.0, atol=0.003)
 
 
 def test_polygons_become_triangles():
     cube = "OFF\n8 6 0\n" + "\n".join(f"{a} {b} {c}" for a in (0, 1) for b in (0, 1) for c in (0, 1))
     cube += "\n4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3\n"
-    found = read_mesh(cube.encode()).surface
-    assert (len(found.mesh.faces), found.holes, found.genus) == (12, 0, 0)
+    mesh = read_mesh(cube.encode()).surface
+    assert (len(mesh.mesh.faces), mesh.holes, mesh.genus) == (12, 0, 0)
 
 
 def test_a_binary_stl_may_begin_like_a_text():
@@ -115,8 +115,8 @@ def test_corners_of_an_obj_may_count_back_from_their_face():
     text = "".join(
         "".join(f"v {x} {y} {z}\n" for x, y, z in face) + "f -3//-1 -2//-1 -1//-1\n" for face in corners
     )
-    found = read_mesh(text.encode()).surface
-    assert (len(found.mesh.faces), found.genus, found.merged) == (80, 1, 200)
+    mesh = read_mesh(text.encode()).surface
+    assert (len(mesh.mesh.faces), mesh.genus, mesh.merged) == (80, 1, 200)
 
 
 def test_an_stl_may_be_written_in_capitals():
@@ -133,11 +133,11 @@ def test_flipped_bytes_give_a_refusal_or_a_sound_mesh(file_type, flips):
     for place, value in flips:
         content[int(place * len(content))] = value
     try:
-        found = read_mesh(bytes(content))
+        mesh = read_mesh(bytes(content))
     except InvalidInput:
         return
-    assert np.isfinite(found.surface.mesh.vertices).all()
-    assert found.surface.mesh.faces.max() < len(found.surface.mesh.vertices)
+    assert np.isfinite(mesh.surface.mesh.vertices).all()
+    assert mesh.surface.mesh.faces.max() < len(mesh.surface.mesh.vertices)
 
 
 def lone(place, accepted="three"):
@@ -254,5 +254,5 @@ def test_the_parts_of_a_scene_become_one_mesh():
     for half in (halves, ~halves):
         parts.add_geometry(trimesh.Trimesh(surface.vertices, surface.faces[half], process=False))
     buffer = io.BytesIO(parts.export(file_type="glb"))
-    found = read_mesh(buffer.getvalue()).surface
-    assert (len(found.mesh.faces), found.genus, found.holes) == (80, 1, 0)
+    mesh = read_mesh(buffer.getvalue()).surface
+    assert (len(mesh.mesh.faces), mesh.genus, mesh.holes) == (80, 1, 0)

@@ -49,9 +49,9 @@ def test_a_volume_deleted_after_it_was_read_is_named(
     read = volume_export.read_volume
 
     def read_and_delete(path: Path) -> Volume:
-        found = read(path)
+        result = read(path)
         path.unlink()
-        return found
+        return result
 
     monkeypatch.setattr(volume_export, "read_volume", read_and_delete)
     with pytest.raises(InvalidInput, match="volume: found one that was deleted during its export"):

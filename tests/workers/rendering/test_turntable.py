@@ -61,14 +61,14 @@ def test_a_zip_holds_each_picture(cluster, path, folder, tmp_path):
         pictures = [archive.read(name) for name in archive.namelist()]
     assert pictures == [picture_png(path, table.frame(k)) for k in range(3)]
     assert len(set(pictures)) == 3
-    done = [(one.done, one.total) for one in told]
+    done = [(progress.done, progress.total) for progress in told]
     assert list(dict.fromkeys(done)) == [(0, 3), (1, 3), (2, 3), (3, 3)]
     told.clear()
     # As a service that died half-way leaves it: one picture missing, the others not drawn again.
     (folder / "0000.png").unlink()
     before = {frame.name: frame.stat().st_mtime_ns for frame in folder.iterdir()}
     draw_turntable(cluster.client, path, table, tmp_path / "u.zip", folder, on_progress=told.append)
-    assert list(dict.fromkeys((one.done, one.total) for one in told)) == [(2, 3), (3, 3)]
+    assert list(dict.fromkeys((progress.done, progress.total) for progress in told)) == [(2, 3), (3, 3)]
     assert before.items() <= {frame.name: frame.stat().st_mtime_ns for frame in folder.iterdir()}.items()
     assert (tmp_path / "u.zip").read_bytes() == (tmp_path / "t.zip").read_bytes()
 
@@ -78,13 +78,13 @@ def test_an_apng_shows_each_picture(cluster, path, folder, tmp_path):
     draw_turntable(cluster.client, path, table, tmp_path / "t.apng", folder)
     control = (tmp_path / "t.apng").read_bytes().partition(b"acTL")[2]
     assert struct.unpack(">II", control[:8]) == (3, 0), "three pictures, without end"
-    with Image.open(tmp_path / "t.apng") as found:
-        assert (found.format, found.n_frames) == ("PNG", 3)
+    with Image.open(tmp_path / "t.apng") as picture:
+        assert (picture.format, picture.n_frames) == ("PNG", 3)
         for k in range(3):
-            found.seek(k)
+            picture.seek(k)
             expected = pixels_of(picture_png(path, table.frame(k)))
-            np.testing.assert_array_equal(np.asarray(found.convert("RGB")), expected)
-            assert found.info["duration"] == 80
+            np.testing.assert_array_equal(np.asarray(picture.convert("RGB")), expected)
+            assert picture.info["duration"] == 80
 
 
 def test_it_stops_between_pictures(cluster, path, folder, tmp_path):

@@ -36,12 +36,12 @@ def test_amplitudes_are_optional_and_do_not_change_times(tmp_path):
     assert plain.log_ratio_np is None
     assert np.array_equal(full.delta_tof_s, plain.delta_tof_s)
     write_dataset(tmp_path / "full.h5", full)
-    found = read_dataset(tmp_path / "full.h5")
-    assert np.array_equal(found.log_ratio_np, full.log_ratio_np)
-    assert found.water_attenuation_np_m == 0.0
+    dataset = read_dataset(tmp_path / "full.h5")
+    assert np.array_equal(dataset.log_ratio_np, full.log_ratio_np)
+    assert dataset.water_attenuation_np_m == 0.0
     # Across the whole breast: about 4 cm of fat at 15 Np/m and 12 cm of tissue at 50.
-    assert 4.0 < found.log_ratio_np.max() < 8.0
-    assert (np.diag(found.log_ratio_np) == 0.0).all()
+    assert 4.0 < dataset.log_ratio_np.max() < 8.0
+    assert (np.diag(dataset.log_ratio_np) == 0.0).all()
 
 
 def test_noise_by_its_ratio_to_the_signal():

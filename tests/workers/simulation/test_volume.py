@@ -21,17 +21,17 @@ def moved():
 
 def test_slices_come_back_from_a_file(moved, tmp_path):
     write_dataset(tmp_path / "moved.h5", moved)
-    found = read_dataset(tmp_path / "moved.h5")
-    assert found.slices == 3
+    dataset = read_dataset(tmp_path / "moved.h5")
+    assert dataset.slices == 3
     for name in ("delta_tof_s", "log_ratio_np", "slice_z_m", "roi"):
-        assert np.array_equal(getattr(found, name), getattr(moved, name)), name
-    assert found.delta_tof_s.shape == found.log_ratio_np.shape == (3, 10, 10)
-    assert found.truth.axes == "x,y,z"
-    assert found.truth.sound_speed_mps.shape == found.truth.attenuation_np_m.shape == found.roi.shape
-    assert found.truth.origin_m[2] == found.slice_z_m[0]
-    assert found.truth.spacing_m[2] == pytest.approx(np.diff(found.slice_z_m)[0])
-    assert found.amplitude_frequency_hz == 7.5e6
-    assert found.water_attenuation_np_m == 0.0
+        assert np.array_equal(getattr(dataset, name), getattr(moved, name)), name
+    assert dataset.delta_tof_s.shape == dataset.log_ratio_np.shape == (3, 10, 10)
+    assert dataset.truth.axes == "x,y,z"
+    assert dataset.truth.sound_speed_mps.shape == dataset.truth.attenuation_np_m.shape == dataset.roi.shape
+    assert dataset.truth.origin_m[2] == dataset.slice_z_m[0]
+    assert dataset.truth.spacing_m[2] == pytest.approx(np.diff(dataset.slice_z_m)[0])
+    assert dataset.amplitude_frequency_hz == 7.5e6
+    assert dataset.water_attenuation_np_m == 0.0
 
 
 def test_each_slice_is_the_scan_of_its_plane(moved):
@@ -43,19 +43,19 @@ def test_each_slice_is_the_scan_of_its_plane(moved):
 
 
 def test_moved_ring_in_space_is_the_diagonal_of_all_rings_at_once(tmp_path):
-    one, all_at_once = (simulate(replace(IN_SPACE, array=array)) for array in ("moved", "rings"))
+    first, all_at_once = (simulate(replace(IN_SPACE, array=array)) for array in ("moved", "rings"))
     assert all_at_once.element_position_m.shape == (30, 3)
     assert all_at_once.slice_z_m is None
     for k in range(3):
         own = slice(10 * k, 10 * k + 10)
-        assert np.array_equal(all_at_once.delta_tof_s[own, own], one.delta_tof_s[k])
-        assert np.array_equal(all_at_once.log_ratio_np[own, own], one.log_ratio_np[k])
+        assert np.array_equal(all_at_once.delta_tof_s[own, own], first.delta_tof_s[k])
+        assert np.array_equal(all_at_once.log_ratio_np[own, own], first.log_ratio_np[k])
     assert np.isfinite(all_at_once.delta_tof_s).all()
     write_dataset(tmp_path / "rings.h5", all_at_once)
-    found = read_dataset(tmp_path / "rings.h5")
-    assert found.array_type == "rings"
-    assert np.array_equal(found.element_position_m, all_at_once.element_position_m)
-    assert np.array_equal(found.delta_tof_s, all_at_once.delta_tof_s)
+    dataset = read_dataset(tmp_path / "rings.h5")
+    assert dataset.array_type == "rings"
+    assert np.array_equal(dataset.element_position_m, all_at_once.element_position_m)
+    assert np.array_equal(dataset.delta_tof_s, all_at_once.delta_tof_s)
 
 
 def test_noise_has_the_requested_ratio(moved):

@@ -46,18 +46,18 @@ def test_the_object_is_picked_slower_than_water_through_fat(scan):
 
 def test_the_vertical_slice_has_water_above_the_chest(scan):
     upright = VerticalWaveSettings(**asdict(SMALL))
-    found = simulate(upright)
-    assert found.title.startswith("2-D breast phantom (Li 2008, Table 6), vertical slice, 50 mm")
-    np.testing.assert_array_equal(found.waveform.water, scan.waveform.water)
-    assert (found.truth.sound_speed_mps[:, -8:] == SMALL.coupling_mps).all()
+    traces = simulate(upright)
+    assert traces.title.startswith("2-D breast phantom (Li 2008, Table 6), vertical slice, 50 mm")
+    np.testing.assert_array_equal(traces.waveform.water, scan.waveform.water)
+    assert (traces.truth.sound_speed_mps[:, -8:] == SMALL.coupling_mps).all()
     # From an element at the top to the next one the direct wave does not pass the object.
-    at = found.element_position_m
-    top = np.argsort(at[found.tx][:, 1])[-1]
-    beside = np.argsort(np.linalg.norm(at - at[found.tx[top]], axis=1))[1]
-    one, water = found.waveform.object[top, beside], found.waveform.water[top, beside]
+    at = traces.element_position_m
+    top = np.argsort(at[traces.tx][:, 1])[-1]
+    beside = np.argsort(np.linalg.norm(at - at[traces.tx[top]], axis=1))[1]
+    first, water = traces.waveform.object[top, beside], traces.waveform.water[top, beside]
     peak = np.abs(water).argmax() + 1
-    assert np.abs(one[:peak] - water[:peak]).max() < 5e-3 * np.abs(water).max()
-    assert np.abs(one - water).max() > 1e-2 * np.abs(water).max()
+    assert np.abs(first[:peak] - water[:peak]).max() < 5e-3 * np.abs(water).max()
+    assert np.abs(first - water).max() > 1e-2 * np.abs(water).max()
 
 
 def test_noise_has_the_requested_size(scan):

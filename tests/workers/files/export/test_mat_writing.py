@@ -15,10 +15,10 @@ CONTENT = Content(SPEED, Grid((1.0, 2.0, 3.0), (0.0,) * 3), "a title", {"speed_m
 
 def test_arrays_come_back_by_name(tmp_path):
     mat_writing.write(tmp_path / "v.mat", CONTENT)
-    found = loadmat(tmp_path / "v.mat")
-    np.testing.assert_array_equal(found["speed_mps"], SPEED)
-    np.testing.assert_array_equal(found["spacing_m"], [[1.0, 2.0, 3.0]])
-    assert (found["axes"].item(), found["title"].item()) == ("x,y,z", "a title")
+    arrays = loadmat(tmp_path / "v.mat")
+    np.testing.assert_array_equal(arrays["speed_mps"], SPEED)
+    np.testing.assert_array_equal(arrays["spacing_m"], [[1.0, 2.0, 3.0]])
+    assert (arrays["axes"].item(), arrays["title"].item()) == ("x,y,z", "a title")
 
 
 def test_the_same_arrays_give_the_same_bytes(tmp_path, monkeypatch):
