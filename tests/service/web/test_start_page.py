@@ -150,9 +150,19 @@ def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, address,
         else:
             route.continue_()
 
+    asked: list[str] = []
+
+    def unready(route):
+        asked.append(route.request.method)
+        # As nginx answers for a service that restarts.
+        if asked.count("HEAD") == 1:
+            route.fulfill(status=502)
+        else:
+            route.continue_()
+
     page.route(
         "**/v1/uploads/*",
-        lambda route: broken(route) if route.request.method == "PATCH" else route.continue_(),
+        lambda route: broken(route) if route.request.method == "PATCH" else unready(route),
     )
     page.goto(address)
     page.reload()

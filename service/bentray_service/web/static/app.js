@@ -107,7 +107,7 @@ at("skip").addEventListener("click", (event) => {
   at("page").focus();
 });
 showHealth();
-if (await admitted(request)) {
+if (await admitted()) {
   addEventListener("hashchange", () => openPage(false));
   openPage(true);
 } else if (at("key").hidden) {

@@ -1,5 +1,5 @@
 // Changes of jobs as they happen: one stream of server-sent events, opened again when it ends.
-import { authorization } from "../parts/key.js";
+import { authorization } from "../parts/api.js";
 
 const STREAM = "/v1/events";
 const SOON_MS = 200;

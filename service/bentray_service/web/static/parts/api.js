@@ -1,6 +1,21 @@
 // Requests to the service; every failure is an Error whose message can be shown as it is, a refusal has its problem.
 
-import { authorization } from "./key.js";
+const STORED = { key: "bentray-key", project: "bentray-project" };
+
+// What this tab keeps until it is closed: the API key ("key") and the project in which it works ("project"); null without.
+export const kept = (name) => sessionStorage.getItem(STORED[name]);
+
+// Without a value it is forgotten.
+export function keep(name, value) {
+  if (value) sessionStorage.setItem(STORED[name], value);
+  else sessionStorage.removeItem(STORED[name]);
+}
+
+// The headers of every request.
+export function authorization() {
+  const [key, project] = [kept("key"), kept("project")];
+  return { ...(key && { Authorization: `Bearer ${key}` }), ...(project && { "Bentray-Project": project }) };
+}
 
 // What was found in a field, or in a file as a whole.
 function foundIn({ field, found, accepted }) {
@@ -26,19 +41,22 @@ export function lost() {
   return new Error(LOST);
 }
 
-export async function request(path, options = {}) {
+// The response to a request that was not refused.
+export async function respond(path, options = {}) {
   let response;
   try {
     response = await fetch(path, { ...options, headers: { ...options.headers, ...authorization() } });
-  } catch {
-    throw lost();
+  } catch (error) {
+    throw options.signal?.aborted ? error : lost();
   }
   report(true);
-  const body = await response.json().catch(() => ({ title: "The service failed", detail: `status ${response.status}` }));
-  if (response.status === 401) document.dispatchEvent(new CustomEvent("locked", { detail: inWords(body) }));
-  if (!response.ok) throw Object.assign(new Error(inWords(body)), { problem: body });
-  return body;
+  if (response.ok) return response;
+  const problem = await response.json().catch(() => ({ title: "The service failed", detail: `status ${response.status}` }));
+  if (response.status === 401) document.dispatchEvent(new CustomEvent("locked", { detail: inWords(problem) }));
+  throw Object.assign(new Error(inWords(problem)), { problem, response });
 }
+
+export const request = async (path, options) => (await respond(path, options)).json();
 
 // A request with a JSON body.
 export function send(method, path, body, headers = {}) {

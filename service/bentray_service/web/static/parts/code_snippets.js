@@ -1,4 +1,5 @@
 // The view of a result as code: Python with the client of Bentray, and curl.
+import { kept } from "./api.js";
 import { queryOf } from "./views.js";
 
 export function pythonOf({ job, volume }, stored) {
@@ -16,6 +17,6 @@ export function pythonOf({ job, volume }, stored) {
 
 export function curlOf({ volume }, stored) {
   const query = queryOf({ format: "npy", quantity: stored });
-  const key = sessionStorage.getItem("bentray-key") ? ' -H "Authorization: Bearer $BENTRAY_KEY"' : "";
+  const key = kept("key") ? ' -H "Authorization: Bearer $BENTRAY_KEY"' : "";
   return `curl${key} -o ${stored}.npy '${location.origin}${volume.links.data}?${query}'\n`;
 }

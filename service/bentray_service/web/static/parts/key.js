@@ -1,31 +1,11 @@
 // Who uses this tab: with an API key, kept until the tab is closed and in no address, or signed in at an OpenID provider.
+import { authorization, keep, kept, request, respond } from "./api.js";
 import { at } from "./dom.js";
 import { html, useEffect, useRef } from "./view.js";
 
-const STORED = "bentray-key";
-const PROJECT = "bentray-project";
-
-// The headers of every request: the key, and the project in which this tab works.
-export function authorization() {
-  const key = sessionStorage.getItem(STORED);
-  const project = sessionStorage.getItem(PROJECT);
-  return { ...(key && { Authorization: `Bearer ${key}` }), ...(project && { "Bentray-Project": project }) };
-}
-
 // Whether requests need headers, which elements and links cannot send.
-function hasHeaders() {
-  return Object.keys(authorization()).length > 0;
-}
-
-function hasKey() {
-  return sessionStorage.getItem(STORED) !== null;
-}
-
-async function blobOf(address) {
-  const response = await fetch(address, { headers: authorization() });
-  if (!response.ok) throw new Error(`status ${response.status}`);
-  return response.blob();
-}
+const hasHeaders = () => Object.keys(authorization()).length > 0;
+const blobOf = async (address) => (await respond(address)).blob();
 
 // An element that shows a picture cannot send a key, so that the picture is fetched for it.
 function show(image, address) {
@@ -111,43 +91,41 @@ async function signOut() {
 function requestKey(why) {
   at("key").hidden = false;
   offerSignIn();
-  at("key-error").textContent = hasKey() ? why : "";
-  at("key-error").hidden = !hasKey();
+  at("key-error").textContent = kept("key") ? why : "";
+  at("key-error").hidden = !kept("key");
 }
 
 // The projects of the user, if there are any; choosing one opens the page again in it.
-async function offerProjects(request) {
+async function offerProjects() {
   const { projects } = await request("/v1/projects");
-  const chosen = sessionStorage.getItem(PROJECT) ?? "";
   const select = at("project");
   select.replaceChildren(new Option("No project", ""), ...projects.map(({ id, name }) => new Option(name, id)));
-  select.value = chosen;
+  select.value = kept("project") ?? "";
   select.hidden = !projects.length;
   select.addEventListener("change", () => openIn(select.value));
 }
 
 function openIn(project) {
-  if (project) sessionStorage.setItem(PROJECT, project);
-  else sessionStorage.removeItem(PROJECT);
+  keep("project", project);
   // What the address names belongs to the project before.
   location.hash = "#/";
   location.reload();
 }
 
 // Show the identity of the user; returns whether the service accepts the key.
-export async function admitted(request) {
+export async function admitted() {
   document.addEventListener("locked", (event) => requestKey(event.detail));
   at("key").addEventListener("submit", (event) => {
     event.preventDefault();
-    sessionStorage.setItem(STORED, new FormData(event.target).get("key").trim());
+    keep("key", new FormData(event.target).get("key").trim());
     location.reload();
   });
   let leave = () => {
-    sessionStorage.removeItem(STORED);
+    keep("key", null);
     location.reload();
   };
   at("forget").addEventListener("click", () => leave());
-  at("forget").hidden = !hasKey();
+  at("forget").hidden = !kept("key");
   try {
     const { tenant, how, who, scopes } = await request("/v1/access");
     const names = { open: "Open to this machine", session: who };
@@ -159,11 +137,11 @@ export async function admitted(request) {
       at("forget").textContent = "Sign out";
       at("forget").hidden = false;
     }
-    await offerProjects(request);
+    await offerProjects();
     return true;
   } catch (error) {
     // Removed from the project, or it was deleted.
-    if (error.problem?.field === "project" && sessionStorage.getItem(PROJECT)) openIn("");
+    if (error.problem?.field === "project" && kept("project")) openIn("");
     // Other errors than a missing key are shown with their reason.
     at("access").textContent = at("key").hidden ? error.message : "Authentication required";
     return false;

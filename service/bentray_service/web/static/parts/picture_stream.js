@@ -1,6 +1,5 @@
 // A picture that follows a view: previews while it moves, the full picture once it rests.
-import { inWords } from "./api.js";
-import { authorization } from "./key.js";
+import { respond } from "./api.js";
 
 // The view rests when it has not moved for this long.
 const REST_MS = 150;
@@ -32,13 +31,7 @@ export function pictureStream(canvas, { onShown = () => {}, onError = () => {} }
 
   async function draw(view, quality, signal) {
     const begun = performance.now();
-    const response = await fetch(view[quality], { headers: authorization(), signal });
-    if (!response.ok) {
-      const problem = await response.json().catch(() => ({ title: "No image", detail: `status ${response.status}` }));
-      throw Object.assign(new Error(inWords(problem)), {
-        retryMs: response.status === 429 ? 1000 * Number(response.headers.get("Retry-After") || 1) : null,
-      });
-    }
+    const response = await respond(view[quality], { signal });
     const bitmap = await createImageBitmap(await response.blob());
     lastMs = performance.now() - begun;
     present(view, quality, bitmap, signal);
@@ -88,12 +81,12 @@ export function pictureStream(canvas, { onShown = () => {}, onError = () => {} }
       await draw(view, quality, one.controller.signal);
     } catch (error) {
       if (!one.controller.signal.aborted) {
-        if (error.retryMs) {
+        if (error.response?.status === 429) {
           view.requested = view.shown;
-          waitUntil = performance.now() + Math.min(error.retryMs, MAX_WAIT_MS);
+          waitUntil = performance.now() + Math.min(1000 * Number(error.response.headers.get("Retry-After") || 1), MAX_WAIT_MS);
         } else {
           view.shown = "full";
-          if (wanted === view && !closed) onError(error.name === "TypeError" ? new Error("The service does not answer.") : error);
+          if (wanted === view && !closed) onError(error);
         }
       }
     }

@@ -1,5 +1,5 @@
 // The quantities of a result: names, units, colours, and where their values come from.
-import { authorization } from "../parts/key.js";
+import { respond } from "../parts/api.js";
 import { Field } from "./field.js";
 import { parseNpy } from "./npy.js";
 
@@ -47,29 +47,18 @@ export function shownOf(stored) {
 }
 
 async function bytesOf(address, onProgress) {
-  const response = await fetch(address, { headers: authorization() });
-  if (!response.ok) {
-    const problem = await response.json().catch(() => ({ title: "The values could not be read", detail: `status ${response.status}` }));
-    throw new Error(`${problem.title}: ${problem.detail}`);
-  }
+  const response = await respond(address);
   const total = Number(response.headers.get("Content-Length")) || 0;
   if (!total) return response.arrayBuffer();
   const bytes = new Uint8Array(total);
   let done = 0;
-  for await (const part of partsOf(response.body.getReader())) {
-    bytes.set(part, done);
-    done += part.length;
+  const reader = response.body.getReader();
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    bytes.set(part.value, done);
+    done += part.value.length;
     onProgress(done / total);
   }
   return bytes.buffer;
-}
-
-async function* partsOf(reader) {
-  for (;;) {
-    const { done, value } = await reader.read();
-    if (done) return;
-    yield value;
-  }
 }
 
 // The values of one result, read once each.

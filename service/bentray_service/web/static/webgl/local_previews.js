@@ -1,5 +1,5 @@
 // Previews that the graphics card of this browser draws while a view moves; the service draws where it cannot or is slow.
-import { authorization } from "../parts/key.js";
+import { respond } from "../parts/api.js";
 import { queryOf } from "../parts/views.js";
 import { parseNpy } from "../viewer/npy.js";
 import { hasGraphicsCard, rayCaster } from "./ray_caster.js";
@@ -27,9 +27,7 @@ export function localPreviews() {
     caster = null;
     try {
       const query = queryOf({ filter, smoothing: smoothing ?? null });
-      const response = await fetch(`${volume.links.coefficients}?${query}`, { headers: authorization() });
-      if (!response.ok) return;
-      const { values, shape } = parseNpy(await response.arrayBuffer());
+      const { values, shape } = parseNpy(await (await respond(`${volume.links.coefficients}?${query}`)).arrayBuffer());
       if (loaded !== key) return;
       const made = rayCaster(document.createElement("canvas"), { values, shape, spacing: volume.spacing_m, filter });
       // The first picture waits for the driver, and says nothing of the others.
@@ -38,8 +36,9 @@ export function localPreviews() {
       if (useless) made.close();
       else caster = made;
       taken = [];
-    } catch {
-      useless = true;
+    } catch (error) {
+      // What the service refuses says nothing of the graphics card.
+      useless = !error.problem;
     }
   }
 
