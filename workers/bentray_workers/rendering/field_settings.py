@@ -40,6 +40,7 @@ class FieldSettings:
         24,
         "Samples along an edge of the cube for rays from outside, n: the table has 36n⁴ entries.",
         Range(4, MAX_SAMPLES),
+        label="Samples per edge",
     )
     inner_samples: int = setting(16, "The same for rays that start on the surface.", Range(4, MAX_SAMPLES))
     divisions: int = setting(

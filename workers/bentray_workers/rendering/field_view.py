@@ -40,18 +40,34 @@ class FieldView:
         "object",
         "object: the mesh in a landscape; mirror-ball: two copies and a reflecting ball; two-mirrors: two "
         "copies side by side.",
+        words={"object": "object alone", "mirror-ball": "two and a ball", "two-mirrors": "two objects"},
     )
     mode: Literal["reflect", "refract", "refract-single", "self", "self-only", "diffuse"] = setting(
         "reflect",
         "Material of the mesh. reflect: a mirror; self: with self-reflection; self-only: the same before a "
         "dark background; refract: glass; refract-single: glass with a single refraction; diffuse: clay, or "
         "its own colours.",
+        label="Material",
+        words={
+            "reflect": "mirror",
+            "refract": "glass",
+            "refract-single": "glass, refracted once",
+            "self": "mirror with self-reflection",
+            "self-only": "self-reflection alone",
+            "diffuse": "clay",
+        },
     )
     lookup: Literal["nearest", "linear", "accurate", "exact", "uv-nearest", "uv-linear"] = setting(
         "accurate",
         "Field lookup of reflected and refracted rays; exact intersects the mesh itself. uv-nearest and "
         "uv-linear, as published (Li 2008, chapter 5), look (u, v) up in the field, and position and normal "
         "in the geometry image: for comparison, with larger errors, and at most 24 samples.",
+        label="Field lookup",
+        words={
+            "exact": "exact (no field)",
+            "uv-nearest": "published, nearest (u, v)",
+            "uv-linear": "published, linear (u, v)",
+        },
     )
     eye: Literal["nearest", "linear", "accurate", "exact", "uv-nearest", "uv-linear"] = setting(
         "exact", "The same for camera rays."
@@ -60,23 +76,31 @@ class FieldView:
         1.5,
         "Refractive index of glass.",
         Range(0.1, 10.0),
+        label="Refractive index",
         used_when=({"mode": ("refract", "refract-single")},),
     )
     share: float = setting(
         0.85,
         "Share of reflected or refracted light; the rest is the colour of the mesh.",
         Range(0.0, 1.0),
+        label="Share of the light",
         used_when=({"mode": ("reflect", "refract", "refract-single", "self", "self-only")},),
     )
     camera: Literal["perspective", "orthographic"] = setting("perspective", "Kind of camera.")
     azimuth_deg: float = setting(
-        -60.0, "Azimuth of the camera about the vertical, degrees.", Range(-36000.0, 36000.0)
+        -60.0,
+        "Azimuth of the camera about the vertical, degrees.",
+        Range(-36000.0, 36000.0),
+        label="Azimuth, degrees",
     )
     elevation_deg: float = setting(
-        15.0, "Elevation of the camera above the horizon, degrees.", Range(-89.0, 89.0)
+        15.0,
+        "Elevation of the camera above the horizon, degrees.",
+        Range(-89.0, 89.0),
+        label="Elevation, degrees",
     )
     zoom: float = setting(1.0, "Zoom factor: 1 shows the whole scene, 2 half of it.", Range(0.05, 50.0))
-    up: Literal["z", "y"] = setting("z", "Axis of the mesh that is up.")
+    up: Literal["z", "y"] = setting("z", "Axis of the mesh that is up.", label="Up axis")
     positions_m: tuple[float, ...] = setting(
         (),
         "x and y of each object on the ground, m, as x1, y1, x2, y2 and so on, the ball last; by default "

@@ -48,6 +48,7 @@ class RefractionView:
         (1.5,),
         "Refractive index above each iso-value: one for each, or one.",
         schema={"items": {"type": "number", **INDEX.schema}, "minItems": 1, "maxItems": MAX_ISOS},
+        label="Refractive index",
         used_when=GLASS,
     )
     outside: float = setting(1.0, "Refractive index below the first iso-value.", INDEX, used_when=GLASS)
@@ -61,6 +62,11 @@ class RefractionView:
         "bspline3",
         "Filter between the nodes: " + ", ".join(FILTERS) + ".",
         schema={"enum": list(FILTERS)},
+        words={
+            **{f"bspline{order}": f"B-spline {order}" for order in range(2, 7)},
+            "catmull-rom": "Catmull-Rom",
+            "central": "central differences",
+        },
     )
     smoothing: float | None = setting(
         None,
@@ -71,15 +77,22 @@ class RefractionView:
     )
     camera: Literal["orthographic", "perspective"] = setting("orthographic", "Kind of camera.")
     azimuth_deg: float = setting(
-        30.0, "Azimuth of the camera about the z axis, degrees.", Range(-36000.0, 36000.0)
+        30.0,
+        "Azimuth of the camera about the z axis, degrees.",
+        Range(-36000.0, 36000.0),
+        label="Azimuth, degrees",
     )
     elevation_deg: float = setting(
-        20.0, "Elevation of the camera above the x-y plane, degrees.", Range(-90.0, 90.0)
+        20.0,
+        "Elevation of the camera above the x-y plane, degrees.",
+        Range(-90.0, 90.0),
+        label="Elevation, degrees",
     )
     zoom: float = setting(1.0, "Zoom factor: 1 shows the whole volume, 2 half of it.", Range(0.05, 50.0))
     backdrop: Literal["checkerboard", "picture", "warped-checkerboard", "warped-picture"] = setting(
         "checkerboard",
         "What is behind the volume: a plane with a checkerboard or a picture, or the same on a wavy surface.",
+        words={"warped-checkerboard": "warped checkerboard", "warped-picture": "warped picture"},
         used_when=GLASS,
     )
     squares: int = setting(
@@ -94,6 +107,7 @@ class RefractionView:
     supersampling: Literal["none", "prss", "real"] = setting(
         "prss",
         "prss: more samples of the backdrop after refraction; real: more rays.",
+        words={"prss": "PRSS", "real": "more rays"},
     )
     degree: int = setting(
         1,

@@ -48,7 +48,7 @@ class Turntable(RefractionView):
         InvalidInput: naming the first field that is wrong.
     """
 
-    frames: int = setting(36, "Number of frames.", Range(1, MAX_FRAMES))
+    frames: int = setting(36, "Number of frames.", Range(1, MAX_FRAMES), label="Frames per turn")
     turn_deg: float = setting(
         360.0,
         "Rotation of the camera, degrees; the last frame is one step before the end.",

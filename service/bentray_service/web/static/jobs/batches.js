@@ -1,12 +1,11 @@
 // Batches of reconstructions above the table of jobs: one with its settings, or the newest, each with one progress.
 import { request } from "../parts/api.js";
 import { Alert, Button, html, useAct, useRead } from "../parts/view.js";
-import { UNFINISHED } from "./followed_jobs.js";
+import { IDLE_MS, isUnfinished } from "./followed_jobs.js";
 import { duration, moment } from "./job_words.js";
 
 const SHOWN = 5;
 const BUSY_MS = 2000;
-const IDLE_MS = 15000;
 const STATES = ["succeeded", "failed", "cancelled", "cancelling", "running", "queued"];
 
 function Batch({ batch, act }) {
@@ -26,7 +25,7 @@ function Batch({ batch, act }) {
 // One batch, or without an id the newest.
 export function Batches({ id }) {
   const read = async () => (id ? [await request(`/v1/batches/${id}`)] : (await request(`/v1/batches?limit=${SHOWN}`)).batches);
-  const busy = (batches) => batches?.some((batch) => UNFINISHED.includes(batch.state));
+  const busy = (batches) => batches?.some(isUnfinished);
   const [batches, error, refresh] = useRead(read, (found) => (busy(found) ? BUSY_MS : IDLE_MS));
   const [failure, attempt] = useAct();
   const act = (address) => attempt(async () => {

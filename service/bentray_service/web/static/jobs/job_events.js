@@ -29,29 +29,28 @@ export function jobEvents({ onChange, onOpen }) {
   let controller = null;
   let timer = 0;
   let wait = LATER_MS;
-  let closed = false;
 
   async function connect() {
     clearTimeout(timer);
-    if (closed || document.hidden || controller) return;
-    const mine = new AbortController();
-    controller = mine;
-    let opened = false;
+    if (document.hidden || controller) return;
+    controller = new AbortController();
+    const { signal } = controller;
+    let pause = SOON_MS;
     try {
-      const response = await fetch(STREAM, { headers: authorization(), signal: mine.signal, cache: "no-store" });
+      const response = await fetch(STREAM, { headers: authorization(), signal, cache: "no-store" });
       if (!response.ok) throw new Error(`status ${response.status}`);
-      opened = true;
       wait = LATER_MS;
       onOpen(true);
-      for await (const change of changesIn(response.body)) if (!mine.signal.aborted) onChange(change);
+      for await (const change of changesIn(response.body)) if (!signal.aborted) onChange(change);
     } catch {
-      if (!mine.signal.aborted) opened = false;
+      if (signal.aborted) return;
+      onOpen(false);
+      pause = wait;
+      wait = Math.min(2 * wait, LATEST_MS);
     }
-    if (mine.signal.aborted) return;
+    if (signal.aborted) return;
     controller = null;
-    if (!opened) onOpen(false);
-    timer = setTimeout(connect, opened ? SOON_MS : wait);
-    if (!opened) wait = Math.min(2 * wait, LATEST_MS);
+    timer = setTimeout(connect, pause);
   }
 
   function drop() {
@@ -60,15 +59,10 @@ export function jobEvents({ onChange, onOpen }) {
     controller = null;
   }
 
-  function follow() {
-    if (document.hidden) drop();
-    else connect();
-  }
-
+  const follow = () => (document.hidden ? drop() : connect());
   document.addEventListener("visibilitychange", follow);
   connect();
   return () => {
-    closed = true;
     document.removeEventListener("visibilitychange", follow);
     drop();
   };

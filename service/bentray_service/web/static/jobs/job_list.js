@@ -2,7 +2,7 @@
 import { linkTo } from "../parts/address.js";
 import { request } from "../parts/api.js";
 import { loadTitles, titleOfJob } from "../parts/titles.js";
-import { Alert, html, useAct } from "../parts/view.js";
+import { Alert, html } from "../parts/view.js";
 import { useJobs } from "./followed_jobs.js";
 import { JobCard } from "./job_cards.js";
 
@@ -13,7 +13,7 @@ const MOST = 6;
 // { current } that gets a function that reads them again.
 export function JobList({ empty = "", filters = {}, read, onJobs, refresh = {} }) {
   const query = new URLSearchParams(filters);
-  const [jobs, error, again] = useJobs({
+  const [jobs, error, again, change] = useJobs({
     async read() {
       const found = await (read ? read() : request(`/v1/jobs?${query}`).then((answer) => answer.jobs));
       await loadTitles(found);
@@ -21,17 +21,12 @@ export function JobList({ empty = "", filters = {}, read, onJobs, refresh = {} }
     },
     onJobs,
   });
-  const [failure, act] = useAct();
-  const cancel = (job) => act(async () => {
-    await request(job.links.cancel, { method: "POST" });
-    await again();
-  });
   refresh.current = again;
   return html`
-    <${Alert} id="jobs-error" error=${failure ?? error} />
+    <${Alert} id="jobs-error" error=${error} />
     <p class="empty" hidden=${!jobs || jobs.length > 0}>${empty}</p>
     <ul class="jobs" id="jobs">
-      ${jobs?.slice(0, MOST).map((job) => html`<${JobCard} key=${job.id} job=${job} onCancel=${() => cancel(job)}
+      ${jobs?.slice(0, MOST).map((job) => html`<${JobCard} key=${job.id} job=${job} onCancel=${() => change(job.links.cancel, "POST")}
         title=${titleOfJob(job) || job.dataset || job.volume || job.mesh} />`)}
     </ul>
     <p class="links" hidden=${!(jobs?.length > MOST)}><a href=${linkTo("/jobs", query)}>All in the table of jobs</a></p>`;

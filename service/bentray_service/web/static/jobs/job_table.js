@@ -4,7 +4,7 @@ import { inTime } from "../parts/amounts.js";
 import { request } from "../parts/api.js";
 import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { loadTitles, titleOfJob } from "../parts/titles.js";
-import { Alert, Button, html, Labelled, Options, useAct, useEffect, useRef, useState } from "../parts/view.js";
+import { Alert, Button, html, Labelled, Options, useEffect, useRef, useState } from "../parts/view.js";
 import { useJobs } from "./followed_jobs.js";
 import { duration, inWords, methodOf, moment } from "./job_words.js";
 
@@ -84,7 +84,6 @@ export function JobTable({ query: first, words }) {
   const [query, setQuery] = useState(pick(first, ["batch", "text", "state", "kind", "before"]));
   const newest = useRef(query);
   const [older, setOlder] = useState("");
-  const [failure, attempt] = useAct();
 
   async function read() {
     for (;;) {
@@ -98,11 +97,7 @@ export function JobTable({ query: first, words }) {
     }
   }
 
-  const [jobs, error, refresh] = useJobs({ read });
-  const act = (address, method) => attempt(async () => {
-    await request(address, { method });
-    await refresh();
-  });
+  const [jobs, error, refresh, act] = useJobs({ read });
 
   function change(filters) {
     // The page of a batch stays that of the batch.
@@ -120,7 +115,7 @@ export function JobTable({ query: first, words }) {
   const count = jobs?.length === 1 ? "1 job" : `${jobs?.length} jobs`;
   return html`
     <${JobFilters} words=${words} query=${query} onChange=${change} hidden=${!jobs || (none && !query.size)} />
-    <${Alert} error=${failure ?? error} />
+    <${Alert} error=${error} />
     <p class="facts" role="status">
       ${jobs?.length > 0 && `${count}${older ? " on this page, and older ones" : ""}`}
       ${none && filtered && "No job matches these filters."}

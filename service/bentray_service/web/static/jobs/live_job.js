@@ -1,7 +1,7 @@
 // An unfinished job: what happens now, even progress with the time left, the image and the misfit so far; a failure with its reason.
 import { inWords, request } from "../parts/api.js";
 import { loadTitles, titleOfJob } from "../parts/titles.js";
-import { Alert, Button, html, useAct, useEffect, useReducer, useRef, useState } from "../parts/view.js";
+import { Alert, Button, html, useEffect, useNewest, useRead, useReducer, useRef, useState } from "../parts/view.js";
 import { useJobs } from "./followed_jobs.js";
 import { Plan } from "./job_cards.js";
 import { duration, methodOf, placeInQueue, summaryOf } from "./job_words.js";
@@ -55,16 +55,11 @@ function advice({ kind, error: { type, field } }) {
   return field ? " Change this and run it again." : " Run it again with fewer nodes, or examine the scan.";
 }
 
-// Calls work() every so often; a new drawing follows.
-function useTicks(work) {
+// Draws again every so often.
+function useTicks() {
   const [, draw] = useReducer((count) => count + 1, 0);
-  const newest = useRef(work);
-  newest.current = work;
   useEffect(() => {
-    const ticking = setInterval(() => {
-      newest.current();
-      draw();
-    }, TICK_MS);
+    const ticking = setInterval(draw, TICK_MS);
     return () => clearInterval(ticking);
   }, []);
 }
@@ -87,44 +82,34 @@ function Progress({ job, estimate, elapsed }) {
     <p class="facts live-time">${words.filter(Boolean).join(" · ")}</p>`;
 }
 
-// The preview after the newest progress, asked for by ask(); without one yet it is null.
+// The preview after the newest progress; null before the first one.
 function usePreview(job) {
-  const [record, setRecord] = useState(null);
-  const last = useRef({ key: "", time: -Infinity });
-  async function ask() {
-    const { phase, done } = job.progress;
-    const key = `${phase} ${done} ${job.history.length}`;
-    const soon = performance.now() - last.current.time < PREVIEW_MS;
-    if (soon || key === last.current.key || !job.links.preview || !done || phase !== "reconstructing") return;
-    last.current = { key, time: Infinity };
-    // There may be none yet, or no longer.
-    const found = await request(job.links.preview).catch(() => null);
-    last.current.time = performance.now();
-    if (found) setRecord(found);
-  }
-  return [record, ask];
+  const newest = useNewest(job);
+  const last = useRef({ key: "", record: null });
+  const [record] = useRead(async () => {
+    const { state, links, history, progress: { phase, done } } = newest.current;
+    const key = `${phase} ${done} ${history.length}`;
+    if (state === "running" && links.preview && done && phase === "reconstructing" && key !== last.current.key) {
+      // There may be none yet, or no longer.
+      const found = await request(links.preview).catch(() => null);
+      last.current = { key, record: found ?? last.current.record };
+    }
+    return last.current.record;
+  }, () => PREVIEW_MS);
+  return record;
 }
 
-// Whether the workers compile, asked for by ask().
-function useCompiling() {
-  const [compiling, setCompiling] = useState(false);
-  const last = useRef(-Infinity);
-  async function ask() {
-    if (performance.now() - last.current < WORKERS_MS) return;
-    last.current = performance.now();
-    const { workers } = await request("/v1/cluster").catch(() => ({ workers: [] }));
-    setCompiling(workers.some((worker) => worker.compiling));
-  }
-  return [compiling, ask];
+// Whether the workers compile, while a job waits for them.
+function useCompiling(waits) {
+  const read = async () => waits && (await request("/v1/cluster")).workers.some((worker) => worker.compiling);
+  const [compiling] = useRead(read, () => (waits ? WORKERS_MS : null), waits);
+  return compiling;
 }
 
-function Links({ job, act, refresh }) {
-  const cancel = async ({ currentTarget: button }) => {
+function Links({ job, change }) {
+  const cancel = ({ currentTarget: button }) => {
     button.disabled = true;
-    await act(async () => {
-      await request(job.links.cancel, { method: "POST" });
-      await refresh();
-    });
+    change(job.links.cancel, "POST");
   };
   const ended = job.kind === "reconstruction" && ["failed", "cancelled"].includes(job.state);
   return html`<div class="links live-links">
@@ -142,7 +127,7 @@ export function LiveJob({ first, onSuccess }) {
   // When the running time of the job was received.
   const clock = useRef({ seconds: first.seconds, received: performance.now() });
   const elapsedOf = (job) => (job.seconds ?? 0) + (job.state === "running" ? (performance.now() - clock.current.received) / 1e3 : 0);
-  const [jobs, error, refresh] = useJobs({
+  const [jobs, error, , change] = useJobs({
     historyMs: HISTORY_MS,
     // Alone, since lists do not count the jobs before it.
     async read() {
@@ -160,19 +145,15 @@ export function LiveJob({ first, onSuccess }) {
     },
   });
   const job = jobs?.[0] ?? first;
-  const [failure, act] = useAct();
-  const [preview, askPreview] = usePreview(job);
-  const [compiling, askWorkers] = useCompiling();
+  const preview = usePreview(job);
   const running = job.state === "running";
+  const compiling = useCompiling(running && !job.progress.done);
   const seen = useRef(false);
   seen.current ||= running && job.kind === "reconstruction";
-  useTicks(() => {
-    if (running && !job.progress.done) askWorkers();
-    if (running && seen.current) askPreview();
-  });
+  useTicks();
   const [summary, settings] = summaryOf(job);
   const what = job.kind === "reconstruction" ? methodOf(job) : summary;
-  const problem = job.error ? `${inWords(job.error)}${advice(job)}` : failure ?? error;
+  const problem = job.error ? `${inWords(job.error)}${advice(job)}` : error;
   return html`
     <p class="crumb"><a href="#/jobs">Jobs</a>
       ${job.dataset && job.kind === "reconstruction" && html`<span class="live-scan"> · <a href=${`#/scans/${job.dataset}`}>Scan</a></span>`}
@@ -184,7 +165,7 @@ export function LiveJob({ first, onSuccess }) {
       <${Progress} job=${job} estimate=${estimate} elapsed=${elapsedOf(job)} />
       <div class="live-plan">${job.plan && html`<${Plan} plan=${job.plan} />`}</div>
       <${Alert} className="live-error" error=${problem} />
-      <${Links} job=${job} act=${act} refresh=${refresh} />
+      <${Links} job=${job} change=${change} />
     </section>
     ${seen.current && html`<section class="live-views" aria-label="Image and misfit so far">
       <${PreviewPicture} record=${preview} what=${comparesModels(job.history) ? "candidate method" : "slice"} />

@@ -5,7 +5,7 @@ import { KeyLink, Picture } from "../parts/key.js";
 import { planInWords, planOf, waitInWords } from "../parts/plan_estimate.js";
 import { readSettings, SettingsForm, useSettings } from "../parts/settings_form.js";
 import { titleOf } from "../parts/titles.js";
-import { Alert, Button, Facts, Form, html, useAct, useEffect, useLater, useRead, useRef, useState } from "../parts/view.js";
+import { Alert, Button, Facts, Form, html, useAct, useAsked, useEffect, useRead, useRef, useState } from "../parts/view.js";
 import { Elements, inWordsOf } from "../scans/scan_drawing.js";
 import { ScanEditor } from "../scans/scan_edit.js";
 import { factRows, Quality } from "../scans/scan_facts.js";
@@ -34,21 +34,18 @@ function Preset({ id, name, title, words, scan, changes }) {
 
 // The plan of the settings in the form, in words: [words, later]; later() asks for it a moment after a change.
 function usePlan(scan, form) {
+  const [estimate, error, ask] = useAsked(PLAN_MS);
   const [words, setWords] = useState("");
-  const wait = useLater();
-  const number = useRef(0);
-  // A setting that the service refuses is told at its field before anything is started.
   async function plan() {
-    number.current += 1;
-    const mine = number.current;
     const settings = form.changed(false);
-    if (!settings) return setWords("");
-    const [estimate, refused] = await planOf({ kind: "reconstruction", dataset: scan.id, settings }).then((found) => [found], (error) => [null, error]);
-    if (mine !== number.current) return undefined;
-    if (estimate) return setWords(`${planInWords(estimate)}. ${estimate.basis}`);
-    return setWords(form.refuse(refused.problem ?? {}, false) ? "" : refused.message);
+    return settings && planOf({ kind: "reconstruction", dataset: scan.id, settings });
   }
-  return [words, () => wait(plan, PLAN_MS)];
+  useEffect(() => {
+    // A setting that the service refuses is told at its field before anything is started.
+    if (error) setWords(form.refuse(error.problem ?? {}, false) ? "" : error.message);
+    else setWords(estimate ? `${planInWords(estimate)}. ${estimate.basis}` : "");
+  }, [estimate, error]);
+  return [words, () => ask(plan)];
 }
 
 // from: the id of a job whose settings are run again with changes; changes: of jobs; onStarted() is called after a start.

@@ -5,7 +5,7 @@ import { request, send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
 import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { titleOf } from "../parts/titles.js";
-import { Alert, Button, Facts, Form, html, Labelled, Options, useAct, useEffect, useRef, useShown, useState } from "../parts/view.js";
+import { Alert, Button, Facts, Form, html, Labelled, Options, useAct, useAsked, useEffect, useRef, useShown, useState } from "../parts/view.js";
 
 // Scans on one page of the list.
 const PAGE_LENGTH = 25;
@@ -76,19 +76,11 @@ function Sample() {
 // changes: a number that grows when the list is to be read again.
 function Scans({ first, changes }) {
   const [query, setQuery] = useState(first);
-  const [found, setFound] = useState(null);
-  const [error, act] = useAct();
-  useEffect(() => {
-    let newest = true;
-    act(async () => {
-      const answer = await request(`/v1/datasets?${new URLSearchParams([...query, ["limit", PAGE_LENGTH]])}`);
-      // The text may have been changed in the meantime.
-      if (newest) setFound({ ...answer, query });
-    });
-    return () => {
-      newest = false;
-    };
-  }, [query, changes]);
+  const [found, error, ask] = useAsked();
+  useEffect(() => ask(async () => {
+    const answer = await request(`/v1/datasets?${new URLSearchParams([...query, ["limit", PAGE_LENGTH]])}`);
+    return { ...answer, query };
+  }), [query, changes]);
   const search = (changed) => {
     keepQuery(changed);
     setQuery(changed);

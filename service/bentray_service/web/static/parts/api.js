@@ -56,7 +56,11 @@ export async function respond(path, options = {}) {
   throw Object.assign(new Error(inWords(problem)), { problem, response });
 }
 
-export const request = async (path, options) => (await respond(path, options)).json();
+// What the service answers, null for nothing.
+export async function request(path, options) {
+  const response = await respond(path, options);
+  return response.status === 204 ? null : response.json();
+}
 
 // A request with a JSON body.
 export function send(method, path, body, headers = {}) {

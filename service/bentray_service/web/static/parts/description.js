@@ -11,3 +11,11 @@ export function description() {
   });
   return asked;
 }
+
+// The JSON schemas of the properties of a record, and of the parameters of a GET request, by name.
+export const propertiesOf = async (schema) => (await description()).components.schemas[schema].properties;
+
+export async function parametersOf(path) {
+  const { parameters } = (await description()).paths[path].get;
+  return Object.fromEntries(parameters.map(({ name, schema }) => [name, schema]));
+}

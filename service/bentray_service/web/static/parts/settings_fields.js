@@ -1,8 +1,8 @@
 // One field of a form for each setting, made from its description in JSON Schema: label, unit, bounds, choices, default.
-import { html, Options } from "./view.js";
+import { html, Labelled, Options } from "./view.js";
 
-// What remains of a schema that also accepts null.
-const without = (schema) => ({ ...schema, ...(schema.anyOf?.find((branch) => branch.type !== "null") ?? {}) });
+// What remains of a schema that also accepts null, or several values of one kind.
+const without = (schema) => ({ ...schema, ...(schema.anyOf?.find((branch) => branch.type !== "null") ?? {}), ...schema.items });
 
 const number = (value) => Number(value).toString();
 const captionOf = (schema) => schema["x-label"] ?? schema.title;
@@ -70,6 +70,14 @@ function kindOf(schema) {
 export function settingOf(path, given) {
   const schema = without(given);
   return { path: path.join("."), schema, kind: kindOf(schema), nullable: Boolean(given.anyOf) };
+}
+
+// A setting below its caption, without words about it, as on a small form. value: the one to begin with, by default that of the schema.
+export function PlainField({ name, given, value = given.default, ...more }) {
+  const { schema, kind, nullable } = settingOf([name], given);
+  return html`<${Labelled} caption=${captionOf(schema)} title=${schema.description}>
+    <${KINDS[kind].inputs} schema=${schema} nullable=${nullable} value=${value} name=${name} step=${schema.type === "integer" ? "1" : "any"} ...${more} />
+  </${Labelled}>`;
 }
 
 const inputsOf = (form, { path }) => [...form.querySelector(`[data-path="${path}"]`).querySelectorAll("input, select")];

@@ -76,28 +76,46 @@ export function useAct() {
   return [error, act, setError];
 }
 
-// [value, error, refresh] of read(), which is read again after waitOf(value) milliseconds while the tab is seen, null: not again; and anew
-// for another key.
+// [value, error, refresh, readIn] of read(), which is read again after waitOf(value, error) milliseconds while the tab is seen, null: not
+// again; and anew for another key. readIn(milliseconds): again after a time, unless that is done earlier anyway.
 export function useRead(read, waitOf = () => null, key = "") {
   const [{ value, error }, setState] = useState({ value: null, error: null });
-  const refresh = useRef(null);
+  const reader = useRef(null);
   useEffect(() => {
-    let [closed, timer, last] = [false, 0, null];
-    refresh.current = async () => {
-      clearTimeout(timer);
-      let problem = null;
-      last = await read().catch((thrown) => {
+    let [closed, timer, due, reading] = [false, 0, Infinity, null];
+    let [last, problem] = [null, null];
+    async function readNow() {
+      try {
+        [last, problem] = [await read(), null];
+      } catch (thrown) {
         problem = thrown;
-        return last;
-      });
+      }
+      reading = null;
       if (closed) return;
       setState({ value: last, error: problem });
-      const wait = waitOf(last);
-      if (wait !== null && !document.hidden) timer = setTimeout(refresh.current, wait);
+      const wait = waitOf(last, problem);
+      if (wait !== null && !document.hidden) reader.current.readIn(wait);
+    }
+    reader.current = {
+      async refresh() {
+        // What is read already may be older than the wish.
+        await reading;
+        clearTimeout(timer);
+        due = Infinity;
+        reading ??= readNow();
+        return reading;
+      },
+      readIn(milliseconds) {
+        const then = performance.now() + milliseconds;
+        if (closed || then >= due) return;
+        due = then;
+        clearTimeout(timer);
+        timer = setTimeout(reader.current.refresh, milliseconds);
+      },
     };
-    const onVisible = () => document.hidden || waitOf(last) === null || refresh.current();
+    const onVisible = () => document.hidden || waitOf(last, problem) === null || reader.current.refresh();
     document.addEventListener("visibilitychange", onVisible);
-    refresh.current();
+    reader.current.refresh();
     return () => {
       closed = true;
       clearTimeout(timer);
@@ -105,7 +123,23 @@ export function useRead(read, waitOf = () => null, key = "") {
       setState({ value: null, error: null });
     };
   }, [key]);
-  return [value, error, () => refresh.current()];
+  return [value, error, () => reader.current.refresh(), (milliseconds) => reader.current.readIn(milliseconds)];
+}
+
+// [value, error, ask]: what the newest ask(read) gave. read() begins some time after the last call; what a newer one overtakes is forgotten.
+export function useAsked(milliseconds = 0) {
+  const [{ value, error }, setState] = useState({ value: null, error: null });
+  const number = useRef(0);
+  const later = useLater();
+  const ask = (read) => {
+    number.current += 1;
+    const mine = number.current;
+    later(async () => {
+      const answer = await read().then((found) => ({ value: found, error: null }), (problem) => ({ error: problem }));
+      if (mine === number.current) setState((before) => ({ ...before, ...answer }));
+    }, milliseconds);
+  };
+  return [value, error, ask];
 }
 
 // later(work, milliseconds) puts off the work that waited before; none is done once the component is gone.

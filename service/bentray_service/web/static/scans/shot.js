@@ -1,6 +1,6 @@
 // The shot of a scan: which emission, its traces on a canvas, and the arrivals of one receiver as text.
 import { request } from "../parts/api.js";
-import { Alert, Facts, html, Labelled, useAct, useEffect, useLater, useRef, useState } from "../parts/view.js";
+import { Alert, Facts, html, Labelled, useAsked, useEffect, useRef, useState } from "../parts/view.js";
 import { ShotCanvas } from "./shot_canvas.js";
 
 // Between the last movement of the slider and the request.
@@ -39,31 +39,16 @@ function Count({ most, ...more }) {
   return html`<input type="number" min="0" max=${most} step="1" ...${more} />`;
 }
 
-// The shot at an address, read a moment after the address has changed: [shot, error].
-function useShot(address, onEmission) {
-  const [shot, setShot] = useState(null);
-  const [error, act] = useAct();
-  const later = useLater();
-  const wanted = useRef("");
-  useEffect(() => {
-    wanted.current = address;
-    later(() => act(async () => {
-      const found = await request(address);
-      if (address !== wanted.current) return;
-      setShot(found);
-      onEmission(found.element);
-    }), WAIT_MS);
-  }, [address]);
-  return [shot, error];
-}
-
 // hasWater: whether there is a water shot, null while that is unknown; onEmission(element) is told which element emits.
 export function Shot({ scan, hasWater, onEmission }) {
   const [emission, setEmission] = useState(0);
   const [slice, setSlice] = useState(0);
   const [quantity, setQuantity] = useState("object");
   const [cursor, setCursor] = useState(0);
-  const [shot, error] = useShot(`/v1/datasets/${scan.id}/traces?emission=${emission}&slice=${slice}&quantity=${quantity}`, onEmission);
+  const address = `/v1/datasets/${scan.id}/traces?emission=${emission}&slice=${slice}&quantity=${quantity}`;
+  const [shot, error, ask] = useAsked(WAIT_MS);
+  useEffect(() => ask(() => request(address)), [address]);
+  useEffect(() => shot && onEmission(shot.element), [shot]);
   const [canvas, view] = [useRef(null), useRef(null)];
   useEffect(() => {
     view.current = new ShotCanvas(canvas.current);

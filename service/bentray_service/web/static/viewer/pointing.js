@@ -1,4 +1,5 @@
 // Mouse, pen, touch and keys on the canvas of a plane, as actions on the state of the view.
+import { watchPointers } from "../parts/pointers.js";
 import { clampZoom } from "./state.js";
 
 const WHEEL = 1.0015;
@@ -8,18 +9,13 @@ const STILL = 4;
 // Of the window: by a pixel of dragging, and by a key.
 const [DRAG_SHARE, KEY_SHARE] = [1 / 300, 0.05];
 
-// act: { current } with state, view ({ centre, zoom }), window ([low, high]), cursor, setView(centre, zoom), setWindow(low, high),
-// hover(place or null), setCursor(x, y), moveCursor(da, db), moveSlice(by), draw(place), automatic(), reset().
-export function watch(canvas, image, act) {
-  const pressed = new Map();
-  let drag = null;
-  let pinch = null;
-  let anchor = null;
+const draws = ({ tool }) => !["pan", "window"].includes(tool);
 
-  const place = (event) => {
-    const box = canvas.getBoundingClientRect();
-    return [event.clientX - box.left, event.clientY - box.top];
-  };
+// act: { current } with state, view ({ centre, zoom }), window ([low, high]), cursor, setView(centre, zoom), setWindow(low, high),
+// hover(point or null), setCursor(x, y), moveCursor(da, db), moveSlice(by), draw(place), automatic(), reset().
+export function watch(canvas, image, act) {
+  let drag = null;
+  let anchor = null;
 
   // Zoom so that the point under (px, py) stays.
   function zoomAt(px, py, factor) {
@@ -29,78 +25,57 @@ export function watch(canvas, image, act) {
     act.current.setView([x + (image.centre[0] - x) * share, y + (image.centre[1] - y) * share], zoom);
   }
 
-  function begin(event) {
-    if (event.button > 0) return;
-    canvas.setPointerCapture(event.pointerId);
-    pressed.set(event.pointerId, place(event));
-    if (pressed.size === 2) {
-      const [one, other] = [...pressed.values()];
-      pinch = { apart: Math.hypot(one[0] - other[0], one[1] - other[1]) };
-      drag = null;
-      return;
-    }
-    const [px, py] = place(event);
-    drag = { px, py, moved: false, at: image.toPlane(px, py), centre: image.centre, window: act.current.window, scale: image.scale };
+  // The window moved by a share of its width, and widened by a factor.
+  function shift([low, high], by, spread) {
+    const half = ((high - low) / 2) * spread;
+    const level = (low + high) / 2 + by * (high - low);
+    act.current.setWindow(level - half, level + half);
   }
 
-  function move(event) {
-    const [px, py] = place(event);
-    if (pressed.has(event.pointerId)) pressed.set(event.pointerId, [px, py]);
-    if (pinch && pressed.size === 2) {
-      const [one, other] = [...pressed.values()];
-      const apart = Math.hypot(one[0] - other[0], one[1] - other[1]);
-      zoomAt((one[0] + other[0]) / 2, (one[1] + other[1]) / 2, apart / pinch.apart);
-      pinch.apart = apart;
-      return;
-    }
-    act.current.hover([px, py]);
+  function dragTo([px, py]) {
     if (!drag) return;
-    const [dx, dy] = [px - drag.px, py - drag.py];
+    const [dx, dy] = [px - drag.point[0], py - drag.point[1]];
     drag.moved ||= Math.hypot(dx, dy) > STILL;
     if (!drag.moved) return;
     const { tool } = act.current.state;
-    if (tool === "pan") {
-      act.current.setView([drag.centre[0] - dx / drag.scale, drag.centre[1] + dy / drag.scale], act.current.view.zoom);
-    } else if (tool === "window") {
-      const [low, high] = drag.window;
-      const level = (low + high) / 2 - dy * DRAG_SHARE * (high - low);
-      const half = ((high - low) / 2) * Math.exp(dx * DRAG_SHARE * 2);
-      act.current.setWindow(level - half, level + half);
-    } else {
-      act.current.draw([...drag.at, ...image.toPlane(px, py)]);
-    }
+    if (tool === "pan") act.current.setView([drag.centre[0] - dx / drag.scale, drag.centre[1] + dy / drag.scale], act.current.view.zoom);
+    else if (tool === "window") shift(drag.window, -dy * DRAG_SHARE, Math.exp(dx * DRAG_SHARE * 2));
+    else act.current.draw([...drag.at, ...image.toPlane(px, py)]);
   }
 
-  function end(event) {
-    pressed.delete(event.pointerId);
-    if (pressed.size < 2) pinch = null;
-    if (!drag) return;
-    if (!drag.moved) act.current.setCursor(...drag.at);
-    else if (!["pan", "window"].includes(act.current.state.tool)) act.current.draw([...drag.at, ...image.toPlane(...place(event))]);
-    drag = null;
-  }
+  watchPointers(canvas, {
+    press(point) {
+      drag = point && { point, moved: false, at: image.toPlane(...point), centre: image.centre, window: act.current.window, scale: image.scale };
+    },
+    hover: (point) => act.current.hover(point),
+    drag: dragTo,
+    pinch: (factor, middle) => zoomAt(...middle, factor),
+    release(point) {
+      if (drag && !drag.moved) act.current.setCursor(...drag.at);
+      else if (draws(act.current.state)) dragTo(point);
+      drag = null;
+    },
+    cancel() {
+      drag = null;
+    },
+  });
 
   function key(event) {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
     const { clientWidth: width, clientHeight: height } = canvas;
-    const shift = (by, spread) => {
-      const [low, high] = act.current.window;
-      const half = ((high - low) / 2) * spread;
-      const level = (low + high) / 2 + by * (high - low);
-      act.current.setWindow(level - half, level + half);
-    };
-    const drawing = !["pan", "window"].includes(act.current.state.tool);
+    const { window } = act.current;
+    const drawing = draws(act.current.state);
     const actions = {
       "+": () => zoomAt(width / 2, height / 2, STEP),
       "=": () => zoomAt(width / 2, height / 2, STEP),
       "-": () => zoomAt(width / 2, height / 2, 1 / STEP),
       0: () => act.current.reset(),
       a: () => act.current.automatic(),
-      ",": () => shift(-KEY_SHARE, 1),
-      ".": () => shift(KEY_SHARE, 1),
-      "[": () => shift(0, 1 - 2 * KEY_SHARE),
-      "]": () => shift(0, 1 + 2 * KEY_SHARE),
+      ",": () => shift(window, -KEY_SHARE, 1),
+      ".": () => shift(window, KEY_SHARE, 1),
+      "[": () => shift(window, 0, 1 - 2 * KEY_SHARE),
+      "]": () => shift(window, 0, 1 + 2 * KEY_SHARE),
       PageUp: () => act.current.moveSlice(1),
       PageDown: () => act.current.moveSlice(-1),
     };
@@ -126,20 +101,12 @@ export function watch(canvas, image, act) {
     event.preventDefault();
   }
 
-  canvas.addEventListener("pointerdown", begin);
-  canvas.addEventListener("pointermove", move);
-  canvas.addEventListener("pointerup", end);
-  canvas.addEventListener("pointercancel", (event) => {
-    pressed.delete(event.pointerId);
-    drag = pinch = null;
-  });
-  canvas.addEventListener("pointerleave", () => act.current.hover(null));
   canvas.addEventListener("keydown", key);
   canvas.addEventListener(
     "wheel",
     (event) => {
       event.preventDefault();
-      zoomAt(...place(event), WHEEL ** -event.deltaY);
+      zoomAt(event.offsetX, event.offsetY, WHEEL ** -event.deltaY);
     },
     { passive: false },
   );

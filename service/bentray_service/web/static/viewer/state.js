@@ -1,5 +1,6 @@
 // The state of a view, and its form in the address.
 import { NAMES } from "./colormaps.js";
+import { AXES } from "./field.js";
 import { QUANTITIES } from "./quantities.js";
 
 export const TOOLS = { pan: "Move", window: "Window", profile: "Profile", rectangle: "Rectangle", ellipse: "Ellipse" };
@@ -8,67 +9,60 @@ const MOST_ZOOM = 64;
 
 const short = (value) => String(Number(value.toPrecision(8)));
 
-function numbers(text, count) {
-  const found = (text ?? "").split(",").map(Number);
-  return text && found.length === count && found.every(Number.isFinite) ? found : null;
-}
-
 export const clampZoom = (zoom) => Math.min(MOST_ZOOM, Math.max(0.25, zoom));
 
-function freshState() {
-  return {
-    quantity: "speed", map: null, window: null, axis: "z", planes: false, fade: false, cursor: null, views: {},
-    tool: "pan", profile: null, region: null, mode: "side", other: 1, swipe: 0.5,
-  };
-}
+// Kinds of values: read(text) gives undefined for what is wrong.
+const oneOf = (names) => ({ read: (text) => (names.includes(text) ? text : undefined), words: String });
+const flag = (word) => ({ read: (text) => text === word, words: () => word });
+const listOf = (count, accepts = () => true) => ({
+  read(text) {
+    const values = text.split(",").map(Number);
+    return text && values.length === count && values.every(Number.isFinite) && accepts(values) ? values : undefined;
+  },
+  words: (values) => values.map(short).join(","),
+});
+const number = (accepts) => {
+  const { read } = listOf(1, ([value]) => accepts(value));
+  return { read: (text) => read(text)?.[0], words: short };
+};
+
+// Of the state: the parameter of the address, the default, and the kind of the value.
+const FIELDS = {
+  quantity: ["q", "speed", oneOf(Object.keys(QUANTITIES))],
+  map: ["map", null, oneOf(NAMES)],
+  window: ["window", null, listOf(2, ([low, high]) => low < high)],
+  axis: ["axis", "z", oneOf([...AXES])],
+  planes: ["planes", false, flag("3")],
+  fade: ["fade", false, flag("1")],
+  cursor: ["at", null, listOf(3)],
+  tool: ["tool", "pan", oneOf(Object.keys(TOOLS))],
+  profile: ["profile", null, listOf(4)],
+  mode: ["mode", "side", oneOf(Object.keys(MODES))],
+  other: ["other", 1, number((value) => [1, 2, 3].includes(value))],
+  swipe: ["swipe", 0.5, number((value) => value >= 0 && value <= 1)],
+};
+const PLACE = listOf(4);
+const VIEW = listOf(3);
 
 // The state that an address asks for; what is wrong in it is left at its default.
 export function stateOf(query) {
-  const state = freshState();
-  const get = (name) => query.get(name);
-  if (Object.hasOwn(QUANTITIES, get("q") ?? "")) state.quantity = get("q");
-  if (NAMES.includes(get("map"))) state.map = get("map");
-  const window = numbers(get("window"), 2);
-  if (window && window[0] < window[1]) state.window = window;
-  if (["x", "y", "z"].includes(get("axis"))) state.axis = get("axis");
-  state.planes = get("planes") === "3";
-  state.fade = get("fade") === "1";
-  state.cursor = numbers(get("at"), 3);
-  for (const axis of ["x", "y", "z"]) {
-    const view = numbers(get(`view-${axis}`), 3);
+  const state = { views: {}, region: null };
+  for (const [field, [name, usual, { read }]] of Object.entries(FIELDS)) state[field] = (query.has(name) ? read(query.get(name)) : undefined) ?? usual;
+  for (const axis of AXES) {
+    const view = VIEW.read(query.get(`view-${axis}`) ?? "");
     if (view) state.views[axis] = { centre: view.slice(0, 2), zoom: clampZoom(view[2]) };
   }
-  if (Object.hasOwn(TOOLS, get("tool") ?? "")) state.tool = get("tool");
-  state.profile = numbers(get("profile"), 4);
   for (const shape of ["rectangle", "ellipse"]) {
-    const place = numbers(get(shape), 4);
+    const place = PLACE.read(query.get(shape) ?? "");
     if (place) state.region = { shape, place };
   }
-  if (Object.hasOwn(MODES, get("mode") ?? "")) state.mode = get("mode");
-  const other = numbers(get("other"), 1);
-  if (other && [1, 2, 3].includes(other[0])) [state.other] = other;
-  const swipe = numbers(get("swipe"), 1);
-  if (swipe && swipe[0] >= 0 && swipe[0] <= 1) [state.swipe] = swipe;
   return state;
 }
 
 export function queryOfState(state) {
   const query = new URLSearchParams();
-  const usual = freshState();
-  const put = (name, value) => query.set(name, [value].flat().map((one) => (typeof one === "number" ? short(one) : one)).join(","));
-  if (state.quantity !== usual.quantity) put("q", state.quantity);
-  if (state.map) put("map", state.map);
-  if (state.window) put("window", state.window);
-  if (state.axis !== usual.axis) put("axis", state.axis);
-  if (state.planes) put("planes", "3");
-  if (state.fade) put("fade", "1");
-  if (state.cursor) put("at", state.cursor);
-  for (const [axis, { centre, zoom }] of Object.entries(state.views)) put(`view-${axis}`, [...centre, zoom]);
-  if (state.tool !== usual.tool) put("tool", state.tool);
-  if (state.profile) put("profile", state.profile);
-  if (state.region) put(state.region.shape, state.region.place);
-  if (state.mode !== usual.mode) put("mode", state.mode);
-  if (state.other !== usual.other) put("other", state.other);
-  if (state.swipe !== usual.swipe) put("swipe", state.swipe);
+  for (const [field, [name, usual, { words }]] of Object.entries(FIELDS)) if (state[field] !== usual) query.set(name, words(state[field]));
+  for (const [axis, { centre, zoom }] of Object.entries(state.views)) query.set(`view-${axis}`, VIEW.words([...centre, zoom]));
+  if (state.region) query.set(state.region.shape, PLACE.words(state.region.place));
   return query;
 }

@@ -1,5 +1,5 @@
 // A histogram as SVG, with a line at each of some values.
-import { html } from "./view.js";
+import { html } from "../parts/view.js";
 
 const HEIGHT = 60;
 

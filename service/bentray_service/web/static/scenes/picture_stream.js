@@ -1,5 +1,5 @@
 // A picture that follows a view: previews while it moves, the full picture once it rests.
-import { respond } from "./api.js";
+import { respond } from "../parts/api.js";
 
 // The view rests when it has not moved for this long.
 const REST_MS = 150;
@@ -16,7 +16,7 @@ export const rateOf = (rate) => ` · preview${rate ? ` · ${Math.round(rate)} fr
 
 // Draws pictures of the service on a canvas. The newest view wins: a preview under way is still shown, since frames would
 // never arrive otherwise, unless a newer one was; a full picture under way is cancelled. After each picture onShown is called
-// with { quality, ms, rate }: how long it took, and previews per second, 0 for the first one of a motion.
+// with { quality, rate }: previews per second, 0 for the first one of a motion.
 export function pictureStream(canvas, { onShown = () => {}, onError = () => {} } = {}) {
   const underWay = new Set();
   let wanted = null;
@@ -61,7 +61,7 @@ export function pictureStream(canvas, { onShown = () => {}, onError = () => {} }
     canvas.dataset.source = source;
     canvas.dataset.pictures = Number(canvas.dataset.pictures || 0) + 1;
     onError(null);
-    onShown({ quality, ms: lastMs, rate: quality === "preview" ? rate() : 0 });
+    onShown({ quality, rate: quality === "preview" ? rate() : 0 });
   }
 
   function rate() {

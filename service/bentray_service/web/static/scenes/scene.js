@@ -1,0 +1,158 @@
+// What the pages of volume and surface rendering share: the picture of a view, its camera, the form of the view, and what is rendered.
+import { JobList } from "../jobs/job_list.js";
+import { go, keepQuery } from "../parts/address.js";
+import { inTime } from "../parts/amounts.js";
+import { request, send } from "../parts/api.js";
+import { DropZone } from "../parts/drop_zone.js";
+import { titleOf } from "../parts/titles.js";
+import { Alert, Button, Facts, Form, html, Options, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
+import { orbit } from "./orbit.js";
+import { pictureStream, rateOf } from "./picture_stream.js";
+
+export const CAMERA = ["azimuth_deg", "elevation_deg", "zoom"];
+// Sides of pictures, pixels: while the view moves, and at rest.
+export const [PREVIEW_PX, FULL_PX] = [256, 512];
+// After the last change until the address has the view: browsers limit how often it changes.
+const KEEP_MS = 200;
+
+export const rounded = (value) => Number(value.toPrecision(4));
+export const clamped = (value, least, most) => Math.min(most, Math.max(least, value));
+
+// The camera in the numbers of a form, within their limits; show(moving) is called after each change.
+function cameraOf(form, show) {
+  const field = (name) => form.current.elements[name];
+  const put = (name, value, round) => {
+    field(name).value = round(clamped(value, Number(field(name).min), Number(field(name).max)));
+  };
+  const hundredths = (value) => Number(value.toFixed(2));
+  return {
+    turn(right, up) {
+      put("azimuth_deg", (Number(field("azimuth_deg").value) + right) % 360, hundredths);
+      put("elevation_deg", Number(field("elevation_deg").value) + up, hundredths);
+      show(true);
+    },
+    zoom(factor) {
+      put("zoom", Number(field("zoom").value) * factor, rounded);
+      show(true);
+    },
+    reset() {
+      for (const name of CAMERA) field(name).value = field(name).defaultValue;
+      show(true);
+    },
+  };
+}
+
+// A record that is rendered as a form says. records: to choose from, newest first; id: the first choice; query: of the address, for the form;
+// pictureOf(record, values): { preview, full, drawHere, keep }, see pictureStream, keep() states the view in the address; null without a picture.
+export function useScene({ records: first, id, query, pictureOf }) {
+  const [records, setRecords] = useState(first);
+  const [chosen, choose] = useState(id);
+  const record = records.find((row) => row.id === chosen) ?? records[0];
+  const [error, act, setError] = useAct();
+  const [form, stream, refresh] = [useRef(null), useRef(null), useRef(null)];
+  const later = useLater();
+  const values = () => Object.fromEntries(new FormData(form.current));
+
+  // Show the values of the form; moving: as one of many steps.
+  function show(moving = false) {
+    const valid = form.current.checkValidity();
+    if (!valid && record && !moving) form.current.reportValidity();
+    const picture = valid && record ? pictureOf(record, values()) : null;
+    if (!picture) return;
+    if (moving) stream.current.move(picture.preview, picture.full, picture.drawHere);
+    else stream.current.set(picture.full);
+    later(picture.keep, KEEP_MS);
+  }
+
+  useEffect(() => {
+    for (const [name, value] of query) Object.assign(form.current.elements.namedItem(name) ?? {}, { value });
+  }, []);
+  return { records, setRecords, record, choose, error, act, setError, form, stream, refresh, values, show, camera: cameraOf(form, show) };
+}
+
+// The picture of a view, which is turned on it. words: label of the stage and of a canvas without a picture; hint: before the first picture;
+// describe(values): the view in words, { label, facts }; onShown() is called after each picture; camera: of useScene, with grab() if objects can
+// be moved.
+function Stage({ id, words, hint, describe, onShown = () => {}, onError, camera, stream }) {
+  const [canvas, stage] = [useRef(null), useRef(null)];
+  const [shown, setShown] = useState(null);
+  const newest = useNewest({ describe, onShown, camera, onError });
+  useEffect(() => {
+    stream.current = pictureStream(canvas.current, {
+      onShown({ quality, rate }) {
+        const { label, facts } = newest.current.describe();
+        setShown({ label, facts: `${facts}${quality === "full" ? "" : rateOf(rate)}` });
+        newest.current.onShown();
+      },
+      onError: (problem) => newest.current.onError(problem),
+    });
+    orbit(stage.current, {
+      turn: (...by) => newest.current.camera.turn(...by),
+      zoom: (factor) => newest.current.camera.zoom(factor),
+      reset: () => newest.current.camera.reset(),
+      grab: (point) => newest.current.camera.grab?.(point, stage.current),
+    });
+    return () => stream.current.close();
+  }, []);
+  return html`
+    <div id="stage" class="stage" ref=${stage} tabindex="0" role="group" aria-label=${words[0]}>
+      <canvas id=${id} ref=${canvas} width=${FULL_PX} height=${FULL_PX} role="img" aria-label=${shown?.label ?? words[1]}></canvas>
+      <p class="hint" id="stage-hint" hidden=${shown !== null}>${hint}</p>
+    </div>
+    <${Facts} id="view-facts">${shown?.facts}</${Facts}>`;
+}
+
+// Stored records to choose from.
+function RecordSelect({ name, path, records, chosen, none }) {
+  const entries = records.length ? records.map((record) => [record.id, `${titleOf(record)} (${inTime(record.created)})`]) : [["", none]];
+  return html`
+    <label for=${name} class="caption">${`${name[0].toUpperCase()}${name.slice(1)} to render`}</label>
+    <select id=${name} disabled=${!records.length} value=${chosen} onChange=${({ target }) => go(`${path}/${target.value}`)}>
+      <${Options} entries=${entries} />
+    </select>`;
+}
+
+// A whole page. scene: of useScene; name: of the kind of record; path: of the page; stage: see Stage; below: the picture; formats, none: of files,
+// and without a record; onStored(record): after an upload; facts: of the record; form: its id; onChange(): of the form; fields: in it; begin:
+// { id, title, job() } of the button that starts a job; actions: beside it; products: what is deleted with a record, null if it is not deleted
+// here; jobs: { id, title, kind, empty, onJobs } of the jobs below.
+export function ScenePage({ scene, title, name, path, stage, below, formats, none, onStored, facts, form, onChange, fields, begin, products, actions, jobs, children }) {
+  const { record, act, camera } = scene;
+  const start = () => act(async () => {
+    await send("POST", "/v1/jobs", begin.job());
+    await scene.refresh.current();
+  });
+  const remove = () => confirm(`Delete ${titleOf(record)} and its ${products} for good?`) && act(async () => {
+    await request(record.links.self, { method: "DELETE" });
+    go(path);
+  });
+  return html`
+    <h1>${title}</h1>
+    <section aria-label=${title} class="panel viewer">
+      <div>
+        <${Stage} onError=${scene.setError} camera=${camera} stream=${scene.stream} ...${stage} />
+        <${Alert} id=${`${form}-error`} error=${scene.error} />
+        ${below}
+      </div>
+      <div>
+        <${DropZone} name=${name} prompt=${`Choose a ${name}`} formats=${formats} onStored=${onStored}
+          metadataOf=${(file) => ({ kind: name, title: file.name.slice(0, 200) })} />
+        <${RecordSelect} name=${name} path=${path} records=${scene.records} chosen=${record?.id} none=${none} />
+        <${Facts} id=${`${name}-facts`}>${facts}</${Facts}>
+        <${Form} id=${form} ref=${scene.form} onChange=${onChange} onSubmit=${start}>
+          ${fields}
+          <div class="actions">
+            <button id=${begin.id} type="submit" disabled=${!record}>${begin.title}</button>
+            <${Button} id="reset-view" onClick=${camera.reset}>Reset the view</${Button}>
+            <${Button} id=${`delete-${name}`} hidden=${!record || !products} onClick=${remove}>Delete the ${name}</${Button}>
+            ${actions}
+          </div>
+          ${children}
+        </${Form}>
+      </div>
+    </section>
+    <section aria-labelledby="jobs-title" id=${jobs.id}>
+      <h2 id="jobs-title">${jobs.title}</h2>
+      <${JobList} refresh=${scene.refresh} empty=${jobs.empty} filters=${{ kind: jobs.kind }} onJobs=${jobs.onJobs} />
+    </section>`;
+}
