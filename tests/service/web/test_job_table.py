@@ -89,7 +89,7 @@ def test_pages_and_actions_by_keyboard(page, address, queued):
     expect(names(page)).to_have_text(["Job 1"])
     # The page of the scan has the newest ones, and leads to the others.
     page.goto(f"{address}/#/scans/{scan}")
-    expect(page.locator("#of-scan .job h2 a")).to_have_text([f"Job {k}" for k in range(26, 20, -1)])
+    expect(page.locator(".of-scan .job h2 a")).to_have_text([f"Job {k}" for k in range(26, 20, -1)])
     page.get_by_role("link", name="All in the table of jobs").click()
     expect(names(page)).to_have_count(25)
     expect(page.get_by_label("Name, scan, notes")).to_have_value(scan)

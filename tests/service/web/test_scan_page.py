@@ -269,14 +269,14 @@ def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
 def test_the_slider_changes_the_emission(page, traced):
     told = page.locator("#shot-facts")
     expect(told).to_contain_text("Emission 0 by element 0")
-    before = page.locator("#shot").evaluate(PIXELS)
+    before = page.locator("#shot canvas").evaluate(PIXELS)
     slider = page.get_by_role("slider", name="Emission")
     slider.focus()
     for _ in range(3):
         page.keyboard.press("ArrowRight")
     expect(told).to_contain_text("Emission 3 by element 3")
     expect(page.get_by_label("Emission number")).to_have_value("3")
-    assert page.locator("#shot").evaluate(PIXELS) != before
+    assert page.locator("#shot canvas").evaluate(PIXELS) != before
     shot = traced("traces?emission=3")
     known = [pick for pick in shot["pick_s"] if pick is not None]
     expect(told).to_contain_text(f"arrivals in {len(known)} of 12")

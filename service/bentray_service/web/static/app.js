@@ -1,7 +1,7 @@
 // The shell of the viewer: opens the page that the address names, and shows the state of the service.
+import { counted } from "./parts/amounts.js";
 import { lost, request } from "./parts/api.js";
-import { at } from "./parts/dom.js";
-import { admitted } from "./parts/key.js";
+import { admitted, at } from "./parts/key.js";
 import { parse } from "./parts/address.js";
 import { Alert, html, render } from "./parts/view.js";
 
@@ -91,7 +91,7 @@ function showSign(words, good) {
 async function showHealth() {
   try {
     const { workers } = await request("/health/ready");
-    showSign(workers === 1 ? "ready, 1 worker" : `ready, ${workers} workers`, true);
+    showSign(`ready, ${counted(workers, "worker", "workers")}`, true);
   } catch (error) {
     if (at("offline").hidden) showSign(error.message, false);
   }

@@ -4,7 +4,8 @@ import { useAct, useEffect, useNewest, useRead, useReducer, useRef, useShown } f
 import { jobEvents } from "./job_events.js";
 
 // Without a stream of events: intervals while a job is unfinished, and else.
-export const [BUSY_MS, IDLE_MS] = [3000, 15000];
+const BUSY_MS = 3000;
+export const IDLE_MS = 15000;
 // With one: soon after a change of a state; the histories, and the place in the queue, which other tenants change too.
 const SOON_MS = 50;
 const HISTORY_MS = 3000;

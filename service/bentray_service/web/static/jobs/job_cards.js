@@ -1,11 +1,14 @@
-// Jobs as cards: pictures of what they made, state, progress, plan, misfit and files.
+// A list of the newest jobs as cards, kept up to date while the page is open: pictures, state, progress, plan, misfit and files.
+import { linkTo } from "../parts/address.js";
 import { FORMATS } from "../parts/export_menu.js";
 import { inNanoseconds } from "../parts/amounts.js";
 import { inWords, request } from "../parts/api.js";
 import { KeyLink, Picture } from "../parts/key.js";
-import { Button, html, useRead, useState } from "../parts/view.js";
+import { loadTitles, titleOfJob } from "../parts/titles.js";
+import { Alert, Button, html, useRead, useState } from "../parts/view.js";
 import { glassOf, queryOf, shownBy } from "../parts/views.js";
-import { duration, placeInQueue, summaryOf } from "./job_words.js";
+import { useJobs } from "./followed_jobs.js";
+import { duration, placeInQueue, summaryOf, tasksInWords } from "./job_words.js";
 import { residuals, Sparkline } from "./misfit_curve.js";
 
 // An image that links to a larger one.
@@ -54,11 +57,11 @@ function Pictures({ job, title }) {
 }
 
 // The plan in a line, with details on demand.
-export function Plan({ plan: { tasks, largest_bytes: bytes, minutes, why } }) {
-  const time = minutes ? `, about ${duration(60 * minutes)}` : "";
+export function Plan({ plan }) {
+  const time = plan.minutes ? `, about ${duration(60 * plan.minutes)}` : "";
   return html`<details class="plan">
-    <summary>Plan: ${tasks} tasks of up to ${Math.ceil(bytes / 2 ** 20)} MiB${time}</summary>
-    <p>${why}</p>
+    <summary>Plan: ${tasksInWords(plan)}${time}</summary>
+    <p>${plan.why}</p>
   </details>`;
 }
 
@@ -86,7 +89,7 @@ function Links({ job: { links }, onCancel }) {
   </div>`;
 }
 
-export function JobCard({ job, title, onCancel }) {
+function JobCard({ job, title, onCancel }) {
   const [what, settings] = summaryOf(job);
   const course = residuals(job.history);
   const { values } = course;
@@ -108,4 +111,30 @@ export function JobCard({ job, title, onCancel }) {
       <${Links} job=${job} onCancel=${onCancel} />
     </div>
   </li>`;
+}
+
+// The newest ones are shown, the others are in the table of jobs.
+const MOST = 6;
+
+// filters: of the table of jobs; read(): jobs, by default those with the filters; onJobs(jobs) is called with all of them; refresh:
+// { current } that gets a function that reads them again.
+export function JobList({ empty = "", filters = {}, read, onJobs, refresh = {} }) {
+  const query = new URLSearchParams(filters);
+  const [jobs, error, again, change] = useJobs({
+    async read() {
+      const found = await (read ? read() : request(`/v1/jobs?${query}`).then((answer) => answer.jobs));
+      await loadTitles(found);
+      return found;
+    },
+    onJobs,
+  });
+  refresh.current = again;
+  return html`
+    <${Alert} id="jobs-error" error=${error} />
+    <p class="empty" hidden=${!jobs || jobs.length > 0}>${empty}</p>
+    <ul class="jobs" id="jobs">
+      ${jobs?.slice(0, MOST).map((job) => html`<${JobCard} key=${job.id} job=${job} onCancel=${() => change(job.links.cancel, "POST")}
+        title=${titleOfJob(job) || job.dataset || job.volume || job.mesh} />`)}
+    </ul>
+    <p class="links" hidden=${!(jobs?.length > MOST)}><a href=${linkTo("/jobs", query)}>All in the table of jobs</a></p>`;
 }

@@ -1,10 +1,10 @@
 // The table of jobs: one row a job, with filters and pages in the address; kept up to date while it is open.
 import { keepQuery, pick } from "../parts/address.js";
-import { inTime } from "../parts/amounts.js";
+import { counted, inTime } from "../parts/amounts.js";
 import { request } from "../parts/api.js";
 import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { loadTitles, titleOfJob } from "../parts/titles.js";
-import { Alert, Button, html, Labelled, Options, useEffect, useRef, useState } from "../parts/view.js";
+import { Alert, Button, Choice, Field, html, useEffect, useRef, useState } from "../parts/view.js";
 import { useJobs } from "./followed_jobs.js";
 import { duration, inWords, methodOf, moment } from "./job_words.js";
 
@@ -65,16 +65,11 @@ function JobFilters({ words, query, onChange, hidden }) {
     form.current.elements.text.focus();
     onChange(new URLSearchParams());
   };
-  const choice = (name) => html`<select name=${name}>
-    <option value="">All</option>
-    <${Options} entries=${words[name].map((word) => [word, inWords(word)])} chosen=${query.get(name)} />
-  </select>`;
+  const entries = (name) => [["", "All"], ...words[name].map((word) => [word, inWords(word)])];
   return html`<${Filters} ref=${form} label="Jobs" hidden=${hidden} onChange=${onChange}>
-    <${Labelled} caption="Name, scan, notes, owner or id">
-      <input name="text" type="search" maxlength="200" autocomplete="off" defaultValue=${query.get("text") ?? ""} />
-    </${Labelled}>
-    <${Labelled} caption="State">${choice("state")}</${Labelled}>
-    <${Labelled} caption="Kind">${choice("kind")}</${Labelled}>
+    <${Field} caption="Name, scan, notes, owner or id" name="text" type="search" maxlength="200" defaultValue=${query.get("text") ?? ""} />
+    <${Choice} caption="State" name="state" entries=${entries("state")} chosen=${query.get("state")} />
+    <${Choice} caption="Kind" name="kind" entries=${entries("kind")} chosen=${query.get("kind")} />
     <${Button} disabled=${!pick(query, ["text", "state", "kind"]).size} onClick=${clear}>Clear filters</${Button}>
   </${Filters}>`;
 }
@@ -112,12 +107,11 @@ export function JobTable({ query: first, words }) {
 
   const none = jobs?.length === 0;
   const filtered = pick(query, ["text", "state", "kind"]).size > 0;
-  const count = jobs?.length === 1 ? "1 job" : `${jobs?.length} jobs`;
   return html`
     <${JobFilters} words=${words} query=${query} onChange=${change} hidden=${!jobs || (none && !query.size)} />
     <${Alert} error=${error} />
     <p class="facts" role="status">
-      ${jobs?.length > 0 && `${count}${older ? " on this page, and older ones" : ""}`}
+      ${jobs?.length > 0 && `${counted(jobs.length, "job", "jobs")}${older ? " on this page, and older ones" : ""}`}
       ${none && filtered && "No job matches these filters."}
       ${none && !filtered && html`Nothing has run yet. Upload a scan and press Fast or Best. <a href="#/">To the scans</a>`}
     </p>

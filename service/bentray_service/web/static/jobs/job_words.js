@@ -1,5 +1,6 @@
-// Jobs in words: kinds, settings and states, durations, times and places in the queue.
-import { inTime } from "../parts/amounts.js";
+// Jobs in words: kinds, settings and states, durations, times and places in the queue; plans before they are started.
+import { counted, inTime } from "../parts/amounts.js";
+import { send } from "../parts/api.js";
 
 const KINDS = { reconstruction: "Reconstruction", simulation: "Simulated scan", refraction: "Turntable", "geometry-field": "Geometry field" };
 const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "Automatic", waveform: "Full waveform" };
@@ -44,7 +45,34 @@ export function moment(text) {
   return today ? `today, ${inTime(text).split(", ")[1]}` : inTime(text);
 }
 
-export function placeInQueue(ahead) {
-  if (!ahead) return "Next in the queue";
-  return ahead === 1 ? "1 job before this one" : `${ahead} jobs before this one`;
+export const placeInQueue = (ahead) => (ahead ? `${counted(ahead, "job", "jobs")} before this one` : "Next in the queue");
+
+// The plan of a job. job: as for POST /v1/jobs.
+export const planOf = (job) => send("POST", "/v1/plans", job);
+
+// Tens of seconds from half a minute on: the estimate is no better.
+function roughly(minutes) {
+  if (minutes < 0.5) return `${Math.max(1, Math.round(60 * minutes))} s`;
+  if (minutes < 1.5) return `${10 * Math.round(6 * minutes)} s`;
+  return minutes < 90 ? `${Math.round(minutes)} min` : `${(minutes / 60).toFixed(1)} h`;
+}
+
+// As ["about 2 min, rough", "after 1 queued job"].
+function waitParts({ minutes, rough, ahead }) {
+  const time = minutes === null ? "no estimate yet" : `about ${roughly(minutes)}${rough ? ", rough" : ""}`;
+  return [time, ...(ahead ? [`after ${counted(ahead, "queued job", "queued jobs")}`] : [])];
+}
+
+// The time, and the place in the queue.
+export const waitInWords = (estimate) => waitParts(estimate).join(", ");
+
+export const tasksInWords = ({ tasks, largest_bytes: bytes }) => `${tasks} tasks of up to ${Math.ceil(bytes / 2 ** 20)} MiB`;
+
+// The plan in a line: time, method, nodes, tasks and memory.
+export function planInWords(estimate) {
+  const { plan } = estimate;
+  const methods = plan.methods.length > 1 ? `the best of ${plan.methods.length} candidates` : plan.methods[0];
+  return [
+    ...waitParts(estimate), methods, `${plan.nodes} nodes per side`, tasksInWords(plan), counted(plan.workers, "worker", "workers"),
+  ].join(" · ");
 }

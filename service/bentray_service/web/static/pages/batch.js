@@ -1,10 +1,10 @@
 // Several scans with one set of settings: choose them, start one reconstruction of each, and follow them as one batch.
 import { go } from "../parts/address.js";
-import { inTime } from "../parts/amounts.js";
+import { counted, inTime } from "../parts/amounts.js";
 import { send } from "../parts/api.js";
 import { readSettings, SettingsForm, useSettings } from "../parts/settings_form.js";
 import { load, titleOf } from "../parts/titles.js";
-import { Alert, Button, Facts, Form, html, Labelled, useShown, useState } from "../parts/view.js";
+import { Alert, Button, Facts, Field, Form, html, Section, useShown, useState } from "../parts/view.js";
 
 const wordsOf = (scan) => `${scan.ntx} emitters × ${scan.nrx} receivers · ${inTime(scan.created)}`;
 
@@ -19,13 +19,10 @@ function Choice({ scans, chosen, onChange }) {
   // In the filter it is no start of a batch.
   const ignoreEnter = (event) => event.key === "Enter" && event.preventDefault();
   const none = scans.length ? "No scan is chosen." : "No scan is stored yet.";
-  return html`<section class="panel" aria-labelledby="choice-title">
-    <h2 id="choice-title">Scans</h2>
+  return html`<${Section} id="choice" title="Scans">
     <div class="line-form">
-      <${Labelled} caption="Show scans with">
-        <input id="choice-filter" type="search" autocomplete="off" onInput=${({ target }) => setText(target.value.trim().toLowerCase())}
-          onKeyDown=${ignoreEnter} />
-      </${Labelled}>
+      <${Field} caption="Show scans with" id="choice-filter" type="search" onKeyDown=${ignoreEnter}
+        onInput=${({ target }) => setText(target.value.trim().toLowerCase())} />
       <${Button} id="choose-all" onClick=${() => onChange(new Set([...chosen, ...scans.filter(shows).map((scan) => scan.id)]))}>Choose all shown</${Button}>
       <${Button} id="choose-none" onClick=${() => onChange(new Set())}>Choose none</${Button}>
     </div>
@@ -39,7 +36,7 @@ function Choice({ scans, chosen, onChange }) {
       </li>`)}
     </ul>
     <p id="choice-count" class="facts" role="status">${chosen.size ? `${chosen.size} of ${scans.length} scans chosen, one job each.` : none}</p>
-  </section>`;
+  </${Section}>`;
 }
 
 function Batch({ scans, groups }) {
@@ -66,29 +63,26 @@ function Batch({ scans, groups }) {
     return undefined;
   }
 
-  const jobs = chosen.size === 1 ? "1 job" : `${chosen.size} jobs`;
   return html`
     <p class="crumb"><a href="#/">Scans</a></p>
     <h1>Reconstruct several scans</h1>
     <${Form} id="batch-form" novalidate onSubmit=${start}>
       <${Choice} scans=${scans} chosen=${chosen} onChange=${setChosen} />
-      <section class="panel" aria-labelledby="same-title">
-        <h2 id="same-title">The same for all</h2>
-        <${Labelled} caption="Name of the batch"><input name="name" type="text" maxlength="200" autocomplete="off" /></${Labelled}>
+      <${Section} id="same" title="The same for all">
+        <${Field} caption="Name of the batch" name="name" type="text" maxlength="200" />
         <details id="batch-own" open=${opened} onToggle=${({ target }) => setState((before) => ({ ...before, opened: target.open }))}>
           <summary>All settings</summary>
           <div id="batch-settings"><${SettingsForm} groups=${groups} form=${settings} /></div>
         </details>
         <details id="batch-webhook">
           <summary>Webhook</summary>
-          <${Labelled} caption="Address that receives a signed message when each job ends">
-            <input name="webhook" type="url" maxlength="2000" autocomplete="off" placeholder="https://" />
-          </${Labelled}>
+          <${Field} caption="Address that receives a signed message when each job ends" name="webhook" type="url" maxlength="2000"
+            placeholder="https://" />
         </details>
         <${Facts}>As they are, rays and method are chosen automatically for each scan.</${Facts}>
-        <button id="batch-start" type="submit" disabled=${sending || !chosen.size}>${chosen.size ? `Start ${jobs}` : "Start"}</button>
+        <button id="batch-start" type="submit" disabled=${sending || !chosen.size}>${chosen.size ? `Start ${counted(chosen.size, "job", "jobs")}` : "Start"}</button>
         <${Alert} id="batch-error" error=${error} />
-      </section>
+      </${Section}>
     </${Form}>`;
 }
 

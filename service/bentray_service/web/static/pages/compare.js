@@ -1,8 +1,7 @@
 // Two to four results with one range of colours and one cursor: side by side, as difference, or with a border to swipe.
 import { methodOf } from "../jobs/job_words.js";
 import { keepQuery } from "../parts/address.js";
-import { facts } from "../parts/result_tables.js";
-import { loadResult, nameOf } from "../parts/results.js";
+import { facts, loadResult, nameOf } from "../parts/result_tables.js";
 import { Facts, html } from "../parts/view.js";
 import { stateOf } from "../viewer/state.js";
 import { Viewer } from "../viewer/viewer.js";

@@ -1,9 +1,40 @@
 // One job: its progress while it runs, then its result; and below it the messages to its webhook.
-import { JobList } from "../jobs/job_list.js";
+import { JobList } from "../jobs/job_cards.js";
 import { LiveJob } from "../jobs/live_job.js";
-import { WebhookPanel } from "../jobs/webhook_panel.js";
+import { inTime } from "../parts/amounts.js";
 import { request } from "../parts/api.js";
-import { Alert, html, useShown, useState } from "../parts/view.js";
+import { HeadedTable } from "../parts/tables.js";
+import { Alert, Facts, html, Section, useRead, useShown, useState } from "../parts/view.js";
+
+const FRESH_MS = 5000;
+const COLUMNS = ["Attempt", "Time", "Answer", "Duration"];
+const STATES = {
+  pending: "The message is sent when the job has ended.",
+  waiting: "The message has not been accepted yet.",
+  delivered: "The message was accepted.",
+  failed: "The message was given up after the last attempt.",
+};
+// States of jobs of the same colour.
+const COLOURS = { delivered: "succeeded", waiting: "running" };
+
+function rowOf({ time, status, error, seconds }, number) {
+  const answer = [status !== null && `status ${status}`, error].filter(Boolean).join(": ");
+  return [number + 1, inTime(time), answer, `${seconds.toFixed(2)} s`];
+}
+
+// Followed until the message is accepted or given up; nothing for a job without a webhook.
+function WebhookPanel({ id }) {
+  const ended = (job) => job && (!job.webhook || ["delivered", "failed"].includes(job.webhook.state));
+  const [job] = useRead(() => request(`/v1/jobs/${id}`), (found) => (ended(found) ? null : FRESH_MS));
+  if (!job?.webhook) return null;
+  const { url, state, attempts, due, message } = job.webhook;
+  const title = html`Webhook<span class=${`state ${COLOURS[state] ?? state}`}>${state}</span>`;
+  return html`<${Section} id="webhook" title=${title} className="panel webhook">
+    <${Facts}>${STATES[state]}${due && ` Next attempt: ${inTime(due)}.`}</${Facts}>
+    <${Facts}>${message ? `${url}, message ${message}` : url}</${Facts}>
+    ${attempts.length > 0 && html`<${HeadedTable} label="Attempts to send the message" columns=${COLUMNS} rows=${attempts.map(rowOf)} />`}
+  </${Section}>`;
+}
 
 const resultOf = async (parameters) => (await import("./result.js")).open(parameters);
 

@@ -3,7 +3,7 @@ import { keepQuery } from "../parts/address.js";
 import { request } from "../parts/api.js";
 import { propertiesOf } from "../parts/description.js";
 import { KeyLink } from "../parts/key.js";
-import { planOf, waitInWords } from "../parts/plan_estimate.js";
+import { planOf, waitInWords } from "../jobs/job_words.js";
 import { PlainField } from "../parts/settings_fields.js";
 import { load, titleOf } from "../parts/titles.js";
 import { html, useAsked, useEffect, useRef, useState } from "../parts/view.js";
@@ -218,7 +218,7 @@ function Rendering({ volumes, id, query, fields }) {
     fields=${html`<${Fields} volume=${volume} histogram=${histogram} marks=${marks} fields=${fields} onSlide=${slide} />`}
     begin=${{ id: "turn", title: "Render a turntable", job: turntable }}
     actions=${html`<${KeyLink} id="picture-link" href=${link} hidden=${!link}>Open the picture</${KeyLink}>`}
-    jobs=${{ id: "turntables", title: "Turntables", kind: "refraction", empty: "No turntable yet", onJobs }}>
+    jobs=${{ title: "Turntables", kind: "refraction", empty: "No turntable yet", onJobs }}>
     <p id="turn-plan" class="facts" role="status">${planWords}</p>
   </${ScenePage}>`;
 }

@@ -2,18 +2,37 @@
 import { methodOf } from "../jobs/job_words.js";
 import { go, keepQuery } from "../parts/address.js";
 import { inTime } from "../parts/amounts.js";
-import { request, send } from "../parts/api.js";
-import { curlOf, pythonOf } from "../parts/code_snippets.js";
+import { kept, request, send } from "../parts/api.js";
 import { CopyButton } from "../parts/copying.js";
 import { ExportMenu } from "../parts/export_menu.js";
 import { Menu } from "../parts/menu.js";
 import { Provenance } from "../parts/provenance.js";
-import { ChoiceTable, facts, PlanTable, TruthTable } from "../parts/result_tables.js";
-import { loadResult, nameOf } from "../parts/results.js";
+import { ChoiceTable, facts, loadResult, nameOf, PlanTable, TruthTable } from "../parts/result_tables.js";
 import { Alert, Button, Facts, Form, html, useAct, useEffect, useRead, useRef, useState } from "../parts/view.js";
+import { queryOf } from "../parts/views.js";
 import { QUANTITIES } from "../viewer/quantities.js";
 import { stateOf } from "../viewer/state.js";
 import { Viewer } from "../viewer/viewer.js";
+
+// The view of a result as code: Python with the client of Bentray, and curl.
+function pythonOf({ job, volume }, stored) {
+  const name = stored === "truth" ? "speed" : stored;
+  return [
+    "from bentray_service.client import Client",
+    "",
+    `with Client("${location.origin}") as client:`,
+    `    result = client.result("${volume.id}")  # of ${job.id}`,
+    `values = result.values["${name}"]  # ${volume.shape.join(" × ")} nodes, ${name === "speed" ? "m/s" : "SI units"}`,
+    'x, y = (1e3 * result.coordinates[axis] for axis in ("x", "y"))  # mm',
+    "",
+  ].join("\n");
+}
+
+function curlOf({ volume }, stored) {
+  const query = queryOf({ format: "npy", quantity: stored });
+  const key = kept("key") ? ' -H "Authorization: Bearer $BENTRAY_KEY"' : "";
+  return `curl${key} -o ${stored}.npy '${location.origin}${volume.links.data}?${query}'\n`;
+}
 
 // Results of other jobs to compare this one with, at most three.
 function CompareMenu({ job }) {

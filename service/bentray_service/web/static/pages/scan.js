@@ -1,11 +1,11 @@
 // One scan: its geometry, facts, quality and traces, the reconstruction to start, and the reconstructions of it.
-import { JobList } from "../jobs/job_list.js";
+import { JobList } from "../jobs/job_cards.js";
 import { request, send } from "../parts/api.js";
 import { KeyLink, Picture } from "../parts/key.js";
-import { planInWords, planOf, waitInWords } from "../parts/plan_estimate.js";
+import { planInWords, planOf, waitInWords } from "../jobs/job_words.js";
 import { readSettings, SettingsForm, useSettings } from "../parts/settings_form.js";
 import { titleOf } from "../parts/titles.js";
-import { Alert, Button, Facts, Form, html, useAct, useAsked, useEffect, useRead, useRef, useState } from "../parts/view.js";
+import { Alert, Button, Facts, Form, html, Section, useAct, useAsked, useEffect, useRead, useRef, useState } from "../parts/view.js";
 import { Elements, inWordsOf } from "../scans/scan_drawing.js";
 import { ScanEditor } from "../scans/scan_edit.js";
 import { factRows, Quality } from "../scans/scan_facts.js";
@@ -75,8 +75,7 @@ function Run({ scan, from, changes, onStarted }) {
   }
 
   const best = scan.has_traces ? "then full waveform, where it predicts unused traces better" : "the same here: full waveforms need traces, and the file has none";
-  return html`<section aria-labelledby="run-title" class="panel">
-    <h2 id="run-title">Reconstruction</h2>
+  return html`<${Section} id="run" title="Reconstruction">
     <${Form} id="run" novalidate onSubmit=${start}>
       <div class="presets">
         <${Preset} id="start" name="fast" title="Fast" words="rays and method chosen automatically" scan=${scan} changes=${changes} />
@@ -93,7 +92,7 @@ function Run({ scan, from, changes, onStarted }) {
       </details>
       <${Alert} id="run-error" error=${error ?? readError} />
     </${Form}>
-  </section>`;
+  </${Section}>`;
 }
 
 // element: the one that emits; openWater(): opens the form of the water.
@@ -102,8 +101,7 @@ function About({ scan, geometry, geometryError, element, openWater }) {
   const water = scan.water_temperature_c ?? "";
   const [report, error] = useRead(() => request(address), undefined, water);
   const [opened, setOpened] = useState(false);
-  return html`<section aria-labelledby="about-title" class="panel">
-    <h2 id="about-title">Geometry and quality</h2>
+  return html`<${Section} id="about" title="Geometry and quality">
     <div class="about">
       <figure id="elements" class="figure">
         ${geometry && html`
@@ -133,7 +131,7 @@ function About({ scan, geometry, geometryError, element, openWater }) {
           alt="Traces with picks, matrix and histogram of the travel times, excluded pairs with reasons, findings" />`}
       <p><${KeyLink} id="quality-page" href=${`${address}.png`} target="_blank" rel="noopener">Quality report as an image</${KeyLink}></p>
     </details>
-  </section>`;
+  </${Section}>`;
 }
 
 function Scan({ scan: first, from }) {
@@ -159,15 +157,12 @@ function Scan({ scan: first, from }) {
     <p id="dataset-facts" class="facts">${factsOf(scan)}</p>
     <${ScanEditor} scan=${scan} proposed=${geometry?.proposed_corrections ?? []} onChange=${setScan} openWater=${openWater} />
     <${Run} scan=${scan} from=${from} changes=${changes} onStarted=${() => refresh.current()} />
-    <section aria-labelledby="jobs-title" id="of-scan">
-      <h2 id="jobs-title">Reconstructions of this scan</h2>
+    <${Section} id="jobs" title="Reconstructions of this scan" className="of-scan">
       <${JobList} refresh=${refresh} empty="Nothing has run yet. Press Fast or Best. The image appears here."
         filters=${{ kind: "reconstruction", text: scan.id }} onJobs=${onJobs} />
-    </section>
+    </${Section}>
     <${About} scan=${scan} geometry=${geometry} geometryError=${geometryError} element=${element} openWater=${() => openWater.current()} />
-    ${scan.has_traces && html`<section aria-labelledby="shot-title" class="panel" id="traces">
-      <${Shot} key=${water} scan=${scan} hasWater=${hasWater} onEmission=${setElement} />
-    </section>`}`;
+    ${scan.has_traces && html`<${Shot} key=${water} scan=${scan} hasWater=${hasWater} onEmission=${setElement} />`}`;
 }
 
 export async function open({ id, query }) {

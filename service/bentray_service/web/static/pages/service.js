@@ -4,7 +4,7 @@ import { request } from "../parts/api.js";
 import { description } from "../parts/description.js";
 import { Projects } from "../parts/projects.js";
 import { HeadedTable, Share } from "../parts/tables.js";
-import { Alert, Facts, html, useRead } from "../parts/view.js";
+import { Alert, Facts, html, Section, useRead } from "../parts/view.js";
 
 // Workers send their state every half a second or more rarely.
 const FRESH_MS = 5000;
@@ -82,12 +82,11 @@ function Keys({ keys, access: { how, tenant, who } }) {
       <code>bentray keys create --tenant ${tenant} --name NAME --expires 90d</code>, <code>bentray keys revoke ID</code>.</${Facts}>`;
 }
 
-function Section({ name, title, error, children }) {
-  return html`<section class="panel" aria-labelledby=${`${name}-title`}>
-    <h2 id=${`${name}-title`}>${title}</h2>
+function Panel({ name, title, error, children }) {
+  return html`<${Section} id=${name} title=${title}>
     <div id=${name}>${children}</div>
     <${Alert} id=${`${name}-error`} error=${error} />
-  </section>`;
+  </${Section}>`;
 }
 
 function Service({ access }) {
@@ -99,13 +98,13 @@ function Service({ access }) {
   return html`
     <h1>Service</h1>
     <p id="service-about" class="facts">${about && `Bentray ${about.info.version}, ${who}`}</p>
-    <${Section} name="workers" title="Workers" error=${clusterError}>${cluster && html`<${Workers} ...${cluster} />`}</${Section}>
-    <${Section} name="queue" title="Queue">${cluster && html`<${Queue} queue=${cluster.queue} shared=${access.how !== "open"} />`}</${Section}>
-    <${Section} name="storage" title="Storage" error=${storageError}>${storage && html`<${Storage} ...${storage} />`}</${Section}>
-    <${Section} name="keys" title="API keys" error=${keysError}>${listed && html`<${Keys} keys=${listed.keys} access=${access} />`}</${Section}>
-    <${Section} name="projects" title="Projects">
+    <${Panel} name="workers" title="Workers" error=${clusterError}>${cluster && html`<${Workers} ...${cluster} />`}</${Panel}>
+    <${Panel} name="queue" title="Queue">${cluster && html`<${Queue} queue=${cluster.queue} shared=${access.how !== "open"} />`}</${Panel}>
+    <${Panel} name="storage" title="Storage" error=${storageError}>${storage && html`<${Storage} ...${storage} />`}</${Panel}>
+    <${Panel} name="keys" title="API keys" error=${keysError}>${listed && html`<${Keys} keys=${listed.keys} access=${access} />`}</${Panel}>
+    <${Panel} name="projects" title="Projects">
       ${(listed || keysError) && html`<${Projects} access=${access} keys=${listed?.keys ?? []} />`}
-    </${Section}>`;
+    </${Panel}>`;
 }
 
 export async function open() {

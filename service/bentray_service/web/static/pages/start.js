@@ -5,7 +5,7 @@ import { request, send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
 import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { titleOf } from "../parts/titles.js";
-import { Alert, Button, Facts, Form, html, Labelled, Options, useAct, useAsked, useEffect, useRef, useShown, useState } from "../parts/view.js";
+import { Alert, Button, Choice, Facts, Field, Form, html, Section, useAct, useAsked, useEffect, useRef, useShown, useState } from "../parts/view.js";
 
 // Scans on one page of the list.
 const PAGE_LENGTH = 25;
@@ -31,31 +31,24 @@ function metadataIn(form) {
 function Upload({ onSeveral }) {
   const [[opened, begun], setState] = useState([false, false]);
   const [form, again] = [useRef(null), useRef(null)];
-  return html`<section aria-labelledby="scan-title" class="panel">
-    <h2 id="scan-title">Upload a scan</h2>
+  return html`<${Section} id="scan" title="Upload a scan">
     <${DropZone} name="scan" accept=${ACCEPT} prompt="Choose a file" formats=${FORMATS} again=${again}
       metadataOf=${() => metadataIn(form.current)} onStored=${(scan, several) => (several ? onSeveral() : go(`/scans/${scan.id}`))}
       onBegin=${() => setState(([open]) => [open, true])} onRefused=${() => setState([true, true])} />
     <details id="scan-own" open=${opened} onToggle=${({ target }) => setState([target.open, begun])}>
       <summary>Own variables, units, water</summary>
       <${Form} id="own" ref=${form} onSubmit=${() => again.current()}>
-        <${Labelled} caption="Variables, FIELD=NAME">
-          <input name="map" type="text" spellcheck="false" placeholder="element_position=pos, delta_tof=dtof" />
-        </${Labelled}>
+        <${Field} caption="Variables, FIELD=NAME" name="map" type="text" spellcheck="false" placeholder="element_position=pos, delta_tof=dtof" />
         <div class="numbers">
-          <${Labelled} caption="Lengths">
-            <select name="unit"><${Options} entries=${[["", "m"], "mm", "cm", ["um", "µm"]]} /></select>
-          </${Labelled}>
-          <${Labelled} caption="Times">
-            <select name="unit"><${Options} entries=${[["", "s"], ["us", "µs"], "ms", "ns"]} /></select>
-          </${Labelled}>
-          <${Labelled} caption="Water, °C"><input name="temperature_c" type="number" step="any" /></${Labelled}>
-          <${Labelled} caption="Frequency, Hz"><input name="frequency_hz" type="number" step="any" /></${Labelled}>
+          <${Choice} caption="Lengths" name="unit" entries=${[["", "m"], "mm", "cm", ["um", "µm"]]} />
+          <${Choice} caption="Times" name="unit" entries=${[["", "s"], ["us", "µs"], "ms", "ns"]} />
+          <${Field} caption="Water, °C" name="temperature_c" type="number" step="any" />
+          <${Field} caption="Frequency, Hz" name="frequency_hz" type="number" step="any" />
         </div>
         <button id="scan-again" type="submit" class="quiet" disabled=${!begun}>Send the file again</button>
       </${Form}>
     </details>
-  </section>`;
+  </${Section}>`;
 }
 
 function Sample() {
@@ -65,12 +58,11 @@ function Sample() {
     const job = await send("POST", "/v1/jobs", SAMPLE);
     if (shown.current) go(`/jobs/${job.id}?then=scan`);
   });
-  return html`<section aria-labelledby="sample-title" class="panel">
-    <h2 id="sample-title">No scan at hand?</h2>
+  return html`<${Section} id="sample" title="No scan at hand?">
     <p>Simulate a small scan of a 2-D breast phantom, with traces and the truth to compare with. It takes some seconds.</p>
     <${Button} id="sample" quiet=${false} onClick=${simulate}>Simulate a sample scan</${Button}>
     <${Alert} id="sample-error" error=${error} />
-  </section>`;
+  </${Section}>`;
 }
 
 // changes: a number that grows when the list is to be read again.
@@ -87,13 +79,10 @@ function Scans({ first, changes }) {
   };
   const scans = found?.datasets ?? [];
   const none = found?.query.has("text") ? "No scan has this text." : "No scan yet. Upload one, or simulate a sample.";
-  return html`<section aria-labelledby="scans-title">
-    <h2 id="scans-title">Stored scans</h2>
+  return html`<${Section} id="scans" title="Stored scans" className="">
     <${Alert} id="scans-error" error=${error} />
     <${Filters} label="Scans" id="scan-filter" hidden=${!scans.length && !query.size} onChange=${search}>
-      <${Labelled} caption="Name, notes or id">
-        <input name="text" type="search" maxlength="200" autocomplete="off" defaultValue=${first.get("text") ?? ""} />
-      </${Labelled}>
+      <${Field} caption="Name, notes or id" name="text" type="search" maxlength="200" defaultValue=${first.get("text") ?? ""} />
     </${Filters}>
     <p id="several" class="links" hidden=${scans.length < 2}><a class="button" href="#/batch">Reconstruct several scans</a></p>
     <p id="empty" class="empty" role="status" hidden=${!found || scans.length > 0}>${found && !scans.length && none}</p>
@@ -104,7 +93,7 @@ function Scans({ first, changes }) {
       </li>`)}
     </ul>
     ${found && html`<${ListPages} id="scan-pages" path="/" query=${found.query} older=${olderOf(found.next)} words="scans" />`}
-  </section>`;
+  </${Section}>`;
 }
 
 function Start({ query }) {

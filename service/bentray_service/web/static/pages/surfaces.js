@@ -1,22 +1,23 @@
 // Surface rendering: a mesh with its geometry field as mirror, glass or clay, turned by mouse, touch or keyboard, its objects moved.
 import { keepQuery } from "../parts/address.js";
+import { counted } from "../parts/amounts.js";
 import { request } from "../parts/api.js";
 import { parametersOf, propertiesOf } from "../parts/description.js";
 import { PlainField } from "../parts/settings_fields.js";
 import { Pairs } from "../parts/tables.js";
 import { load, titleOf } from "../parts/titles.js";
-import { html, Labelled, useEffect, useRead, useState } from "../parts/view.js";
+import { Field, html, useEffect, useRead, useState } from "../parts/view.js";
 import { queryOf } from "../parts/views.js";
-import { objectAt, objectsOf, placeAt } from "../scenes/ground.js";
+import { objectAt, objectsOf, placeAt } from "../scenes/camera.js";
 import { CAMERA, clamped, FULL_PX, PREVIEW_PX, ScenePage, useScene } from "../scenes/scene.js";
 
 const WORDS = ["View of the scene: arrow keys turn it, plus and minus zoom, Home resets; objects on the ground are dragged", "No image yet"];
 const FIELDS = ["mode", "scene", "lookup", "up", "index", "share", ...CAMERA, "samples"];
 
 function factsOf({ faces, closed, holes, genus, repairs }) {
-  const form = closed ? "closed" : `${holes} ${holes === 1 ? "hole" : "holes"}`;
+  const form = closed ? "closed" : counted(holes, "hole", "holes");
   const mended = Object.values(repairs).some((count) => count > 0) ? " · mended" : "";
-  return `${faces} faces · ${form} · ${genus} ${genus === 1 ? "handle" : "handles"}${mended}`;
+  return `${faces} faces · ${form} · ${counted(genus, "handle", "handles")}${mended}`;
 }
 
 // Below this share rounding decides.
@@ -84,11 +85,9 @@ function grabObject(point, stage, values, move) {
 // Numbers for the places of the movable objects of a scene. places: x and y of each, by default where they stand; limits: of a place.
 function Objects({ scene, places, limits: { minimum, maximum } }) {
   return html`<div id="objects" class="numbers">
-    ${objectsOf(scene).flatMap((object, number) => ["x", "y"].map((axis, k) => html`
-      <${Labelled} key=${`${scene} ${axis}${number}`} caption=${`${object.name}, ${axis}, m`}>
-        <input type="number" step="any" required name=${`${axis}${number}`} min=${minimum} max=${maximum}
-          defaultValue=${places[2 * number + k] ?? object[axis]} />
-      </${Labelled}>`))}
+    ${objectsOf(scene).flatMap((object, number) => ["x", "y"].map((axis, k) => html`<${Field} key=${`${scene} ${axis}${number}`} type="number" step="any"
+      caption=${`${object.name}, ${axis}, m`} name=${`${axis}${number}`} min=${minimum} max=${maximum} required
+      defaultValue=${places[2 * number + k] ?? object[axis]} />`))}
   </div>`;
 }
 
@@ -160,7 +159,7 @@ function Surfaces({ meshes, built, id, query, fields }) {
       <div class="numbers">${FIELDS.map((name) => html`<${PlainField} name=${name} given=${fields[name]} required />`)}</div>
       <${Objects} scene=${standing} places=${places} limits=${limits} />`}
     begin=${{ id: "make", title: "Build the geometry field", job }}
-    jobs=${{ id: "of-fields", title: "Geometry fields", kind: "geometry-field", empty: "No geometry field yet", onJobs }} />`;
+    jobs=${{ title: "Geometry fields", kind: "geometry-field", empty: "No geometry field yet", onJobs }} />`;
 }
 
 export async function open({ id, query }) {

@@ -1,43 +1,29 @@
 // Who uses this tab: with an API key, kept until the tab is closed and in no address, or signed in at an OpenID provider.
 import { authorization, keep, kept, request, respond } from "./api.js";
-import { at } from "./dom.js";
 import { html, useEffect, useRef } from "./view.js";
+
+// An element of the shell by its id.
+export const at = (id) => document.getElementById(id);
 
 // Whether requests need headers, which elements and links cannot send.
 const hasHeaders = () => Object.keys(authorization()).length > 0;
 const blobOf = async (address) => (await respond(address)).blob();
 
-// An element that shows a picture cannot send a key, so that the picture is fetched for it.
-function show(image, address) {
-  image.addEventListener("load", () => URL.revokeObjectURL(image.src), { once: true });
-  blobOf(address).then(
-    (blob) => {
-      image.src = URL.createObjectURL(blob);
-    },
-    () => image.dispatchEvent(new Event("error")),
-  );
-}
-
-const near = new IntersectionObserver(
-  (entries) => {
-    for (const { isIntersecting, target } of entries) {
-      if (!isIntersecting) continue;
-      near.unobserve(target);
-      show(target, target.dataset.address);
-    }
-  },
-  { rootMargin: "300px" },
-);
-
-// A picture of the service, once the reader comes near it.
-export function Picture({ address, alt, ...more }) {
+// A picture of the service, once the reader comes near it. With headers, which its element cannot send, it is fetched for it.
+export function Picture({ address, onError = () => {}, ...more }) {
   const image = useRef(null);
   useEffect(() => {
-    if (!hasHeaders()) return;
-    image.current.dataset.address = address;
+    if (!hasHeaders()) return undefined;
+    const near = new IntersectionObserver((entries) => {
+      if (!entries.some((entry) => entry.isIntersecting)) return;
+      near.disconnect();
+      blobOf(address).then((blob) => Object.assign(image.current ?? {}, { src: URL.createObjectURL(blob) }), onError);
+    }, { rootMargin: "300px" });
     near.observe(image.current);
+    return () => near.disconnect();
   }, [address]);
-  return html`<img ref=${image} loading="lazy" alt=${alt} src=${hasHeaders() ? undefined : address} ...${more} />`;
+  return html`<img ref=${image} loading="lazy" src=${hasHeaders() ? undefined : address} onLoad=${({ target }) => URL.revokeObjectURL(target.src)}
+    onError=${onError} ...${more} />`;
 }
 
 const ENDINGS = { "image/png": ".png", "image/apng": ".png", "application/zip": ".zip", "application/x-hdf5": ".h5" };

@@ -2,7 +2,7 @@
 import { inTime } from "./amounts.js";
 import { request, send } from "./api.js";
 import { HeadedTable } from "./tables.js";
-import { Alert, Button, Facts, Form, html, Labelled, Options, useAct, useRead, useRef, useState } from "./view.js";
+import { Alert, Button, Choice, Facts, Field, Form, html, Options, useAct, useRead, useRef, useState } from "./view.js";
 
 const ROLES = ["reader", "contributor", "owner"];
 const MEMBER = "(key:[0-9a-f]{12}|user:.{1,200})";
@@ -11,9 +11,7 @@ const WORDS = "A reader sees everything in the project, a contributor also uploa
   + "its members. The head of the page chooses the project in which this tab works.";
 
 function NameField({ caption, ...more }) {
-  return html`<${Labelled} caption=${caption}>
-    <input type="text" name="name" maxlength="200" required autocomplete="off" spellcheck="false" ...${more} />
-  </${Labelled}>`;
+  return html`<${Field} caption=${caption} type="text" name="name" maxlength="200" required spellcheck="false" ...${more} />`;
 }
 
 // keys: those of the tenant; put(member, role) returns whether the member has the role.
@@ -25,11 +23,9 @@ function AddMember({ id, keys, put, field }) {
     member.focus();
   }
   return html`<${Form} class="line-form" onSubmit=${add}>
-    <${Labelled} caption="New member">
-      <input type="text" name="member" ref=${field} list=${`keys-${id}`} maxlength="205" required autocomplete="off" spellcheck="false"
+    <${Field} caption="New member" type="text" name="member" ref=${field} list=${`keys-${id}`} maxlength="205" required spellcheck="false"
         pattern=${MEMBER} placeholder="user:NAME or key:ID" title="user: and the name of a user, or key: and the id of a key" />
-    </${Labelled}>
-    <${Labelled} caption="Role"><select name="role" aria-label="Role"><${Options} entries=${ROLES} /></select></${Labelled}>
+    <${Choice} caption="Role" name="role" aria-label="Role" entries=${ROLES} />
     <datalist id=${`keys-${id}`}><${Options} entries=${keys.map((key) => [`key:${key.id}`, key.name])} /></datalist>
     <button type="submit">Add</button>
   </${Form}>`;

@@ -1,8 +1,26 @@
-// How a result was made and how good it is, as tables: errors against the truth, what auto compared, the plan.
+// A result, read from the service: how it was made and how good it is, as tables: errors against the truth, what auto compared, the plan.
 import { duration, methodOf } from "../jobs/job_words.js";
 import { inNanoseconds } from "./amounts.js";
-import { Frame, Pairs } from "./tables.js";
+import { request } from "./api.js";
+import { HeadedTable, Pairs } from "./tables.js";
 import { html } from "./view.js";
+import { Values } from "../viewer/quantities.js";
+
+// { job, volume, summary, values } of a job.
+export async function loadResult(id) {
+  const job = await request(`/v1/jobs/${id}`);
+  if (job.kind !== "reconstruction" || job.state !== "succeeded") {
+    throw new Error(`${id} is no finished reconstruction: ${job.kind}, ${job.state}`);
+  }
+  const volume = await request(job.links.volume);
+  const summary = await request(`${volume.links.self}/summary`);
+  return { job, volume, summary, values: new Values(volume, summary.grids) };
+}
+
+// What a reader calls it: its own name, else what was reconstructed how.
+export function nameOf({ job, volume }) {
+  return job.name || volume.title || job.id;
+}
 
 // The result in a line.
 export function facts({ job, volume, summary }) {
@@ -33,14 +51,8 @@ function candidateCells({ label, held_out_mean_s: mean, held_out_rms_s: rms, tra
 export function ChoiceTable({ candidates, reason, advice }) {
   if (!candidates.length) return advice && html`<${Section} title="Notes" words=${advice} />`;
   return html`<${Section} title="Automatic choice" className="whole-row" words=${reason}>
-    <${Frame} label="Candidates of the automatic choice">
-      <table class="choice-table">
-        <thead><tr>${CANDIDATE_COLUMNS.map((name) => html`<th scope="col">${name}</th>`)}</tr></thead>
-        <tbody>${candidates.map((candidate) => html`<tr class=${candidate.chosen ? "chosen" : ""}>
-          ${candidateCells(candidate).map((cell) => html`<td>${cell}</td>`)}
-        </tr>`)}</tbody>
-      </table>
-    </${Frame}>
+    <${HeadedTable} label="Candidates of the automatic choice" columns=${CANDIDATE_COLUMNS} rows=${candidates.map(candidateCells)}
+      chosen=${candidates.findIndex((candidate) => candidate.chosen)} />
   </${Section}>`;
 }
 

@@ -1,21 +1,18 @@
 // Tables in frames of their own that scroll sideways, and bars of shares.
 import { html } from "./view.js";
 
-export function Frame({ label, children }) {
-  return html`<div class="scroll" tabindex="0" role="region" aria-label=${label}>${children}</div>`;
-}
-
-// label: of the frame, another one than that of the section; columns: headings; rows: lists of texts or elements, with keys if they move.
-export function HeadedTable({ label, columns, rows, keys = [] }) {
-  return html`<${Frame} label=${label}>
-    <table class="headed">
-      <thead><tr>${columns.map((name) => html`<th scope="col">${name}</th>`)}</tr></thead>
-      <tbody>${rows.map(([first, ...others], number) => html`<tr key=${keys[number] ?? number}>
+// label: of the frame, another one than that of the section; columns: headings, if there are any; rows: lists of texts or elements, with keys if
+// they move; chosen: the number of the row that is marked.
+export function HeadedTable({ label, columns = [], rows, keys = [], className = "headed", chosen = -1 }) {
+  return html`<div class="scroll" tabindex="0" role="region" aria-label=${label}>
+    <table class=${className}>
+      ${columns.length > 0 && html`<thead><tr>${columns.map((name) => html`<th scope="col">${name}</th>`)}</tr></thead>`}
+      <tbody>${rows.map(([first, ...others], number) => html`<tr key=${keys[number] ?? number} class=${number === chosen ? "chosen" : ""}>
         <th scope="row">${first}</th>
         ${others.map((cell) => html`<td>${cell}</td>`)}
       </tr>`)}</tbody>
     </table>
-  </${Frame}>`;
+  </div>`;
 }
 
 // Names and values.

@@ -1,5 +1,5 @@
 // The structure of pages: Preact with htm, and the elements and hooks that all pages share.
-import { useEffect, useRef, useState } from "../vendor/hooks.mjs";
+import { useEffect, useLayoutEffect, useRef, useState } from "../vendor/hooks.mjs";
 import htm from "../vendor/htm.mjs";
 import { h } from "../vendor/preact.mjs";
 
@@ -17,9 +17,23 @@ export function Facts({ children, ...more }) {
   return html`<p class="facts" ...${more}>${children}</p>`;
 }
 
+// A part of a page below its heading, which names it. id: of the heading before "-title"; className: "panel" in a frame.
+export function Section({ id, title, className = "panel", children, ...more }) {
+  return html`<section class=${className} aria-labelledby=${`${id}-title`} ...${more}><h2 id=${`${id}-title`}>${title}</h2>${children}</section>`;
+}
+
 // A field below its caption.
 export function Labelled({ caption, children, ...more }) {
   return html`<label ...${more}><span class="caption">${caption}</span>${children}</label>`;
+}
+
+// An input below its caption, or a choice. label: attributes of the label; entries, chosen: see Options.
+export function Field({ caption, label, ...more }) {
+  return html`<${Labelled} caption=${caption} ...${label}><input autocomplete="off" ...${more} /></${Labelled}>`;
+}
+
+export function Choice({ caption, label, entries, chosen, ...more }) {
+  return html`<${Labelled} caption=${caption} ...${label}><select ...${more}><${Options} entries=${entries} chosen=${chosen} /></select></${Labelled}>`;
 }
 
 // entries: [value, words], or words that are their own value. A reset of the form goes back to the chosen one.
@@ -51,6 +65,18 @@ export function useShown() {
     shown.current = false;
   }, []);
   return shown;
+}
+
+// [element, width, height]: the size of an element, pixels of the page; 0 before it is shown.
+export function useSize() {
+  const element = useRef(null);
+  const [size, setSize] = useState([0, 0]);
+  useLayoutEffect(() => {
+    const watcher = new ResizeObserver(([{ contentRect: { width, height } }]) => setSize([width, height]));
+    watcher.observe(element.current);
+    return () => watcher.disconnect();
+  }, []);
+  return [element, ...size];
 }
 
 // The newest value for functions that outlive a drawing, as { current }.

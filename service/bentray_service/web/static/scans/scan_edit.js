@@ -2,17 +2,15 @@
 import { go } from "../parts/address.js";
 import { request, send } from "../parts/api.js";
 import { titleOf } from "../parts/titles.js";
-import { Alert, Button, Facts, Form, html, Labelled, Options, useAct, useEffect, useRef, useShown, useState } from "../parts/view.js";
+import { Alert, Button, Choice, Facts, Field, Form, html, Labelled, useAct, useEffect, useRef, useShown, useState } from "../parts/view.js";
 
 const TIMES = { s: "s", ms: "ms", us: "µs", ns: "ns" };
 const LENGTHS = { m: "m", cm: "cm", mm: "mm", um: "µm" };
 const WATER = "Empty: as in the file. A temperature replaces it in the views of this page and in reconstructions that are started later; "
   + "each of their results states both. The file is not changed.";
 
-// focus: the name of the field to begin with; onSave(changes) returns whether they were saved.
-function EditForm({ scan, focus, error, onSave, onCancel }) {
-  const form = useRef(null);
-  useEffect(() => form.current.elements[focus].focus(), [focus]);
+// onSave(changes): of the record.
+function EditForm({ scan, form, error, onSave, onCancel }) {
   const save = () => {
     const { title, notes, water } = form.current.elements;
     const changes = { notes: notes.value, water_temperature_c: water.value === "" ? null : Number(water.value) };
@@ -21,15 +19,11 @@ function EditForm({ scan, focus, error, onSave, onCancel }) {
     onSave(changes);
   };
   return html`<${Form} id="edit-form" class="panel edit" ref=${form} onSubmit=${save}>
-    <${Labelled} caption="Name">
-      <input name="title" type="text" maxlength="200" aria-describedby="edit-title-words" defaultValue=${scan.title} />
-    </${Labelled}>
+    <${Field} caption="Name" name="title" type="text" maxlength="200" aria-describedby="edit-title-words" defaultValue=${scan.title} />
     <${Facts} id="edit-title-words">Empty: the title in the file.</${Facts}>
     <${Labelled} caption="Notes"><textarea name="notes" maxlength="4000" rows="3" defaultValue=${scan.notes}></textarea></${Labelled}>
-    <${Labelled} caption="Water temperature (°C)" class="short">
-      <input name="water" type="number" min="0" max="95" step="any" placeholder="as in the file" aria-describedby="edit-water-words"
-        defaultValue=${scan.water_temperature_c ?? ""} />
-    </${Labelled}>
+    <${Field} caption="Water temperature (°C)" label=${{ class: "short" }} name="water" type="number" min="0" max="95" step="any"
+      placeholder="as in the file" aria-describedby="edit-water-words" defaultValue=${scan.water_temperature_c ?? ""} />
     <${Facts} id="edit-water-words">${WATER}</${Facts}>
     <div class="actions"><button type="submit">Save</button> <${Button} id="edit-cancel" onClick=${onCancel}>Cancel</${Button}></div>
     <${Alert} id="edit-error" error=${error} />
@@ -40,12 +34,8 @@ function EditForm({ scan, focus, error, onSave, onCancel }) {
 function UnitFields({ name, words, units, proposed = {} }) {
   const entries = Object.entries(units);
   return html`<div class="units">
-    <${Labelled} caption=${`${words} in the original file`}>
-      <select name=${`${name}_in`}><${Options} entries=${[["", "as they were read"], ...entries]} chosen=${proposed.unit} /></select>
-    </${Labelled}>
-    <${Labelled} caption=${`${words} were read as`}>
-      <select name=${`${name}_read_as`}><${Options} entries=${entries} chosen=${proposed.read_as} /></select>
-    </${Labelled}>
+    <${Choice} caption=${`${words} in the original file`} name=${`${name}_in`} entries=${[["", "as they were read"], ...entries]} chosen=${proposed.unit} />
+    <${Choice} caption=${`${words} were read as`} name=${`${name}_read_as`} entries=${entries} chosen=${proposed.read_as} />
   </div>`;
 }
 
@@ -62,46 +52,38 @@ function correctionIn(fields) {
   return correction;
 }
 
-// The form of a corrected copy, which then opens. proposed: corrections that the numbers of the scan suggest.
-function CorrectForm({ scan, proposed, hidden, form, onCancel }) {
-  const [error, act] = useAct();
+// A copy with a correction, onMake(correction, key). proposed: corrections that the numbers of the scan suggest.
+function CorrectForm({ proposed, form, error, onMake, onCancel }) {
   const [sending, setSending] = useState(false);
   const last = useRef({ body: "", key: "" });
-  const shown = useShown();
   const proposal = (name) => proposed.find(({ what }) => what === name);
-  async function make({ currentTarget: { elements } }) {
-    const correction = correctionIn(elements);
+  async function make() {
+    const correction = correctionIn(form.current.elements);
     const body = JSON.stringify(correction);
     // The same again, as after an answer that was lost, makes no second copy.
     if (body !== last.current.body) last.current = { body, key: crypto.getRandomValues(new Uint32Array(4)).join("-") };
     setSending(true);
-    await act(async () => {
-      const made = await send("POST", `/v1/datasets/${scan.id}/corrections`, correction, { "Idempotency-Key": last.current.key });
-      if (shown.current) go(`/scans/${made.id}`);
-    });
+    await onMake(correction, last.current.key);
     setSending(false);
   }
   const hertz = proposal("frequency")?.frequency_hz;
-  return html`<${Form} id="correct-form" class="panel edit" hidden=${hidden} ref=${form} onSubmit=${make}>
+  return html`<${Form} id="correct-form" class="panel edit" ref=${form} onSubmit=${make}>
     <${Facts}>If the file was read in wrong units, state the right ones. This makes a corrected copy, which is checked like an upload. The scan
       itself stays as it is, since its reconstructions were made of it.</${Facts}>
     <${UnitFields} name="times" words="Times" units=${TIMES} proposed=${proposal("times")} />
     <${Facts}>Travel times, time of the first sample, and sample interval.</${Facts}>
     <${UnitFields} name="positions" words="Lengths" units=${LENGTHS} proposed=${proposal("positions")} />
     <${Facts}>Positions of the elements, and all other lengths.</${Facts}>
-    <${Labelled} caption="Sampling rate (MHz)" class="short">
-      <input name="sampling" type="number" min="0.001" max="100000" step="any" placeholder="by the times" />
-    </${Labelled}>
-    <${Labelled} caption="Centre frequency (kHz)" class="short">
-      <input name="frequency" type="number" min="1" max="10000000" step="any" placeholder="as stored" defaultValue=${hertz ? 1e-3 * hertz : ""} />
-    </${Labelled}>
-    <${Labelled} caption="Fault in the order of the elements" class="short">
-      <input name="arrangement" type="text" maxlength="80" placeholder="none" defaultValue=${proposal("arrangement")?.arrangement ?? ""} />
-    </${Labelled}>
+    <${Field} caption="Sampling rate (MHz)" label=${{ class: "short" }} name="sampling" type="number" min="0.001" max="100000" step="any"
+      placeholder="by the times" />
+    <${Field} caption="Centre frequency (kHz)" label=${{ class: "short" }} name="frequency" type="number" min="1" max="10000000" step="any"
+      placeholder="as stored" defaultValue=${hertz ? 1e-3 * hertz : ""} />
+    <${Field} caption="Fault in the order of the elements" label=${{ class: "short" }} name="arrangement" type="text" maxlength="80"
+      placeholder="none" defaultValue=${proposal("arrangement")?.arrangement ?? ""} />
     <div class="actions">
       <button type="submit" disabled=${sending}>Make a corrected copy</button> <${Button} id="correct-cancel" onClick=${onCancel}>Cancel</${Button}>
     </div>
-    <${Alert} id="correct-error" error=${hidden ? null : error} />
+    <${Alert} id="correct-error" error=${error} />
   </${Form}>`;
 }
 
@@ -115,46 +97,50 @@ function proposalInWords({ what, unit, read_as: readAs, frequency_hz: hertz, arr
 // onChange(scan) gets the record after each change; proposed: corrections that the numbers of the scan suggest; openWater: { current } that
 // gets a function that opens the form at the water.
 export function ScanEditor({ scan, proposed, onChange, openWater }) {
-  const [editing, setEditing] = useState("");
-  const [correcting, setCorrecting] = useState(false);
+  // The field with which the open form begins, "" without one.
+  const [field, setField] = useState("");
   const [deleteError, attemptDelete] = useAct();
-  const [editError, attemptEdit, setEditError] = useAct();
-  const [editButton, correctButton, correctForm] = [useRef(null), useRef(null), useRef(null)];
+  const [error, attempt, setError] = useAct();
+  const shown = useShown();
+  const [form, button] = [useRef(null), useRef(null)];
   const address = `/v1/datasets/${scan.id}`;
+  useEffect(() => field && form.current.elements[field].focus(), [field]);
 
-  function edit(field) {
-    setEditError(null);
-    setEditing(field);
-    if (!field) editButton.current.focus();
+  function open(name) {
+    setError(null);
+    setField(name);
   }
-  openWater.current = () => edit("water");
-  const save = (changes) => attemptEdit(async () => {
+  function close() {
+    open("");
+    button.current.focus();
+  }
+  openWater.current = () => open("water");
+  const save = (changes) => attempt(async () => {
     onChange(await send("PATCH", address, changes));
-    edit("");
+    close();
+  });
+  const correct = (correction, key) => attempt(async () => {
+    const made = await send("POST", `${address}/corrections`, correction, { "Idempotency-Key": key });
+    if (shown.current) go(`/scans/${made.id}`);
   });
   const remove = () => confirm(`Delete ${titleOf(scan)} and its reconstructions for good?`) && attemptDelete(async () => {
     await request(address, { method: "DELETE" });
     go("/");
   });
-  useEffect(() => {
-    if (correcting) correctForm.current.elements.times_in.focus();
-  }, [correcting]);
-  const stopCorrecting = () => {
-    setCorrecting(false);
-    correctButton.current.focus();
-  };
+  const correcting = field === "times_in";
+  const opener = (id, name, expanded, words) => html`<button id=${id} type="button" class="quiet" ref=${expanded ? button : null} aria-expanded=${expanded}
+    aria-controls=${`${id}-form`} onClick=${() => (expanded ? close() : open(name))}>${words}</button>`;
+  const shared = { scan, form, error, onCancel: close };
   return html`<div id="scan-editor">
     <div class="links">
-      <button id="edit" type="button" class="quiet" ref=${editButton} aria-expanded=${editing !== ""} aria-controls="edit-form"
-        onClick=${() => edit(editing ? "" : "title")}>Edit name, notes and water</button>
-      <button id="correct" type="button" class="quiet" ref=${correctButton} aria-expanded=${correcting} aria-controls="correct-form"
-        onClick=${() => (correcting ? stopCorrecting() : setCorrecting(true))}>Correct units, frequency or order</button>
+      ${opener("edit", "title", field !== "" && !correcting, "Edit name, notes and water")}
+      ${opener("correct", "times_in", correcting, "Correct units, frequency or order")}
       <${Button} id="delete-scan" onClick=${remove}>Delete</${Button}>
     </div>
     <${Alert} id="delete-error" error=${deleteError} />
     <p id="scan-notes" class="notes" hidden=${!scan.notes}>${scan.notes}</p>
-    ${editing && html`<${EditForm} scan=${scan} focus=${editing} error=${editError} onSave=${save} onCancel=${() => edit("")} />`}
+    ${field && !correcting && html`<${EditForm} ...${shared} onSave=${save} />`}
     <p id="proposed" class="notes" hidden=${!proposed.length}>${proposed.map(proposalInWords).join(" ")}</p>
-    <${CorrectForm} key=${JSON.stringify(proposed)} scan=${scan} proposed=${proposed} hidden=${!correcting} form=${correctForm} onCancel=${stopCorrecting} />
+    ${correcting && html`<${CorrectForm} ...${shared} proposed=${proposed} onMake=${correct} />`}
   </div>`;
 }

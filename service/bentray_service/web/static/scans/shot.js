@@ -1,7 +1,7 @@
 // The shot of a scan: which emission, its traces on a canvas, and the arrivals of one receiver as text.
 import { request } from "../parts/api.js";
-import { Alert, Facts, html, Labelled, useAsked, useEffect, useRef, useState } from "../parts/view.js";
-import { ShotCanvas } from "./shot_canvas.js";
+import { Alert, Choice, Facts, Field, html, Section, useAsked, useEffect, useState } from "../parts/view.js";
+import { Traces } from "./traces.js";
 
 // Between the last movement of the slider and the request.
 const WAIT_MS = 80;
@@ -9,6 +9,8 @@ const WAIT_MS = 80;
 const NO_SHOT = "no arrivals here: the scan has no water shot. A reconstruction estimates one from the paths that miss the object, "
   + "and picks the arrivals against it; the quality report as an image shows them";
 const NO_PULSE = "no arrivals here: the traces have no pulse to pick";
+
+const SHOTS = [["object", "with the object"], ["water", "of the water shot"]];
 
 const microseconds = (seconds) => `${(1e6 * seconds).toFixed(2)} µs`;
 const within = (value, most) => Math.min(most, Math.max(0, Math.round(Number(value) || 0)));
@@ -35,8 +37,8 @@ function valuesOf(shot, receiver) {
   return `${words}, with the object ${microseconds(pick)}, difference ${microseconds(pick - straight)}`;
 }
 
-function Count({ most, ...more }) {
-  return html`<input type="number" min="0" max=${most} step="1" ...${more} />`;
+function Count({ most, onCount, ...more }) {
+  return html`<${Field} type="number" min="0" max=${most} step="1" onChange=${({ target }) => onCount(target.value)} ...${more} />`;
 }
 
 // hasWater: whether there is a water shot, null while that is unknown; onEmission(element) is told which element emits.
@@ -49,13 +51,7 @@ export function Shot({ scan, hasWater, onEmission }) {
   const [shot, error, ask] = useAsked(WAIT_MS);
   useEffect(() => ask(() => request(address)), [address]);
   useEffect(() => shot && onEmission(shot.element), [shot]);
-  const [canvas, view] = [useRef(null), useRef(null)];
-  useEffect(() => {
-    view.current = new ShotCanvas(canvas.current);
-    return () => view.current.close();
-  }, []);
   const receiver = shot ? Math.min(cursor, shot.receivers - 1) : 0;
-  useEffect(() => shot && view.current.show(shot, receiver), [shot, receiver]);
 
   const choose = (value) => setEmission(within(value, scan.ntx - 1));
   const point = (value) => shot && setCursor(within(value, shot.receivers - 1));
@@ -67,34 +63,23 @@ export function Shot({ scan, hasWater, onEmission }) {
     else choose(emission + move[1]);
   }
   const label = shot && `Traces of emission ${shot.emission}: ${shot.receivers} receivers over time`;
-  return html`
-    <h2 id="shot-title">Traces</h2>
+  return html`<${Section} id="shot" title="Traces" className="panel traces">
     <div class="shot-controls">
-      <${Labelled} caption="Emission" class="shot-slider">
-        <input id="shot-slider" type="range" min="0" max=${scan.ntx - 1} step="1" value=${emission} aria-valuetext=${`emission ${emission} of ${scan.ntx}`}
-          onInput=${({ target }) => choose(target.value)} />
-      </${Labelled}>
-      <${Labelled} caption="Emission number">
-        <${Count} id="shot-number" most=${scan.ntx - 1} value=${emission} onChange=${({ target }) => choose(target.value)} />
-      </${Labelled}>
-      <${Labelled} caption="Slice" id="shot-slices" hidden=${scan.slices < 2}>
-        <${Count} id="shot-slice" most=${scan.slices - 1} value=${slice} onChange=${({ target }) => setSlice(within(target.value, scan.slices - 1))} />
-      </${Labelled}>
-      <${Labelled} caption="Traces" id="shot-shots" hidden=${!hasWater}>
-        <select id="shot-quantity" value=${quantity} onChange=${({ target }) => setQuantity(target.value)}>
-          <option value="object">with the object</option>
-          <option value="water">of the water shot</option>
-        </select>
-      </${Labelled}>
+      <${Field} caption="Emission" label=${{ class: "shot-slider" }} id="shot-slider" type="range" min="0" max=${scan.ntx - 1} step="1"
+        value=${emission} aria-valuetext=${`emission ${emission} of ${scan.ntx}`} onInput=${({ target }) => choose(target.value)} />
+      <${Count} caption="Emission number" id="shot-number" most=${scan.ntx - 1} value=${emission} onCount=${choose} />
+      <${Count} caption="Slice" label=${{ id: "shot-slices", hidden: scan.slices < 2 }} id="shot-slice" most=${scan.slices - 1} value=${slice}
+        onCount=${(value) => setSlice(within(value, scan.slices - 1))} />
+      <${Choice} caption="Traces" label=${{ id: "shot-shots", hidden: !hasWater }} id="shot-quantity" entries=${SHOTS} chosen=${quantity}
+        onChange=${({ target }) => setQuantity(target.value)} />
     </div>
-    <canvas id="shot" class="shot" ref=${canvas} tabindex="0" role="application" aria-roledescription="image" aria-describedby="shot-keys" aria-label=${label}
-      onPointerMove=${({ offsetX }) => shot && point(view.current.receiverAt(offsetX))} onKeyDown=${onKeyDown}></canvas>
+    <${Traces} shot=${shot} cursor=${receiver} id="shot" aria-describedby="shot-keys" aria-label=${label} onPoint=${point} onKeyDown=${onKeyDown} />
     <${Facts} id="shot-legend">${shot && hasWater !== null && html`<${Legend} shot=${shot} hasWater=${hasWater} />`}</${Facts}>
     <p class="facts" id="shot-facts" role="status">${shot && factsOf(shot)}</p>
-    <${Labelled} caption="Receiver, from 0" class="shot-receiver">
-      <${Count} id="shot-receiver" most=${shot && shot.receivers - 1} value=${receiver} onChange=${({ target }) => point(target.value)} />
-    </${Labelled}>
+    <${Count} caption="Receiver, from 0" label=${{ class: "shot-receiver" }} id="shot-receiver" most=${shot && shot.receivers - 1} value=${receiver}
+      onCount=${point} />
     <${Facts} id="shot-values">${shot && valuesOf(shot, receiver)}</${Facts}>
     <${Facts} id="shot-keys">Left and right, on the picture, choose the receiver; Page up and Page down the emission.</${Facts}>
-    <${Alert} id="shot-error" error=${error} />`;
+    <${Alert} id="shot-error" error=${error} />
+  </${Section}>`;
 }

@@ -17,125 +17,103 @@ export const rateOf = (rate) => ` · preview${rate ? ` · ${Math.round(rate)} fr
 // Draws pictures of the service on a canvas. The newest view wins: a preview under way is still shown, since frames would
 // never arrive otherwise, unless a newer one was; a full picture under way is cancelled. After each picture onShown is called
 // with { quality, rate }: previews per second, 0 for the first one of a motion.
-export function pictureStream(canvas, { onShown = () => {}, onError = () => {} } = {}) {
-  const underWay = new Set();
-  let wanted = null;
-  let views = 0;
-  let shown = 0;
-  let lastMs = Infinity;
-  let lastPreview = -Infinity;
-  let interval = 0;
-  let waitUntil = 0;
-  let timer = 0;
-  let closed = false;
-
-  async function draw(view, quality, signal) {
-    const begun = performance.now();
-    const response = await respond(view[quality], { signal });
-    const bitmap = await createImageBitmap(await response.blob());
-    lastMs = performance.now() - begun;
-    present(view, quality, bitmap, signal);
+export class PictureStream {
+  constructor(canvas, { onShown, onError }) {
+    Object.assign(this, { canvas, onShown, onError, underWay: new Set(), wanted: null, views: 0, shown: 0, waitUntil: 0, timer: 0 });
+    // The time of the last picture, and of previews: when the last one came, and the mean interval; ms.
+    Object.assign(this, { lastMs: Infinity, lastPreview: -Infinity, interval: 0 });
   }
 
-  // Show a picture of the service, unless it comes too late.
-  function present(view, quality, bitmap, signal) {
-    const late = view.number < shown || view.shown === "full";
-    if (closed || signal.aborted || late) {
-      bitmap.close();
-      return;
-    }
-    if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
-      canvas.width = bitmap.width;
-      canvas.height = bitmap.height;
-    }
-    canvas.getContext("2d").drawImage(bitmap, 0, 0);
-    bitmap.close();
-    note(view, quality, "service");
+  // The view moves: addresses of its preview and of its full picture; drawHere, if given, draws the preview on the canvas and returns whether
+  // it did.
+  move(preview, full, drawHere = null) {
+    this.want({ preview, full, drawHere, moved: performance.now() });
   }
 
-  function note(view, quality, source) {
-    shown = view.number;
-    view.shown = quality;
-    canvas.dataset.address = view[quality];
-    canvas.dataset.quality = quality;
-    canvas.dataset.source = source;
-    canvas.dataset.pictures = Number(canvas.dataset.pictures || 0) + 1;
-    onError(null);
-    onShown({ quality, rate: quality === "preview" ? rate() : 0 });
+  // The view has changed at once.
+  set(full) {
+    const { wanted } = this;
+    if (wanted?.full !== full || (wanted.shown !== "full" && wanted.preview)) this.want({ preview: "", full, moved: -Infinity });
   }
 
-  function rate() {
+  close() {
+    this.wanted = null;
+    clearTimeout(this.timer);
+    for (const { controller } of this.underWay) controller.abort();
+  }
+
+  want(view) {
+    this.views += 1;
+    this.wanted = { ...view, number: this.views, requested: "", shown: "" };
+    for (const { quality, controller } of this.underWay) if (quality === "full") controller.abort();
+    this.next();
+  }
+
+  next() {
+    const { wanted } = this;
+    clearTimeout(this.timer);
+    if (!wanted || wanted.shown === "full" || wanted.requested === "full") return;
+    const nextIn = (milliseconds) => {
+      this.timer = setTimeout(() => this.next(), milliseconds);
+    };
     const now = performance.now();
-    const since = now - lastPreview;
-    lastPreview = now;
-    if (since > QUICK_MS) interval = 0;
-    else interval = interval ? (1 - NEWEST) * interval + NEWEST * since : since;
-    return interval ? 1000 / interval : 0;
+    const left = wanted.moved + REST_MS - now;
+    const free = this.underWay.size < (this.lastMs < QUICK_MS ? MAX_UNDER_WAY : 1);
+    if (now < this.waitUntil) nextIn(this.waitUntil - now);
+    else if (wanted.preview && !wanted.requested && left > 0) {
+      if (wanted.drawHere?.(this.canvas)) {
+        wanted.requested = "preview";
+        this.note(wanted, "preview", "browser");
+        nextIn(left);
+      } else if (free) this.start(wanted, "preview");
+    } else if (left > 0) nextIn(left);
+    else if (free) this.start(wanted, "full");
   }
 
-  async function start(view, quality) {
-    const one = { controller: new AbortController(), quality };
-    underWay.add(one);
+  async start(view, quality) {
+    const request = { controller: new AbortController(), quality };
+    const { signal } = request.controller;
+    this.underWay.add(request);
     view.requested = quality;
+    const begun = performance.now();
     try {
-      await draw(view, quality, one.controller.signal);
+      const bitmap = await createImageBitmap(await (await respond(view[quality], { signal })).blob());
+      this.lastMs = performance.now() - begun;
+      // It may come too late.
+      if (!signal.aborted && view.number >= this.shown && view.shown !== "full") {
+        [this.canvas.width, this.canvas.height] = [bitmap.width, bitmap.height];
+        this.canvas.getContext("2d").drawImage(bitmap, 0, 0);
+        this.note(view, quality, "service");
+      }
+      bitmap.close();
     } catch (error) {
-      if (!one.controller.signal.aborted) {
-        if (error.response?.status === 429) {
-          view.requested = view.shown;
-          waitUntil = performance.now() + Math.min(1000 * Number(error.response.headers.get("Retry-After") || 1), MAX_WAIT_MS);
-        } else {
-          view.shown = "full";
-          if (wanted === view && !closed) onError(error);
-        }
+      if (error.response?.status === 429) {
+        view.requested = view.shown;
+        this.waitUntil = performance.now() + Math.min(1000 * Number(error.response.headers.get("Retry-After") || 1), MAX_WAIT_MS);
+      } else if (!signal.aborted) {
+        view.shown = "full";
+        if (this.wanted === view) this.onError(error);
       }
     }
-    underWay.delete(one);
-    next();
+    this.underWay.delete(request);
+    this.next();
   }
 
-  function next() {
-    clearTimeout(timer);
-    if (closed || !wanted || wanted.shown === "full" || wanted.requested === "full") return;
+  note(view, quality, source) {
+    this.shown = view.number;
+    view.shown = quality;
+    Object.assign(this.canvas.dataset, { address: view[quality], quality, source, pictures: Number(this.canvas.dataset.pictures || 0) + 1 });
+    this.onError(null);
+    this.onShown({ quality, rate: quality === "preview" ? this.rate() : 0 });
+  }
+
+  // Previews per second.
+  rate() {
     const now = performance.now();
-    if (now < waitUntil) {
-      timer = setTimeout(next, waitUntil - now);
-      return;
-    }
-    const left = wanted.moved + REST_MS - now;
-    const free = underWay.size < (lastMs < QUICK_MS ? MAX_UNDER_WAY : 1);
-    if (wanted.preview && !wanted.requested && left > 0) {
-      if (wanted.drawHere?.(canvas)) {
-        wanted.requested = "preview";
-        note(wanted, "preview", "browser");
-        timer = setTimeout(next, left);
-      } else if (free) start(wanted, "preview");
-    } else if (left > 0) timer = setTimeout(next, left);
-    else if (free) start(wanted, "full");
+    const since = now - this.lastPreview;
+    this.lastPreview = now;
+    if (since > QUICK_MS) this.interval = 0;
+    else this.interval = this.interval ? (1 - NEWEST) * this.interval + NEWEST * since : since;
+    return this.interval ? 1000 / this.interval : 0;
   }
-
-  function want(preview, full, moved, drawHere = null) {
-    views += 1;
-    wanted = { preview, full, moved, drawHere, number: views, requested: "", shown: "" };
-    for (const one of underWay) if (one.quality === "full") one.controller.abort();
-    next();
-  }
-
-  return {
-    // The view moves: addresses of its preview and of its full picture; drawHere, if given, draws the preview on the canvas
-    // and returns whether it did.
-    move(preview, full, drawHere = null) {
-      want(preview, full, performance.now(), drawHere);
-    },
-    // The view has changed at once.
-    set(full) {
-      if (wanted?.full === full && (wanted.shown === "full" || !wanted.preview)) return;
-      want("", full, -Infinity);
-    },
-    close() {
-      closed = true;
-      clearTimeout(timer);
-      for (const one of underWay) one.controller.abort();
-    },
-  };
 }

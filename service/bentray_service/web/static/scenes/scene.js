@@ -1,13 +1,13 @@
 // What the pages of volume and surface rendering share: the picture of a view, its camera, the form of the view, and what is rendered.
-import { JobList } from "../jobs/job_list.js";
-import { go, keepQuery } from "../parts/address.js";
+import { JobList } from "../jobs/job_cards.js";
+import { go } from "../parts/address.js";
 import { inTime } from "../parts/amounts.js";
 import { request, send } from "../parts/api.js";
 import { DropZone } from "../parts/drop_zone.js";
 import { titleOf } from "../parts/titles.js";
-import { Alert, Button, Facts, Form, html, Options, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
+import { Alert, Button, Facts, Form, html, Options, Section, useAct, useEffect, useLater, useNewest, useRef, useState } from "../parts/view.js";
 import { orbit } from "./orbit.js";
-import { pictureStream, rateOf } from "./picture_stream.js";
+import { PictureStream, rateOf } from "./picture_stream.js";
 
 export const CAMERA = ["azimuth_deg", "elevation_deg", "zoom"];
 // Sides of pictures, pixels: while the view moves, and at rest.
@@ -43,7 +43,7 @@ function cameraOf(form, show) {
 }
 
 // A record that is rendered as a form says. records: to choose from, newest first; id: the first choice; query: of the address, for the form;
-// pictureOf(record, values): { preview, full, drawHere, keep }, see pictureStream, keep() states the view in the address; null without a picture.
+// pictureOf(record, values): { preview, full, drawHere, keep }, see PictureStream, keep() states the view in the address; null without a picture.
 export function useScene({ records: first, id, query, pictureOf }) {
   const [records, setRecords] = useState(first);
   const [chosen, choose] = useState(id);
@@ -78,7 +78,7 @@ function Stage({ id, words, hint, describe, onShown = () => {}, onError, camera,
   const [shown, setShown] = useState(null);
   const newest = useNewest({ describe, onShown, camera, onError });
   useEffect(() => {
-    stream.current = pictureStream(canvas.current, {
+    stream.current = new PictureStream(canvas.current, {
       onShown({ quality, rate }) {
         const { label, facts } = newest.current.describe();
         setShown({ label, facts: `${facts}${quality === "full" ? "" : rateOf(rate)}` });
@@ -115,8 +115,9 @@ function RecordSelect({ name, path, records, chosen, none }) {
 // A whole page. scene: of useScene; name: of the kind of record; path: of the page; stage: see Stage; below: the picture; formats, none: of files,
 // and without a record; onStored(record): after an upload; facts: of the record; form: its id; onChange(): of the form; fields: in it; begin:
 // { id, title, job() } of the button that starts a job; actions: beside it; products: what is deleted with a record, null if it is not deleted
-// here; jobs: { id, title, kind, empty, onJobs } of the jobs below.
-export function ScenePage({ scene, title, name, path, stage, below, formats, none, onStored, facts, form, onChange, fields, begin, products, actions, jobs, children }) {
+// here; jobs: { title, kind, empty, onJobs } of the jobs below.
+export function ScenePage(props) {
+  const { scene, title, name, path, stage, below, formats, none, onStored, facts, form, onChange, fields, begin, products, actions, jobs, children } = props;
   const { record, act, camera } = scene;
   const start = () => act(async () => {
     await send("POST", "/v1/jobs", begin.job());
@@ -151,8 +152,7 @@ export function ScenePage({ scene, title, name, path, stage, below, formats, non
         </${Form}>
       </div>
     </section>
-    <section aria-labelledby="jobs-title" id=${jobs.id}>
-      <h2 id="jobs-title">${jobs.title}</h2>
+    <${Section} id="jobs" title=${jobs.title} className="">
       <${JobList} refresh=${scene.refresh} empty=${jobs.empty} filters=${{ kind: jobs.kind }} onJobs=${jobs.onJobs} />
-    </section>`;
+    </${Section}>`;
 }

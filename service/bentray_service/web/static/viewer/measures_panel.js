@@ -1,6 +1,6 @@
 // The profile and the region of a view: their places in mm, plot and statistics, and CSV files of both.
 import { saveBlob } from "../parts/key.js";
-import { Frame } from "../parts/tables.js";
+import { HeadedTable } from "../parts/tables.js";
 import { Button, Facts, html } from "../parts/view.js";
 import { NumberField } from "./controls.js";
 import { profileOf, regionOf } from "./measures.js";
@@ -57,23 +57,18 @@ function Profile({ curves, place, quantity, onPlace }) {
 
 function Statistics({ found, quantity }) {
   const unit = inUnit(quantity);
-  const of = (name) => found.map(({ statistics }) => shown(statistics[name], quantity));
-  const uncertain = found.map(({ statistics: { uncertainty } }) => (uncertainty === undefined ? "–" : shown(uncertainty, quantity)));
+  const row = (title, name) => [`${title}${unit}`, ...found.map(({ statistics }) => (name in statistics ? shown(statistics[name], quantity) : "–"))];
   const rows = [
-    [`Mean${unit}`, of("mean")],
-    ...(found[0].statistics.uncertainty === undefined ? [] : [[`Uncertainty of the mean${unit}`, uncertain]]),
-    [`Standard deviation${unit}`, of("deviation")],
-    [`Contrast to surroundings${unit}`, of("contrast")],
-    ["Area (mm²)", found.map(({ statistics }) => statistics.area.toFixed(2))],
-    ["Nodes", found.map(({ statistics }) => statistics.nodes)],
+    row("Mean", "mean"),
+    ...("uncertainty" in found[0].statistics ? [row("Uncertainty of the mean", "uncertainty")] : []),
+    row("Standard deviation", "deviation"),
+    row("Contrast to surroundings", "contrast"),
+    ["Area (mm²)", ...found.map(({ statistics }) => statistics.area.toFixed(2))],
+    ["Nodes", ...found.map(({ statistics }) => statistics.nodes)],
   ];
   // Four results are wider than a telephone.
-  return html`<${Frame} label="Statistics of the region">
-    <table class="statistics"><tbody>
-      ${found.length > 1 && html`<tr><th scope="row"></th>${found.map(({ title }) => html`<th>${title}</th>`)}</tr>`}
-      ${rows.map(([name, cells]) => html`<tr><th scope="row">${name}</th>${cells.map((cell) => html`<td>${cell}</td>`)}</tr>`)}
-    </tbody></table>
-  </${Frame}>`;
+  const columns = found.length > 1 ? ["", ...found.map(({ title }) => title)] : [];
+  return html`<${HeadedTable} className="statistics" label="Statistics of the region" columns=${columns} rows=${rows} />`;
 }
 
 // beside: images whose region is measured, too, such as the truth. deviations: of the nodes of the first image, or null.

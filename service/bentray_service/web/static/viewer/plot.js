@@ -21,12 +21,13 @@ function decades(low, high) {
   return values.filter((value) => Math.log10(value) >= low && Math.log10(value) <= high);
 }
 
-// Grid lines, numbers and names of two axes. box: [left, top, right, bottom]; px, py: places of the values x and y; words: of the axes.
-export function Axes({ box: [left, top, right, bottom], px, py, x, y, words, height, margin }) {
+// Grid lines, numbers and names of two axes. box: [left, top, right, bottom]; px, py: places of the values x and y; wordsOf: of a value x;
+// words: of the axes.
+export function Axes({ box: [left, top, right, bottom], px, py, x, y, wordsOf = String, words, height, margin }) {
   const middle = (top + bottom) / 2;
   return html`
     ${x.map((value) => html`<line class="grid" x1=${px(value)} x2=${px(value)} y1=${top} y2=${bottom} />
-      <text x=${px(value)} y=${bottom + 15} text-anchor="middle">${value}</text>`)}
+      <text x=${px(value)} y=${bottom + 15} text-anchor="middle">${wordsOf(value)}</text>`)}
     ${y.map((value) => html`<line class="grid" x1=${left} x2=${right} y1=${py(value)} y2=${py(value)} />
       <text x=${left - 6} y=${py(value) + 4} text-anchor="end">${value}</text>`)}
     <text x=${(left + right) / 2} y=${height - 6} text-anchor="middle">${words[0]}</text>

@@ -13,101 +13,115 @@ const draws = ({ tool }) => !["pan", "window"].includes(tool);
 
 // act: { current } with state, view ({ centre, zoom }), window ([low, high]), cursor, setView(centre, zoom), setWindow(low, high),
 // hover(point or null), setCursor(x, y), moveCursor(da, db), moveSlice(by), draw(place), automatic(), reset().
-export function watch(canvas, image, act) {
-  let drag = null;
-  let anchor = null;
+export class Pointing {
+  constructor(canvas, image, act) {
+    // drag: a press and what was shown then; anchor: where a profile or region was begun by a key.
+    Object.assign(this, { canvas, image, newest: act, drag: null, anchor: null });
+    watchPointers(canvas, {
+      press: (point) => {
+        this.drag = point && { point, moved: false, at: image.toPlane(...point), centre: image.centre, window: this.act.window };
+      },
+      hover: (point) => this.act.hover(point),
+      drag: (point) => this.dragTo(point),
+      pinch: (factor, [px, py]) => this.zoomAt(px, py, factor),
+      release: (point) => this.release(point),
+      cancel: () => {
+        this.drag = null;
+      },
+    });
+    canvas.addEventListener("keydown", (event) => {
+      const action = event.ctrlKey || event.altKey || event.metaKey ? null : this.actionOf(event);
+      if (!action) return;
+      action();
+      event.preventDefault();
+    });
+    const zoom = (event) => {
+      event.preventDefault();
+      this.zoomAt(event.offsetX, event.offsetY, WHEEL ** -event.deltaY);
+    };
+    canvas.addEventListener("wheel", zoom, { passive: false });
+  }
+
+  get act() {
+    return this.newest.current;
+  }
 
   // Zoom so that the point under (px, py) stays.
-  function zoomAt(px, py, factor) {
-    const [x, y] = image.toPlane(px, py);
-    const zoom = clampZoom(act.current.view.zoom * factor);
-    const share = act.current.view.zoom / zoom;
-    act.current.setView([x + (image.centre[0] - x) * share, y + (image.centre[1] - y) * share], zoom);
+  zoomAt(px, py, factor) {
+    const { act, image: { centre } } = this;
+    const [x, y] = this.image.toPlane(px, py);
+    const zoom = clampZoom(act.view.zoom * factor);
+    const share = act.view.zoom / zoom;
+    act.setView([x + (centre[0] - x) * share, y + (centre[1] - y) * share], zoom);
   }
 
-  // The window moved by a share of its width, and widened by a factor.
-  function shift([low, high], by, spread) {
+  // Show what is some pixels to the right of a centre, and above it.
+  pan([x, y], right, up) {
+    this.act.setView([x + right / this.image.scale, y + up / this.image.scale], this.act.view.zoom);
+  }
+
+  // A window moved by a share of its width, and widened by a factor.
+  shift([low, high], by, spread) {
     const half = ((high - low) / 2) * spread;
     const level = (low + high) / 2 + by * (high - low);
-    act.current.setWindow(level - half, level + half);
+    this.act.setWindow(level - half, level + half);
   }
 
-  function dragTo([px, py]) {
+  dragTo([px, py]) {
+    const { act, drag } = this;
     if (!drag) return;
     const [dx, dy] = [px - drag.point[0], py - drag.point[1]];
     drag.moved ||= Math.hypot(dx, dy) > STILL;
     if (!drag.moved) return;
-    const { tool } = act.current.state;
-    if (tool === "pan") act.current.setView([drag.centre[0] - dx / drag.scale, drag.centre[1] + dy / drag.scale], act.current.view.zoom);
-    else if (tool === "window") shift(drag.window, -dy * DRAG_SHARE, Math.exp(dx * DRAG_SHARE * 2));
-    else act.current.draw([...drag.at, ...image.toPlane(px, py)]);
+    if (act.state.tool === "pan") this.pan(drag.centre, -dx, dy);
+    else if (act.state.tool === "window") this.shift(drag.window, -dy * DRAG_SHARE, Math.exp(dx * DRAG_SHARE * 2));
+    else act.draw([...drag.at, ...this.image.toPlane(px, py)]);
   }
 
-  watchPointers(canvas, {
-    press(point) {
-      drag = point && { point, moved: false, at: image.toPlane(...point), centre: image.centre, window: act.current.window, scale: image.scale };
-    },
-    hover: (point) => act.current.hover(point),
-    drag: dragTo,
-    pinch: (factor, middle) => zoomAt(...middle, factor),
-    release(point) {
-      if (drag && !drag.moved) act.current.setCursor(...drag.at);
-      else if (draws(act.current.state)) dragTo(point);
-      drag = null;
-    },
-    cancel() {
-      drag = null;
-    },
-  });
-
-  function key(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
-    const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-    const { clientWidth: width, clientHeight: height } = canvas;
-    const { window } = act.current;
-    const drawing = draws(act.current.state);
-    const actions = {
-      "+": () => zoomAt(width / 2, height / 2, STEP),
-      "=": () => zoomAt(width / 2, height / 2, STEP),
-      "-": () => zoomAt(width / 2, height / 2, 1 / STEP),
-      0: () => act.current.reset(),
-      a: () => act.current.automatic(),
-      ",": () => shift(window, -KEY_SHARE, 1),
-      ".": () => shift(window, KEY_SHARE, 1),
-      "[": () => shift(window, 0, 1 - 2 * KEY_SHARE),
-      "]": () => shift(window, 0, 1 + 2 * KEY_SHARE),
-      PageUp: () => act.current.moveSlice(1),
-      PageDown: () => act.current.moveSlice(-1),
-    };
-    if (arrows[event.key]) {
-      const [da, db] = arrows[event.key];
-      if (event.shiftKey) {
-        const [x, y] = image.centre;
-        act.current.setView([x + (0.1 * da * width) / image.scale, y + (0.1 * db * height) / image.scale], act.current.view.zoom);
-      } else {
-        act.current.moveCursor(da, db);
-        if (anchor && drawing) act.current.draw([...anchor, ...act.current.cursor]);
-      }
-    } else if (event.key === "Enter" && drawing) {
-      if (anchor) act.current.draw([...anchor, ...act.current.cursor]);
-      anchor = anchor ? null : act.current.cursor;
-    } else if (event.key === "Escape" && anchor) {
-      anchor = null;
-    } else if (actions[event.key]) {
-      actions[event.key]();
-    } else {
-      return;
-    }
-    event.preventDefault();
+  release(point) {
+    if (this.drag && !this.drag.moved) this.act.setCursor(...this.drag.at);
+    else if (draws(this.act.state)) this.dragTo(point);
+    this.drag = null;
   }
 
-  canvas.addEventListener("keydown", key);
-  canvas.addEventListener(
-    "wheel",
-    (event) => {
-      event.preventDefault();
-      zoomAt(event.offsetX, event.offsetY, WHEEL ** -event.deltaY);
-    },
-    { passive: false },
-  );
+  // A step of the cursor, with what is drawn to it; of the image with Shift.
+  step(da, db, shifted) {
+    const { act, canvas, image } = this;
+    if (shifted) return this.pan(image.centre, 0.1 * da * canvas.clientWidth, 0.1 * db * canvas.clientHeight);
+    act.moveCursor(da, db);
+    if (this.anchor && draws(act.state)) act.draw([...this.anchor, ...act.cursor]);
+  }
+
+  // Begin a profile or region at the cursor, or end it there.
+  mark() {
+    if (this.anchor) this.act.draw([...this.anchor, ...this.act.cursor]);
+    this.anchor = this.anchor ? null : this.act.cursor;
+  }
+
+  // What a key does, nothing for others.
+  actionOf({ key, shiftKey }) {
+    const { act, canvas: { clientWidth: width, clientHeight: height } } = this;
+    const zoom = (factor) => this.zoomAt(width / 2, height / 2, factor);
+    return {
+      ArrowLeft: () => this.step(-1, 0, shiftKey),
+      ArrowRight: () => this.step(1, 0, shiftKey),
+      ArrowUp: () => this.step(0, 1, shiftKey),
+      ArrowDown: () => this.step(0, -1, shiftKey),
+      "+": () => zoom(STEP),
+      "=": () => zoom(STEP),
+      "-": () => zoom(1 / STEP),
+      0: act.reset,
+      a: act.automatic,
+      ",": () => this.shift(act.window, -KEY_SHARE, 1),
+      ".": () => this.shift(act.window, KEY_SHARE, 1),
+      "[": () => this.shift(act.window, 0, 1 - 2 * KEY_SHARE),
+      "]": () => this.shift(act.window, 0, 1 + 2 * KEY_SHARE),
+      PageUp: () => act.moveSlice(1),
+      PageDown: () => act.moveSlice(-1),
+      Enter: draws(act.state) && (() => this.mark()),
+      Escape: this.anchor && (() => {
+        this.anchor = null;
+      }),
+    }[key];
+  }
 }

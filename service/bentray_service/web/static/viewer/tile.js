@@ -1,14 +1,14 @@
 // One image of the viewer: a canvas that is pointed at, below it its title.
 import { html, useLayoutEffect, useNewest, useRef } from "../parts/view.js";
 import { ImageView } from "./image_view.js";
-import { watch } from "./pointing.js";
+import { Pointing } from "./pointing.js";
 
 // image: as for ImageView.show; actionsOf(view): what pointers and keys do, see pointing.js. grip: whether dragging does not scroll the page.
 export function Tile({ title, words, image: { plane, ...look }, grip, actionsOf }) {
   const [canvas, view, actions] = [useRef(null), useRef(null), useNewest(null)];
   useLayoutEffect(() => {
     view.current = new ImageView(canvas.current);
-    watch(canvas.current, view.current, actions);
+    new Pointing(canvas.current, view.current, actions);
     return () => view.current.close();
   }, []);
   useLayoutEffect(() => {

@@ -2,10 +2,9 @@
 import { Alert, html, useEffect, useLater, useMemo, useReducer, useRef, useState } from "../parts/view.js";
 import { ColourBar } from "./colour_bar.js";
 import { ChoiceBar, Keys, Slices, Swipe, Tools, Window } from "./controls.js";
-import { AXES } from "./field.js";
+import { AXES, Planes } from "./field.js";
 import { Measures } from "./measures_panel.js";
 import { robustLimits } from "./measures.js";
-import { Planes } from "./planes.js";
 import { FADED, QUANTITIES, shownOf } from "./quantities.js";
 import { Readout } from "./readout.js";
 import { MODES, queryOfState } from "./state.js";

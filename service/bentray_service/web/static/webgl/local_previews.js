@@ -2,8 +2,7 @@
 import { respond } from "../parts/api.js";
 import { queryOf } from "../parts/views.js";
 import { parseNpy } from "../viewer/npy.js";
-import { hasGraphicsCard, rayCaster } from "./ray_caster.js";
-import { hasFilter, MAX_ISOS } from "./ray_shader.js";
+import { hasFilter, hasGraphicsCard, MAX_ISOS, rayCaster } from "./ray_caster.js";
 
 // Slower than 10 previews a second, by the mean of some, it is not used again.
 const SLOW_MS = 100;

@@ -1,22 +1,28 @@
 // Casts refracted rays through a volume on the graphics card: a WebGL2 program, its textures, and the camera of the service.
-import { BLOCK, fragmentOf, MAX_ISOS, VERTEX } from "./ray_shader.js";
+import { frameOf } from "../scenes/camera.js";
+
+export const MAX_ISOS = 4;
+// Cells along each side of a block, of which the range of the field is known.
+const BLOCK = 4;
+
+// One triangle that covers the picture.
+const VERTEX = `#version 300 es
+void main() {
+  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+}`;
+const FRAGMENT = await (await fetch(new URL("./rays.frag", import.meta.url))).text();
+
+// What the shader calls a filter.
+const FILTERS = { bspline3: "B_SPLINE_3", "catmull-rom": "CATMULL_ROM" };
+
+export const hasFilter = (name) => name in FILTERS;
+
+const fragmentOf = (filter) => ["#version 300 es", `#define MAX_ISOS ${MAX_ISOS}`, `#define BLOCK ${BLOCK}`, `#define ${FILTERS[filter]}`, FRAGMENT].join("\n");
 
 // As in workers/bentray_workers/rendering/refraction.py, and the defaults of refraction_view.py.
 const VIEW_MARGIN = 1.25;
 const SQUARES = 16;
 const DEPTH = 16;
-
-const degrees = (angle) => (angle * Math.PI) / 180;
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-
-// Unit vectors to the right, down and ahead, with z up.
-function frameOf(azimuthDeg, elevationDeg) {
-  const [azimuth, elevation] = [degrees(azimuthDeg), degrees(elevationDeg)];
-  const [east, north] = [Math.cos(azimuth), Math.sin(azimuth)];
-  const ahead = [-Math.cos(elevation) * east, -Math.cos(elevation) * north, -Math.sin(elevation)];
-  const right = [-north, east, 0];
-  return { right, down: cross(ahead, right), ahead };
-}
 
 // Least and greatest coefficient around each block of cells: the field is between them. Two numbers per block, z fastest.
 function rangesOf(values, [nx, ny, nz]) {
@@ -106,13 +112,12 @@ export function rayCaster(canvas, { values, shape, spacing, filter }) {
   const { ranges, blocks } = rangesOf(values, shape);
   texture3d(gl, 0, values, shape, 1);
   texture3d(gl, 1, ranges, blocks, 2);
-  const place = (name) => gl.getUniformLocation(program, name);
+  // Uniforms of a kind by their names: "1i" for an integer, "3fv" for three numbers.
+  const set = (kind, values) => Object.entries(values).forEach(([name, value]) => gl[`uniform${kind}`](gl.getUniformLocation(program, name), value));
   gl.useProgram(program);
-  gl.uniform1i(place("coefficients"), 0);
-  gl.uniform1i(place("ranges"), 1);
-  gl.uniform3iv(place("cells"), cells);
-  gl.uniform3fv(place("spacing"), steps);
-  gl.uniform1i(place("depth"), DEPTH);
+  set("1i", { coefficients: 0, ranges: 1, depth: DEPTH });
+  set("3iv", { cells });
+  set("3fv", { spacing: steps });
   if (gl.getError() !== gl.NO_ERROR) throw new Error("The volume does not fit into WebGL2");
 
   // view: as the parameters of refraction.png; iso and index are lists. Returns the time that it took, ms.
@@ -127,18 +132,12 @@ export function rayCaster(canvas, { values, shape, spacing, filter }) {
     const wide = ((VIEW_MARGIN * Math.max(...extent)) / zoom) * Math.max(1, width / height);
     const light = ahead.map((one, axis) => -one - 0.6 * right[axis] - 0.8 * down[axis]);
     const padded = (list, length) => [...list, ...new Array(length - list.length).fill(0)];
-    gl.uniformMatrix3fv(place("frame"), false, [...right, ...down, ...ahead]);
-    gl.uniform2f(place("field"), wide, (wide * height) / width);
-    gl.uniform2f(place("pixels"), width, height);
-    gl.uniform1f(place("away"), diagonal);
-    gl.uniform1f(place("beyond"), diagonal);
-    gl.uniform1f(place("square"), (wide * Math.min(1, height / width)) / SQUARES);
-    gl.uniform1fv(place("levels"), padded([-1e30, ...iso, 1e30], MAX_ISOS + 2));
-    gl.uniform1fv(place("indices"), padded([outside, ...index], MAX_ISOS + 1));
-    gl.uniform1i(place("layers"), iso.length + 1);
-    gl.uniform1i(place("around"), surroundings);
-    gl.uniform1i(place("lit"), mode === "shaded" ? 1 : 0);
-    gl.uniform3fv(place("towards"), light.map((one) => one / Math.hypot(...light)));
+    gl.uniformMatrix3fv(gl.getUniformLocation(program, "frame"), false, [...right, ...down, ...ahead]);
+    set("2fv", { field: [wide, (wide * height) / width], pixels: [width, height] });
+    set("1f", { away: diagonal, beyond: diagonal, square: (wide * Math.min(1, height / width)) / SQUARES });
+    set("1fv", { levels: padded([-1e30, ...iso, 1e30], MAX_ISOS + 2), indices: padded([outside, ...index], MAX_ISOS + 1) });
+    set("1i", { layers: iso.length + 1, around: surroundings, lit: mode === "shaded" ? 1 : 0 });
+    set("3fv", { towards: light.map((one) => one / Math.hypot(...light)) });
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     // Reading waits for the picture.
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));

@@ -1,4 +1,4 @@
-// Places on the ground of a scene of geometry fields: where the camera of the service sees a point of a picture.
+// Cameras as the service has them, and the objects on the ground of a scene of geometry fields: where a camera sees a point of a picture.
 
 // As in bentray_workers.rendering.field_scenes: what the camera looks at, m, its angle, and the objects with their sizes, m.
 const VIEW_DEG = 38;
@@ -13,16 +13,24 @@ export function objectsOf(scene) {
 }
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
+
+// Unit vectors to the right, down and ahead of a camera, with z up.
+export function frameOf(azimuthDeg, elevationDeg) {
+  const [a, e] = [radians(azimuthDeg), radians(elevationDeg)];
+  return {
+    right: [-Math.sin(a), Math.cos(a), 0],
+    down: [Math.sin(e) * Math.cos(a), Math.sin(e) * Math.sin(a), -Math.cos(e)],
+    ahead: [-Math.cos(e) * Math.cos(a), -Math.cos(e) * Math.sin(a), -Math.sin(e)],
+  };
+}
+
 const plus = (a, b, by) => a.map((one, axis) => one + by * b[axis]);
 
 function camera({ scene, azimuth_deg: azimuth, elevation_deg: elevation, zoom }) {
   const { centre, radius } = FRAMINGS[scene];
-  const [a, e] = [radians(azimuth), radians(elevation)];
-  const towards = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)];
-  const right = [-Math.sin(a), Math.cos(a), 0];
-  const down = [Math.sin(e) * Math.cos(a), Math.sin(e) * Math.sin(a), -Math.cos(e)];
+  const frame = frameOf(azimuth, elevation);
   const away = radius / Math.sin(radians(VIEW_DEG / 2));
-  return { eye: plus(centre, towards, away), ahead: towards.map((one) => -one), right, down, wide: (2 * Math.tan(radians(VIEW_DEG / 2))) / zoom };
+  return { ...frame, eye: plus(centre, frame.ahead, -away), wide: (2 * Math.tan(radians(VIEW_DEG / 2))) / zoom };
 }
 
 // The place at a height, m, that a point of a square picture shows, u and v from -1/2 to 1/2 right and down; null beyond the

@@ -1,17 +1,18 @@
-// The fragment shader that casts refracted rays through a filtered volume: as kernels/bentray_kernels/refraction, in float32.
-
-export const MAX_ISOS = 4;
-// Cells along each side of a block, of which the range of the field is known.
-export const BLOCK = 4;
-
-export const VERTEX = `#version 300 es
-void main() {
-  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
-}`;
+// Casts refracted rays through a filtered volume: as kernels/bentray_kernels/refraction, in float32. ray_caster.js defines
+// MAX_ISOS, BLOCK (cells along each side of a block, of which the range of the field is known), and CATMULL_ROM for that filter.
+precision highp float;
+precision highp int;
+precision highp sampler3D;
 
 // Weights of the four nodes around a point, t of a cell after the second, and their derivatives.
-const FILTERS = {
-  bspline3: `
+#ifdef CATMULL_ROM
+vec4 weights(float t) {
+  return 0.5 * vec4(t * (-1.0 + t * (2.0 - t)), 2.0 + t * t * (3.0 * t - 5.0), t * (1.0 + t * (4.0 - 3.0 * t)), t * t * (t - 1.0));
+}
+vec4 slopes(float t) {
+  return 0.5 * vec4(-1.0 + t * (4.0 - 3.0 * t), t * (9.0 * t - 10.0), 1.0 + t * (8.0 - 9.0 * t), t * (3.0 * t - 2.0));
+}
+#else
 vec4 weights(float t) {
   float u = 1.0 - t;
   return vec4(u * u * u / 6.0, 2.0 / 3.0 - 0.5 * t * t * (2.0 - t), 2.0 / 3.0 - 0.5 * u * u * (2.0 - u), t * t * t / 6.0);
@@ -19,23 +20,8 @@ vec4 weights(float t) {
 vec4 slopes(float t) {
   float u = 1.0 - t;
   return vec4(-0.5 * u * u, t * (1.5 * t - 2.0), u * (2.0 - 1.5 * u), 0.5 * t * t);
-}`,
-  "catmull-rom": `
-vec4 weights(float t) {
-  return 0.5 * vec4(t * (-1.0 + t * (2.0 - t)), 2.0 + t * t * (3.0 * t - 5.0), t * (1.0 + t * (4.0 - 3.0 * t)), t * t * (t - 1.0));
 }
-vec4 slopes(float t) {
-  return 0.5 * vec4(-1.0 + t * (4.0 - 3.0 * t), t * (9.0 * t - 10.0), 1.0 + t * (8.0 - 9.0 * t), t * (3.0 * t - 2.0));
-}`,
-};
-
-export const hasFilter = (name) => name in FILTERS;
-
-export const fragmentOf = (filter) => `#version 300 es
-precision highp float;
-precision highp int;
-precision highp sampler3D;
-${FILTERS[filter]}
+#endif
 
 // Coefficients and ranges of blocks are indexed z, y, x. Lengths are in units of the smallest spacing.
 uniform sampler3D coefficients;
@@ -48,8 +34,8 @@ uniform vec2 pixels;
 uniform float away;      // of the plane of the camera, and of the backdrop
 uniform float beyond;
 uniform float square;    // edge of the backdrop's squares
-uniform float levels[${MAX_ISOS + 2}];
-uniform float indices[${MAX_ISOS + 1}];
+uniform float levels[MAX_ISOS + 2];
+uniform float indices[MAX_ISOS + 1];
 uniform int layers;
 uniform int around;
 uniform int depth;
@@ -139,9 +125,9 @@ float leaveInterval(vec3 place, vec3 along, float start, float stop, float below
   vec3 over = vec3(1.0) / mix(along, vec3(1e-20), vec3(equal(along, vec3(0.0))));
   for (int n = 0; n < MAX_STEPS && a < stop; n++) {
     vec3 at = place + a * along;
-    ivec3 block = clamp(ivec3(floor(at + 1e-4 * along / speed)), ivec3(0), cells - 1) / ${BLOCK};
+    ivec3 block = clamp(ivec3(floor(at + 1e-4 * along / speed)), ivec3(0), cells - 1) / BLOCK;
     vec2 range = texelFetch(ranges, block.zyx, 0).rg;
-    vec3 low = vec3(block * ${BLOCK}), high = low + float(${BLOCK});
+    vec3 low = vec3(block * BLOCK), high = low + float(BLOCK);
     vec3 outs = (mix(low, high, vec3(greaterThan(along, vec3(0.0)))) - place) * over;
     outs = mix(outs, vec3(FAR), vec3(equal(along, vec3(0.0))));
     float leave = max(min(outs.x, min(outs.y, outs.z)), a + 1e-3 / speed);
@@ -256,4 +242,4 @@ void main() {
   vec2 place = vec2(gl_FragCoord.x, pixels.y - gl_FragCoord.y) / pixels - 0.5;
   vec3 origin = frame[0] * place.x * field.x + frame[1] * place.y * field.y - away * frame[2];
   colour = vec4(floor(followed(origin, frame[2]) + 0.5) / 255.0, 1.0);
-}`;
+}

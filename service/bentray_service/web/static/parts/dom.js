@@ -1,3 +1,0 @@
-// Elements of the shell by their ids.
-
-export const at = (id) => document.getElementById(id);
