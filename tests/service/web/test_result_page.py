@@ -524,12 +524,14 @@ def test_provenance_is_told_in_words_and_copied_as_json(page, result):
     job = httpx.get(result.replace("/#/jobs/", "/v1/jobs/")).json()
     volume = httpx.get(result.partition("/#/")[0] + job["links"]["volume"]).json()
     box.get_by_text("Settings", exact=True).click()
+    # The form of settings names them, once its description is read.
+    box.get_by_role("row", name="Region of interest only").wait_for()
     rows = {row.locator("th").inner_text(): row.locator("td").inner_text() for row in box.locator("tr").all()}
     assert (rows["Job"], rows["Scan"], rows["Speed in water"]) == (job["id"], job["dataset"], "1500.0 m/s")
-    image = (rows["Method"], rows["Side of the image"], rows["Only the region of interest"])
-    assert image == ("sart", "automatic", "no")
-    assert (rows["Speed bounds"], rows["SART: relaxation"]) == ("1300 to 1800 m/s", "0.1")
-    assert rows["SART: smoothing of updates"] == "1 nodes"
+    image = (rows["Method"], rows["Side of the image"], rows["Region of interest only"])
+    assert image == ("SART", "the array and a margin", "no")
+    assert (rows["Speed bounds"], rows["SART: Relaxation factor λ"]) == ("1300 to 1800 m/s", "0.1")
+    assert rows["SART: Smoothing of updates"] == "1 nodes"
     assert "{" not in box.inner_text()
     box.get_by_text("Those of the rays before full waveforms").click()
     expect(box.get_by_role("row", name="Width of rays")).to_have_text("Width of rays0.0026 m")

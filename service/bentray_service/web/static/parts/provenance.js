@@ -1,8 +1,10 @@
 // Provenance, settings and numerical parameters of a result as tables in words, and all of it as JSON to copy.
 import { inTime } from "./amounts.js";
 import { CopyButton } from "./copying.js";
+import { captionOf } from "./settings_fields.js";
+import { readSettings } from "./settings_form.js";
 import { Pairs } from "./tables.js";
-import { html } from "./view.js";
+import { html, useRead } from "./view.js";
 
 const SOFTWARE = { bentray: "Bentray", python: "Python", numpy: "NumPy", numba: "Numba", scipy: "SciPy" };
 const SAID = {
@@ -29,18 +31,11 @@ const NUMERICS = {
 };
 const UNITS = { mps: "m/s", s: "s", m: "m", hz: "Hz", deg: "°", c: "°C", nodes: "nodes" };
 
-const NAMES = {
-  sart: "SART", gauss_newton: "Gauss–Newton", roi: "Only the region of interest", eikonal: "Eikonal solver", side_m: "Side of the image",
-  minutes: "Time budget of full waveform (minutes)", examine: "Scan is checked first", max_left_out: "Pairs that may be left out", enabled: "Reconstructed", attenuation_solver: "Solver",
-  nodes: "Nodes per side", smoothing_nodes: "Smoothing of updates", edge_mps: "Edges above",
-  pixel_m: "Pixel spacing", pair_angle_deg: "Largest angle of a pair", delays: "Travel times in", gain: "Compensated",
-};
-
 // "speed_bounds_mps" is "Speed bounds" and the unit m/s.
 function named(name) {
   const [, stem, ending] = /^(.*?)(?:_(mps|s|m|hz|deg|c|nodes))?$/.exec(name);
   const words = stem.replaceAll("_", " ");
-  return [NAMES[name] ?? words[0].toUpperCase() + words.slice(1), UNITS[ending] ?? ""];
+  return [words[0].toUpperCase() + words.slice(1), UNITS[ending] ?? ""];
 }
 
 // A value in words; without one, what that means.
@@ -58,13 +53,25 @@ function Folded({ title, rows }) {
   return html`<details><summary>${title}</summary><${Pairs} rows=${rows} /></details>`;
 }
 
-// Rows of settings: those of nested records below the name of the record.
-function settingRows(settings, before = "") {
+// Settings by their paths.
+function flat(settings, before = "") {
   return Object.entries(settings).flatMap(([name, value]) => {
-    if (value !== null && typeof value === "object" && !Array.isArray(value)) return settingRows(value, `${before}${named(name)[0]}: `);
-    const [words, unit] = named(name);
-    return [[before ? `${before}${words[0].toLowerCase()}${words.slice(1)}` : words, inWords(value, unit)]];
+    const nested = value !== null && typeof value === "object" && !Array.isArray(value);
+    return nested ? flat(value, `${before}${name}.`) : [[`${before}${name}`, value]];
   });
+}
+
+// Settings as the form names them; earlier versions had others.
+function Settings({ settings }) {
+  const [groups] = useRead(readSettings);
+  const labels = new Map(groups?.flatMap(([group, members]) => members.map(({ path, schema }) => [path, { group, schema }])));
+  const rows = flat(settings).map(([path, value]) => {
+    const { group, schema } = labels.get(path) ?? {};
+    const [words, unit] = schema ? [captionOf(schema), schema["x-unit"]] : named(path.split(".").at(-1));
+    const shown = schema?.["x-words"]?.[value] ?? inWords(value, unit, schema?.["x-unset"]);
+    return [group ? `${captionOf(group)}: ${words}` : words, shown];
+  });
+  return html`<${Folded} title="Settings" rows=${rows} />`;
 }
 
 const fixed = (numerics) => Object.entries(numerics).map(([name, value]) => {
@@ -95,7 +102,7 @@ export function Provenance({ job, volume }) {
       <${CopyButton} title="Copy JSON" text=${() => `${JSON.stringify(everything, null, 2)}\n`} />
     </div>
     <${Pairs} rows=${rows} />
-    <${Folded} title="Settings" rows=${settingRows(job.settings)} />
+    <${Settings} settings=${job.settings} />
     ${numerics && html`<${Folded} title="Numerical parameters, chosen automatically" rows=${fixed(numerics)} />`}
     ${rayNumerics && html`<${Folded} title="Those of the rays before full waveforms" rows=${fixed(rayNumerics)} />`}
   </section>`;

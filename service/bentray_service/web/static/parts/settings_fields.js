@@ -5,7 +5,7 @@ import { html, Labelled, Options } from "./view.js";
 const without = (schema) => ({ ...schema, ...(schema.anyOf?.find((branch) => branch.type !== "null") ?? {}), ...schema.items });
 
 const number = (value) => Number(value).toString();
-const captionOf = (schema) => schema["x-label"] ?? schema.title;
+export const captionOf = (schema) => schema["x-label"] ?? schema.title;
 
 function bounds(schema) {
   const { minimum, maximum, exclusiveMinimum: above, exclusiveMaximum: below } = schema;
