@@ -48,11 +48,11 @@ def read_dataset(
             as a whole), the value found and the accepted values; and as ``check_plausible``.
     """
     with opened(Path(path), limits or Limits()) as reader:
-        return dataset_of(reader, _waveform if traces else None, plausible=plausible)
+        return dataset_of(reader, waveform_in if traces else None, plausible=plausible)
 
 
 def dataset_of(
-    reader: Reader, waveform: Callable[[Reader], Waveform] | None, *, plausible: bool = True
+    reader: Reader, waveform: Callable[[Reader], Waveform | None] | None, *, plausible: bool = True
 ) -> Dataset:
     """The dataset in an open file, see ``read_dataset``.
 
@@ -186,7 +186,7 @@ def traces_in(reader: Reader) -> bool:
     return reader.checked("waveform/object", "iuf", "traces over (ntx, nrx, nt)") is not None
 
 
-def placeholder_traces(reader: Reader) -> Waveform:
+def placeholder_traces(reader: Reader) -> Waveform | None:
     """Arrays of zeros of the shape and type of the traces, which take no memory."""
 
     def placeholder(path: str) -> NDArray[Any] | None:
@@ -195,7 +195,7 @@ def placeholder_traces(reader: Reader) -> Waveform:
             return None
         return np.broadcast_to(np.zeros((), trace_type(stored.dtype)), stored.shape)
 
-    return _waveform(reader, placeholder)
+    return waveform_in(reader, placeholder)
 
 
 def trace_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
@@ -213,19 +213,26 @@ def kept_traces(array: NDArray[Any]) -> NDArray[Any]:
         return np.ascontiguousarray(array, dtype=trace_type(array.dtype)).reshape(array.shape)
 
 
-def _waveform(reader: Reader, traces: Callable[[str], NDArray[Any] | None] | None = None) -> Waveform:
-    """The traces with their scales; ``traces`` reads one array of them in its own way."""
+def waveform_in(
+    reader: Reader, traces: Callable[[str], Any] | None = None, index: int | None = None
+) -> Waveform | None:
+    """The traces with their scales; None where there are none.
+
+    Args:
+        reader: of the file.
+        traces: reads those of a path in its own way.
+        index: of the slice whose scales are read; None: of all.
+    """
     scale = reader.number("waveform", "scale", "the unit of the traces a count")
     read = traces or (lambda path: _traces(reader, path))
     received = read("waveform/object")
-    assert received is not None
-    return Waveform(
-        received,
-        read("waveform/water"),
-        1.0 if scale is None else scale,
-        _floats(reader, "waveform/object_scale", "numbers over (ntx, nrx)"),
-        _floats(reader, "waveform/water_scale", "numbers over (ntx, nrx)"),
-    )
+    if received is None:
+        return None
+    scales = []
+    for name in ("object_scale", "water_scale"):
+        factors = _floats(reader, f"waveform/{name}", "numbers over (ntx, nrx)")
+        scales.append(factors if factors is None or index is None else factors[index])
+    return Waveform(received, read("waveform/water"), 1.0 if scale is None else scale, *scales)
 
 
 def _traces(reader: Reader, path: str) -> NDArray[Any] | None:

@@ -10,15 +10,14 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.emissions import Emissions
 
 from ..hdf5_reading import Limits, Reader, opened, rejecting_hdf5_damage
 from .counts import BLOCK_BYTES
-from .read import NUMERIC, TRACES, kept_traces, trace_type
+from .read import NUMERIC, TRACES, kept_traces, trace_type, waveform_in
 
 
 def trace_samples(path: Path) -> int:
@@ -56,29 +55,9 @@ def open_slice(
         InvalidInput: as ``read_dataset``; on access for damaged traces.
     """
     with opened(path, Limits()) as reader:
-        stacked = whole.slice_z_m is not None
-        read = partial(emissions_in, reader, poll=poll, index=index if stacked else None)
-        waveform = _waveform(reader, whole, index, read)
-        yield replace(whole.slice(index), waveform=waveform)
-
-
-def _waveform(reader: Reader, whole: Dataset, index: int, read: Callable[[str], Any]) -> Waveform | None:
-    """The traces of a slice; ``read`` returns those of a path."""
-    received, water = (read(f"waveform/{name}") for name in ("object", "water"))
-    if received is None:
-        return None
-    factors = [
-        reader.array(f"waveform/{name}", NUMERIC, "numbers over (ntx, nrx)")
-        for name in ("object_scale", "water_scale")
-    ]
-    scale = reader.number("waveform", "scale", "the unit of the traces a count")
-    of_slice = [
-        None
-        if factor is None
-        else np.asarray(factor if whole.slice_z_m is None else factor[index], np.float64)
-        for factor in factors
-    ]
-    return Waveform(received, water, 1.0 if scale is None else scale, *of_slice)
+        stored = None if whole.slice_z_m is None else index
+        read = partial(emissions_in, reader, poll=poll, index=stored)
+        yield replace(whole.slice(index), waveform=waveform_in(reader, read, stored))
 
 
 def emissions_in(
