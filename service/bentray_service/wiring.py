@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Generic, NamedTuple, TypeVar, cast
 
 from fastapi import Depends, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.types import Scope
 
 from .access.audit import Audit
@@ -124,21 +127,34 @@ class Requested(NamedTuple, Generic[Row]):
     path: Path
 
 
-def _dataset(dataset_id: str, stores: Stores, tenant: CallerTenant) -> Requested[DatasetRow]:
-    row = stores.datasets.get(tenant, dataset_id)
-    return Requested(tenant, row, stores.files.of(tenant).dataset(row.id))
+# Awaited by a route, so that wrong parameters are named before an unknown id.
+Find = Callable[[], Awaitable[Requested[Row]]]
 
 
-def _volume(volume_id: str, stores: Stores, tenant: CallerTenant) -> Requested[VolumeRow]:
-    row = stores.volumes.get(tenant, volume_id)
-    return Requested(tenant, row, stores.files.of(tenant).volume(row.id))
+def _find(
+    tenant: Tenant, name: str, get: Callable[[Tenant, str], Row], path_of: Callable[[str], Path]
+) -> Find[Row]:
+    def find() -> Requested[Row]:
+        row = get(tenant, name)
+        return Requested(tenant, row, path_of(row.id))
+
+    return partial(run_in_threadpool, find)
 
 
-def _field(field_id: str, stores: Stores, tenant: CallerTenant) -> Requested[FieldRow]:
-    row = stores.geometry_fields.get(tenant, field_id)
-    return Requested(tenant, row, stores.files.of(tenant).field(row.id))
+async def _dataset(dataset_id: str, stores: Stores, tenant: CallerTenant) -> Find[DatasetRow]:
+    return _find(tenant, dataset_id, stores.datasets.get, lambda name: stores.files.of(tenant).dataset(name))
 
 
-RequestedDataset = Annotated[Requested[DatasetRow], Depends(_dataset)]
-RequestedVolume = Annotated[Requested[VolumeRow], Depends(_volume)]
-RequestedField = Annotated[Requested[FieldRow], Depends(_field)]
+async def _volume(volume_id: str, stores: Stores, tenant: CallerTenant) -> Find[VolumeRow]:
+    return _find(tenant, volume_id, stores.volumes.get, lambda name: stores.files.of(tenant).volume(name))
+
+
+async def _field(field_id: str, stores: Stores, tenant: CallerTenant) -> Find[FieldRow]:
+    return _find(
+        tenant, field_id, stores.geometry_fields.get, lambda name: stores.files.of(tenant).field(name)
+    )
+
+
+FindDataset = Annotated[Find[DatasetRow], Depends(_dataset)]
+FindVolume = Annotated[Find[VolumeRow], Depends(_volume)]
+FindField = Annotated[Find[FieldRow], Depends(_field)]

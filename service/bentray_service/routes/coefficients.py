@@ -15,7 +15,7 @@ from bentray_workers.rendering.refraction_view import RefractionView
 from .. import __version__
 from ..compute import check_renderable
 from ..web.errors import problems
-from ..wiring import Background, RequestedVolume, access_of, caller_of
+from ..wiring import Background, FindVolume, access_of, caller_of
 from .downloads import headers_of, unchanged
 from .pictures import while_connected
 
@@ -39,7 +39,7 @@ router = APIRouter()
     },
 )
 async def show_coefficients(
-    volume: RequestedVolume,
+    find: FindVolume,
     request: Request,
     background: Background,
     filter: Annotated[  # noqa: A002 - the name of the query parameter
@@ -51,6 +51,7 @@ async def show_coefficients(
     ] = None,
 ) -> Response:
     """Filter a volume on a worker, and return its coefficients as a NumPy file."""
+    volume = await find()
     check_renderable(volume.row)
     check_nodes(tuple(volume.row.shape))
     view = RefractionView(filter=filter, smoothing=smoothing)

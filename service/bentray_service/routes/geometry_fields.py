@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request, Response
 
 from ..view_parameters import FieldViewParameters
 from ..web.errors import problems
-from ..wiring import Background, CallerTenant, RequestedField, Stores
+from ..wiring import Background, CallerTenant, FindField, Stores
 from .bodies import Limit
 from .models.surface_records import FieldList, FieldRecord
 from .pictures import PICTURE, picture
@@ -37,12 +37,13 @@ def show_field(field_id: str, stores: Stores, tenant: CallerTenant) -> FieldReco
 @router.head("/{field_id}/image.png", include_in_schema=False)
 @router.get("/{field_id}/image.png", response_class=Response, responses=PICTURE)
 async def image_png(
-    field: RequestedField, request: Request, background: Background, view: FieldViewParameters
+    find: FindField, request: Request, background: Background, view: FieldViewParameters
 ) -> Response:
     """Render a scene with the mesh as mirror, glass or clay, using the geometry field for secondary rays.
 
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
+    field = await find()
     view.check_samples(field.row.settings["samples"])
     return await picture(
         request, field.row, view.plain(), lambda: background.pictures.field_png(*field, view)
@@ -51,18 +52,19 @@ async def image_png(
 
 @router.head("/{field_id}/geometry-image.png", include_in_schema=False)
 @router.get("/{field_id}/geometry-image.png", response_class=Response, responses=PICTURE)
-async def geometry_image_png(field: RequestedField, request: Request, background: Background) -> Response:
+async def geometry_image_png(find: FindField, request: Request, background: Background) -> Response:
     """The geometry image: surface positions as colours over the unit square."""
-    return await _map(field, request, background, "positions")
+    return await _map(find, request, background, "positions")
 
 
 @router.head("/{field_id}/normal-map.png", include_in_schema=False)
 @router.get("/{field_id}/normal-map.png", response_class=Response, responses=PICTURE)
-async def normal_map_png(field: RequestedField, request: Request, background: Background) -> Response:
+async def normal_map_png(find: FindField, request: Request, background: Background) -> Response:
     """The normal map: surface normals as colours over the unit square."""
-    return await _map(field, request, background, "normals")
+    return await _map(find, request, background, "normals")
 
 
-async def _map(field: RequestedField, request: Request, background: Background, which: str) -> Response:
+async def _map(find: FindField, request: Request, background: Background, which: str) -> Response:
+    field = await find()
     draw = partial(background.pictures.field_map_png, *field, which)
     return await picture(request, field.row, {"map": which}, draw)

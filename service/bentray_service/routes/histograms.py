@@ -11,7 +11,7 @@ from bentray_workers.files.quantities import QUANTITIES, QuantityName
 from bentray_workers.rendering.histogram import BINS, DEFAULT_BINS
 
 from ..web.errors import problems
-from ..wiring import Background, RequestedVolume
+from ..wiring import Background, FindVolume
 from .models.job_records import HistogramRecord
 from .pictures import while_connected
 from .quality import check_render_rate
@@ -25,7 +25,7 @@ router = APIRouter()
     dependencies=[Depends(check_render_rate)],
 )
 async def show_histogram(
-    volume: RequestedVolume,
+    find: FindVolume,
     request: Request,
     background: Background,
     quantity: Annotated[
@@ -44,6 +44,7 @@ async def show_histogram(
     ] = DEFAULT_BINS,
 ) -> HistogramRecord:
     """Count the nodes of a volume by value, on a worker; and the surface that a picture shows by default."""
+    volume = await find()
     uploaded = volume.row.job_id is None
     chosen = quantity or ("value" if uploaded else "speed")
     if (chosen == "value") != uploaded:

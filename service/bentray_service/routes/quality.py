@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from bentray_kernels.picker_names import DEFAULT_PICKER, PickerName
 
 from ..web.errors import problems
-from ..wiring import Background, RequestedDataset, access_of, caller_of
+from ..wiring import Background, FindDataset, access_of, caller_of
 from .models.quality_records import QualityRecord
 from .pictures import PICTURE, picture, while_connected
 
@@ -32,12 +32,13 @@ async def check_render_rate(request: Request) -> None:
     dependencies=[Depends(check_render_rate)],
 )
 async def show_quality(
-    dataset: RequestedDataset,
+    find: FindDataset,
     request: Request,
     background: Background,
     picker: Picker = DEFAULT_PICKER,
 ) -> QualityRecord:
     """Check the quality of a scan on a worker: faulty elements and times, and the action taken for each."""
+    dataset = await find()
     work = background.pictures.quality(*dataset, picker)
     return QualityRecord.model_validate(await while_connected(request, work))
 
@@ -45,11 +46,12 @@ async def show_quality(
 @router.head("/{dataset_id}/quality.png", include_in_schema=False)
 @router.get("/{dataset_id}/quality.png", response_class=Response, responses={**PICTURE, **problems(404, 422)})
 async def quality_png(
-    dataset: RequestedDataset,
+    find: FindDataset,
     request: Request,
     background: Background,
     picker: Picker = DEFAULT_PICKER,
 ) -> Response:
     """The quality report as an image: gathers with picks, matrix of times, findings."""
+    dataset = await find()
     how = {"picker": picker, "what": "quality", "water_temperature_c": dataset.row.water_temperature_c}
     return await picture(request, dataset.row, how, lambda: background.pictures.quality_png(*dataset, picker))

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from ..compute import check_renderable
 from ..view_parameters import ViewParameters
-from ..wiring import Background, RequestedVolume
+from ..wiring import Background, FindVolume
 from .pictures import PICTURE, picture
 
 router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
@@ -15,7 +15,7 @@ router = APIRouter(prefix="/v1/volumes", tags=["volumes"])
 @router.head("/{volume_id}/refraction.png", include_in_schema=False)
 @router.get("/{volume_id}/refraction.png", response_class=Response, responses=PICTURE)
 async def refraction_png(
-    volume: RequestedVolume,
+    find: FindVolume,
     request: Request,
     background: Background,
     view: ViewParameters,
@@ -25,6 +25,7 @@ async def refraction_png(
     Requires a 3-D volume with uniform spacing. HEAD returns the ETag without rendering, so Content-Length is
     absent.
     """
+    volume = await find()
     check_renderable(volume.row)
     view = view.within(*volume.row.value_range)
     return await picture(

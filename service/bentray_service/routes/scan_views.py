@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Query, Request
 
 from ..web.errors import problems
-from ..wiring import Background, RequestedDataset
+from ..wiring import Background, FindDataset
 from .models.quality_records import EmissionRecord, GeometryRecord
 from .pictures import while_connected
 from .quality import check_render_rate
@@ -20,10 +20,9 @@ router = APIRouter()
     responses=problems(404, 422, 429, 503),
     dependencies=[Depends(check_render_rate)],
 )
-async def show_geometry(
-    dataset: RequestedDataset, request: Request, background: Background
-) -> GeometryRecord:
+async def show_geometry(find: FindDataset, request: Request, background: Background) -> GeometryRecord:
     """Show the elements, the acquisition and the water of a scan, read by a worker."""
+    dataset = await find()
     work = background.pictures.scan_geometry(*dataset)
     return GeometryRecord.model_validate(await while_connected(request, work))
 
@@ -32,7 +31,7 @@ async def show_geometry(
     "/{dataset_id}/traces", responses=problems(404, 422, 429, 503), dependencies=[Depends(check_render_rate)]
 )
 async def show_traces(
-    dataset: RequestedDataset,
+    find: FindDataset,
     request: Request,
     background: Background,
     emission: Annotated[int, Query(ge=0, description="Index of the emission, from 0.")] = 0,
@@ -42,6 +41,7 @@ async def show_traces(
     ] = "object",
 ) -> EmissionRecord:
     """Show the traces of one emission, at most 512 receivers and 1024 samples, and their picks."""
+    dataset = await find()
     how = {"emission": emission, "index": slice, "what": quantity}
     work = background.pictures.emission_traces(*dataset, how)
     return EmissionRecord.model_validate(await while_connected(request, work))

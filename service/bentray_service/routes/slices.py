@@ -19,7 +19,7 @@ from bentray_workers.images.slice_style import (
     SliceStyle,
 )
 
-from ..wiring import Background, RequestedVolume
+from ..wiring import Background, FindVolume
 from .pictures import PICTURE, picture
 
 router = APIRouter()
@@ -60,7 +60,7 @@ async def read_style(
 @router.head("/{volume_id}/slice.png", include_in_schema=False)
 @router.get("/{volume_id}/slice.png", response_class=Response, responses=PICTURE)
 async def slice_png(
-    volume: RequestedVolume,
+    find: FindVolume,
     request: Request,
     background: Background,
     style: Annotated[SliceStyle, Depends(read_style)],
@@ -88,6 +88,7 @@ async def slice_png(
 
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
+    volume = await find()
     check_plane(volume.row.shape, volume.row.spacing_m, axis, index)
     for name, value in (("low", low), ("high", high)):
         if value is not None:

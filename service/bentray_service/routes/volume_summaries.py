@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from ..rows.tables import DatasetRow, VolumeRow
 from ..rows.tenants import Tenant
 from ..web.errors import problems
-from ..wiring import Background, RequestedVolume, Stores
+from ..wiring import Background, FindVolume, Stores
 from .models.summary_records import SummaryRecord
 from .pictures import while_connected
 from .quality import check_render_rate
@@ -38,9 +38,10 @@ def scan_of(stores: Stores, tenant: Tenant, volume: VolumeRow) -> tuple[DatasetR
     dependencies=[Depends(check_render_rate)],
 )
 async def show_summary(
-    volume: RequestedVolume, request: Request, stores: Stores, background: Background
+    find: FindVolume, request: Request, stores: Stores, background: Background
 ) -> SummaryRecord:
     """Summarise a reconstruction on a worker: quantities, what auto compared, errors against the truth."""
+    volume = await find()
     dataset, scan = await run_in_threadpool(scan_of, stores, volume.tenant, volume.row)
     work = background.pictures.summary(*volume, dataset, scan)
     return SummaryRecord.model_validate(await while_connected(request, work))
