@@ -13,7 +13,6 @@ import trimesh
 BOX = trimesh.creation.box()
 PLY = BOX.export(file_type="ply")
 STL = BOX.export(file_type="stl")
-OBJ = BOX.export(file_type="obj").encode()
 OFF = BOX.export(file_type="off").encode()
 GLB = BOX.export(file_type="glb")
 

@@ -93,6 +93,7 @@ def path(tmp_path):
     return tmp_path / "scan.h5"
 
 
+@pytest.mark.nightly
 def test_a_run_is_in_blocks_where_memory_is_short_and_stays_so(path, tmp_path, monkeypatch):
     settings = Settings.of(method="sart", nodes=24, decomposition="volume", iterations=1)
     work = tmp_path / "work"
