@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from bentray_kernels.limits import MAX_LEFT_OUT
-from bentray_kernels.picker_names import DEFAULT_PICKER
+from bentray_kernels.picker_names import DEFAULT_PICKER, PickerName
 
 from .options.paths import output_folder
 from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options
@@ -22,7 +22,9 @@ def quality(
     file: Annotated[Path, typer.Argument(help="Dataset file, or a scan of another program.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
     scan_options: ScanOptions,
-    picker: Annotated[str, typer.Option(help="Picker of first arrivals in raw traces.")] = DEFAULT_PICKER,
+    picker: Annotated[
+        PickerName, typer.Option(help="Picker of first arrivals in raw traces.")
+    ] = DEFAULT_PICKER,
     calibrate: Annotated[
         Literal["stated", "fitted"] | None,
         typer.Option(

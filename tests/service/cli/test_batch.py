@@ -127,28 +127,6 @@ def test_without_json_it_ends_with_a_table_and_the_reasons(
     assert [line for line in told if " " in line][:3] == ["broken failed", "one succeeded", "two succeeded"]
 
 
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        (
-            ("--batch", "nowhere", "--scheduler", "tcp://h:1"),
-            "bentray: --batch: found nowhere (no such folder)",
-        ),
-        (("x.h5", "--batch", "."), "bentray: file: found x.h5 with --batch"),
-        ((), "bentray: file: found nothing"),
-        (("x.h5", "--scheduler", "tcp://h:1"), "bentray: scheduler: found tcp://h:1 without --batch"),
-        (
-            ("--batch", ".", "--scheduler", "tcp://h:1", "--no-wait"),
-            "bentray: scheduler: found tcp://h:1 with",
-        ),
-    ],
-)
-def test_rejects_invalid_arguments(bentray: Callable[..., Result], words: tuple[str, ...], line: str) -> None:
-    result = bentray("submit", *words)
-    assert result.exit_code == 2
-    assert result.stderr.startswith(line)
-
-
 def test_scans_of_other_programs_are_converted(
     bentray: Callable[..., Result], cluster: Cluster, scan_file: Path, tmp_path: Path
 ) -> None:
@@ -186,9 +164,3 @@ def test_two_scans_of_the_same_name_are_rejected(bentray: Callable[..., Result],
     result = bentray("submit", "--batch", scans, "--scheduler", "tcp://127.0.0.1:1")
     assert result.exit_code == 2
     assert "found one.h5 and one.mat; accepted: names that differ" in result.stderr
-
-
-def test_a_folder_without_scans_is_rejected(bentray: Callable[..., Result], tmp_path: Path) -> None:
-    result = bentray("submit", "--batch", tmp_path, "--scheduler", "tcp://127.0.0.1:1")
-    assert result.exit_code == 2
-    assert "without any scan" in result.stderr

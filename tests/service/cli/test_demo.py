@@ -51,12 +51,3 @@ def test_it_fails_in_one_line_when_bent_rays_do_not_win(
     assert result.exit_code == 1
     assert "are not better than straight rays" in result.stderr.splitlines()[-1]
     assert "rms error" in result.stdout, "the figures are shown all the same"
-
-
-def test_a_bad_number_is_rejected_before_a_service_starts(
-    bentray: Callable[..., Result], tmp_path: Path
-) -> None:
-    result = bentray("demo", "--elements", 1, "-o", tmp_path)
-    assert result.exit_code == 2
-    assert result.stderr.startswith("bentray: elements: found 1")
-    assert not (tmp_path / "service.log").exists()

@@ -60,22 +60,3 @@ def test_a_format_by_its_name(bentray: Callable[..., Result], tmp_path: Path, as
     refused = bentray("download", SCAN, "-o", tmp_path / "scan", "--format", "npy")
     assert refused.exit_code == 2
     assert "format: found 'npy'; accepted: one of hdf5, h5" in refused.stderr
-
-
-@pytest.mark.parametrize(
-    ("what", "name", "said"),
-    [
-        ("mesh-1", "m.ply", "id: found 'mesh-1'"),
-        (SCAN, "scan.mat", "a name ending in .h5"),
-        (VOLUME, "v.png", ".hdf5, .npy, .nii, .nrrd, .mha, .mat, .vti, .ozx, .zip, .dcm"),
-        (SCAN, "there.h5", "(exists)"),
-    ],
-)
-def test_rejects_invalid_arguments_before_any_request(
-    bentray: Callable[..., Result], tmp_path: Path, asked: list[Any], what: str, name: str, said: str
-) -> None:
-    (tmp_path / "there.h5").write_bytes(b"")
-    result = bentray("download", what, "-o", tmp_path / name)
-    assert result.exit_code == 2
-    assert said in " ".join(result.stderr.split())
-    assert asked == []

@@ -77,22 +77,6 @@ def test_interrupted_field_is_resumed(
     assert not list((tmp_path / "out").glob("*-unfinished"))
 
 
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (("--samples", 99), "samples"),
-        (("--scene", "moon"), "scene"),
-        (("--image-threshold", 1e-12), "threshold"),
-    ],
-)
-def test_bad_input_is_one_line(
-    bentray: Callable[..., Result], mesh: Path, tmp_path: Path, words: tuple[object, ...], named: str
-) -> None:
-    result = bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE, *words)
-    assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
-    assert named in result.stderr
-
-
 def test_no_mesh_is_one_line(bentray: Callable[..., Result], tmp_path: Path) -> None:
     (tmp_path / "notes.ply").write_text("only text")
     for path in (tmp_path / "notes.ply", tmp_path / "absent.ply"):

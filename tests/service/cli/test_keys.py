@@ -64,23 +64,6 @@ def test_only_the_key_is_on_stdout(bentray: Run, tmp_path: Path) -> None:
     assert "not shown again" in result.stderr
 
 
-@pytest.mark.parametrize(
-    ("words", "field"),
-    [
-        (["create", "--name", "a", "--tenant", "../x"], "tenant"),
-        (["create", "--name", "a", "--scopes", "read,admin"], "scopes"),
-        (["create", "--name", "a", "--expires", "soon"], "expires"),
-        (["create", "--name", "a\nb"], "name"),
-        (["create", "--name", ""], "name"),
-        (["revoke", "0" * 12], "key"),
-    ],
-)
-def test_names_invalid_input(bentray: Run, tmp_path: Path, words: list[str], field: str) -> None:
-    result = bentray("keys", *words, "--data", tmp_path)
-    assert result.exit_code == 2
-    assert result.stderr.startswith(f"bentray: {field}: found ")
-
-
 def test_new_key_is_valid_in_a_running_service(
     bentray: Run, start: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -63,13 +63,6 @@ def test_a_scan_without_findings_is_told_what_was_checked(
     assert second.startswith(first)
 
 
-def test_an_unknown_picker_is_bad_input(bentray: Callable[..., Result], tmp_path: Path) -> None:
-    write_dataset(tmp_path / "scan.h5", scan(elements=8))
-    result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out", "--picker", "eye")
-    assert result.exit_code == 2
-    assert "one of aic, threshold" in " ".join(result.stderr.split())
-
-
 def test_a_calibration_puts_the_elements_where_the_water_shot_has_them(
     bentray: Callable[..., Result], tmp_path: Path
 ) -> None:

@@ -205,13 +205,3 @@ def test_incomplete_hdf5_file_gives_a_one_line_error(
     result = bentray("reconstruct", path, "-o", tmp_path / "out")
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1
-
-
-def test_paths_are_checked_first(bentray: Callable[..., Result], tmp_path: Path, scan_file: Path) -> None:
-    absent = bentray("reconstruct", tmp_path / "absent.h5", "-o", tmp_path)
-    assert absent.exit_code == 2
-    assert "no such file" in absent.stderr
-    (tmp_path / "taken").touch()
-    taken = bentray("reconstruct", scan_file, "-o", tmp_path / "taken")
-    assert taken.exit_code == 2
-    assert "a file is in the way" in taken.stderr

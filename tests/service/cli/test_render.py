@@ -107,33 +107,6 @@ def test_a_file_that_exists_is_kept_without_force(
     assert bentray("render", volume, "-o", tmp_path / "p.png", *SMALL, "--force").exit_code == 0
 
 
-@pytest.mark.parametrize(
-    ("words", "field"),
-    [
-        (("--iso", 7), "iso"),
-        (("--iso", 0.6, "--index", 1.1, "--index", 1.2), "index"),
-        (("--backdrop", "absent.jpg"), "backdrop"),
-        (("--phantom", "sphere"), "file"),
-        (("--shape", 2, 2, 2), "dtype"),
-        (("--dtype", "uint8"), "shape"),
-        (("--map", "m.npy", "--mode", "shaded"), "--map"),
-        (("--spacing", 1, "--spacing", 2), "spacing_m"),
-        (("--spacing", 1, 2), "spacing_m"),
-        (("-o", "p.jpg"), "output"),
-        (("--map", "map.txt"), "output"),
-        (("-o", "/proc/self/p.png"), "output"),
-    ],
-)
-def test_invalid_arguments_give_a_one_line_error(
-    bentray: Callable[..., Result], tmp_path: Path, volume: Path, words: tuple[object, ...], field: str
-) -> None:
-    result = bentray("render", volume, "-o", tmp_path / "p.png", *words)
-    assert result.exit_code == 2
-    assert result.stderr.startswith(f"bentray: {field}: found "), result.stderr
-    assert result.stderr.count("\n") == 1
-    assert not (tmp_path / "p.png").exists()
-
-
 def test_a_spacing_is_one_word_or_three(bentray: Callable[..., Result], tmp_path: Path, volume: Path) -> None:
     maps = []
     for words in ((2e-3,), (2e-3, 2e-3, 2e-3), (2e-3, 2e-3, 1e-3)):

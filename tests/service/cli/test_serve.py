@@ -58,8 +58,6 @@ def test_an_unknown_host_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("words", "environment", "line"),
     [
-        (["--port", "70000"], {}, "--port: found 70000"),
-        (["--workers", "0"], {}, "--workers: found 0"),
         ([], {"BENTRAY_PORT": "http"}, "BENTRAY_PORT: found 'http'"),
         (["--workers", "2"], {"BENTRAY_PORT": "http"}, "BENTRAY_PORT: found 'http'"),
     ],

@@ -41,16 +41,3 @@ def test_a_folder_of_scans(bentray, serve, work, quick_pictures, scan_file, tmp_
     shutil.rmtree(folder / "results")
     queued = bentray(*words, "--no-wait")
     assert json.loads(queued.stdout)["size"] == 1
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--batch", ".", "--at-once", 2), "at_once: found 2; accepted: no --at-once without --scheduler"),
-        (("--batch", "nowhere"), "--batch: found nowhere (no such folder)"),
-    ],
-)
-def test_options_that_do_not_fit(bentray, words, message):
-    result = bentray("submit", *words)
-    assert result.exit_code == 2
-    assert message in result.stderr

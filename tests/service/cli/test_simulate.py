@@ -99,27 +99,6 @@ def test_a_file_that_exists_is_kept_without_force(bentray: Callable[..., Result]
     assert read_dataset(path).water_speed_mps == 1400.0
 
 
-@pytest.mark.parametrize(
-    ("words", "field"),
-    [
-        (("--refinement", 1), "refinement"),
-        (("--noise-ns", 5, "--snr", 10), "snr"),
-        ((*SOLID, "--array", "rings"), "array"),
-        ((*SOLID[:2], "--waveform", "--frequency", 2e6), "frequency_hz"),
-        (("--waveform", "--emissions", 500), "emissions"),
-        (("--frequency", 3e5), "frequency_hz"),
-    ],
-)
-def test_invalid_arguments_give_a_one_line_error(
-    bentray: Callable[..., Result], tmp_path: Path, words: tuple[object, ...], field: str
-) -> None:
-    result = bentray("simulate", "-o", tmp_path / "x.h5", *words)
-    assert result.exit_code == 2
-    assert result.stderr.startswith(f"bentray: {field}: found ")
-    assert result.stderr.count("\n") == 1
-    assert not (tmp_path / "x.h5").exists()
-
-
 @pytest.mark.parametrize("as_json", [True, False])
 def test_waves_are_simulated_with_their_traces(
     bentray: Callable[..., Result], tmp_path: Path, as_json: bool

@@ -182,14 +182,3 @@ def test_refused_connection_exits_with_failure(bentray: Callable[..., Result], s
     assert result.exit_code == 1
     assert result.stderr.startswith("bentray: no answer from http://127.0.0.1:1")
     assert result.stderr.count("\n") == 1
-
-
-def test_options_that_exclude_each_other_and_bad_addresses_are_rejected(
-    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
-) -> None:
-    both = bentray("submit", scan_file, "-o", tmp_path, "--no-wait")
-    assert both.exit_code == 2
-    assert "there is no result to download yet" in both.stderr
-    address = bentray("submit", scan_file, "--url", "lab:8000")
-    assert address.exit_code == 2
-    assert address.stderr.startswith("bentray: url: found 'lab:8000'")

@@ -125,23 +125,6 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
     assert "never retrieved" not in said
 
 
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        (("--memory-limit", "plenty"), "bentray: memory_limit: found 'plenty'; accepted: a size, e.g. 4GiB"),
-        (("--tls", "nowhere"), "bentray: tls: found nowhere (without authority.pem)"),
-        ((), "bentray: scheduler_address: found nonsense"),
-    ],
-)
-def test_rejects_invalid_arguments_with_one_line(
-    bentray: Callable[..., Result], words: tuple[str, ...], line: str
-) -> None:
-    result = bentray("worker", "--scheduler", "nonsense", "--no-opencl", *words)
-    assert result.exit_code == 2
-    assert result.stderr.startswith(line)
-    assert result.stderr.count("\n") == 1
-
-
 def test_the_lane_of_opencl_is_offered_where_a_device_passed(
     bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:

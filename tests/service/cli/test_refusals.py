@@ -1,0 +1,97 @@
+"""What commands refuse: exit code 2, and one line that names the option; nothing is written or asked."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import Result
+
+from bentray_kernels.phantoms import ONE_HOLE, sampled
+
+RENDER = "render {volume} -o {out}/p.png"
+SIMULATE = "simulate -o {out}/x.h5"
+SOLID = "--phantom table7 --nodes 16 --elements 12 --refinement 4 --slices 3"
+FIELD = "geometry-field {mesh} -o {out}/field --samples 4 --inner-samples 4 --divisions 2 --image-size 33"
+
+CASES = (
+    ("keys create --name a --tenant ../x --data {out}/data", "tenant: found"),
+    ("keys create --name a --scopes read,admin --data {out}/data", "scopes: found"),
+    ("keys create --name a --expires soon --data {out}/data", "expires: found"),
+    ("keys create --name 'a\nb' --data {out}/data", "name: found"),
+    ("keys create --name '' --data {out}/data", "name: found"),
+    ("keys revoke 000000000000 --data {out}/data", "key: found"),
+    (
+        "worker --scheduler nonsense --no-opencl --memory-limit plenty",
+        "memory_limit: found 'plenty'; accepted: a size",
+    ),
+    ("worker --scheduler nonsense --no-opencl --tls nowhere", "tls: found nowhere (without authority.pem)"),
+    ("worker --scheduler nonsense --no-opencl", "scheduler_address: found nonsense"),
+    ("download mesh-1 -o {out}/m.ply", "id: found 'mesh-1'"),
+    ("download ds-0123456789abcdef0123 -o {out}/scan.mat", "a name ending in .h5"),
+    ("download vol-0123456789abcdef0123 -o {out}/v.png", ".hdf5, .npy, .nii"),
+    ("download ds-0123456789abcdef0123 -o {scan}", "(exists)"),
+    ("submit --batch {out}/nowhere --scheduler tcp://h:1", "--batch: found"),
+    ("submit x.h5 --batch {out}", "file: found x.h5 with --batch"),
+    ("submit", "file: found nothing"),
+    ("submit x.h5 --scheduler tcp://h:1", "scheduler: found tcp://h:1 without --batch"),
+    ("submit --batch {out} --scheduler tcp://h:1 --no-wait", "scheduler: found tcp://h:1 with"),
+    ("submit --batch {out} --scheduler tcp://h:1", "without any scan"),
+    ("submit --batch {out} --at-once 2", "at_once: found 2; accepted: no --at-once without --scheduler"),
+    ("submit {scan} -o {out} --no-wait", "there is no result to download yet"),
+    ("submit {scan} --url lab:8000", "url: found 'lab:8000'"),
+    ("demo --elements 1 -o {out}/demo", "elements: found 1"),
+    ("quality {scan} -o {out}/quality --picker eye", "Invalid value for '--picker'"),
+    ("reconstruct {out}/absent.h5 -o {out}/r", "no such file"),
+    ("reconstruct {scan} -o {scan}", "a file is in the way"),
+    ("serve --port 70000 --data {out}/data", "--port: found 70000; accepted: "),
+    ("serve --workers 0 --data {out}/data", "--workers: found 0; accepted: "),
+    (f"{FIELD} --samples 99", "samples: found 99"),
+    (f"{FIELD} --scene moon", "scene: found 'moon'"),
+    (f"{SIMULATE} --refinement 1", "refinement: found "),
+    (f"{SIMULATE} --noise-ns 5 --snr 10", "snr: found "),
+    (f"{SIMULATE} {SOLID} --array rings", "array: found "),
+    (f"{SIMULATE} --phantom table7 --waveform --frequency 2e6", "frequency_hz: found "),
+    (f"{SIMULATE} --waveform --emissions 500", "emissions: found "),
+    (f"{SIMULATE} --frequency 3e5", "frequency_hz: found "),
+    (f"{RENDER} --iso 7", "iso: found "),
+    (f"{RENDER} --iso 0.6 --index 1.1 --index 1.2", "index: found "),
+    (f"{RENDER} --backdrop absent.jpg", "backdrop: found "),
+    (f"{RENDER} --phantom sphere", "file: found "),
+    (f"{RENDER} --shape 2 2 2", "dtype: found "),
+    (f"{RENDER} --dtype uint8", "shape: found "),
+    (f"{RENDER} --map {{out}}/m.npy --mode shaded", "--map: found "),
+    (f"{RENDER} --spacing 1 --spacing 2", "spacing_m: found "),
+    (f"{RENDER} --spacing 1 2", "spacing_m: found "),
+    (f"{RENDER} -o {{out}}/p.jpg", "output: found "),
+    (f"{RENDER} --map {{out}}/map.txt", "output: found "),
+    (f"{RENDER} -o /proc/self/p.png", "output: found "),
+)
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory: pytest.TempPathFactory, scan_file: Path) -> dict[str, Path]:
+    """Sound inputs by their kind."""
+    folder = tmp_path_factory.mktemp("inputs")
+    np.save(folder / "v.npy", sampled(ONE_HOLE, 12))
+    trimesh.creation.icosphere(1).export(folder / "m.ply")
+    return {"scan": scan_file, "volume": folder / "v.npy", "mesh": folder / "m.ply"}
+
+
+@pytest.mark.parametrize(("words", "said"), CASES, ids=[words for words, _ in CASES])
+def test_it_is_refused_in_one_line(
+    bentray: Callable[..., Result], inputs: dict[str, Path], tmp_path: Path, words: str, said: str
+) -> None:
+    result = bentray(*shlex.split(words.format(out=tmp_path, **inputs)))
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith("bentray: ")
+    assert result.stderr.count("\n") == 1
+    assert said in result.stderr
+    # Folders may be made, and a database to look a key up.
+    assert [
+        path for path in tmp_path.rglob("*") if path.is_file() and tmp_path / "data" not in path.parents
+    ] == []
