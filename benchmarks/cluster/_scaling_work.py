@@ -15,8 +15,9 @@ from distributed.protocol.pickle import dumps
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.reconstruction import run_reconstruction
 from bentray_kernels.tomography.reconstruction_graph import TomographyGraph
-from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.reconstruction.file_scan import FileScan, FileWaveScan
+from bentray_kernels.tomography.settled import settled
+from bentray_workers.files.dataset import write_dataset
+from bentray_workers.reconstruction.file_scan import FileSource
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 
@@ -64,11 +65,6 @@ def of_a_slice(nodes: int, elements: int, sweeps: int) -> Work:
         # A few nodes, to compile and read.
         for asked in (replace(settings, nodes=16, iterations=1), settings):
             seconds.clear(), sent.clear(), returned.clear()
-            run_reconstruction(
-                read_dataset(path),
-                asked,
-                lambda plan, part: FileScan(path, stamp, plan, part),
-                run_graphs,
-                lambda plan, index: FileWaveScan(path, stamp, plan, index, path),
-            )
+            source = FileSource(path, stamp, path, stamp, path)
+            run_reconstruction(source, settled(source, asked), run_graphs)
     return Work(len(seconds), *(float(np.mean(column)) for column in (seconds, sent, returned)))

@@ -12,7 +12,7 @@ import numpy as np
 
 from bentray_kernels.acquisition import Dataset, pick
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
-from bentray_kernels.tomography.reflection.delay_and_sum import Pixels, Signals, sum_echoes
+from bentray_kernels.tomography.reflection.delay_and_sum import PAIR_ANGLE_DEG, Pixels, Signals, sum_echoes
 from bentray_kernels.tomography.reflection.element_times import joined, solve_times
 from bentray_kernels.tomography.result import Reflection
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
@@ -178,13 +178,12 @@ def timed(context: BenchmarkContext) -> Iterator[Row]:
     batches = range(0, ELEMENTS // (8 if context.quick else 1), BATCH)
 
     def solve(begin: int) -> object:
-        return solve_times(speed, spacing, ring[begin : begin + BATCH], None)
+        return solve_times(speed, spacing, ring[begin : begin + BATCH])
 
     def total(begin: int) -> object:
         context.progress(begin, ELEMENTS, "pairs")
-        return sum_echoes(
-            signals, times, spacing, everyone[begin : begin + BATCH], everyone, pixels, 90.0, False
-        )
+        emitters = everyone[begin : begin + BATCH]
+        return sum_echoes(signals, times, spacing, emitters, everyone, pixels, PAIR_ANGLE_DEG)
 
     with ThreadPoolExecutor(2) as pool:
         begun, cpu = time.perf_counter(), time.process_time()

@@ -31,9 +31,7 @@ for trial in result.trials:
 
 figure, ax = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
 for trial in result.trials:
-    known = {
-        k: v for k, v in trial.settings.items() if k in ("method", "rays", "penalty_strength", "edge_mps")
-    }
+    known = {k: v for k, v in trial.settings.items() if k in ("method", "rays", "penalty_strength")}
     if len(known) < len(trial.settings):
         continue
     method = known.pop("method")

@@ -2,7 +2,7 @@
 ==========================
 
 The same traces hold echoes. With the delays along the bent rays of the speed image they are focused where
-they came from; with those of water they are not.
+they came from; with those of water, to which speed bounds keep the second image, they are not.
 """
 
 # %%
@@ -15,7 +15,7 @@ import bentray
 scan = bentray.simulate(waveform=True, elements=64, emissions=24, nodes=64, frequency_hz=3e5, side_m=0.06)
 settings = {"nodes": 64, "reflection": True}
 bent = bentray.reconstruct(scan, "gauss-newton", **settings)
-water = bentray.reconstruct(scan, "gauss-newton", delays="water", **settings)
+water = bentray.reconstruct(scan, "sart", speed_bounds_mps=(1499.9, 1500.1), iterations=1, **settings)
 
 figure, axes = plt.subplots(1, 3, figsize=(11, 3.5), layout="constrained")
 bent.plot(ax=axes[0])

@@ -13,9 +13,11 @@ from pydantic import TypeAdapter, ValidationError
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.request_fields import check_used
 from bentray_kernels.tomography.settings import NUMERICAL, PLACES, Settings
-from bentray_kernels.tomography.stored_settings import REMOVED, RENAMED
+from bentray_kernels.tomography.stored_settings import WITHDRAWN
 
 Record = TypeVar("Record")
+# The record of a reconstruction and those in it.
+RECORDS = {Settings, *(type(field.default) for field in fields(Settings) if is_dataclass(field.default))}
 _ADAPTERS: dict[type, TypeAdapter[Any]] = {}
 
 
@@ -34,7 +36,7 @@ def check_setting_names(settings: Any, kind: type[Any] = Settings, place: str = 
     for name, value in settings.items() if isinstance(settings, Mapping) else ():
         inner = is_dataclass(known.get(name))
         if name not in known or (inner and isinstance(value, bool)):
-            instead = _replacement(name) if kind is Settings else ""
+            instead = _replacement(name) if kind in RECORDS else ""
             others = PLACES.values() if kind is Settings else (f"{place}{one}" for one in known)
             accepted = instead or known_setting(place + str(name), others, ", ".join(known))
             raise InvalidInput(place + str(name), repr(value)[:80], accepted)
@@ -44,14 +46,13 @@ def check_setting_names(settings: Any, kind: type[Any] = Settings, place: str = 
 
 
 def _replacement(name: str) -> str:
-    """What replaces a setting of the flat record of earlier versions; empty for a name that it had not."""
-    if name in REMOVED:
-        return "sart.speed_range_mps alone" if name == "speed_update" else "no such setting: it was removed"
-    new = RENAMED.get(name, name)
-    if new in NUMERICAL:
-        budget = ", from minutes" if new in ("bands", "emitters") else ""
+    """What replaces a setting of earlier versions; empty for a name that they had not."""
+    if name in WITHDRAWN:
+        return WITHDRAWN[name]
+    if name in NUMERICAL:
+        budget = ", from minutes" if name in ("bands", "emitters") else ""
         return f"no such setting: it is decided automatically{budget}"
-    return f"{PLACES[new]}, which replaces it" if new in PLACES else ""
+    return f"{PLACES[name]}, which replaces it" if name in PLACES else ""
 
 
 def known_setting(name: str, names: Iterable[str], known: str) -> str:

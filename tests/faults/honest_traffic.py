@@ -23,7 +23,7 @@ PIECE = {**TUS, "Content-Type": "application/offset+octet-stream"}
 STREAM = {"Content-Type": "application/octet-stream"}
 # How often a request is sent again that was to come later.
 TRIES = 60
-PLAN = {"nodes": 32, "method": "sart", "iterations": 3, "attenuation": {"enabled": False}, "seed": 5}
+PLAN = {"nodes": 32, "method": "sart", "iterations": 3, "attenuation": {"enabled": False}}
 SIMULATION = {"nodes": 24, "elements": 16}
 # Shorter than a service keeps a connection on which nothing is asked.
 KEEPALIVE_S = 2.0

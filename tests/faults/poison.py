@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bentray_kernels.tomography import Problem, Settings
-from bentray_workers.reconstruction.file_scan import FileScan
+from bentray_kernels.tomography.scan import Scan
+from bentray_workers.reconstruction.file_scan import FileSource
 
 
 class PoisonedScan(NamedTuple):
-    """As ``bentray_workers.reconstruction.file_scan.FileScan``."""
+    """As ``bentray_kernels.tomography.scan.Scan``."""
 
     path: Path
     settings: Settings
@@ -27,4 +28,4 @@ class PoisonedScan(NamedTuple):
         if os.getpid() != self.maker:
             # As the kernel ends it for lack of memory.
             os.kill(os.getpid(), signal.SIGKILL)
-        return FileScan(self.path, 0, self.settings, "all").problem(index, stage)
+        return Scan(FileSource(self.path, 0, self.path, 0, self.path), self.settings).problem(index, stage)

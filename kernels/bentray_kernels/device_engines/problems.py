@@ -38,7 +38,7 @@ from ..refraction.caster_opencl import on_the_device as caster_on_the_device
 from ..splines import Spline
 from ..tomography import Problem, Settings
 from ..tomography.grid_schedule import initial_slowness
-from ..tomography.reflection.delay_and_sum import Pixels, Signals, Sums, sum_echoes
+from ..tomography.reflection.delay_and_sum import PAIR_ANGLE_DEG, Pixels, Signals, Sums, sum_echoes
 from ..tomography.reflection.delay_and_sum_opencl import sum_echoes_opencl
 from ..tomography.reflection.element_times import solve_times
 from ..tomography.sart.device_slices import TRIAL_EMITTERS
@@ -259,7 +259,7 @@ def echoes(pixels: int, elements: int, emissions: int) -> Engine:
     spacing, nodes, middle = 2e-3, 64, 0.063
     turn = 2.0 * np.pi * np.arange(elements) / elements
     ring = 0.05 * np.column_stack((np.cos(turn), np.sin(turn)))
-    times = solve_times(np.full((nodes, nodes), WATER_MPS), spacing, ring + middle, None)
+    times = solve_times(np.full((nodes, nodes), WATER_MPS), spacing, ring + middle)
     step = 0.096 / pixels
     line = step * (np.arange(pixels) - 0.5 * (pixels - 1))
     inside = np.hypot(line[:, None], line[None, :]) < 0.048
@@ -269,7 +269,7 @@ def echoes(pixels: int, elements: int, emissions: int) -> Engine:
     signals = Signals(parts, np.ones((emissions, elements), bool), 0.0, 1e7)
     receivers = np.arange(elements)
     senders = receivers[np.linspace(0, elements, emissions, endpoint=False).astype(int)]
-    scan = signals, times, spacing, senders, receivers, grid, 90.0, False
+    scan = signals, times, spacing, senders, receivers, grid, PAIR_ANGLE_DEG
 
     def image(sums: Sums) -> Floats:
         return np.stack((sums.echo.real, sums.echo.imag)).astype(float)

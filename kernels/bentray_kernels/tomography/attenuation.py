@@ -49,13 +49,13 @@ def active_emitters(problem: Problem) -> Ints:
 def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
     """Rows of some emitters along the rays of the finished image; any split gives the same.
 
-    With ``settings.attenuation.focusing`` the amplitudes are corrected for focusing by refraction, and pairs
+    With ``settings.numerics.focusing`` the amplitudes are corrected for focusing by refraction, and pairs
     whose ray has passed a caustic are left out.
 
     Raises:
         InvalidInput: for ``focusing`` without a frequency.
     """
-    if settings.attenuation.focusing:
+    if settings.numerics.focusing:
         problem = _without_focusing(problem, settings, slowness, emitters)
     return linearise_losses(problem, settings, slowness, emitters)
 
@@ -98,7 +98,7 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
     if density == 0.0:
         return water / problem.spacing
     bounds = (0.0, MAX_NP_M * problem.spacing)
-    if settings.attenuation.attenuation_solver == "sart":
+    if settings.numerics.attenuation_solver == "sart":
         return attenuation_sart.solve(parts, water, problem.region, settings, bounds) / problem.spacing
     image, dual = water, np.zeros((len(shape), *shape))
     # Rays through a blurred speed image are all somewhat off, and none is an outlier: on Table 6 after SART

@@ -24,7 +24,7 @@ def solve(
         parts: rows of all emitters, in their order; residuals are log ratios minus those of water, Np.
         water: the image of the water, in which iterations start, (nx, ny[, nz]), Np per node.
         region: as ``water``, nodes that may change.
-        settings: ``sart``, ``iterations`` and ``seed``.
+        settings: ``sart``, ``iterations`` and ``numerics``.
         bounds: lowest and highest attenuation, Np per node.
 
     Returns:
@@ -33,10 +33,9 @@ def solve(
     image = water.copy()
     emitters = [rows for part in parts for rows in part.by_emitter() if rows.residual.size]
     for iteration in range(settings.iterations):
-        relaxation = settings.sart.relaxation * settings.numerics.relaxation_decay**iteration
-        for k in np.random.default_rng((settings.seed, iteration)).permutation(len(emitters)):
-            change = _smoothed(_update(emitters[k], image - water), settings.sart.smoothing_nodes)
-            moved = np.clip(image + relaxation * change, *bounds)
+        for k in np.random.default_rng((settings.numerics.seed, iteration)).permutation(len(emitters)):
+            change = _smoothed(_update(emitters[k], image - water), settings.numerics.smoothing_nodes)
+            moved = np.clip(image + settings.sart.relaxation * change, *bounds)
             image[region] = moved[region]
     return image
 

@@ -52,8 +52,6 @@ def _widest_gap(angle_deg: Floats) -> float:
     return float(np.diff(np.append(rising, rising[0] + 360.0)).max())
 
 
-def with_decomposition(position_m: Floats, settings: Settings) -> Settings:
-    """The settings with the decomposition that is used: the given one, or that of the array."""
-    if settings.decomposition is not None:
-        return settings
-    return settings.changed(decomposition=automatic_decomposition(position_m))
+def decomposition_of(position_m: Floats, settings: Settings) -> Literal["slices", "volume"]:
+    """The decomposition that is used: that of the settings, or that of the array."""
+    return settings.decomposition or automatic_decomposition(position_m)

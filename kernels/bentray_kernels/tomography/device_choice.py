@@ -71,8 +71,10 @@ def device_work(scan: ScanSize, settings: Settings) -> Work | None:
     )
 
 
-def with_device(scan: ScanSize, settings: Settings) -> Settings:
-    """The settings with the device of this machine: ``opencl`` where ``auto`` means it here.
+def choose_device(scan: ScanSize, settings: Settings) -> tuple[str, str]:
+    """The device of a reconstruction on this machine, ``opencl`` where ``auto`` means it here, and why.
+
+    The reason is empty where nothing had to be decided.
 
     Args:
         scan, settings: as ``device_work``.
@@ -80,14 +82,13 @@ def with_device(scan: ScanSize, settings: Settings) -> Settings:
     Raises:
         InvalidInput: for a device that is requested, and of which there is none.
     """
-    work = device_work(scan, settings)
-    if work is None or settings.device == "cpu":
-        return settings
+    if not needs_decision(settings) or (work := device_work(scan, settings)) is None:
+        return settings.device, ""
     if settings.device == "opencl":
         check_available("opencl")
-        return settings
+        return settings.device, ""
     session = select_engine(work)
     # Compiled tasks take all cores of a processor; the benchmark measured one core beside all of the driver.
     if session is None or (session.device.kind == "cpu" and requested() == "auto"):
-        return settings
-    return settings.changed(device="opencl")
+        return settings.device, "no OpenCL device of this machine was faster in a trial"
+    return "opencl", f"{session.device.name} was faster in a trial"

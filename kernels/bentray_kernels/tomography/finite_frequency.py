@@ -48,8 +48,6 @@ def blurred(change: Floats, width: float) -> Floats:
 def front_smoothing(problem: Problem, settings: Settings) -> float:
     """Standard deviation, nodes, of the Gaussian on the speed of ``ray_slowness`` in which rays bend.
 
-    As in the settings; by default so that both Gaussians together have ``BENDS_WIDER`` widths.
+    Both Gaussians together have ``BENDS_WIDER`` widths.
     """
-    if settings.numerics.front_smoothing_nodes > 0.0:
-        return settings.numerics.front_smoothing_nodes
     return width_in_nodes(problem, settings) * math.sqrt(BENDS_WIDER**2 - 1.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -10,7 +10,6 @@ from scipy.ndimage import distance_transform_edt
 from ..acquisition import Dataset
 from ..acquisition.angular_coverage import angular_coverage
 from ..arrays import Floats
-from .decomposition import distinct_heights
 from .directivity import within_opening
 from .problem import RIM_NODES, Problem
 from .settings import Settings
@@ -22,26 +21,25 @@ MAX_PAIRS, POINTS = 20_000, 65
 BEYOND_NODES = 2 * RIM_NODES + 1
 
 
-def geometry_summary(dataset: Dataset, requested: Settings, settings: Settings, problem: Problem) -> str:
+def geometry_summary(
+    dataset: Dataset, settings: Settings, problem: Problem, reasons: Mapping[str, str]
+) -> str:
     """Properties of the geometry of a reconstruction beyond the usual; empty for a plain ring.
 
     Args:
         dataset: the scan.
-        requested: settings before the automatic decisions.
         settings: that are used.
         problem: of one slice, or the volume.
+        reasons: of automatic decisions, see ``settled``.
     """
-    return " ".join(_sentences(dataset, requested, settings, problem))
+    sentences = [*_sentences(dataset, settings, problem)]
+    if settings.decomposition == "volume" and "decomposition" in reasons:
+        why = reasons["decomposition"].removeprefix("volume")
+        sentences.insert(0, f"Reconstructed in 3-D (decomposition: volume){why}.")
+    return " ".join(sentences)
 
 
-def _sentences(dataset: Dataset, requested: Settings, settings: Settings, problem: Problem) -> Iterator[str]:
-    position = dataset.element_position_m
-    if requested.decomposition is None and settings.decomposition == "volume":
-        heights = distinct_heights(position).size
-        yield (
-            f"Reconstructed in 3-D (decomposition: volume), since {len(position)} elements at {heights} "
-            "heights are not stacked rings."
-        )
+def _sentences(dataset: Dataset, settings: Settings, problem: Problem) -> Iterator[str]:
     if settings.opening_angle_deg is not None:
         outside = ~within_opening(dataset, settings.opening_angle_deg)
         outside = outside[dataset.tx[:, None] != dataset.rx]

@@ -1,4 +1,4 @@
-"""Stages of a reconstruction: coarser grids and straight rays before the requested grid and rays."""
+"""Stages of a reconstruction: coarser grids before the requested one."""
 
 from __future__ import annotations
 
@@ -16,17 +16,13 @@ from .settings import Settings
 def stages(dataset: Dataset, settings: Settings) -> tuple[Settings, ...]:
     """The settings of each stage, the coarsest first; each starts from the image of the previous one.
 
-    All grids have the same side, and every coarser one half as many nodes. Straight rays come first, on the
-    coarsest grid.
+    All grids have the same side, and every coarser one half as many nodes.
     """
-    coarser, straight = settings.numerics.coarser_grids, settings.numerics.straight_iterations
-    last = settings.changed(coarser_grids=0, straight_iterations=0)
+    coarser = settings.numerics.coarser_grids
+    last = settings.changed(coarser_grids=0)
     if coarser and settings.side_m is None:
         last = replace(last, side_m=image_side(dataset, settings.grid_nodes))
-    plans = [replace(last, nodes=-(-settings.grid_nodes // 2**k)) for k in range(coarser, -1, -1)]
-    if straight and settings.rays != "straight":
-        plans.insert(0, replace(plans[0], rays="straight", iterations=straight))
-    return tuple(plans)
+    return tuple(replace(last, nodes=-(-settings.grid_nodes // 2**k)) for k in range(coarser, -1, -1))
 
 
 def initial_slowness(problem: Problem, image: Floats | None = None, before: Problem | None = None) -> Floats:

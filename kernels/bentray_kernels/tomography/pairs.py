@@ -11,7 +11,7 @@ from ..acquisition import Dataset
 from ..acquisition.noise import robust_deviation
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
-from .decomposition import distinct_heights, with_decomposition
+from .decomposition import decomposition_of, distinct_heights
 from .directivity import within_opening
 from .settings import Settings
 
@@ -65,7 +65,7 @@ def count(dataset: Dataset, settings: Settings) -> int:
         InvalidInput: as ``heights``, and for a volume with a single height.
     """
     z = heights(dataset)
-    if with_decomposition(dataset.element_position_m, settings).decomposition == "slices":
+    if decomposition_of(dataset.element_position_m, settings) == "slices":
         return 1 if z is None else len(z)
     if z is None or len(z) == 1:
         raise InvalidInput("decomposition", "'volume'", "slices, for the scan has one height only")
@@ -81,8 +81,7 @@ def from_dataset(dataset: Dataset, settings: Settings, index: int) -> Pairs:
     if not 0 <= index < count(dataset, settings):
         raise InvalidInput("slice", index, f"0 to {count(dataset, settings) - 1}")
     plane = dataset.element_position_m.shape[1] == 2
-    settings = with_decomposition(dataset.element_position_m, settings)
-    if settings.decomposition == "slices":
+    if decomposition_of(dataset.element_position_m, settings) == "slices":
         pairs = _slice(dataset, settings, index) if plane else _ring(dataset, settings, index)
     elif plane:
         pairs = _moved_ring(dataset, settings)

@@ -38,7 +38,6 @@ class Problem:
         log_ratio: as ``delta_tof``, ln(A_water / A_object), Np; None where no amplitudes were recorded.
         water_attenuation: Np/m.
         wavelength_m: in water, of the amplitudes; None if their frequency is unknown.
-        axial_margin: nodes that a ray may go above and below its emitter and receivers; None: any number.
         noise_s: standard deviation of a time, s, from pairs measured both ways; 0: there are none.
     """
 
@@ -53,7 +52,6 @@ class Problem:
     log_ratio: Floats | None = None
     water_attenuation: float = 0.0
     wavelength_m: float | None = None
-    axial_margin: int | None = None
     noise_s: float = 0.0
 
     @classmethod
@@ -124,7 +122,6 @@ class Problem:
             log_ratio=data.log_ratio,
             water_attenuation=dataset.water_attenuation_np_m or 0.0,
             wavelength_m=None if frequency is None else dataset.water_speed_mps / frequency,
-            axial_margin=settings.numerics.axial_margin_nodes,
             noise_s=data.noise_s,
         )
 
@@ -147,16 +144,6 @@ class Problem:
     def receivers_of(self, emitter: int) -> Floats:
         """(nrx, ndim), m: receivers of the emitter's row of the data."""
         return np.asarray(self.receivers[self.ring[emitter]])
-
-    def slab(self, emitter: int) -> slice:
-        """Range of heights of the emitter's rays, as nodes of the last axis; of a slice the whole axis."""
-        nodes = self.region.shape[-1]
-        if self.region.ndim == 2 or self.axial_margin is None:
-            return slice(0, nodes)
-        z = np.append(self.receivers_of(emitter)[:, 2], self.emitters[emitter, 2]) / self.spacing
-        # Rounding must not add a node to a height that lies on one.
-        low = max(math.floor(z.min() + 1e-6) - self.axial_margin, 0)
-        return slice(low, min(math.ceil(z.max() - 1e-6) + self.axial_margin + 1, nodes))
 
     def each_pair_once(self) -> Problem:
         """This problem without reverse pairs, if every element is emitter and receiver: half the rays.

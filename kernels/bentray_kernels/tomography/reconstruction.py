@@ -5,32 +5,24 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 
 import numpy as np
 
 from ..acquisition import Dataset
-from ..acquisition.element_pitch import element_pitch
 from ..acquisition.picking.amplitudes import with_log_ratios
 from ..acquisition.plausibility import check_plausible
 from ..acquisition.quality.finding import words
 from ..acquisition.quality.left_out import find_impossible
 from ..arrays import Floats
-from ..errors import InvalidInput
 from ..task_graph import ThreadPool, run
 from . import pairs
 from .attenuation import EXPERIMENTAL
 from .cautions import bound_cautions, fit_cautions, with_settings_caution
-from .decomposition import with_decomposition
-from .device_choice import ScanSize, needs_decision, with_device
 from .gauss_newton.gauss_newton_step import Iterate
 from .geometry_summary import geometry_summary
-from .grid_schedule import stages
-from .image_grid import automatic_nodes
-from .model_selection.held_out import Part, part_of
-from .model_selection.selection import select_model
+from .model_selection.selection import explain_candidates, select_model
 from .numerics import recorded
 from .problem import Problem
 from .reconstruction_graph import (
@@ -42,18 +34,15 @@ from .reconstruction_graph import (
     progress_of,
     solve_attenuation,
 )
-from .reflection.memory_echoes import MemoryEchoScan
-from .reflection.reflection_plan import Echoes, check_reflection
+from .reflection.reflection_plan import check_reflection
 from .reflection.with_reflection import with_reflection
 from .result import Candidate, Caution, Progress, Reconstruction
 from .sart.sart_step import State
+from .scan import MemorySource, Scan, Source
 from .settings import Settings
-from .stage_graphs import Scan
+from .settled import Settled, in_sentences, reasons_of_model, settled
 from .stopping import travel_time_noise
-from .waveform.memory_scan import MemoryWaveScan
-from .waveform.refinement import Refinement, WaveScanOf
-from .waveform.refinement_graph import WaveScan
-from .waveform.waveform_settings import WaveSettings
+from .waveform.refinement import Refinement
 
 
 class FinishedGraph(TomographyGraph, Protocol):
@@ -101,176 +90,74 @@ def reconstruct(
 
         run({str(k): graph for k, graph in enumerate(graphs)}, ThreadPool(None), report)
 
-    def wave_scan(plan: WaveSettings, index: int) -> WaveScan:
-        return MemoryWaveScan(dataset, plan, index=index)
-
-    recorded, requested = dataset.waveform, settings
-    settings = on_this_machine(dataset, settings, 0 if recorded is None else recorded.object.shape[-1])
-    echoes = None
-    if recorded is not None:
-        echoes = Echoes(recorded.object.shape[-1], lambda index: MemoryEchoScan(dataset, index))
-    result = run_reconstruction(
-        dataset,
-        settings,
-        lambda plan, part: MemoryScan(dataset, plan, part),
-        run_graphs,
-        wave_scan,
-        0 if recorded is None or recorded.water is None else recorded.object.shape[-1],
-        echoes,
-    )
+    source = MemorySource(dataset)
+    result = run_reconstruction(source, settled(source, settings), run_graphs)
     if impossible := find_impossible(dataset.impossible_times):
         result = replace(result, provenance={**result.provenance, "quality": words(impossible)})
-    return with_settings_caution(result, requested, picks=False)
-
-
-def on_this_machine(dataset: Dataset, settings: Settings, samples: int) -> Settings:
-    """The settings with the device that this machine computes on, see ``device_choice.with_device``."""
-    if not needs_decision(settings):
-        return settings
-    return settings.changed(device=with_device(*device_request(dataset, settings, samples)).device)
-
-
-def device_request(dataset: Dataset, settings: Settings, samples: int) -> tuple[ScanSize, Settings]:
-    """The arguments of ``device_choice.with_device`` for a dataset with so many samples in a trace."""
-    sized = with_nodes(dataset, with_decomposition(dataset.element_position_m, settings))
-    return ScanSize(dataset.slices, len(dataset.tx), len(dataset.rx), samples), sized
+    return with_settings_caution(result, settings, picks=False)
 
 
 def run_reconstruction(
-    dataset: Dataset,
-    settings: Settings,
-    scan_of: Callable[[Settings, Part], Scan],
-    run_graphs: Run,
-    wave_scan_of: WaveScanOf,
-    samples: int = 0,
-    echoes: Echoes | None = None,
-    graph_of: GraphOf = ReconstructionGraph,
+    source: Source, chosen: Settled, run_graphs: Run, graph_of: GraphOf = ReconstructionGraph
 ) -> Reconstruction:
-    """Reconstruct a dataset by task graphs that the caller runs.
+    """Reconstruct a scan by task graphs that the caller runs.
 
     Args:
-        dataset: with travel times.
-        settings: see ``Settings``.
-        scan_of: makes the scan in which tasks find their data.
+        source: of a scan with travel times.
+        chosen: its settings.
         run_graphs: runs graphs to their end.
-        wave_scan_of: the same as ``scan_of`` for the refinement of a slice.
-        samples: of each trace of object and water; 0: none.
-        echoes: the traces of the object; None without any.
         graph_of: makes the graph of a slice or volume.
 
     Raises:
-        InvalidInput: from the dataset or a setting that does not fit it, and errors of ``run_graphs``.
+        InvalidInput: from the scan or a setting that does not fit it, and errors of ``run_graphs``.
     """
-    if not settings.reflection.enabled:
-        return _speed_of(dataset, settings, scan_of, run_graphs, wave_scan_of, samples, graph_of)
+    if not chosen.settings.reflection.enabled:
+        return _speed_of(source, chosen, run_graphs, graph_of)
+    dataset = source.dataset()
     in_space = dataset.element_position_m.shape[1] == 3
-    check_reflection(settings, traces=echoes is not None, in_space=in_space)
-    assert echoes is not None
+    check_reflection(chosen.settings, traces=source.samples > 0, in_space=in_space)
     passes = [0]
 
     def run_first(graphs: Sequence[TomographyGraph], before: int, after: int) -> None:
         run_graphs(graphs, before, after + dataset.slices * len(dataset.tx))
         passes[0] = before + sum(graph.total for graph in graphs)
 
-    result = _speed_of(dataset, settings, scan_of, run_first, wave_scan_of, samples)
-    return with_reflection(result, dataset, settings, echoes, run_graphs, passes[0])
+    result = _speed_of(source, chosen, run_first, ReconstructionGraph)
+    return with_reflection(result, source, chosen.settings, run_graphs, passes[0])
 
 
-def _speed_of(
-    dataset: Dataset,
-    settings: Settings,
-    scan_of: Callable[[Settings, Part], Scan],
-    run_graphs: Run,
-    wave_scan_of: WaveScanOf,
-    samples: int,
-    graph_of: GraphOf = ReconstructionGraph,
-) -> Reconstruction:
+def _speed_of(source: Source, chosen: Settled, run_graphs: Run, graph_of: GraphOf) -> Reconstruction:
     """Like ``run_reconstruction``, without the reflection image."""
-    requested = settings
-    settings = with_nodes(dataset, with_decomposition(dataset.element_position_m, settings))
+    dataset, settings, waves = source.dataset(), chosen.settings, chosen.waves
     count = pairs.count(dataset, settings)
     trials: tuple[Candidate, ...] = ()
-    before = 0
-    waves = _refinement(dataset, settings, samples, wave_scan_of)
-    allowed = waves is not None and (settings.method == "waveform" or waves.within_budget)
-    refinement = waves if allowed else None
-    after = refinement.total if refinement is not None else waves.passes if waves is not None else 0
+    before = after = 0
+    refinement = None
+    if waves is not None:
+        refinement = Refinement(source, waves.scale, waves.settings, waves.whole_minutes)
+        after = refinement.total if waves.allowed else refinement.passes
     if settings.selects_model:
-        settings, trials, before = select_model(dataset, settings, count // 2, scan_of, run_graphs, after)
-    scan = scan_of(settings, "all")
+        settings, trials, before = select_model(source, settings, count // 2, run_graphs, after)
+    scan = Scan(source, settings)
     graphs = [graph_of(scan, index) for index in range(count)]
     run_graphs(graphs, before, after)
+    reasons = {
+        **chosen.reasons,
+        **reasons_of_model(settings, chosen.settings, explain_candidates(trials)),
+    }
+    decided = {
+        "geometry": geometry_summary(dataset, settings, scan.problem(count // 2), chosen.reasons),
+        "automatic": in_sentences(reasons),
+    }
     rays = _assembled(dataset, settings, scan.problem(0), graphs, trials)
-    summary = geometry_summary(dataset, requested, settings, scan.problem(count // 2))
-    if summary:
-        rays = replace(rays, provenance={**rays.provenance, "geometry": summary})
-    if waves is None:
-        return rays
+    said = {name: text for name, text in decided.items() if text}
+    rays = replace(rays, provenance={**rays.provenance, **said})
     done = before + sum(graph.total for graph in graphs)
-    if refinement is None:
-        return waves.advised(rays, travel_time_noise(dataset), run_graphs, done)
-    return refinement.refined(rays, run_graphs, done)
-
-
-def _refinement(
-    dataset: Dataset, settings: Settings, samples: int, wave_scan_of: WaveScanOf
-) -> Refinement | None:
-    """The waveform refinement that may follow; None if not requested, or impossible with ``auto``."""
-    if settings.method not in ("waveform", "auto") or (settings.method == "auto" and not samples):
-        return None
-    try:
-        return Refinement(dataset, settings, samples, wave_scan_of)
-    except InvalidInput:
-        if settings.method == "waveform":
-            raise
-        return None
-
-
-def with_nodes(dataset: Dataset, settings: Settings) -> Settings:
-    """The settings with the number of nodes that is used: the given one, or that of the scan."""
-    if settings.nodes is not None:
-        return settings
-    position, water = dataset.element_position_m, dataset.water_speed_mps
-    frequency = dataset.center_frequency_hz
-    width = float(np.ptp(position[:, :2], axis=0).max())
-    wavelength = None if frequency is None else water / frequency
-    noise = travel_time_noise(dataset) if wavelength is None else 0.0
-    pitch, elements = element_pitch(position), len(position)
-    nodes = automatic_nodes(settings, width, pitch, wavelength, noise, water, elements)
-    return settings.changed(nodes=nodes)
-
-
-class MemoryScan:
-    """A scan in the memory of this process; see ``stage_graphs.Scan``."""
-
-    def __init__(self, dataset: Dataset, settings: Settings, part: Part) -> None:
-        plans = stages(dataset, settings)
-        self._plans = plans
-        self._problem = cache(lambda index, stage: problem_of(dataset, plans[stage], index, part))
-
-    def stages(self) -> tuple[Settings, ...]:
-        return self._plans
-
-    def problem(self, index: int, stage: int = -1) -> Problem:
-        problem: Problem = self._problem(index, stage % len(self._plans))
-        return problem
-
-    def problems(self, indices: tuple[int, ...], stage: int = -1) -> tuple[Problem, ...]:
-        return tuple(self.problem(index, stage) for index in indices)
-
-
-def problem_of(dataset: Dataset, settings: Settings, index: int, part: Part = "all") -> Problem:
-    """The problem of one slice for the method of the settings, with the pairs of one part.
-
-    Held-out pairs that were measured both ways have their mean, for every method: with half the variance
-    of the noise for one method, and all of it for another, misfits could not be compared.
-
-    Raises:
-        InvalidInput: as ``Problem.from_dataset``.
-    """
-    problem = Problem.from_dataset(part_of(dataset, part), settings, index)
-    once = settings.method == "gauss-newton" or not (part == "all" or part.startswith("shown"))
-    return problem.each_pair_once() if once and settings.numerics.reciprocity else problem
+    if waves is None or refinement is None:
+        return rays
+    if waves.allowed:
+        return refinement.refined(rays, run_graphs, done)
+    return refinement.advised(rays, travel_time_noise(dataset), run_graphs, done)
 
 
 def _assembled(

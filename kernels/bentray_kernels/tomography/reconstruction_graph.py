@@ -15,7 +15,8 @@ from .gauss_newton.linearisation import Rows
 from .grid_schedule import initial_slowness
 from .result import Iteration, Progress
 from .sart.sart_step import State
-from .stage_graphs import GaussNewtonStage, SartStage, Scan, Stage, batches_of, trace_rays
+from .scan import Scan
+from .stage_graphs import GaussNewtonStage, SartStage, Stage, batches_of, trace_rays
 from .uncertainty.ray_uncertainty import Uncertainty, ray_uncertainty, trace_probed_rays
 
 

@@ -6,7 +6,7 @@ from ..acquisition.array_hull import check_extent
 from ..acquisition.dataset import Dataset
 from ..errors import InvalidInput
 from . import pairs
-from .decomposition import with_decomposition
+from .decomposition import decomposition_of
 from .directivity import check_normals
 from .settings import Settings
 
@@ -36,7 +36,7 @@ def check_scan(dataset: Dataset, settings: Settings, samples: int) -> None:
         check_waveform(settings, samples, dataset.slices, in_space=dataset.element_position_m.shape[1] != 2)
     check_normals(settings.opening_angle_deg, normals=dataset.element_normal is not None)
     pairs.count(dataset, settings)
-    flat = with_decomposition(dataset.element_position_m, settings).decomposition == "slices"
+    flat = decomposition_of(dataset.element_position_m, settings) == "slices"
     check_extent(dataset.element_position_m[:, :2] if flat else dataset.element_position_m)
 
 

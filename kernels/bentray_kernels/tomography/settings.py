@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 from ..errors import InvalidInput
 from ..limits import LEFT_OUT, MAX_LEFT_OUT, SPEED_MPS, WATER_C
 from ..picker_names import DEFAULT_PICKER, PickerName
-from ..ranges import SEED, Range
+from ..ranges import Range
 from ..request_fields import ABOVE_ZERO, Uses, check, declared, setting
 from ..solver_names import SolverName
 from .numerics import Numerics
@@ -25,7 +25,7 @@ AUTOMATIC = Numerics()
 SART, GAUSS_NEWTON = ("sart", "auto", "waveform"), ("gauss-newton", "auto", "waveform")
 LOSSES = {"attenuation": (True,), "scan_amplitudes": (True,)}
 ECHOES: Uses = ({"reflection": (True,)},)
-BY_SART: Uses = ({"method": SART}, {**LOSSES, "attenuation_solver": ("sart",)})
+BY_SART: Uses = ({"method": SART},)
 # The compiled pass of SART over a slice exists for devices, full waveforms and reflection.
 _SLICES = {"method": ("sart", "auto"), "decomposition": (None, "slices")}
 ON_DEVICES: Uses = (
@@ -52,14 +52,6 @@ class SartSettings:
         label="Relaxation factor λ",
         used_when=BY_SART,
     )
-    smoothing_nodes: float = setting(
-        1.0,
-        "Standard deviation of the Gaussian filter on each update, nodes; 0 for none.",
-        Range(0.0, 32.0),
-        label="Smoothing of updates",
-        unit="nodes",
-        used_when=BY_SART,
-    )
     speed_range_mps: tuple[float, float] | None = setting(
         None,
         "Lowest and highest speed known in the object, m/s. The image is stretched to this range before the "
@@ -82,14 +74,6 @@ class GaussNewtonSettings:
 
     __pydantic_config__: ClassVar[dict[str, str]] = FORBID
 
-    penalty: Literal["total-variation", "laplacian", "tikhonov"] = setting(
-        "total-variation",
-        "total-variation preserves edges; laplacian prefers smooth images; tikhonov prefers images near the "
-        "initial one.",
-        label="Penalty",
-        words={"total-variation": "Total variation", "laplacian": "Laplacian", "tikhonov": "Tikhonov"},
-        used_when=({"method": GAUSS_NEWTON},),
-    )
     penalty_strength: float = setting(
         0.3,
         "Weight of the penalty relative to the rms residual; 0 for none. The attenuation, by either method, "
@@ -98,23 +82,7 @@ class GaussNewtonSettings:
         label="Strength of the penalty",
         used_when=(
             {"method": GAUSS_NEWTON},
-            {**LOSSES, "attenuation_solver": ("penalised",)},
-        ),
-    )
-    edge_mps: float = setting(
-        0.0,
-        "For total-variation: difference of neighbouring nodes, m/s, above which the penalty stays constant; "
-        "for objects of flat parts with sharp edges, such as phantoms. 0: the penalty grows with every "
-        "difference.",
-        Range(0.0, 1000.0, unit="m/s"),
-        label="Edges above",
-        unit="m/s",
-        used_when=(
-            {
-                "method": GAUSS_NEWTON,
-                "penalty": ("total-variation",),
-                "penalty_strength": ABOVE_ZERO,
-            },
+            LOSSES,
         ),
     )
 
@@ -174,21 +142,6 @@ class AttenuationSettings:
         words={"recorded": "Recorded", "ratio": "Pulse height", "spectrum": "Spectrum"},
         used_when=({"attenuation": (True,)},),
     )
-    attenuation_solver: Literal["penalised", "sart"] = setting(
-        "penalised",
-        "penalised: all rays at once, with the penalty_strength of gauss_newton; sart: one emitter after the "
-        "other with the settings of sart, without a penalty (Li 2008, chapter 6).",
-        label="Solver",
-        words={"penalised": "Penalised", "sart": "SART"},
-        used_when=(LOSSES,),
-    )
-    focusing: bool = setting(
-        False,
-        "Correct amplitudes for focusing by refraction, by the spreading of ray tubes in the speed image; "
-        "needs the frequency of the amplitudes.",
-        label="Correct for focusing",
-        used_when=({**LOSSES, "amplitudes": ("recorded", "ratio")},),
-    )
 
     def __post_init__(self) -> None:
         check(self, place="attenuation")
@@ -206,14 +159,6 @@ class ReflectionSettings:
         "travel times along bent rays and summed.",
         label="Make a reflection image",
     )
-    delays: Literal["reconstructed", "water"] = setting(
-        "reconstructed",
-        "reconstructed: travel times in the reconstructed speed; water: travel times in water, for "
-        "comparison.",
-        label="Travel times in",
-        words={"reconstructed": "Reconstructed speed", "water": "Water"},
-        used_when=ECHOES,
-    )
     pixel_m: float | None = setting(
         None,
         "Spacing of the pixels, m; at most the wavelength, and at most 4096 pixels along a side.",
@@ -221,30 +166,6 @@ class ReflectionSettings:
         unset="an eighth of the wavelength in water at the centre frequency, at most 2048 along a side",
         label="Pixel spacing",
         unit="m",
-        used_when=ECHOES,
-    )
-    pair_angle_deg: float = setting(
-        90.0,
-        "Largest angle at a pixel between the rays from the emitter and from the receiver, degrees; the "
-        "weight of a pair falls with its cosine, from 1 for an echo straight back to 0.",
-        Range(1.0, 180.0, unit="degrees"),
-        label="Largest angle of a pair",
-        unit="degrees",
-        used_when=ECHOES,
-    )
-    coherence_factor: bool = setting(
-        True,
-        "Multiply by the coherence factor of the emissions, which suppresses echoes that do not focus.",
-        label="Coherence factor",
-        used_when=ECHOES,
-    )
-    gain: Literal["none", "spreading", "attenuation"] = setting(
-        "none",
-        "Compensation of the amplitudes on the way to a pixel and back. none: no compensation; spreading: of "
-        "the spreading of cylindrical waves; attenuation: of the spreading, and of the losses along the rays "
-        "in the reconstructed attenuation.",
-        label="Compensate",
-        words={"none": "Nothing", "spreading": "Spreading", "attenuation": "Spreading and attenuation"},
         used_when=ECHOES,
     )
 
@@ -293,7 +214,7 @@ class Settings:
         DEVIATION,
         "Eikonal solver for curved rays. deviation is for SART on slices; elsewhere accurate replaces it.",
         label="Eikonal solver",
-        used_when=({"rays": ("curved",)}, {"uncertainty": (True,)}, {"focusing": (True,), **LOSSES}),
+        used_when=({"rays": ("curved",)}, {"uncertainty": (True,)}),
     )
     decomposition: Literal["slices", "volume"] | None = setting(
         None,
@@ -363,13 +284,6 @@ class Settings:
         used_when=ON_DEVICES,
         neutral=("cpu",),
     )
-    seed: int = setting(
-        0,
-        "Seed of the random order of emitters.",
-        SEED,
-        label="Random seed",
-        used_when=(*BY_SART, {"uncertainty": (True,)}),
-    )
     resolution_check: bool = setting(
         False,
         "Also reconstruct a checkerboard along the same rays, and report its recovery at each node.",
@@ -394,9 +308,7 @@ class Settings:
         unit="minutes of one core",
         used_when=({"method": ("auto", "waveform"), "scan_traces": (True,)},),
     )
-    sart: SartSettings = field(
-        default=SartSettings(), metadata=_record("SART", "For method sart, and the attenuation by it.")
-    )
+    sart: SartSettings = field(default=SartSettings(), metadata=_record("SART", "For method sart."))
     gauss_newton: GaussNewtonSettings = field(
         default=GaussNewtonSettings(),
         metadata=_record("Gauss-Newton", "For gauss-newton, and the attenuation."),
@@ -464,7 +376,7 @@ class Settings:
         """Nodes along each side of the image, once they are known.
 
         Raises:
-            ValueError: before ``image_grid.with_nodes`` has set them.
+            ValueError: before ``settled`` has set them.
         """
         if self.nodes is None:
             raise ValueError("the number of nodes is not set yet")
@@ -504,11 +416,11 @@ class FixedSettings(Settings):
     def __post_init__(self) -> None:
         super().__post_init__()
         fixed = self.numerics
-        if fixed.guided_rounds and self.decomposition == "volume":
-            raise InvalidInput("guided_rounds", fixed.guided_rounds, "0, with decomposition volume")
         if fixed.coarser_grids and self.nodes and self.nodes >> fixed.coarser_grids < MIN_NODES:
             accepted = f"few enough that the coarsest of {self.nodes} nodes has {MIN_NODES}"
             raise InvalidInput("coarser_grids", fixed.coarser_grids, accepted)
+        if fixed.focusing and self.attenuation.amplitudes == "spectrum":
+            raise InvalidInput("focusing", True, "false, with amplitudes spectrum, which it does not change")
         if fixed.ray_width_m > 0.0 and self.method != "gauss-newton":
             raise InvalidInput("ray_width_m", fixed.ray_width_m, "0, unless method is gauss-newton")
 

@@ -39,7 +39,7 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
 
 def sart_engine(settings: Settings, dimensions: int) -> Engine:
     """The engine of SART on slices: a device has the compiled pass, with a wave front in the image itself."""
-    changed = settings.sart.speed_range_mps is not None or settings.numerics.front_smoothing_nodes > 0.0
+    changed = settings.sart.speed_range_mps is not None
     able = solver_of(settings, dimensions).compiled and not (changed and settings.rays == "curved")
     return "opencl" if settings.device == "opencl" and able else "compiled"
 
@@ -52,16 +52,14 @@ def undivided_reason(settings: Settings, *, amplitudes: bool) -> str:
         amplitudes: whether the scan has them.
     """
     numerics = settings.numerics
-    changed = settings.sart.speed_range_mps is not None or numerics.front_smoothing_nodes > 0.0
-    staged = numerics.coarser_grids > 0 or (numerics.straight_iterations > 0 and settings.rays == "curved")
-    special = staged or numerics.axial_margin_nodes is not None or numerics.ray_gradient != "differences"
     reasons = {
         f"decomposition {settings.decomposition}": settings.decomposition != "volume",
         f"method {settings.method}": settings.method != "sart",
         f"eikonal {settings.eikonal}": settings.rays == "curved"
         and settings.eikonal not in (DEVIATION, "fsm"),
-        "sart.speed_range_mps": changed,
-        "stages or margins": special,
+        "sart.speed_range_mps": settings.sart.speed_range_mps is not None,
+        "coarser grids": numerics.coarser_grids > 0,
+        "other gradients": numerics.ray_gradient != "differences",
         "resolution_check": settings.resolution_check,
         "uncertainty": settings.uncertainty,
         "attenuation": settings.attenuation.enabled and amplitudes,

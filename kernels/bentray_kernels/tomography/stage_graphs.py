@@ -5,17 +5,16 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 from ..arrays import Floats, Ints
 from ..task_graph import Task
 from .gauss_newton import gauss_newton_step
 from .gauss_newton.linearisation import Rows
-from .problem import Problem
 from .result import Iteration
 from .sart import sart_step
 from .sart.sart_slices import SliceCall, advance_slices
-from .settings import Settings
+from .scan import Scan
 from .solver_choice import sart_engine
 
 # Long enough that scheduling costs nothing, short enough to show progress and to stop soon.
@@ -25,19 +24,6 @@ FIRST_NODES = 2_000_000
 
 # Emitters whose rays are traced in one task of Gauss-Newton, and after the last image.
 BATCH = 16
-
-
-class Scan(Protocol):
-    """The data source of tasks; it is sent with them, so it holds a path or the dataset itself."""
-
-    def stages(self) -> tuple[Settings, ...]:
-        """Settings of each stage, see ``grid_schedule``."""
-
-    def problem(self, index: int, stage: int = -1) -> Problem:
-        """The problem of one slice at a stage, the last by default; made once in a process."""
-
-    def problems(self, indices: tuple[int, ...], stage: int = -1) -> tuple[Problem, ...]:
-        """Those of several slices that are updated together."""
 
 
 class Stage(ABC):

@@ -6,61 +6,65 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from ..errors import InvalidInput
 from .settings import Settings
 
-# Earlier versions stored one flat record; these names changed since.
-RENAMED = MappingProxyType(
+# Settings that earlier versions had, and what holds or helps instead.
+WITHDRAWN = MappingProxyType(
     {
-        "sweeps": "iterations",
-        "straight_sweeps": "straight_iterations",
-        "axial_room_nodes": "axial_margin_nodes",
-        "huber_spreads": "huber_scale",
-        "wave_bands": "bands",
-        "wave_emitters": "emitters",
-        "wave_minutes": "minutes",
+        "seed": "no such setting: the random order of the emitters is always the same",
+        "smoothing_nodes": "no such setting: updates are smoothed over one node; choose sart.relaxation and "
+        "iterations",
+        "penalty": "no such setting: total variation is used; choose gauss_newton.penalty_strength",
+        "edge_mps": "no such setting: method auto tries sharp edges by itself; choose "
+        "gauss_newton.penalty_strength",
+        "attenuation_solver": "no such setting: all rays are solved at once; choose "
+        "gauss_newton.penalty_strength",
+        "focusing": "no such setting: choose attenuation.amplitudes spectrum, which focusing does not change",
+        "delays": "no such setting: for delays in water, choose speed_bounds_mps close around its speed",
+        "pair_angle_deg": "no such setting: pairs of up to 90 degrees are summed",
+        "coherence_factor": "no such setting: the coherence factor is always applied",
+        "gain": "no such setting: amplitudes are not compensated",
+        "sweeps": "iterations, which replaces it",
+        "wave_minutes": "minutes, which replaces it",
+        "speed_update": "sart.speed_range_mps alone",
     }
 )
-# Settings without a successor.
-REMOVED = ("huber_s", "speed_update", "wave_misfit", "wave_variation")
-# Removed values, by setting, and what replaces them.
-INSTEAD = {"rays": {"adjoint": "curved"}, "amplitudes": {"centroid": "spectrum"}}
-# Where no value was stored.
-EARLIER_DEFAULTS = MappingProxyType({"method": "sart", "nodes": 128, "decomposition": "slices"})
-# Where 0 meant what None means now.
-ZERO_IS_NONE = ("emitters", "minutes", "stop_rms_s")
+# Parameters that are not even internal any more, with the one value that is left.
+FIXED = MappingProxyType(
+    {
+        "pair_angle_deg": 90.0,
+        "coherence_factor": True,
+        "gain": "none",
+        "axial_margin_nodes": None,
+        "straight_iterations": 0,
+        "front_smoothing_nodes": 0.0,
+        "relaxation_decay": 1.0,
+        "guided_rounds": 0,
+    }
+)
 
 
 def from_stored(values: Mapping[str, Any], numerics: Mapping[str, Any] | None = None) -> Settings:
     """The settings of a stored record.
 
     Args:
-        values: as ``json.loads`` gives ``Settings.to_dict``, or the flat record of earlier versions.
+        values: as ``json.loads`` gives ``Settings.to_dict``.
         numerics: numerical parameters of a result, as ``json.loads`` gives them.
 
     Raises:
         TypeError: for a name that no version had.
-        InvalidInput: for a value that is not accepted.
+        InvalidInput: for a value that is not accepted, and for one that no version computes any more.
     """
     current: dict[str, Any] = {}
-    flat = not any(isinstance(value, Mapping) for value in values.values())
     for name, value in values.items():
-        if isinstance(value, Mapping):
-            inner = {name if leaf == "enabled" else leaf: one for leaf, one in value.items()}
-            current |= {leaf: _plain(one) for leaf, one in inner.items()}
-        elif name not in REMOVED:
-            instead = INSTEAD.get(name, {})
-            current[RENAMED.get(name, name)] = _plain(instead.get(value, value) if instead else value)
-    if flat:
-        current = {**EARLIER_DEFAULTS, **current}
-        current |= {name: None for name in ZERO_IS_NONE if current.get(name) == 0}
-        if values.get("speed_update") != "data-driven":
-            current.pop("speed_range_mps", None)
-        if current.get("method") == "waveform":
-            # Only ``auto`` had a budget.
-            current["minutes"] = None
-        if current.get("minutes") is None and current.get("bands") == 4:
-            current["bands"] = None
-    return Settings.of(**current, **(numerics or {}))
+        inner = value if isinstance(value, Mapping) else {name: value}
+        current |= {name if leaf == "enabled" else leaf: _plain(part) for leaf, part in inner.items()}
+    current |= numerics or {}
+    for name, left in FIXED.items():
+        if (value := current.pop(name, left)) != left:
+            raise InvalidInput(name, value, f"{left}: {WITHDRAWN.get(name, 'it was removed')}")
+    return Settings.of(**current)
 
 
 def _plain(value: Any) -> Any:

@@ -94,10 +94,10 @@ def useful_workers(dataset: Dataset, settings: Settings) -> int:
     Raises:
         InvalidInput: for a volume of a scan with one height only.
     """
-    from bentray_kernels.tomography.decomposition import with_decomposition
+    from bentray_kernels.tomography.decomposition import decomposition_of
     from bentray_kernels.tomography.pairs import count
 
-    settings = with_decomposition(dataset.element_position_m, settings)
     problems, cores = count(dataset, settings), len(os.sched_getaffinity(0))
-    volume = settings.decomposition == "volume" and settings.method == "gauss-newton"
+    of_array = decomposition_of(dataset.element_position_m, settings)
+    volume = of_array == "volume" and settings.method == "gauss-newton"
     return cores if volume or settings.selects_model else min(problems, cores)

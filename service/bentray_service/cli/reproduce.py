@@ -29,7 +29,7 @@ def reproduce(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Repeat a reconstruction with its own settings and seed, and compare every array.
+    """Repeat a reconstruction with its own settings, and compare every array.
 
     The exit code is 0 if all arrays are identical, else 1. Other versions of Python, NumPy or Numba, or
     another processor, may round differently.

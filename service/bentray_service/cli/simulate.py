@@ -5,75 +5,34 @@ from __future__ import annotations
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..interactive.setting_types import PhantomName
+from bentray_workers.simulation.request import PhantomScan
+
+from .options.option_tables import options_of, with_options
 from .options.paths import output_file
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
     from bentray_kernels.acquisition import Dataset
-    from bentray_workers.simulation.request import Simulated
+    from bentray_workers.simulation.kinds import Simulated
     from bentray_workers.simulation.waves import WaveSimulationSettings
 
 
+OPTIONS = options_of(PhantomScan, {}, {})
+# A person types nanoseconds.
+del OPTIONS["noise_s"]
+
+
+@with_options(OPTIONS, dict)
 def simulate(
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (HDF5).")],
-    phantom: Annotated[
-        PhantomName,
-        typer.Option(
-            help="2-D breast phantom (Li 2008, Table 6), its vertical slice, 2-D with glandular texture, or "
-            "3-D (Table 7)."
-        ),
-    ] = "table6",
-    nodes: Annotated[int, typer.Option(help="Nodes per side of the image that the scan is made for.")] = 128,
-    elements: Annotated[int, typer.Option(help="Transducers of a ring; each emits and receives.")] = 256,
-    coupling: Annotated[float, typer.Option(help="Speed of the water, m/s.")] = 1500.0,
-    refinement: Annotated[
-        int | None,
-        typer.Option(show_default="4", help="Refinement of the simulation grid over the image grid."),
-    ] = None,
-    slices: Annotated[
-        int | None, typer.Option(show_default="40", help="table7: number of ring heights, one node apart.")
-    ] = None,
-    array: Annotated[
-        Literal["moved", "rings"] | None,
-        typer.Option(
-            show_default="moved",
-            help="table7: one moving ring, or rings at all heights that receive each other.",
-        ),
-    ] = None,
-    three_d: Annotated[
-        bool, typer.Option("--three-d", help="table7: 3-D wave fronts instead of one slice at a time.")
-    ] = False,
+    options: dict[str, Any],
     noise_ns: Annotated[
         float | None,
         typer.Option(show_default="0", help="2-D phantoms: standard deviation of the travel-time noise, ns."),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
-    attenuation: Annotated[bool, typer.Option("--attenuation", help="Record amplitudes too.")] = False,
-    snr: Annotated[
-        float | None,
-        typer.Option(help="Signal-to-noise ratio of times and amplitudes, e.g. 10; default: no noise."),
-    ] = None,
-    waveform: Annotated[
-        bool,
-        typer.Option(
-            "--waveform",
-            help="Simulate waves and record traces of object and water, not travel times; table7: in 3-D.",
-        ),
-    ] = False,
-    frequency: Annotated[
-        float | None,
-        typer.Option(show_default="500000, table7 100000", help="--waveform: centre frequency, Hz."),
-    ] = None,
-    emissions: Annotated[
-        int | None, typer.Option(show_default="64", help="--waveform: number of emitting elements.")
-    ] = None,
-    side: Annotated[
-        float | None, typer.Option(show_default="0.12", help="--waveform: side of the square, m.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
@@ -86,27 +45,12 @@ def simulate(
 
     from bentray_workers.compilation.cache_misses import announce
     from bentray_workers.files.dataset import read_dataset
-    from bentray_workers.simulation.request import PhantomScan
     from bentray_workers.simulation.simulation_run import simulate_to_file
     from bentray_workers.simulation.waves import WaveSimulationSettings
 
-    request: dict[str, Any] = {
-        "nodes": nodes,
-        "elements": elements,
-        "coupling_mps": coupling,
-        "refinement": refinement,
-        "slices": slices,
-        "array": array,
-        "three_d": three_d or None,
-        "noise_s": None if noise_ns is None else noise_ns * 1e-9,
-        "seed": seed,
-        "attenuation": attenuation or None,
-        "snr": snr,
-        "frequency_hz": frequency,
-        "emissions": emissions,
-        "side_m": side,
-    }
-    settings = PhantomScan(phantom=phantom, waveform=waveform, **request).chosen()
+    if noise_ns is not None:
+        options["noise_s"] = noise_ns * 1e-9
+    settings = PhantomScan(**options).chosen()
     announce()
     started = time.perf_counter()
     with progress_bar("Simulating") as step:

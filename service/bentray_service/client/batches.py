@@ -5,11 +5,10 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from ..html_tables import RecordList
 from ..interactive.progress_bar import progress_bar
-from ..interactive.setting_types import Method, ReconstructionSettings
 from ..routes.models.batch_records import BatchList, BatchRecord
 from .connection import Connection
 from .errors import ClientError
@@ -17,6 +16,9 @@ from .flows import merged_settings
 from .lists import LIMIT, get
 from .steps import Flow, PauseStep, RequestStep
 from .stored import BatchId, DatasetId, id_of
+
+if TYPE_CHECKING:
+    from ..interactive.setting_types import Method, ReconstructionSettings
 
 ENDED = ("succeeded", "failed", "cancelled")
 # Parts of a progress bar.

@@ -8,18 +8,16 @@ import tempfile
 import uuid
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
-from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.export.registry import FormatName
 
 from ..interactive.progress_bar import progress_bar
 from ..interactive.result import Result
-from ..interactive.setting_types import Method, PhantomName, ReconstructionSettings, SimulationSettings
 from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from ..routes.models.name_changes import LengthUnit, TimeUnit
 from ..routes.models.surface_records import MeshRecord
-from ..settings_request import known_setting, nested, plain_numbers
+from ..settings_request import check_setting_names, nested, plain_numbers
 from .connection import Connection
 from .errors import ClientError
 from .lists import volume as volume_record
@@ -28,6 +26,9 @@ from .steps import DownloadStep, Flow, RequestStep
 from .stored import DatasetId, JobId, StoredId, VolumeId, id_of, volume_of
 from .uploading import PLACES, OnBytes, UploadKind, send_direct, send_file
 from .waiting import wait_for
+
+if TYPE_CHECKING:
+    from ..interactive.setting_types import Method, PhantomName, ReconstructionSettings, SimulationSettings
 
 Format = Literal[FormatName, "h5"]
 
@@ -165,10 +166,9 @@ def simulate(
     Raises:
         InvalidInput: for an unknown name in ``values``, with the one that is spelt most like it.
     """
-    known = SimulationSettings.__annotations__
-    for name, value in values.items():
-        if name not in known:
-            raise InvalidInput(name, repr(value)[:80], known_setting(name, known, ", ".join(known)))
+    from bentray_workers.simulation.request import PhantomScan
+
+    check_setting_names(values, PhantomScan)
     given = {**values} if phantom is None else {"phantom": phantom, **values}
     return (
         yield from _start({"kind": "simulation", "settings": {**(settings or {}), **plain_numbers(given)}})

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
-from bentray_kernels.errors import InvalidInput
 from bentray_kernels.picker_names import DEFAULT_PICKER, PickerName
 
 from ..interactive.picture import Picture
-from ..interactive.setting_types import RefractionSettings
-from ..settings_request import known_setting
+from ..settings_request import check_setting_names
 from .connection import Connection
 from .steps import Flow, RequestStep
 from .stored import DatasetId, VolumeId, id_of, volume_of
+
+if TYPE_CHECKING:
+    from ..interactive.setting_types import RefractionSettings
 
 
 def slice_png(connection: Connection, volume: VolumeId, /, **how: str | float) -> Flow[Picture]:
@@ -32,10 +33,9 @@ def refraction_png(
     Raises:
         InvalidInput: for an unknown setting, with the one that is spelt most like it.
     """
-    known = RefractionSettings.__annotations__
-    for name, value in view.items():
-        if name not in known:
-            raise InvalidInput(name, repr(value)[:80], known_setting(name, known, ", ".join(known)))
+    from bentray_workers.rendering.refraction_view import RefractionView
+
+    check_setting_names(view, RefractionView)
     return (yield from _picture(f"/v1/volumes/{volume_of(volume)}/refraction.png", dict(view)))
 
 

@@ -6,7 +6,7 @@ import os
 import time
 import warnings
 from pathlib import Path
-from typing import Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from bentray_kernels.tomography.result import Progress, Reconstruction
 
@@ -14,7 +14,9 @@ from .interruption import OnProgress, Stop, run_interruptibly
 from .progress_bar import progress_bar
 from .result import Result, result_of
 from .scan import Scan, read
-from .setting_types import Method, ReconstructionSettings
+
+if TYPE_CHECKING:
+    from .setting_types import Method, ReconstructionSettings
 
 MOST_THREADS = 1024
 

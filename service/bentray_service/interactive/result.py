@@ -307,6 +307,10 @@ class Result:
         shown = f"<bentray.Result of {size} nodes: {', '.join(self.values)}; {name} {spread}>"
         return f"{doubt}\n{shown}" if doubt else shown
 
+    def __str__(self) -> str:
+        automatic = self.attributes.get("automatic")
+        return f"{self!r}\nDecided automatically: {automatic}" if automatic else repr(self)
+
     def _repr_html_(self) -> str:
         from bentray_workers.images.captions import facts
 
@@ -322,7 +326,7 @@ class Result:
         if isinstance(self.image, Reconstruction):
             rows.append(("method", facts(self.image)))
             rows[:0] = [("caution", one.text) for one in self.image.cautions]
-        told = ("seconds", "water", "geometry", "quality", "waveform", "bentray")
+        told = ("seconds", "automatic", "water", "geometry", "quality", "waveform", "bentray")
         rows += [(name, self.attributes[name]) for name in told if name in self.attributes]
         title = self.attributes.get("title") or "Result"
         return picture_html(png, title) + figures_html(title, rows)

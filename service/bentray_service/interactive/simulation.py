@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from .interruption import OnProgress, Stop, run_interruptibly
 from .progress_bar import progress_bar
 from .scan import Scan, temporary_scan
-from .setting_types import PhantomName, SimulationSettings
+
+if TYPE_CHECKING:
+    from .setting_types import PhantomName, SimulationSettings
 
 
 def simulate(

@@ -16,7 +16,7 @@ from bentray_kernels.acquisition.simulation.array_shapes import arc, bowl, facin
 from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
-from bentray_kernels.tomography.decomposition import with_decomposition
+from bentray_kernels.tomography.decomposition import decomposition_of
 from bentray_kernels.tomography.problem import RIM_NODES
 from bentray_kernels.tomography.requirements import check_scan
 
@@ -197,8 +197,8 @@ def test_the_decomposition_follows_the_heights_of_the_elements():
         (rings[1:], "volume"),
         (rings[:8], "slices"),
     ):
-        assert with_decomposition(position, settings).decomposition == expected
+        assert decomposition_of(position, settings) == expected
     lines = facing_lines(6, 0.08, 0.08).position_m
     planes = np.concatenate([np.column_stack((lines, np.full(12, z))) for z in (0.0, 0.01)])
-    assert with_decomposition(planes, settings).decomposition == "volume"
-    assert with_decomposition(rings[1:], Settings(decomposition="slices")).decomposition == "slices"
+    assert decomposition_of(planes, settings) == "volume"
+    assert decomposition_of(rings[1:], Settings(decomposition="slices")) == "slices"

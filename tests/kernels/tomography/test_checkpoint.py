@@ -13,7 +13,6 @@ from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.model_selection.candidates import CandidateGraph
-from bentray_kernels.tomography.reconstruction import MemoryScan
 from bentray_kernels.tomography.reconstruction_graph import (
     ReconstructionCheckpoint,
     ReconstructionGraph,
@@ -22,6 +21,7 @@ from bentray_kernels.tomography.reconstruction_graph import (
     solve_attenuation,
 )
 from bentray_kernels.tomography.sart.sart_step import begin
+from bentray_kernels.tomography.scan import MemorySource, Scan
 
 from ...effort import effort
 from .graph_runs import run, stored
@@ -34,7 +34,6 @@ PLANS = {
         side_m=TABLE6_SIDE_M,
         iterations=3,
         coarser_grids=1,
-        straight_iterations=1,
     ),
 }
 
@@ -52,7 +51,7 @@ def dataset():
 @given(cuts=st.sets(st.integers(0, 12), min_size=1, max_size=4))
 def test_a_graph_interrupted_anywhere_gives_the_same_bits(dataset, name, cuts):
     def make():
-        return ReconstructionGraph(MemoryScan(dataset, PLANS[name], "all"), 0)
+        return ReconstructionGraph(Scan(MemorySource(dataset), PLANS[name]), 0)
 
     whole, _ = run(make)
     resumed, _ = run(make, cuts)
@@ -72,7 +71,7 @@ def test_the_uncertainty_is_kept_and_computed_again_to_the_same_bits(dataset):
     plan = PLANS["sart"].changed(iterations=1, attenuation=False, resolution_check=False, uncertainty=True)
 
     def make():
-        return ReconstructionGraph(MemoryScan(dataset, plan, "all"), 0)
+        return ReconstructionGraph(Scan(MemorySource(dataset), plan), 0)
 
     whole, tasks = run(make)
     kept = stored(whole).values[0]
@@ -88,7 +87,7 @@ def test_the_graph_of_a_candidate_keeps_its_misfit(dataset):
     plan = PLANS["sart"].changed(attenuation=False, resolution_check=False)
 
     def make():
-        shown, *held = (MemoryScan(dataset, plan, part) for part in ("shown", "held-out", "views"))
+        shown, *held = (Scan(MemorySource(dataset), plan, part) for part in ("shown", "held-out", "views"))
         return CandidateGraph(shown, 0, *held)
 
     whole, tasks = run(make)

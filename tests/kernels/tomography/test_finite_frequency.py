@@ -58,7 +58,6 @@ def test_rays_bend_in_an_image_blurred_by_twice_their_width():
     width = width_in_nodes(problem, PLAN)
     assert width == pytest.approx(WIDTH / problem.spacing)
     assert np.hypot(width, front_smoothing(problem, PLAN)) == pytest.approx(BENDS_WIDER * width)
-    assert front_smoothing(problem, PLAN.changed(front_smoothing_nodes=3.0)) == 3.0
     assert front_smoothing(problem, PLAN.changed(ray_width_m=0.0)) == 0.0
 
 

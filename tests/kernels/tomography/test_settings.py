@@ -61,18 +61,17 @@ def test_every_setting_has_a_description_a_default_and_a_place():
 def test_choices_are_those_of_the_code():
     assert set(choices_of(Settings)["eikonal"]) == {DEVIATION, *methods()}
     assert choices_of(PickingSettings)["picker"] == tuple(PICKERS)
-    assert choices_of(GaussNewtonSettings)["penalty"] == PENALTIES
+    assert choices_of(Numerics)["penalty"] == PENALTIES
 
 
 @pytest.mark.parametrize(
     ("values", "field"),
     [
         ({"penalty_strength": -1.0}, "gauss_newton.penalty_strength"),
-        ({"penalty": "lp"}, "gauss_newton.penalty"),
-        ({"amplitudes": "spectrum", "focusing": True}, "attenuation.focusing"),
+        ({"penalty": "lp"}, "penalty"),
+        ({"amplitudes": "spectrum", "focusing": True}, "focusing"),
         ({"method": "auto", "speed_range_mps": (1400.0, 1600.0)}, "sart.speed_range_mps"),
         ({"method": "waveform", "decomposition": "volume"}, "decomposition"),
-        ({"guided_rounds": 1, "decomposition": "volume"}, "guided_rounds"),
         ({"nodes": 32, "coarser_grids": 2}, "coarser_grids"),
         ({"minutes": -1.0}, "minutes"),
     ],

@@ -10,7 +10,6 @@ from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
-from bentray_kernels.tomography.problem import MARGIN_NODES
 
 NODES, WATER = 24, 1500.0
 RING, HEIGHTS = Ring(16, 0.04), np.array([-0.012, -0.004, 0.004, 0.012])
@@ -84,21 +83,6 @@ def test_between_slices_the_volume_is_more_accurate(scan):
     planes = np.rint((HEIGHTS - volume.origin_m[2]) / volume.spacing_m[2]).astype(int)
     inside = speed[..., planes] > WATER + 5.0
     assert rmse(slices.speed, speed[..., planes], inside) < 20.0
-
-
-def test_a_slab_around_the_ring_is_as_good_where_rays_stay_in_it(scan):
-    dataset, _ = scan
-    problem, near = problem_of(dataset), problem_of(dataset, PLAN.changed(axial_margin_nodes=5))
-    nodes = problem.region.shape[2]
-    assert problem.slab(0) == slice(0, nodes)
-    if len(problem.receivers) == 1:
-        # Every ring hears every other.
-        assert near.slab(0) == slice(0, nodes)
-        return
-    assert near.slab(0) == slice(0, MARGIN_NODES + 5 + 1)
-    assert near.slab(len(near.emitters) - 1).stop == nodes
-    whole, cut = (reconstruct(dataset, PLAN.changed(axial_margin_nodes=n)).speed for n in (None, 5))
-    assert np.abs(whole - cut).max() < 1.0
 
 
 def test_a_region_of_interest_keeps_the_rest_water(scan):

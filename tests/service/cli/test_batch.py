@@ -111,7 +111,7 @@ def test_only_finished_entries_are_skipped(
     damaged.write_bytes(damaged.read_bytes()[:1000])
     os.utime(scans / "two.h5", ns=(1, 1))
     assert states(submit()[1]) == {"broken": "skipped", "one": "succeeded", "two": "succeeded"}
-    assert set(states(submit("--smoothing", 2)[1]).values()) == {"succeeded"}
+    assert set(states(submit("--penalty-strength", 2)[1]).values()) == {"succeeded"}
 
 
 def test_without_json_it_ends_with_a_table_and_the_reasons(

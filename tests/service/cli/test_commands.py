@@ -43,9 +43,11 @@ def test_help_fits_a_narrow_terminal_and_gives_an_example_that_parses(
     example = said.stdout.split("Example:")[1].split("\n\n")[0].split()
     assert example[: len(words) + 1] == ["bentray", *words]
     named()[command].make_context(command, list(example[len(words) + 1 :]))
-    options = [one for param in named()[command].params for one in (*param.opts, *param.secondary_opts)]
+    # Withdrawn options are hidden.
+    shown_params = [param for param in named()[command].params if not getattr(param, "hidden", False)]
+    options = [word for param in shown_params for word in (*param.opts, *param.secondary_opts)]
     shown = said.stdout.replace(",", " ").split()
-    assert [one for one in options if one.startswith("-") and one not in shown] == []
+    assert [word for word in options if word.startswith("-") and word not in shown] == []
 
 
 @pytest.mark.parametrize("group", ["", "keys", "projects", "webhooks"])
@@ -61,7 +63,7 @@ def test_no_summary_of_a_command_is_cut(
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_option_is_explained(command: str) -> None:
     params = named()[command].params
-    assert [param.name for param in params if not param.help] == []
+    assert [param.name for param in params if not (param.help or param.hidden)] == []
     assert "--json" in [option for param in params for option in param.opts]
 
 

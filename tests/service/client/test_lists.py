@@ -99,11 +99,11 @@ def test_a_volume_is_rendered(client, tmp_path):
 
 def test_settings_by_name_join_nested_ones(client, scan):
     dataset = client.upload(scan())
-    nested = {"sart": {"smoothing_nodes": 2.0}, "iterations": 9}
+    nested = {"sart": {"speed_range_mps": [1400, 1600]}, "iterations": 9}
     job = client.submit(dataset, nested, method="sart", relaxation=np.float64(0.2), iterations=1, nodes=16)
-    assert job.settings["sart"]["smoothing_nodes"] == 2.0
+    assert job.settings["sart"]["speed_range_mps"] == [1400, 1600]
     assert (job.settings["sart"]["relaxation"], job.settings["iterations"]) == (0.2, 1)
-    assert nested == {"sart": {"smoothing_nodes": 2.0}, "iterations": 9}
+    assert nested == {"sart": {"speed_range_mps": [1400, 1600]}, "iterations": 9}
     with pytest.raises(InvalidInput, match=r"relaxtion: found .*; accepted: relaxation is spelt like it"):
         client.submit(dataset, relaxtion=0.2)
     with pytest.raises(ClientError, match=r"settings\.itertions: found 2; accepted: iterations is spelt"):

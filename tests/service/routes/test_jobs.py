@@ -124,6 +124,9 @@ def test_unknown_setting_lists_the_known_ones(http, dataset):
         ({"speed_bounds_mps": [-1, 1500]}, "settings.speed_bounds_mps"),
         ({"speed_bounds_mps": [0, 1500]}, "settings.speed_bounds_mps"),
         ({"method": "auto", "sart": {"speed_range_mps": [1400, 1600]}}, "settings.sart.speed_range_mps"),
+        ({"gauss_newton": {"edge_mps": 7}}, "settings.gauss_newton.edge_mps"),
+        ({"reflection": {"gain": "spreading"}}, "settings.reflection.gain"),
+        ({"seed": 0}, "settings.seed"),
         ([], "settings"),
     ],
 )
@@ -143,8 +146,7 @@ def test_a_setting_of_the_earlier_flat_record_is_rejected_with_what_to_use_inste
         ("attenuation", False, "attenuation.enabled, which replaces it"),
         ("picker", "aic", "picking.picker, which replaces it"),
         ("coarser_grids", 1, "no such setting: it is decided automatically"),
-        ("wave_bands", 1, "no such setting: it is decided automatically, from minutes"),
-        ("wave_misfit", "correlation", "no such setting: it was removed"),
+        ("bands", 1, "no such setting: it is decided automatically, from minutes"),
         ("speed_update", "fixed", "sart.speed_range_mps alone"),
         ("numerics", {}, "a known setting: "),
     ):

@@ -21,8 +21,8 @@ from benchmarks.shared._peak_memory import peak
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings
-from bentray_kernels.tomography.reconstruction import MemoryScan
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph
+from bentray_kernels.tomography.scan import MemorySource, Scan
 from bentray_workers.reconstruction.blocks.block_graph import BlockSartGraph
 
 
@@ -60,7 +60,7 @@ def held(*things: Any) -> int:
 
 def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     """The most that a task of each name takes, over one slice or the volume."""
-    scan = MemoryScan(dataset, settings, "all")
+    scan = Scan(MemorySource(dataset), settings)
     with TemporaryDirectory() as folder:
         blocks = settings.numerics.blocks > 1
         graph = BlockSartGraph(scan, 0, Path(folder) / "blocks") if blocks else ReconstructionGraph(scan, 0)

@@ -6,11 +6,12 @@ import pytest
 
 from bentray_kernels.tomography.waveform.band_inversion import Model
 from bentray_kernels.tomography.waveform.refinement_graph import evaluate_emitter
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.findings import ScanFindings, write_findings
-from bentray_workers.reconstruction.file_scan import FileWaveScan
+from bentray_workers.reconstruction.file_scan import FileSource
 
 from ...kernels.tomography.waveform.scans import SETTINGS, scan
 
@@ -20,7 +21,8 @@ def test_wave_comparison_stops_with_its_job(tmp_path, monkeypatch):
     write_dataset(path, scan())
     folder.mkdir()
     write_findings(folder / "findings.json", ScanFindings((), examined=True, changed=False))
-    waves = FileWaveScan(path, path.stat().st_mtime_ns, SETTINGS, 0, folder / "findings.json")
+    stamp = path.stat().st_mtime_ns
+    waves = WaveScan(FileSource(path, stamp, path, stamp, folder / "findings.json"), SETTINGS)
     problem = waves.problem(0)
     water = Model(problem.water.speed + 0.0 * problem.region)
     assert evaluate_emitter(waves, 0, water, 0).misfit > 0.0

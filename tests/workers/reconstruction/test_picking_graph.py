@@ -14,6 +14,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.task_graph import Cancelled, ThreadPool, run
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.findings import read_findings
@@ -151,7 +152,7 @@ def test_calls_end_with_their_emission_once_the_job_has(tmp_path):
         folder.rmdir()
         with pytest.raises(JobEnded):
             one.waveform.object[1]
-    for function, arguments in ((measure_traces, (range(4),)), (pick_emissions, ((), None, range(4)))):
+    for function, arguments in ((measure_traces, (range(4),)), (pick_emissions, ((), range(4)))):
         with pytest.raises(JobEnded):
             function(source, 0, *arguments)
 
@@ -215,8 +216,8 @@ def test_waves_are_refined_from_channels_put_back(tmp_path, monkeypatch):
     """As far as the problem of the first band; from there on only that counts."""
     problems = []
 
-    def begun(dataset, settings, scan_of, drive, waves_of, samples, echoes, graph_of):
-        problems.append(waves_of(SETTINGS, 0).problem(0))
+    def begun(source, chosen, run_graphs, graph_of):
+        problems.append(WaveScan(source, SETTINGS).problem(0))
         raise Cancelled
 
     monkeypatch.setattr(reconstruction_run, "run_reconstruction", begun)

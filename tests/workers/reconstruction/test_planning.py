@@ -21,7 +21,7 @@ from bentray_kernels.tomography.sart.device_slices import SliceSize
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.cluster.task_words import task_in_words
 from bentray_workers.files.dataset.counts import DatasetCounts, Summary, Traces
-from bentray_workers.reconstruction.memory.ray_memory import call_bytes, ray_task_parts
+from bentray_workers.reconstruction.memory.ray_memory import ray_task_parts
 from bentray_workers.reconstruction.planning import plan
 
 PROGRAM = Path(__file__).with_name("ray_task_memory.py")
@@ -116,17 +116,6 @@ def test_refusal_states_what_takes_most_memory(method, nodes, name, part):
     said = task_in_words(name)
     found = f"a task ({said}) takes {sum(parts.values())} bytes, {parts[part]} of them for {part}"
     assert found in refusal.value.value
-
-
-def test_an_axial_margin_saves_memory_where_emitters_and_receivers_share_a_height():
-    free, near = (
-        Settings.of(method="sart", decomposition="volume", nodes=96, axial_margin_nodes=margin)
-        for margin in (None, 2)
-    )
-    rings = replace(RING, slices=32, pairs=32 * 256**2, height_m=0.08)
-    assert call_bytes(rings, near)["update_sart"] < 0.8 * call_bytes(rings, free)["update_sart"]
-    bowl_scan = replace(RING, in_space=True, height_m=0.08)
-    assert call_bytes(bowl_scan, near) == call_bytes(bowl_scan, free)
 
 
 def test_no_limit_is_none():

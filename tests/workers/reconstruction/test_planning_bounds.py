@@ -39,7 +39,7 @@ WAYS = [
     {"method": "auto", "minutes": 100.0},
     {"method": "waveform"},
     {"decomposition": "volume"},
-    {"guided_rounds": 3, "amplitudes": "ratio"},
+    {"amplitudes": "ratio"},
 ]
 OFFERS = [WorkerCapacity(0, ("recon", "render"))]
 SMALL = DatasetCounts(256, 256, 256, 2, False, 0.004, 0.2, False, True, 2**30, 4000, 2, 2.5e7, 1e6, 1500.0)

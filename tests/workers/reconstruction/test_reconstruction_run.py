@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import count
 
+import h5py
 import numpy as np
 import pytest
 
@@ -16,6 +17,7 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.cluster.fair_shares import Shares
 from bentray_workers.files.dataset import write_dataset
+from bentray_workers.files.findings import ScanFindings
 from bentray_workers.reconstruction import picking_graph, reconstruction_run
 
 from ..cluster.tearing import torn_runs
@@ -24,8 +26,8 @@ PLAN = Settings(method="sart", nodes=32, iterations=2)
 METHODS = [PLAN, replace(PLAN, method="gauss-newton", iterations=3)]
 OTHERS = {
     "auto": replace(PLAN, method="auto"),
-    "stages": PLAN.changed(coarser_grids=1, straight_iterations=1, resolution_check=True),
-    "volume": PLAN.changed(nodes=20, decomposition="volume", method="gauss-newton", axial_margin_nodes=2),
+    "stages": PLAN.changed(coarser_grids=1, resolution_check=True),
+    "volume": PLAN.changed(nodes=20, decomposition="volume", method="gauss-newton"),
 }
 
 
@@ -176,3 +178,27 @@ def test_a_small_job_of_another_tenant_runs_beside_a_large_one_to_the_same_bits(
     np.testing.assert_array_equal(small.speed, reconstruction_run.reconstruct(None, path, PLAN).speed)
     np.testing.assert_array_equal(result.speed, reconstruction_run.reconstruct(None, path, large).speed)
     assert result.history[-1].sweep == 60
+
+
+@pytest.mark.parametrize(
+    "plan", [PLAN, replace(PLAN, method="auto"), OTHERS["volume"]], ids=lambda plan: plan.method
+)
+def test_a_scan_is_opened_once_before_the_first_task(path, monkeypatch, plan):
+    opened, counts = [], []
+
+    class Counted(h5py.File):
+        def __init__(self, name, *arguments, **options):
+            opened.append(name)
+            super().__init__(name, *arguments, **options)
+
+    def first_task(graphs, *_):
+        counts.append(opened.count(path))
+        raise Cancelled
+
+    monkeypatch.setattr(h5py, "File", Counted)
+    monkeypatch.setattr(reconstruction_run, "run", lambda *_: None)
+    monkeypatch.setattr(reconstruction_run, "read_findings", lambda *_: ScanFindings((), True, False))
+    monkeypatch.setattr(reconstruction_run, "run_resumable", first_task)
+    with pytest.raises(Cancelled):
+        reconstruction_run.reconstruct(None, path, plan)
+    assert counts == [1]

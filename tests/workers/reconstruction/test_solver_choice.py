@@ -105,8 +105,6 @@ def test_waves_and_slices_are_computed_on_a_device_that_is_requested(method, dev
         ({}, True),
         ({"rays": "straight"}, True),
         ({"speed_range_mps": (1400.0, 1600.0)}, False),
-        ({"front_smoothing_nodes": 1.0}, False),
-        ({"front_smoothing_nodes": 1.0, "rays": "straight"}, True),
         ({"eikonal": "fmm"}, False),
         ({"ray_gradient": "bspline"}, False),
     ],

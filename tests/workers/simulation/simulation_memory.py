@@ -16,8 +16,9 @@ import numpy as np
 from benchmarks.shared._peak_memory import peak
 
 from bentray_workers.simulation.assembly import write_scan
+from bentray_workers.simulation.kinds import Simulated
 from bentray_workers.simulation.parts import Part, make_part, parts_of
-from bentray_workers.simulation.request import PhantomScan, Simulated
+from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 TINY: list[dict[str, Any]] = [

@@ -82,8 +82,8 @@ def trace_settings() -> Iterator[dict[str, Any]]:
     """The same for traces."""
     for picker in PICKERS:
         yield {"picker": picker, "attenuation": False}
-    yield {"guided_rounds": 1, "amplitudes": "ratio", "focusing": True}
-    yield {"amplitudes": "spectrum", "reflection": True, "pixel_m": 5e-3, "gain": "attenuation"}
+    yield {"amplitudes": "ratio", "focusing": True}
+    yield {"amplitudes": "spectrum", "reflection": True, "pixel_m": 5e-3}
     yield {"method": "waveform", "bands": 1, "emitters": 4}
 
 

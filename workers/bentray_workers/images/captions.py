@@ -54,8 +54,6 @@ def stage_names(result: Reconstruction) -> tuple[str, ...]:
     nodes = settings.nodes or result.speed.shape[0]
     grids = [-(-nodes // 2**k) for k in range(settings.numerics.coarser_grids, -1, -1)]
     names = [f"{nodes} nodes" for nodes in grids]
-    if settings.numerics.straight_iterations and settings.rays != "straight":
-        names.insert(0, "straight")
     bands = {
         sweep.stage: "attenuation" if sweep.of_attenuation else f"{1e-3 * sweep.band_hz[1]:.0f} kHz"
         for sweep in result.history

@@ -28,9 +28,10 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         ``candidates``: the models that were compared, the chosen one first, each with ``label``,
         ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s``,
         ``chosen`` and ``rejection`` (why a lower misfit was not chosen, else empty); ``reason``: of this
-        choice, empty without candidates; ``truth``: None without a truth,
-        else ``region``, ``nodes``, errors, similarities (None if they do not exist), mean and spread of
-        image and truth there; or ``region`` with the reason why it is not compared, and ``nodes``.
+        choice, empty without candidates; ``automatic``: what was decided automatically, and why, empty in
+        files of earlier versions; ``truth``: None without a truth, else ``region``, ``nodes``, errors,
+        similarities (None if they do not exist), mean and spread of image and truth there; or ``region``
+        with the reason why it is not compared, and ``nodes``.
 
     Raises:
         InvalidInput: naming the field of a file.
@@ -78,6 +79,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
             if image.values.shape != own.speed.shape
         },
         "reason": advice_of(own),
+        "automatic": own.provenance.get("automatic", ""),
         "candidates": [
             {
                 "label": label(trial.settings),

@@ -1,53 +1,46 @@
-"""A scan for tasks: a file and settings; every process reads it once."""
+"""A scan in a file, for tasks: every process reads it once."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.quality.correction import apply
-from bentray_kernels.tomography import Problem, Settings
-from bentray_kernels.tomography.grid_schedule import stages
-from bentray_kernels.tomography.model_selection.held_out import Part
-from bentray_kernels.tomography.reconstruction import problem_of
-from bentray_kernels.tomography.waveform.preparation import prepare
-from bentray_kernels.tomography.waveform.waveform_problem import WaveProblem
-from bentray_kernels.tomography.waveform.waveform_settings import WaveSettings
+from bentray_kernels.tomography.scan import problem_of, problems_of, stages_of
+from bentray_kernels.tomography.waveform.wave_scan import wave_problem_of
 
 from ..cluster.job_cancellation import check_job_active
-from ..files.dataset.scan import read_scan
+from ..files.dataset.scan import ScanHeader, read_header
 from ..files.dataset.traces import open_slice
 from ..files.findings import read_findings
-from ..files.reference import with_reference
+from ..files.reference import reference_path, with_reference
 from .memory.ray_memory import PROBLEMS_KEPT
 
-
-class FileScan(NamedTuple):
-    """See ``tomography.stage_graphs.Scan``; ``stamp`` distinguishes a rewritten file from the old one."""
-
-    path: Path
-    stamp: int
-    settings: Settings
-    part: Part
-
-    def stages(self) -> tuple[Settings, ...]:
-        return _stages(self)
-
-    def problem(self, index: int, stage: int = -1) -> Problem:
-        return _problem(self, index, stage % len(self.stages()))
-
-    def problems(self, indices: tuple[int, ...], stage: int = -1) -> tuple[Problem, ...]:
-        return _problems(self, indices, stage % len(self.stages()))
+# How many values of each kind a process keeps. Two jobs may alternate; more problems of waves would cost
+# memory, since they hold the traces of the object. Slices that a device updates together are of one job.
+KEPT: dict[Callable[..., Any], int] = {
+    stages_of: 16,
+    problem_of: PROBLEMS_KEPT,
+    problems_of: 1,
+    wave_problem_of: 2,
+}
+_MADE: dict[Callable[..., Any], Callable[..., Any]] = {
+    make: lru_cache(maxsize=most)(make) for make, most in KEPT.items()
+}
 
 
-class FileWaveScan(NamedTuple):
-    """See ``tomography.waveform.refinement_graph.WaveScan``; ``path`` is that of a file with traces.
+class FileSource(NamedTuple):
+    """See ``tomography.scan.Source``; stamps distinguish a rewritten file from the old one.
 
     Attributes:
+        path: of a file with travel times.
+        stamp: of this file.
+        recorded: the file with the traces.
+        recorded_stamp: of that file.
         findings: the file of findings in the scan; faulty traces are corrected or left out. Tasks end within
             a second once its folder, that of the job, is removed.
         water_temperature_c: in place of that of the file, °C.
@@ -55,76 +48,61 @@ class FileWaveScan(NamedTuple):
 
     path: Path
     stamp: int
-    plan: WaveSettings
-    slice: int
+    recorded: Path
+    recorded_stamp: int
     findings: Path
     water_temperature_c: float | None = None
 
-    def settings(self) -> WaveSettings:
-        return self.plan
+    @property
+    def samples(self) -> int:
+        return read_once(self.recorded, self.recorded_stamp).samples
 
-    def problem(self, number: int) -> WaveProblem:
-        return _wave_problem(self, number)
+    @property
+    def estimates_source(self) -> bool:
+        return read_once(self.recorded, self.recorded_stamp).lacks_water
 
+    @property
+    def has_water(self) -> bool:
+        # A scan with travel times and without a water shot has no estimated one, unless waves are requested.
+        return not self.estimates_source or reference_path(self.findings.parent, 0).exists()
 
-class FileEchoScan(NamedTuple):
-    """See ``tomography.reflection.reflection_plan.EchoScan``; attributes as of ``FileWaveScan``."""
+    @property
+    def poll(self) -> Callable[[], None]:
+        return partial(check_job_active, self.findings.parent)
 
-    path: Path
-    stamp: int
-    slice: int
-    findings: Path
-    water_temperature_c: float | None = None
+    def dataset(self) -> Dataset:
+        return read_once(self.path, self.stamp, self.water_temperature_c).dataset
 
     @contextmanager
-    def open(self) -> Iterator[Dataset]:
-        faults = read_findings(self.findings).of_traces(self.slice)
-        poll = partial(check_job_active, self.findings.parent)
-        recorded = read_once(self.path, self.stamp, self.water_temperature_c)
-        with open_slice(self.path, recorded, self.slice, poll) as one:
-            yield apply(one, faults)
+    def traces(self, index: int, *, estimated_water: bool = False) -> Iterator[Dataset]:
+        faults = read_findings(self.findings).of_traces(index)
+        whole = read_once(self.recorded, self.recorded_stamp, self.water_temperature_c).dataset
+        with open_slice(self.recorded, whole, index, self.poll) as one:
+            put_right = apply(one, faults)
+            yield with_reference(put_right, self.findings.parent, index) if estimated_water else put_right
+
+    def once(self, make: Callable[..., Any], /, *arguments: Any) -> Any:
+        return _MADE[make](*arguments)
 
 
-@lru_cache(maxsize=16)
-def _stages(scan: FileScan) -> tuple[Settings, ...]:
-    return stages(read_once(scan.path, scan.stamp, scan.settings.water_temperature_c), scan.settings)
-
-
-@lru_cache(maxsize=PROBLEMS_KEPT)
-def _problem(scan: FileScan, index: int, stage: int) -> Problem:
-    return _new_problem(scan, index, stage)
-
-
-# Of one job: all slices that a device updates together.
-@lru_cache(maxsize=1)
-def _problems(scan: FileScan, indices: tuple[int, ...], stage: int) -> tuple[Problem, ...]:
-    return tuple(_new_problem(scan, index, stage) for index in indices)
-
-
-def _new_problem(scan: FileScan, index: int, stage: int) -> Problem:
-    dataset = read_once(scan.path, scan.stamp, scan.settings.water_temperature_c)
-    return problem_of(dataset, scan.stages()[stage], index, scan.part)
-
-
-@lru_cache(maxsize=2)
-def read_once(path: Path, stamp: int, water_temperature_c: float | None = None) -> Dataset:
-    """A dataset without its traces.
+def read_once(path: Path, stamp: int, water_temperature_c: float | None = None) -> ScanHeader:
+    """What is known of a scan without its traces.
 
     Args:
         path: of its file.
         stamp: distinguishes a rewritten file from the old one.
         water_temperature_c: in place of that of the file, °C; a file picked from it states it already.
     """
-    # Before the first task, the run held the times against the positions.
-    return read_scan(path, plausible=False).in_water_of(water_temperature_c)
+    return _read(path, stamp) if water_temperature_c is None else _in_water(path, stamp, water_temperature_c)
 
 
-# Two jobs may alternate; more would cost memory, since a problem holds the traces of the object.
 @lru_cache(maxsize=2)
-def _wave_problem(scan: FileWaveScan, number: int) -> WaveProblem:
-    faults = read_findings(scan.findings).of_traces(scan.slice)
-    poll = partial(check_job_active, scan.findings.parent)
-    recorded = read_once(scan.path, scan.stamp, scan.water_temperature_c)
-    with open_slice(scan.path, recorded, scan.slice, poll) as one:
-        whole = with_reference(apply(one, faults), scan.findings.parent, scan.slice)
-        return prepare(whole, scan.plan, number, poll=poll)
+def _read(path: Path, _stamp: int) -> ScanHeader:
+    # Before the first task, the run held the times against the positions.
+    return read_header(path, plausible=False)
+
+
+@lru_cache(maxsize=2)
+def _in_water(path: Path, stamp: int, temperature_c: float) -> ScanHeader:
+    header = _read(path, stamp)
+    return header._replace(dataset=header.dataset.in_water_of(temperature_c))

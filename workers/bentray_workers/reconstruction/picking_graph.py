@@ -15,7 +15,6 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.picking.amplitudes import read_log_ratios
 from bentray_kernels.acquisition.picking.first_arrivals import (
-    reach_of,
     read_times,
     require_traces,
     screen_times,
@@ -42,13 +41,12 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import MAX_LEFT_OUT
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
-from bentray_kernels.tomography.guided_picking import predicted_delta
 
 from ..cluster.job_cancellation import check_job_active
-from ..files.dataset.traces import lacks_water, open_slice, trace_samples
+from ..files.dataset.scan import ScanHeader
+from ..files.dataset.traces import open_slice
 from ..files.dataset.write import write_dataset
-from ..files.findings import ScanFindings, read_findings, write_findings
-from ..files.reconstruction import read_reconstruction
+from ..files.findings import ScanFindings, write_findings
 from ..files.reference import reference_path, with_reference, write_reference
 from .file_scan import read_once
 from .memory.picking_memory import parts_of
@@ -66,31 +64,9 @@ class PickingFiles(NamedTuple):
     findings: Path
 
     @classmethod
-    def in_folder(cls, folder: Path, number: int = 0) -> PickingFiles:
-        """The files of a round of picking in the folder of a job, from 0."""
-        before = f"{number}-" if number else ""
-        return cls(folder / (before + PICKED), folder / (before + FINDINGS))
-
-
-class PickingGuide(NamedTuple):
-    """Guide of a repeated picking: the file of an image that predicts arrivals, and of the findings."""
-
-    image: Path
-    findings: Path
-
-    def predicted(self, one: Dataset, index: int, part: range) -> Floats:
-        """(ntx, nrx), s: predicted times, object minus water; NaN outside the batch of emissions."""
-        times, rows = np.full((len(one.tx), len(one.rx)), np.nan), slice(part.start, part.stop)
-        image = read_reconstruction(self.image)
-        speed = image.speed if image.speed.ndim == 2 else image.speed[:, :, index]
-        bare = replace(one, waveform=None, valid=None, tof_s=None, sigma_s=None, log_ratio_np=None)
-        some = replace(bare, tx=one.tx[rows], delta_tof_s=times[rows])
-        times[rows] = predicted_delta(some, replace(image, speed=speed))
-        return times
-
-    def faults(self, index: int) -> tuple[Finding, ...]:
-        """Findings in the traces of a slice."""
-        return read_findings(self.findings).of_traces(index)
+    def in_folder(cls, folder: Path) -> PickingFiles:
+        """The files in the folder of a job."""
+        return cls(folder / PICKED, folder / FINDINGS)
 
 
 class EmissionPicks(NamedTuple):
@@ -139,6 +115,11 @@ class PickingSource(NamedTuple):
     @property
     def dataset(self) -> Dataset:
         """The scan without its traces."""
+        return self.header.dataset
+
+    @property
+    def header(self) -> ScanHeader:
+        """What is known without the traces."""
         return read_once(self.path, self.stamp, self.water_temperature_c)
 
     @property
@@ -155,7 +136,7 @@ class PickingSource(NamedTuple):
     def estimates_water(self) -> bool:
         """Whether a water shot is needed and must be estimated, because the file has none."""
         needed = self.waves or self.reads_amplitudes or not self.dataset.picked
-        return needed and lacks_water(self.path) and self.dataset.center_frequency_hz is not None
+        return needed and self.header.lacks_water and self.dataset.center_frequency_hz is not None
 
     @contextmanager
     def slice(self, index: int, findings: Sequence[Finding] = ()) -> Iterator[Dataset]:
@@ -179,14 +160,13 @@ class PickingGraph:
     Args:
         source: the scan.
         files: to write, in a folder that every worker can write.
-        guide: for picking again near predicted times; None: the first picking.
 
     Raises:
         InvalidInput: for a scan without times or amplitudes, and without the traces to read them from.
     """
 
-    def __init__(self, source: PickingSource, files: PickingFiles, guide: PickingGuide | None = None) -> None:
-        self._source, self._files, self._guide = source, files, guide
+    def __init__(self, source: PickingSource, files: PickingFiles) -> None:
+        self._source, self._files = source, files
         dataset = source.dataset
         self._slices = range(dataset.slices)
         self._parts: list[range] = []
@@ -195,14 +175,14 @@ class PickingGraph:
             with source.slice(0) as one:
                 require_traces(one, water=False)
             self._picks = True
-        self._estimates = guide is None and source.estimates_water
+        self._estimates = source.estimates_water
         if self._picks or self._estimates:
-            self._parts = parts_of(len(dataset.tx), trace_samples(source.path) * len(dataset.rx))
-        self._examines = guide is None and source.examine and not dataset.picked
+            self._parts = parts_of(len(dataset.tx), source.header.samples * len(dataset.rx))
+        self._examines = source.examine and not dataset.picked
         self._measures = self._examines or self._estimates
         # Of the object, until the chords through water are found in them.
         self._measured: dict[int, list[Any]] = {}
-        self._findings: dict[int, Any] = {k: guide.faults(k) if guide else () for k in self._slices}
+        self._findings: dict[int, Any] = dict.fromkeys(self._slices, ())
         self._results: dict[tuple[Any, int], dict[int, Any]] = defaultdict(dict)
         self._emissions_done: dict[Any, int] = defaultdict(int)
 
@@ -273,7 +253,7 @@ class PickingGraph:
         """The tasks that pick a slice, or the one that finishes it."""
         findings = self._findings[index]
         if self._picks:
-            return self._each_part(pick_emissions, index, findings, self._guide)
+            return self._each_part(pick_emissions, index, findings)
         return [Task(finish_slice, (self._source, index, findings, []), keep_on_worker=True)]
 
     def _each_part(self, function: Callable[..., Any], index: int, *arguments: Any) -> list[Task]:
@@ -335,7 +315,7 @@ def estimate_slice_water(
 
 
 def pick_emissions(
-    source: PickingSource, index: int, findings: tuple[Finding, ...], guide: PickingGuide | None, part: range
+    source: PickingSource, index: int, findings: tuple[Finding, ...], part: range
 ) -> EmissionPicks:
     """Task: times of a batch of emissions with standard deviations, and amplitudes if needed."""
     with source.with_water(index, findings) as one:
@@ -343,11 +323,8 @@ def pick_emissions(
             delta = one.differential_tof()[part.start : part.stop]
             sigma = np.full_like(delta, np.nan)
         else:
-            if guide is None:
-                predicted = np.full((len(one.tx), len(one.rx)), np.nan)
-            else:
-                predicted = guide.predicted(one, index, part)
-            delta, sigma = read_times(one, part, source.picker, predicted, reach_of(one, source.picker))
+            require_traces(one)
+            delta, sigma = read_times(one, part, source.picker)
         ratio = read_log_ratios(one, part, delta, source.amplitudes) if source.reads_amplitudes else None
         return EmissionPicks(delta, sigma, ratio)
 

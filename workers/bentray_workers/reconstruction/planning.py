@@ -30,7 +30,7 @@ from ..cluster.task_words import task_in_words
 from ..files.dataset.counts import Summary
 from ..files.dataset.format import PAIR_ARRAYS
 from ..files.quantities import IMAGES
-from .blocks.block_choice import with_blocks
+from .blocks.block_choice import fitting_blocks
 from .memory.block_memory import block_files_bytes
 from .memory.picking_memory import picking_tasks
 from .memory.ray_memory import (
@@ -124,15 +124,14 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     """
     _check_extent(scan)
     check_normals(settings.opening_angle_deg, normals=scan.normals)
-    if settings.decomposition is None:
-        settings = settings.changed(decomposition=scan.decomposition)
-    if settings.nodes is None:
-        settings = settings.changed(nodes=scan.nodes)
+    settings = settings.changed(
+        decomposition=settings.decomposition or scan.decomposition, nodes=settings.nodes or scan.nodes
+    )
     lane: Lane = "opencl" if resource_of(settings) == "opencl" else "recon"
     fitting = [one for one in capacities if lane in one.resources]
     if capacities and not fitting:
         raise without_device(settings)
-    settings = with_blocks(scan, settings, fitting)
+    settings = settings.changed(blocks=fitting_blocks(scan, settings, fitting))
     methods = [settings]
     if settings.selects_model:
         methods = [final_settings(settings, changes) for changes in CANDIDATES]
@@ -170,9 +169,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     tasks = sum(_tasks(scan, method, shape) for method in methods)
     tasks += scan.slices * wave_tasks(traces, scan.width_m, refining) + reflection_tasks(scan, settings)
     if scan.traces_bytes:
-        tasks = tasks * (1 + settings.numerics.guided_rounds) + picking_tasks(
-            scan.traces, scan.slices, settings
-        )
+        tasks += picking_tasks(scan.traces, scan.slices, settings)
     cost = reconstruction_cost(scan, settings, len(able))
     return Plan(
         decomposition,
@@ -244,7 +241,6 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     emitters = emitters_of(scan, settings)
     parts = -(-emitters // BATCH)
     passes = settings.iterations * (settings.numerics.coarser_grids + 1)
-    passes += settings.numerics.straight_iterations if settings.rays != "straight" else 0
     if settings.numerics.blocks > 1:
         return passes * emitters * BLOCK_TASKS * settings.numerics.blocks + 1
     if settings.method == "gauss-newton":

@@ -68,8 +68,7 @@ def reconstruction_cost(scan: Summary, settings: Settings, workers: int) -> Reco
     picking = 0.0
     if scan.traces_bytes and scan.traces is not None:
         samples = 2.0 * scan.slices * scan.traces.emissions * scan.traces.receivers * scan.traces.samples
-        rounds = 1 + settings.numerics.guided_rounds
-        picking, rays = rounds * samples / SAMPLES_PER_S, rounds * rays
+        picking = samples / SAMPLES_PER_S
     sequential = settings.method == "sart"
     problems = 1 if settings.decomposition == "volume" else scan.slices
     at_once = max(1, min(workers, problems) if sequential else workers)
@@ -121,9 +120,6 @@ def _problem_seconds(scan: Summary, settings: Settings) -> float:
     numerics = settings.numerics
     grids = [-(-settings.grid_nodes // 2**k) for k in range(numerics.coarser_grids + 1)]
     visits = sum(settings.iterations * _visits(scan, settings, nodes) for nodes in grids)
-    if settings.rays != "straight" and numerics.straight_iterations:
-        straight = settings.changed(rays="straight")
-        visits += numerics.straight_iterations * _visits(scan, straight, grids[-1])
     seconds = visits / VISITS_PER_S[settings.method]
     further = int(settings.attenuation.enabled and scan.amplitudes) + int(settings.resolution_check)
     # Rays are traced once more, and sixteen probes cost about as much as that.

@@ -17,34 +17,30 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED, replaced_water, water_summary
 from bentray_kernels.acquisition.water import describe_assumption
 from bentray_kernels.task_graph import Pool, run, run_resumable
-from bentray_kernels.tomography import Candidate, Progress, Reconstruction, Settings
+from bentray_kernels.tomography import Progress, Reconstruction, Settings
 from bentray_kernels.tomography.cautions import with_settings_caution
-from bentray_kernels.tomography.guided_picking import same_picks
 from bentray_kernels.tomography.reconstruction import run_reconstruction
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph, TomographyGraph, progress_of
-from bentray_kernels.tomography.reflection.reflection_plan import Echoes
+from bentray_kernels.tomography.settled import settled
 
-from ..cluster.capacities import resources_for
 from ..cluster.checkpoints import Checkpoints
 from ..cluster.fair_shares import Share
-from ..cluster.resources import RECONSTRUCTION
 from ..cluster.task_pool import open_pool
-from ..files.dataset import read_dataset
-from ..files.dataset.scan import read_scan, spectrum_of
-from ..files.dataset.traces import lacks_water, trace_samples
+from ..files.dataset.read import check_readable
+from ..files.dataset.scan import ScanHeader
 from ..files.findings import ScanFindings, read_findings
-from ..files.reconstruction import write_reconstruction
 from ..files.reference import read_reference, reference_path
 from ..files.volume_export import FREQUENCY
-from .blocks.block_choice import settled_blocks
 from .blocks.block_files import BLOCKS
 from .blocks.block_graph import BlockSartGraph
-from .device_of_job import settled
-from .file_scan import FileEchoScan, FileScan, FileWaveScan
-from .picking_graph import PickingFiles, PickingGraph, PickingGuide, PickingSource
+from .file_scan import FileSource, read_once
+from .job_machine import JobMachine
+from .picking_graph import PickingFiles, PickingGraph, PickingSource
 
 # Phase of the progress of a job, after those of ``picking_graph``.
 RECONSTRUCTING = "reconstructing"
+
+_Show = Callable[[Progress], None]
 
 # Folder of the checkpoints in the work folder.
 CHECKPOINTS = "checkpoints"
@@ -83,40 +79,43 @@ def reconstruct(
         Cancelled: when ``stop`` returned true.
         InvalidInput: from the file or the settings, and for a device that no worker offers.
     """
-    requested = settings
+    stamp = dataset_path.stat().st_mtime_ns
+    header = read_once(dataset_path, stamp)
     with _folder(work_dir) as folder:
-        settings = settled(client, folder, dataset_path, settings)
-        settings = settled_blocks(client, folder, dataset_path, settings)
-        resources = RECONSTRUCTION if client is None else resources_for(client, settings)
-        pool = open_pool(client, folder, share, placement=lambda: {"resources": resources}, threads=threads)
+        machine = JobMachine(client, folder)
+        machine.place(settings)
+        pool = open_pool(client, folder, share, placement=lambda: machine.placement, threads=threads)
         checkpoints = Checkpoints(folder / CHECKPOINTS, on_saved or (lambda: None))
-        job = _Job(pool, stop, dataset_path, folder, checkpoints, count())
-        progress = _JobProgress(on_progress)
-        path, findings, chosen, trials = _pick_with_guides(job, settings, progress)
-        result = _reconstruct_picked(job, path, chosen, progress)
-        result = replace(result, trials=trials or result.trials)
+        job = _Job(pool, stop, dataset_path, stamp, folder, checkpoints, count(), machine)
+
+        def show(progress: Progress) -> None:
+            if on_progress is not None and progress.total:
+                on_progress(progress)
+
+        path, findings = _pick(job, settings, show)
+        result = _reconstruct_picked(job, path, settings, show)
         estimated = _estimated(
-            job, findings, settings.water_temperature_c, attenuation=result.attenuation is not None
+            job, header, findings, settings.water_temperature_c, attenuation=result.attenuation is not None
         )
     if settings.picking.examine or findings.findings:
         estimated["quality"] = findings.words(stacked=result.speed.ndim == 3)
     result = replace(result, provenance={**result.provenance, **estimated})
-    header = read_dataset(dataset_path, traces=False, plausible=False)
-    picks = header.tof_s is None and header.delta_tof_s is None
-    return with_settings_caution(result, requested, picks=picks)
+    return with_settings_caution(result, settings, picks=not header.dataset.picked)
 
 
 def _estimated(
-    job: _Job, findings: ScanFindings, water_temperature_c: float | None, *, attenuation: bool
+    job: _Job,
+    header: ScanHeader,
+    findings: ScanFindings,
+    water_temperature_c: float | None,
+    *,
+    attenuation: bool,
 ) -> dict[str, str]:
     """Entries of the provenance about the scan: frequency, what was estimated of the pulse, and the water."""
-    scan = read_dataset(job.scan, traces=False, plausible=False)
-    estimated = {}
+    scan, estimated = header.dataset, {}
     frequency = scan.amplitude_frequency_hz or scan.center_frequency_hz
-    spectrum = spectrum_of(job.scan, scan)
-    if spectrum is not None:
-        estimated["pulse"] = spectrum.summary
-        frequency = frequency or spectrum.center_frequency_hz
+    if header.spectrum is not None:
+        estimated["pulse"] = header.spectrum.summary
     if attenuation and frequency is not None:
         # For exports in dB/cm/MHz.
         estimated[FREQUENCY] = repr(float(frequency))
@@ -147,23 +146,19 @@ class _Job(NamedTuple):
     pool: Pool
     stop: Callable[[], bool] | None
     scan: Path
+    stamp: int
     folder: Path
     checkpoints: Checkpoints
     runs: Iterator[int]
+    machine: JobMachine
 
 
-def _pick_with_guides(
-    job: _Job, settings: Settings, progress: _JobProgress
-) -> tuple[Path, ScanFindings, Settings, tuple[Candidate, ...]]:
-    """A file with travel times, and the findings in the scan: picked, and again guided by images.
-
-    Also the settings to continue with: what ``auto`` chose for the first image holds for all, so that the
-    settings of the result reproduce it.
-    """
+def _pick(job: _Job, settings: Settings, show: _Show) -> tuple[Path, ScanFindings]:
+    """A file with travel times, and the findings in the scan."""
     amplitudes = settings.attenuation.amplitudes if settings.reads_amplitudes else "recorded"
     source = PickingSource(
         job.scan,
-        job.scan.stat().st_mtime_ns,
+        job.stamp,
         job.folder,
         settings.picking.picker,
         settings.picking.examine,
@@ -172,43 +167,7 @@ def _pick_with_guides(
         settings.water_temperature_c,
         settings.picking.max_left_out,
     )
-    path, findings = _pick(job, source, PickingFiles.in_folder(job.folder), None, progress)
-    rounds = 0 if source.dataset.picked else settings.numerics.guided_rounds
-    rays = settings.changed(
-        method="auto" if settings.method == "waveform" else settings.method,
-        attenuation=False,
-        resolution_check=False,
-        uncertainty=False,
-        reflection=False,
-        minutes=None,
-    )
-    trials: tuple[Candidate, ...] = ()
-    for number in range(1, rounds + 1):
-        progress.following = 1 + rounds - number
-        image = job.folder / f"{number}-image.h5"
-        result = _reconstruct_picked(job, path, rays, progress)
-        write_reconstruction(image, result)
-        progress.next()
-        if settings.method == "auto" and not trials:
-            rays, trials = result.settings, result.trials
-            names = ("attenuation", "resolution_check", "uncertainty", "reflection", "minutes")
-            requested = {name: getattr(settings, name) for name in names}
-            settings = rays.changed(**requested)
-        guide = PickingGuide(image, PickingFiles.in_folder(job.folder).findings)
-        again, findings_again = _pick(
-            job, source, PickingFiles.in_folder(job.folder, number), guide, progress
-        )
-        if same_picks(*(read_dataset(scan, traces=False) for scan in (path, again))):
-            break
-        path, findings = again, findings_again
-    progress.following = 0
-    return path, findings, settings, trials
-
-
-def _pick(
-    job: _Job, source: PickingSource, files: PickingFiles, guide: PickingGuide | None, progress: _JobProgress
-) -> tuple[Path, ScanFindings]:
-    """The file to reconstruct after a round of picking, and its findings."""
+    files = PickingFiles.in_folder(job.folder)
     try:
         findings = read_findings(files.findings, files.picked)
         if source.estimates_water:
@@ -216,19 +175,20 @@ def _pick(
                 read_reference(reference_path(job.folder, index))
     except (OSError, ValueError, KeyError, TypeError):
         # Absent, or damaged since.
-        graph = PickingGraph(source, files, guide)
-        progress.show(graph.progress)
-        run({"picking": graph}, job.pool, lambda _name: progress.show(graph.progress), job.stop)
+        graph = PickingGraph(source, files)
+        show(graph.progress)
+        run({"picking": graph}, job.pool, lambda _name: show(graph.progress), job.stop)
         findings = read_findings(files.findings)
     return files.picked if findings.changed else job.scan, findings
 
 
-def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _JobProgress) -> Reconstruction:
-    # A scan with travel times and without a water shot has no estimated one, unless waves are requested.
-    lacking = lacks_water(job.scan)
-    bare = lacking and not reference_path(job.folder, 0).exists()
-    stamp, recorded = path.stat().st_mtime_ns, job.scan.stat().st_mtime_ns
+def _reconstruct_picked(job: _Job, path: Path, settings: Settings, show: _Show) -> Reconstruction:
+    stamp = job.stamp if path == job.scan else path.stat().st_mtime_ns
+    check_readable(read_once(path, stamp).dataset)
     faults = PickingFiles.in_folder(job.folder).findings
+    source = FileSource(path, stamp, job.scan, job.stamp, faults, settings.water_temperature_c)
+    chosen = settled(source, settings, job.machine)
+    job.machine.place(chosen.settings)
 
     def run_graphs(graphs: Sequence[TomographyGraph], before: int, after: int) -> None:
         # A resumed job runs the same groups in the same order, so a number names the same graph again.
@@ -236,67 +196,15 @@ def _reconstruct_picked(job: _Job, path: Path, settings: Settings, progress: _Jo
         named = {f"{number}-{k:05d}": graph for k, graph in enumerate(graphs)}
 
         def report() -> None:
-            progress.show_reconstruction(progress_of(graphs, before, after))
+            show(replace(progress_of(graphs, before, after), phase=RECONSTRUCTING))
 
         run_resumable(named, job.pool, job.checkpoints, report, job.stop)
         if not after:
             report()
 
-    return run_reconstruction(
-        read_scan(path).in_water_of(settings.water_temperature_c),
-        settings,
-        lambda plan, part: FileScan(path, stamp, plan, part),
-        run_graphs,
-        lambda plan, index: FileWaveScan(
-            job.scan,
-            recorded,
-            replace(plan, estimates_source=lacking),
-            index,
-            faults,
-            settings.water_temperature_c,
-        ),
-        0 if bare else trace_samples(job.scan),
-        _echoes(job, recorded, settings.water_temperature_c),
-        partial(BlockSartGraph, folder=job.folder / BLOCKS)
-        if settings.numerics.blocks > 1
-        else ReconstructionGraph,
-    )
-
-
-def _echoes(job: _Job, stamp: int, water_temperature_c: float | None) -> Echoes | None:
-    """The traces of the object; None without any."""
-    samples, faults = trace_samples(job.scan), PickingFiles.in_folder(job.folder).findings
-    if not samples:
-        return None
-    return Echoes(samples, lambda index: FileEchoScan(job.scan, stamp, index, faults, water_temperature_c))
-
-
-class _JobProgress:
-    """Progress of several reconstructions in a row as of one.
-
-    Attributes:
-        following: how many may follow the present one.
-    """
-
-    def __init__(self, on_progress: Callable[[Progress], None] | None) -> None:
-        self._on_progress = on_progress
-        self._over = self._total = self.following = 0
-
-    def show_reconstruction(self, progress: Progress) -> None:
-        """Report the progress of the present reconstruction."""
-        self._total = progress.total
-        total = self._over + progress.total * (1 + self.following)
-        done = self._over + progress.done
-        self.show(replace(progress, done=done, total=total, phase=RECONSTRUCTING))
-
-    def show(self, progress: Progress) -> None:
-        """Report progress of a phase, if it has any work."""
-        if self._on_progress is not None and progress.total:
-            self._on_progress(progress)
-
-    def next(self) -> None:
-        """The present reconstruction is over."""
-        self._over += self._total
+    in_blocks = partial(BlockSartGraph, folder=job.folder / BLOCKS)
+    graph_of = in_blocks if chosen.settings.numerics.blocks > 1 else ReconstructionGraph
+    return run_reconstruction(source, chosen, run_graphs, graph_of)
 
 
 def _folder(work_dir: Path | None) -> AbstractContextManager[Path]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.picking.first_arrivals import reach_of, read_times, screen_times
+from bentray_kernels.acquisition.picking.first_arrivals import read_times, screen_times
 from bentray_kernels.acquisition.quality.water_speed import stated_water
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
@@ -149,8 +149,7 @@ def _picks(dataset: Dataset, emission: int) -> tuple[Floats | None, str]:
     if dataset.waveform is None or dataset.waveform.water is None or dataset.center_frequency_hz is None:
         return None, ""
     shape = len(dataset.tx), len(dataset.rx)
-    reach = reach_of(dataset, DEFAULT_PICKER)
-    delta, _ = read_times(dataset, [emission], DEFAULT_PICKER, np.full(shape, np.nan), reach)
+    delta, _ = read_times(dataset, [emission], DEFAULT_PICKER)
     whole = np.full(shape, np.nan)
     whole[emission] = delta[0]
     # Without the comparison with neighbouring emissions, which would read all traces.

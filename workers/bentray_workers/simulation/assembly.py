@@ -16,8 +16,8 @@ from ..files.dataset.record import record_of
 from ..files.dataset.write import Piece, write_dataset
 from . import plane, volume, waves
 from .cost import Timed
+from .kinds import Simulated
 from .parts import parts_of, read_part
-from .request import Simulated
 from .waves import Noise, WaveSimulationSettings
 
 

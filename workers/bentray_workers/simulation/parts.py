@@ -21,7 +21,7 @@ from ..cluster.task_retries import ResultsLostError
 from ..files.atomic import atomic_replace
 from ..files.npy_headers import PARSING
 from .cost import Timed, emitters_a_task
-from .request import Simulated
+from .kinds import Simulated
 from .shared_media import made_once
 from .waves import WaveSimulationSettings, simulate_emission
 

@@ -27,8 +27,7 @@ from bentray_kernels.phantoms import (
 from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.tomography.problem import MARGIN_NODES
 
-# The memory grows with its square; more gains less than the noise of any scan.
-MAX_REFINEMENT = 64
+from .ranges import ELEMENTS, NODES, NOISE_S, REFINEMENT, SNR
 
 PlanePhantom = Literal["table6", "table6-vertical", "detailed"]
 TITLES = {
@@ -40,10 +39,6 @@ SIDES_M = {"table6": TABLE6_SIDE_M, "table6-vertical": TABLE6_SIDE_M, "detailed"
 PLANE_PHANTOMS: Mapping[str, Callable[[float], EllipsePhantom | DetailedBreast]] = MappingProxyType(
     {"table6": table6, "table6-vertical": table6_vertical, "detailed": DetailedBreast}
 )
-
-# Of all kinds of simulated scans.
-NODES = Range(16, 1024)
-SNR = Range(1e-6, 1e12)
 
 
 @dataclass(frozen=True)
@@ -66,10 +61,10 @@ class SimulationSettings:
 
     phantom: PlanePhantom = "table6"
     nodes: int = ranged(128, NODES)
-    elements: int = ranged(256, Range(3, 4096))
+    elements: int = ranged(256, ELEMENTS)
     coupling_mps: float = ranged(1500.0, SPEED_MPS)
-    refinement: int = ranged(4, Range(4, MAX_REFINEMENT))
-    noise_s: float = ranged(0.0, Range(0.0, 1.0, below=True, unit="s"))
+    refinement: int = ranged(4, Range(4, REFINEMENT.most))
+    noise_s: float = ranged(0.0, NOISE_S)
     seed: int = ranged(0, SEED)
     attenuation: bool = False
     snr: float | None = ranged(None, SNR)

@@ -8,8 +8,8 @@ from typing import Any
 from bentray_kernels.task_graph import Task
 
 from .assembly import write_scan
+from .kinds import Simulated
 from .parts import make_part, missing, parts_of
-from .request import Simulated
 
 
 class SimulationGraph:

@@ -15,8 +15,8 @@ from bentray_kernels.tomography import Progress
 
 from ..cluster.task_pool import JobControl, run_job
 from ..files.dataset import read_dataset
+from .kinds import Simulated
 from .parts import folder_of
-from .request import Simulated
 from .simulation_graph import SimulationGraph
 
 

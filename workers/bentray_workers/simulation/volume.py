@@ -16,9 +16,10 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, table7_slices
-from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
+from bentray_kernels.ranges import SEED, check_ranges, ranged
 
-from .plane import MAX_REFINEMENT, NODES, SNR, ring_radius
+from .plane import ring_radius
+from .ranges import ELEMENTS, NODES, REFINEMENT, SLICES, SNR
 
 # The coarsest voxels in which the lesions of the phantom are separate.
 MIN_NODES = min(nodes for nodes, _ in TABLE7_GRIDS)
@@ -43,10 +44,10 @@ class VolumeSimulationSettings:
     """
 
     nodes: int = ranged(128, NODES)
-    slices: int = ranged(40, Range(2, 1024))
-    elements: int = ranged(256, Range(3, 4096))
+    slices: int = ranged(40, SLICES)
+    elements: int = ranged(256, ELEMENTS)
     coupling_mps: float = ranged(1500.0, SPEED_MPS)
-    refinement: int = ranged(4, Range(2, MAX_REFINEMENT))
+    refinement: int = ranged(4, REFINEMENT)
     three_d: bool = False
     array: Literal["moved", "rings"] = "moved"
     attenuation: bool = False

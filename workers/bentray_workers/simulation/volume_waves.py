@@ -16,7 +16,8 @@ from bentray_kernels.ranges import ranged
 from bentray_kernels.wave.medium import EDGE_NODES
 from bentray_kernels.wave.points import REACH
 
-from .waves import FREQUENCY_HZ, WaveSimulationSettings
+from .ranges import FREQUENCY_HZ
+from .waves import WaveSimulationSettings
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import longest_step, phase_error
 from bentray_kernels.wave.time_blocks import Poll, no_poll
 
-from .plane import NODES, SNR, ring_radius
+from .plane import ring_radius
+from .ranges import DEFAULT_EMISSIONS, EMISSIONS, FREQUENCY_HZ, NODES, SIDE_M, SNR
 from .shared_media import made_once
 
 # The pulse is a sine with a Gaussian envelope; at this multiple of its centre frequency its spectrum has 3 %
@@ -35,13 +36,8 @@ HIGHEST = 1.54
 # that data are not inverted with the model that made them; and the time step over the longest stable one.
 ORDER, NODES_A_WAVE, STEP = 6, 7.0, 0.5
 
-FREQUENCY_HZ = Range(1e4, 1e7, unit="Hz")
-
 # Of the absorbing boundary; wider than that of a refinement.
 EDGE_NODES = 40
-
-# Emitting elements by default, of as many or more.
-EMISSIONS = 64
 
 # Larger grids take too long.
 MAX_NODES = 8192**2
@@ -71,9 +67,9 @@ class WaveSimulationSettings:
     """
 
     frequency_hz: float = ranged(5e5, FREQUENCY_HZ)
-    side_m: float = ranged(0.12, Range(1e-3, 1.0, unit="m"))
+    side_m: float = ranged(0.12, SIDE_M)
     elements: int = ranged(128, Range(8, 4096))
-    emissions: int = ranged(EMISSIONS, Range(1, 4096))
+    emissions: int = ranged(DEFAULT_EMISSIONS, EMISSIONS)
     nodes: int = ranged(256, NODES)
     coupling_mps: float = ranged(1500.0, SPEED_MPS)
     snr: float | None = ranged(None, SNR)

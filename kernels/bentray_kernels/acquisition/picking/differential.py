@@ -51,8 +51,6 @@ def emission(
     frequency: float,
     rounding: float,
     picker: int,
-    predicted: Trace,
-    reach: float,
     delta: Trace,
     sigma: Trace,
 ) -> None:
@@ -66,8 +64,6 @@ def emission(
         frequency: centre frequency of the pulse, Hz.
         rounding: standard deviation of the traces' rounding, in their unit.
         picker: code of a ``picking.pickers.Picker``.
-        predicted: (nrx,), s: prediction of ``delta`` by a model; NaN where there is none.
-        reach: largest distance of the pick from the prediction, s.
         delta, sigma: (nrx,), s, written.
     """
     nt = water.shape[1]
@@ -88,12 +84,9 @@ def emission(
         water_onset, strong = onset(w, begin, end, period, water_noise, picker)
         if not math.isfinite(water_onset):
             continue
-        # Search window in the object: around the water pulse, shifted by plausible speeds or the prediction.
+        # Search window in the object: around the water pulse, shifted by plausible speeds.
         early = (far / FASTEST_MPS - far / water_speed) * rate
         late = (far / SLOWEST_MPS - far / water_speed) * rate
-        guided = math.isfinite(predicted[r])
-        if guided:
-            early, late = (predicted[r] - reach) * rate, (predicted[r] + reach) * rate
         begin, end = clip(water_onset + early - period, strong + late + 0.5 * period, nt)
         noise = prepare(object_[r], begin, rounding, o)
         if end - begin < 2.0 * period or not math.isfinite(noise):
@@ -106,8 +99,6 @@ def emission(
         if not math.isfinite(object_onset) or not math.isfinite(moved):
             continue
         shift, same = match_pulse(w, o, pulse, past, moved, MATCH_REACH * period)
-        if guided and not early <= shift <= late:
-            continue
         if math.isfinite(shift) and same >= MIN_CORRELATION:
             delta[r] = shift / rate
             quiet = noise_fraction(w, pulse, past, water_noise)

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...errors import InvalidInput
 from ...picker_names import DEFAULT_PICKER
-from .. import rules
 from ..dataset import Dataset, Floats
 from .consistency import consistent
 from .differential import emission
@@ -28,8 +27,6 @@ def pick(
     picker: str = DEFAULT_PICKER,
     progress: Callable[[int, int], None] | None = None,
     *,
-    predicted_s: Floats | None = None,
-    reach_s: float | None = None,
     screened: bool = True,
 ) -> Dataset:
     """Pick the travel times of a scan from its traces.
@@ -50,9 +47,6 @@ def pick(
         dataset: with traces of object and water, a sampling rate and a centre frequency.
         picker: method of the onset, see ``picking.pickers.PICKERS``.
         progress: called with (emissions done, emissions in all).
-        predicted_s: (…, ntx, nrx), s: object minus water predicted by a model, which then replaces the window
-            of plausible speeds. NaN where there is no prediction.
-        reach_s: largest distance of a pick from the prediction, s; None: a period.
         screened: whether to remove inconsistent picks; ``quality`` keeps them for its report.
 
     Returns:
@@ -62,9 +56,9 @@ def pick(
     Raises:
         InvalidInput: for an unknown picker, or a dataset that lacks one of the above.
     """
-    reach = reach_of(dataset, picker, reach_s)
+    picker_named(picker)
+    require_traces(dataset)
     nz, every = dataset.slices, range(len(dataset.tx))
-    predicted = _predictions(dataset, predicted_s)
     readings = []
     for k in range(nz):
         slice_data = dataset.slice(k)
@@ -73,7 +67,7 @@ def pick(
             if progress is not None:
                 progress(k * len(every) + e + 1, nz * len(every))
 
-        times = read_times(slice_data, every, picker, predicted[k], reach, done)
+        times = read_times(slice_data, every, picker, done)
         readings.append(screen_times(slice_data, *times, screened=screened))
     delta, sigma = (np.stack(both) for both in zip(*readings, strict=True))
     if dataset.slice_z_m is None:
@@ -81,27 +75,10 @@ def pick(
     return replace(dataset, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=picker, waveform=None)
 
 
-def reach_of(dataset: Dataset, picker: str, reach_s: float | None = None) -> float:
-    """Largest distance of a pick from its prediction, s; checks that the scan can be picked.
-
-    Raises:
-        InvalidInput: as ``pick``.
-    """
-    picker_named(picker)
-    require_traces(dataset)
-    assert dataset.center_frequency_hz is not None
-    reach = 1.0 / dataset.center_frequency_hz if reach_s is None else reach_s
-    if not 0.0 < reach < math.inf:
-        raise InvalidInput("reach_s", reach_s, "a finite time > 0 s")
-    return reach
-
-
 def read_times(
     dataset: Dataset,
     emissions: Sequence[int],
     picker: str,
-    predicted_s: Floats,
-    reach_s: float,
     done: Callable[[int], None] = lambda e: None,
 ) -> tuple[Floats, Floats]:
     """Pick some emissions, without consistency checks between pairs.
@@ -110,8 +87,6 @@ def read_times(
         dataset: of one slice, see ``pick``; its traces may be ``Emissions``.
         emissions: indices, from 0.
         picker: one of ``PICKERS``.
-        predicted_s: (ntx, nrx), s; NaN where nothing is predicted.
-        reach_s: see ``reach_of``.
         done: called after each.
 
     Returns:
@@ -122,7 +97,7 @@ def read_times(
     delta = np.empty((len(emissions), len(dataset.rx)))
     sigma = np.empty_like(delta)
     for row, e in enumerate(emissions):
-        _pick_emission(dataset, e, chosen, inverse, predicted_s[e], reach_s, delta[row], sigma[row])
+        _pick_emission(dataset, e, chosen, inverse, delta[row], sigma[row])
         done(e)
     return delta, sigma
 
@@ -168,22 +143,11 @@ def require_traces(dataset: Dataset, *, water: bool = True) -> None:
         )
 
 
-def _predictions(dataset: Dataset, predicted_s: Floats | None) -> Floats:
-    """(nz, ntx, nrx), s; NaN without a model."""
-    shape = (dataset.slices, len(dataset.tx), len(dataset.rx))
-    if predicted_s is None:
-        return np.full(shape, np.nan)
-    rules.shape("predicted_s", predicted_s, shape if dataset.slice_z_m is not None else shape[1:])
-    return np.asarray(predicted_s, dtype=np.float64).reshape(shape)
-
-
 def _pick_emission(
     dataset: Dataset,
     e: int,
     picker: Picker,
     inverse: Inverse | None,
-    predicted: Floats,
-    reach: float,
     delta: Floats,
     sigma: Floats,
 ) -> None:
@@ -208,8 +172,6 @@ def _pick_emission(
         float(dataset.center_frequency_hz),
         rounding,
         picker.code,
-        predicted,
-        reach,
         delta,
         sigma,
     )

@@ -145,7 +145,7 @@ def step(
     lowest, highest = settings.speed_bounds_mps
     coverage = ray_density(problem, parts) * problem.spacing
     # Total variation is scaled by the misfit, s; quadratic penalties are relative to the data.
-    unit = huber.clipped_rms(residual, limit) if settings.gauss_newton.penalty == "total-variation" else 1.0
+    unit = huber.clipped_rms(residual, limit) if settings.numerics.penalty == "total-variation" else 1.0
     image, dual = Linearised(
         parts,
         state.slowness * problem.spacing,
@@ -153,10 +153,10 @@ def step(
         problem.region,
         (problem.spacing / highest, problem.spacing / lowest),
         settings.gauss_newton.penalty_strength * unit,
-        settings.gauss_newton.penalty,
+        settings.numerics.penalty,
         limit,
         state.begun * problem.spacing,
-        problem.spacing * settings.gauss_newton.edge_mps / problem.water_speed**2 or math.inf,
+        problem.spacing * settings.numerics.edge_mps / problem.water_speed**2 or math.inf,
         width_in_nodes(problem, settings),
     ).solve(state.dual)
     return replace(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from ...arrays import Floats, Ints
 from ...compiled import kernel
@@ -19,7 +20,6 @@ from ...rays.newton_step import allocate_bending
 from ...splines import coefficients
 from ..finite_frequency import front_smoothing, ray_slowness
 from ..problem import Problem
-from ..sart.sart_update import smoothed
 from ..settings import Settings
 from .ray_matrix import back_project, project
 
@@ -151,30 +151,24 @@ def _trace(
             and the lengths of the rays, m.
     """
     slowness, front = ray_slowness(problem, settings, slowness), front_smoothing(problem, settings)
-    speed = smoothed(1.0 / slowness, front)
-    traced, splines = [], {}
+    speed = 1.0 / slowness
+    if front > 0.0:
+        # A wave averages over its Fresnel zone; a ray follows every edge.
+        speed = np.asarray(gaussian_filter(speed, front, mode="nearest"))
+    traced, spline = [], np.empty((0,) * slowness.ndim)
+    if settings.rays == "curved":
+        spline = coefficients(-np.log(speed))
     for emitter in emitters:
         valid = np.flatnonzero(np.isfinite(data[emitter]))
-        slab = problem.slab(int(emitter))
-        corner = np.zeros(slowness.ndim)
-        corner[-1] = slab.start * problem.spacing
-        source = problem.emitters[emitter] - corner
-        receivers = problem.receivers_of(int(emitter))[valid] - corner
+        source = problem.emitters[emitter]
+        receivers = problem.receivers_of(int(emitter))[valid]
         distance = np.linalg.norm(receivers - source, axis=1)
-        inside, tof = np.ascontiguousarray(slowness[..., slab]), np.ascontiguousarray(speed[..., slab])
-        spline = np.empty((0,) * slowness.ndim)
+        tof = speed
         if settings.rays == "curved":
-            # Emitters of one height share a slab.
-            if (slab.start, slab.stop) not in splines:
-                splines = {(slab.start, slab.stop): coefficients(-np.log(tof))}
-            spline = splines[slab.start, slab.stop]
-            tof = solve(tof, problem.spacing, source, settings.ray_eikonal)
+            tof = solve(speed, problem.spacing, source, settings.ray_eikonal)
         gradient = settings.numerics.ray_gradient
         fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays, gradient)
-        counts, columns, lengths, predicted = _rows(fan, front > 0.0, inside.ravel(), spline)
-        if inside.shape != slowness.shape:
-            column, height = np.divmod(columns, inside.shape[-1])
-            columns = (column * slowness.shape[-1] + height + slab.start).astype(np.int32)
+        counts, columns, lengths, predicted = _rows(fan, front > 0.0, slowness.ravel(), spline)
         ends = np.concatenate(([0], np.cumsum(counts)))
         length = np.array([lengths[a:b].sum(dtype=np.float64) for a, b in itertools.pairwise(ends)])
         residual = residual_of(

@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Floats
 from ..gauss_newton.linearisation import Rows
 from ..reconstruction_graph import Evaluation, ReconstructionGraph, trace_final_rays
-from ..stage_graphs import Scan
+from ..scan import Scan
 
 # The functions that trace the rays of a batch of emitters, and that evaluate all of them.
 Tasks = tuple[Callable[..., Rows], Callable[..., Floats]]

@@ -9,10 +9,11 @@ from ...acquisition import Dataset
 from ...errors import InvalidInput
 from .. import pairs
 from ..grid_schedule import stages
+from ..held_out import Part
 from ..reconstruction_graph import Run
 from ..result import Candidate, Reconstruction
+from ..scan import Scan, Source
 from ..settings import Settings
-from ..stage_graphs import Scan
 from ..stopping import stop_at_noise
 from .candidates import CandidateGraph
 from .finite_frequency_candidates import (
@@ -23,7 +24,6 @@ from .finite_frequency_candidates import (
     mean_misfit,
     mean_time,
 )
-from .held_out import Part
 
 # Training part, then held-out parts: of thin rays, and of finite-frequency rays.
 PARTS: tuple[Part, ...] = ("shown", "held-out", "views")
@@ -62,12 +62,9 @@ def candidate_settings(
     plans = []
     for changes in candidates:
         plan = settings.changed(**changes, attenuation=False, resolution_check=False, uncertainty=False)
-        front = plan.numerics.front_smoothing_nodes * coarser
         # An image of half the nodes has half the edge nodes for the same rays.
         strength = plan.gauss_newton.penalty_strength * (coarser if plan.numerics.ray_width_m > 0.0 else 1.0)
-        plan = plan.changed(
-            nodes=nodes, coarser_grids=0, front_smoothing_nodes=front, penalty_strength=strength
-        )
+        plan = plan.changed(nodes=nodes, coarser_grids=0, penalty_strength=strength)
         plans.append(_from_coarser_grids(plan))
     return plans
 
@@ -89,10 +86,9 @@ def _from_coarser_grids(settings: Settings) -> Settings:
 
 
 def select_model(
-    dataset: Dataset,
+    source: Source,
     settings: Settings,
     index: int,
-    scan_of: Callable[[Settings, Part], Scan],
     run_graphs: Run,
     after: int = 0,
 ) -> tuple[Settings, tuple[Candidate, ...], int]:
@@ -106,10 +102,9 @@ def select_model(
     candidate shows that the noise is lower.
 
     Args:
-        dataset: for its frequency and the noise of its times.
+        source: of the scan.
         settings: with an automatic choice of rays and method.
         index: of the slice.
-        scan_of: makes a scan of a part of the pairs.
         run_graphs: runs graphs to their end.
         after: emitter passes that come after the reconstruction, at most.
 
@@ -120,22 +115,23 @@ def select_model(
     Raises:
         InvalidInput: for a slice without pairs.
     """
+    dataset = source.dataset()
     rest = passes_to_come(dataset, settings) + after
     before = 0
+
+    def graph_of(plan: Settings, shown: Part, held: Sequence[Part]) -> CandidateGraph:
+        return CandidateGraph(Scan(source, plan, shown), index, *(Scan(source, plan, part) for part in held))
 
     def graphs_of(candidates: Sequence[dict[str, Any]], parts: Sequence[Part]) -> Graphs:
         """The candidates with the requested rays; none without training or held-out pairs."""
         first = candidate_settings(settings)[0]
-        held = [part for part in parts[1:] if _has_pairs(scan_of(first, part), index)]
-        if not held or not _has_pairs(scan_of(first, parts[0]), index):
+        held = [part for part in parts[1:] if _has_pairs(Scan(source, first, part), index)]
+        if not held or not _has_pairs(Scan(source, first, parts[0]), index):
             return []
         curved = settings.rays == "curved"
         tried = [changes for changes in candidates if curved or changes["rays"] == "straight"]
         plans = zip(tried, candidate_settings(settings, tried), strict=True)
-        return [
-            (changes, CandidateGraph(scan_of(plan, parts[0]), index, *(scan_of(plan, part) for part in held)))
-            for changes, plan in plans
-        ]
+        return [(changes, graph_of(plan, parts[0], held)) for changes, plan in plans]
 
     def run(tried: Graphs, later: int = 0) -> list[Candidate]:
         nonlocal before
@@ -251,8 +247,6 @@ def label(changes: dict[str, Any]) -> str:
     words = [f"{rays}{wide} rays"]
     if "method" in changes:
         words.append({"sart": "SART", "gauss-newton": "Gauss-Newton"}[changes["method"]])
-    if changes.get("front_smoothing_nodes"):
-        words.append("smoothed wave front")
     if changes.get("edge_mps"):
         words.append("sharp edges")
     if "penalty_strength" in changes and not wide:

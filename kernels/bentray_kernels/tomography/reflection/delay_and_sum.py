@@ -12,6 +12,10 @@ from ...arrays import Flags, Float32s, Floats, Ints
 from ...compiled import kernel
 from .element_times import ElementTimes, Views, view_pixels
 
+# Pairs whose rays make a larger angle at a pixel are left out, degrees; the weight of a pair falls with its
+# cosine, from 1 for an echo straight back to 0.
+PAIR_ANGLE_DEG = 90.0
+
 # Pixels of a side of a tile: its views of all receivers stay in the cache.
 TILE = 16
 
@@ -74,17 +78,16 @@ def sum_echoes(
     receivers: Ints,
     pixels: Pixels,
     pair_angle_deg: float,
-    spreading: bool,
 ) -> Sums:
     """Sums over some emissions; those of several groups are added in the order of the emitters.
 
     For each emitter e and pixel x, with the analytic signals a and the travel times T along bent rays,
 
-        b_e(x) = Σ_r w(θ) g_e(x) g_r(x) a_er(T(e, x) + T(r, x)),
+        b_e(x) = Σ_r w(θ) a_er(T(e, x) + T(r, x)),
         w(θ) = max(0, (cos θ − cos θ_max) / (1 − cos θ_max)).
 
     θ is the angle at x between the rays from e and from r: 0 for an echo that returns where it came from.
-    The gains g are 1 unless losses or spreading are compensated. Signals are read by linear interpolation.
+    Signals are read by linear interpolation.
 
     Args:
         signals: of the emissions.
@@ -94,11 +97,10 @@ def sum_echoes(
         receivers: (receivers,), the same.
         pixels: of the image.
         pair_angle_deg: θ_max.
-        spreading: whether the gains compensate cylindrical spreading.
     """
     sums = empty_sums(pixels.inside.shape)
     cosine = math.cos(math.radians(pair_angle_deg))
-    _sum_tiles(signals, times, spacing, emitters, receivers, pixels, cosine, spreading, sums)
+    _sum_tiles(signals, times, spacing, emitters, receivers, pixels, cosine, sums)
     return sums
 
 
@@ -111,7 +113,6 @@ def _sum_tiles(
     receivers: Ints,
     pixels: Pixels,
     least: float,
-    spreading: bool,
     sums: Sums,
 ) -> None:
     size = TILE * TILE
@@ -138,8 +139,8 @@ def _sum_tiles(
                         count += 1
             if count == 0:
                 continue
-            view_pixels(times, emitters, spacing, px, py, count, spreading, of_emitters)
-            view_pixels(times, receivers, spacing, px, py, count, spreading, of_receivers)
+            view_pixels(times, emitters, spacing, px, py, count, of_emitters)
+            view_pixels(times, receivers, spacing, px, py, count, of_receivers)
             for e in range(len(emitters)):
                 real[:count], imaginary[:count], total[:count] = 0.0, 0.0, 0.0
                 for r in range(len(receivers)):
@@ -191,10 +192,9 @@ def _add_echo(
     imaginary: Float32s,
     total: Float32s,
 ) -> None:
-    """Add w g_e g_r a(T(e, x) + T(r, x)) of one pair at some pixels."""
+    """Add w a(T(e, x) + T(r, x)) of one pair at some pixels."""
     cosines, sines = signals.parts[e, r, 0], signals.parts[e, r, 1]
     to_pixel, back = sent.time[e], received.time[r]
-    gain_sent, gain_received = sent.gain[e], received.gain[r]
     rate = np.float32(signals.rate_hz)
     first = np.float32(signals.first_s * signals.rate_hz)
     last = np.float32(cosines.size - 2)
@@ -203,7 +203,7 @@ def _add_echo(
         place = min(max(place, np.float32(0.0)), last)
         k = np.uint32(place)
         part = place - np.float32(k)
-        w = weight[p] * gain_sent[p] * gain_received[p]
+        w = weight[p]
         real[p] += w * (cosines[k] + part * (cosines[k + np.uint32(1)] - cosines[k]))
         imaginary[p] += w * (sines[k] + part * (sines[k + np.uint32(1)] - sines[k]))
         total[p] += weight[p]
@@ -212,7 +212,6 @@ def _add_echo(
 @kernel
 def _empty_views(elements: int, pixels: int) -> Views:
     return Views(
-        np.empty((elements, pixels), np.float32),
         np.empty((elements, pixels), np.float32),
         np.empty((elements, pixels), np.float32),
         np.empty((elements, pixels), np.float32),

@@ -38,7 +38,6 @@ def sum_echoes_opencl(
     receivers: Ints,
     pixels: Pixels,
     pair_angle_deg: float,
-    spreading: bool,
 ) -> Sums:
     """As ``sum_echoes``, on the chosen OpenCL device; there if none passes its self-test.
 
@@ -53,11 +52,9 @@ def sum_echoes_opencl(
     """
     session = session_or_warning(instead="compiled code")
     if session is None:
-        return sum_echoes(signals, times, spacing, emitters, receivers, pixels, pair_angle_deg, spreading)
+        return sum_echoes(signals, times, spacing, emitters, receivers, pixels, pair_angle_deg)
     with computing_on(session), session.lock:
-        return _summed(
-            session, signals, times, spacing, (emitters, receivers), pixels, pair_angle_deg, spreading
-        )
+        return _summed(session, signals, times, spacing, (emitters, receivers), pixels, pair_angle_deg)
 
 
 def _summed(
@@ -68,7 +65,6 @@ def _summed(
     pairs: tuple[Ints, Ints],
     pixels: Pixels,
     pair_angle_deg: float,
-    spreading: bool,
 ) -> Sums:
     column, row = np.nonzero(pixels.inside)
     sums = empty_sums(pixels.inside.shape)
@@ -77,8 +73,7 @@ def _summed(
     parts, used = session.upload(signals.parts), session.upload(_bytes(signals.used))
     sent, back = (session.upload(np.ascontiguousarray(one, np.int32)) for one in pairs)
     places = session.upload(np.ascontiguousarray(times.place, np.float64))
-    slowness, lossy = session.upload(times.slowness), times.loss.size > 0
-    loss = session.upload(times.loss) if lossy else slowness
+    slowness = session.upload(times.slowness)
     at_once = min(PIXELS, _pixels_at_once(session, elements, emissions))
     least = math.cos(math.radians(pair_angle_deg))
     views = session.reserve(VIEW_BYTES * elements * at_once)
@@ -96,11 +91,8 @@ def _summed(
             kernels[0],
             places,
             slowness,
-            loss,
-            np.int32(lossy),
             *stored,
             np.float64(spacing),
-            np.int32(spreading),
             *there,
             count,
             views,

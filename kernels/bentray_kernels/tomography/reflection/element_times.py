@@ -1,4 +1,4 @@
-"""Travel times and losses from elements to every pixel: factored Eikonal solutions, read by cubic splines."""
+"""Travel times from elements to every pixel: factored Eikonal solutions, read by cubic splines."""
 
 from __future__ import annotations
 
@@ -12,59 +12,42 @@ from ...compiled import kernel
 from ...eikonal import solve
 from ...splines.cubic import coefficients, jet_2d
 
-# The loss along a ray is the derivative of its time by the slowness (Fermat): from a second solution with
-# this relative change of the slowness at the largest attenuation.
-CHANGE = 1e-2
-
 
 class ElementTimes(NamedTuple):
-    """Times and losses between some elements and every point, on the nodes of the speed.
+    """Times between some elements and every point, on the nodes of the speed.
 
-    Divided by the distance from the element both are smooth there, so that a spline may read them between
+    Divided by the distance from the element they are smooth there, so that a spline may read them between
     nodes (T = |x - element| · τ; dissertation, section 6.2).
 
     Attributes:
         place: (k, 2), elements, nodes.
         slowness: (k, nx + 3, ny + 3), spline of τ, the mean slowness along the ray, s/m, float32.
-        loss: the same of the mean attenuation along the ray, Np/m; (k, 0, 0) without one.
     """
 
     place: Floats
     slowness: Float32s
-    loss: Float32s
 
 
-def solve_times(speed: Floats, spacing: float, elements: Floats, attenuation: Floats | None) -> ElementTimes:
-    """Times, and losses where an attenuation is given, of some elements.
+def solve_times(speed: Floats, spacing: float, elements: Floats) -> ElementTimes:
+    """Times of some elements.
 
     Args:
         speed: (nx, ny), m/s.
         spacing: node spacing, m.
         elements: (k, 2), m, node 0 at 0, inside the grid.
-        attenuation: as ``speed``, Np/m; None: no losses.
 
     Raises:
         InvalidInput: as ``eikonal.solve``.
     """
     splines = np.empty((len(elements), *(n + 3 for n in speed.shape)), dtype=np.float32)
-    losses = np.empty(splines.shape if attenuation is not None else (len(elements), 0, 0), dtype=np.float32)
     nodes = np.stack(np.meshgrid(*map(np.arange, speed.shape), indexing="ij"), axis=-1) * spacing
-    strongest = 0.0 if attenuation is None else float(attenuation.max())
-    change = 0.0 if strongest == 0.0 else CHANGE / (strongest * float(speed.max()))
     for k, element in enumerate(elements):
         distance = np.linalg.norm(nodes - element, axis=-1)
         near = distance < 1e-6 * spacing
         distance[near] = 1.0
         time = solve(speed, spacing, element)
         splines[k] = coefficients(np.where(near, 1.0 / speed, time / distance))
-        if attenuation is None:
-            continue
-        if change == 0.0:
-            losses[k] = 0.0
-            continue
-        later = solve(1.0 / (1.0 / speed + change * attenuation), spacing, element)
-        losses[k] = coefficients(np.where(near, attenuation, (later - time) / (change * distance)))
-    return ElementTimes(elements / spacing, splines, losses)
+    return ElementTimes(elements / spacing, splines)
 
 
 def joined(parts: list[ElementTimes]) -> ElementTimes:
@@ -100,13 +83,11 @@ class Views(NamedTuple):
     Attributes:
         time: T(element, pixel), s.
         x, y: direction of the ray at the pixel, ∇T/|∇T|.
-        gain: correction of the amplitude on this way.
     """
 
     time: Float32s
     x: Float32s
     y: Float32s
-    gain: Float32s
 
 
 @kernel(inline="always")
@@ -117,17 +98,15 @@ def view_pixels(
     px: Floats,
     py: Floats,
     count: int,
-    spreading: bool,
     views: Views,
 ) -> None:
-    """Times, directions and gains of some elements at the first ``count`` pixels.
+    """Times and directions of some elements at the first ``count`` pixels.
 
     Args:
         times: of the elements.
         which: (k,), indices of those that are viewed.
         spacing: of the nodes, m.
         px, py: of the pixels, nodes.
-        spreading: whether the gain compensates cylindrical spreading, √distance.
         views: written.
     """
     for n in range(len(which)):
@@ -143,7 +122,3 @@ def view_pixels(
             views.time[n, p] = spacing * distance * slowness
             views.x[n, p] = gx / length
             views.y[n, p] = gy / length
-            gain = math.sqrt(spacing * distance) if spreading else 1.0
-            if times.loss.shape[1] > 0:
-                gain *= math.exp(spacing * distance * jet_2d(times.loss[k], px[p], py[p])[0])
-            views.gain[n, p] = gain

@@ -14,7 +14,8 @@ from ...errors import InvalidInput
 from ...opencl.lost_device import computed
 from ...task_graph import Task
 from ..result import Iteration
-from .delay_and_sum import Signals, Sums, empty_sums, sum_echoes
+from ..scan import EchoScan
+from .delay_and_sum import PAIR_ANGLE_DEG, Signals, Sums, empty_sums, sum_echoes
 from .delay_and_sum_opencl import sum_echoes_opencl
 from .echoes import (
     Pulse,
@@ -26,7 +27,7 @@ from .echoes import (
     without_water_shot,
 )
 from .element_times import ElementTimes, joined, solve_times, times_between
-from .reflection_plan import EchoScan, ReflectionPlan, emissions_per_task
+from .reflection_plan import ReflectionPlan, emissions_per_task
 
 # Elements whose travel times are solved in one task.
 ELEMENTS = 16
@@ -146,7 +147,7 @@ class ReflectionGraph:
         return [
             Task(
                 solve_element_times,
-                (plan.speed, plan.spacing, plan.attenuation, plan.elements[group], number),
+                (plan.speed, plan.spacing, plan.elements[group], number),
                 keep_on_worker=True,
             )
             for number, group in enumerate(self._groups)
@@ -193,11 +194,9 @@ class ReflectionGraph:
         ]
 
 
-def solve_element_times(
-    speed: Floats, spacing: float, attenuation: Floats | None, elements: Floats, _number: int
-) -> ElementTimes:
+def solve_element_times(speed: Floats, spacing: float, elements: Floats, _number: int) -> ElementTimes:
     """Task: travel times of some elements to all nodes."""
-    return solve_times(speed, spacing, elements, attenuation)
+    return solve_times(speed, spacing, elements)
 
 
 def measure_scan_pulse(scan: EchoScan, plan: ReflectionPlan, times: list[ElementTimes]) -> Pulse:
@@ -230,7 +229,6 @@ def sum_emissions(
     transmitted = _transmitted(plan, times, emissions)
     with scan.open() as dataset:
         signals = echo_signals(dataset, plan, pulse, transmitted, emissions)
-    settings = plan.settings
     work = partial(
         sum_echoes_opencl if plan.engine == "opencl" else sum_echoes,
         signals,
@@ -239,8 +237,7 @@ def sum_emissions(
         plan.emitters[emissions],
         plan.receivers,
         plan.pixels,
-        settings.pair_angle_deg,
-        settings.gain != "none",
+        PAIR_ANGLE_DEG,
     )
     # A device that fails leaves this batch to compiled code; the log says so.
     return computed(work)[0]
@@ -309,5 +306,5 @@ def _transmitted(plan: ReflectionPlan, times: list[ElementTimes], emissions: Int
     """Predicted times of the first arrivals, (emissions, nrx), s."""
     whole = joined(times)
     which = plan.emitters[emissions]
-    of_emitters = ElementTimes(whole.place[which], whole.slowness[which], whole.loss[which])
+    of_emitters = ElementTimes(whole.place[which], whole.slowness[which])
     return times_between(of_emitters, plan.spacing, plan.elements[plan.receivers])

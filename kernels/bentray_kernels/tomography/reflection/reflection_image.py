@@ -13,21 +13,18 @@ from .delay_and_sum import Sums
 FLOOR_DB = -100.0
 
 
-def envelope_of(sums: Sums, emissions: int, *, coherence_factor: bool) -> Float32s:
-    """Envelope of the mean echo at every pixel, |Σ b_e| / Σ w.
+def envelope_of(sums: Sums, emissions: int) -> Float32s:
+    """Envelope of the mean echo at every pixel, |Σ b_e| / Σ w, times the coherence factor.
 
-    With the coherence factor it is multiplied by |Σ b_e|² / (n Σ |b_e|²), from 0 for echoes of n emissions
+    The factor is |Σ b_e|² / (n Σ |b_e|²), from 0 for echoes of n emissions
     with random phases (1/n on average) to 1 for equal ones (Mallart & Fink, J. Acoust. Soc. Am. 96, 1994).
 
     Args:
         sums: over all emissions.
         emissions: n.
-        coherence_factor: whether it is applied.
     """
     size = np.abs(sums.echo)
     mean = np.divide(size, sums.weight, out=np.zeros_like(size), where=sums.weight > 0.0)
-    if not coherence_factor:
-        return mean
     most = emissions * sums.power
     return np.asarray(mean * np.divide(size**2, most, out=np.zeros_like(size), where=most > 0.0))
 

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -16,7 +13,7 @@ from ...arrays import Flags, Floats, Ints
 from ...errors import InvalidInput
 from ...wave.emissions import Engine
 from ..directivity import within_opening
-from ..settings import ReflectionSettings, Settings
+from ..settings import Settings
 from ..solver_choice import echo_engine
 from .delay_and_sum import Pixels
 
@@ -33,28 +30,12 @@ RIM_WAVES = 2.0
 TASK_BYTES = 128 * 2**20
 
 
-class EchoScan(Protocol):
-    """The data source of tasks; it is sent with them, so it holds a path or the dataset itself."""
-
-    def open(self) -> AbstractContextManager[Dataset]:
-        """One slice with its traces, which may be read on access while the context is open."""
-
-
-class Echoes(NamedTuple):
-    """The traces of a scan: samples of each, and the source of a slice by its index."""
-
-    samples: int
-    scan_of: Callable[[int], EchoScan]
-
-
 @dataclass(frozen=True)
 class ReflectionPlan:
     """Data of the reflection image of one slice, without traces.
 
     Attributes:
-        settings: of the image.
         speed: (nx, ny), in which delays are computed, m/s.
-        attenuation: as ``speed``, Np/m; None: losses are not compensated.
         spacing: of its nodes, m.
         elements: (k, 2), emitters and receivers, m, node 0 at 0.
         emitters, receivers: (ntx,), (nrx,), their indices in ``elements``.
@@ -66,9 +47,7 @@ class ReflectionPlan:
         engine: what sums the echoes.
     """
 
-    settings: ReflectionSettings
     speed: Floats
-    attenuation: Floats | None
     spacing: float
     elements: Floats
     emitters: Ints
@@ -106,7 +85,6 @@ def plan_reflection(
     dataset: Dataset,
     settings: Settings,
     speed: Floats,
-    attenuation: Floats | None,
     spacing: float,
     origin: tuple[float, float],
 ) -> ReflectionPlan:
@@ -116,25 +94,19 @@ def plan_reflection(
         dataset: the slice; its traces may still be in their file.
         settings: of the reconstruction.
         speed: (nx, ny), the reconstructed image, m/s.
-        attenuation: as ``speed``, Np/m, or None.
         spacing: of its nodes, m.
         origin: position of node 0, m.
 
     Raises:
         InvalidInput: naming what is missing or does not fit.
     """
-    own = settings.reflection
     if dataset.center_frequency_hz is None:
         raise InvalidInput("acquisition@center_frequency_hz", "nothing", "the centre frequency, Hz")
-    if own.gain == "attenuation" and attenuation is None:
-        raise InvalidInput(
-            "reflection.gain", "'attenuation' without an attenuation image", "none or spreading"
-        )
     members = np.union1d(dataset.tx, dataset.rx)
     elements = dataset.element_position_m[members]
     wavelength = dataset.water_speed_mps / dataset.center_frequency_hz
     low, extent = elements.min(axis=0), np.ptp(elements, axis=0)
-    pixel = pixel_size(own.pixel_m, float(extent.max()), wavelength)
+    pixel = pixel_size(settings.reflection.pixel_m, float(extent.max()), wavelength)
     shape = tuple(int(n) for n in np.floor(extent / pixel + 1e-9) + 1)
     first = low + 0.5 * (extent - pixel * (np.array(shape) - 1))
     inside = inside_array(elements, shape, pixel, first, RIM_WAVES * wavelength / pixel)
@@ -146,9 +118,7 @@ def plan_reflection(
     if settings.opening_angle_deg is not None:
         used = used & within_opening(dataset, settings.opening_angle_deg)
     return ReflectionPlan(
-        settings=own,
-        speed=np.full_like(speed, dataset.water_speed_mps) if own.delays == "water" else speed,
-        attenuation=attenuation if own.gain == "attenuation" else None,
+        speed=np.full_like(speed, dataset.water_speed_mps) if settings.numerics.delays == "water" else speed,
         spacing=spacing,
         elements=elements - np.asarray(origin),
         emitters=np.searchsorted(members, dataset.tx),

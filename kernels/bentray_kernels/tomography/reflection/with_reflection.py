@@ -6,54 +6,49 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...acquisition import Dataset
 from ...arrays import Floats
-from .. import pairs
 from ..reconstruction_graph import Run
 from ..result import Reconstruction, Reflection
+from ..scan import EchoScan, Source
 from ..settings import Settings
 from .reflection_graph import ReflectionGraph
 from .reflection_image import envelope_of, in_decibels
-from .reflection_plan import Echoes, plan_reflection
+from .reflection_plan import plan_reflection
 
 
 def with_reflection(
     result: Reconstruction,
-    dataset: Dataset,
+    source: Source,
     settings: Settings,
-    echoes: Echoes,
     run_graphs: Run,
     before: int,
 ) -> Reconstruction:
     """The reconstruction with the reflection image along the rays of its speed.
 
     Args:
-        result: with the speed, and the attenuation where losses are compensated.
-        dataset: of the scan; its traces may be in their file.
+        result: with the speed.
+        source: of the scan, with traces of the object.
         settings: as requested.
-        echoes: the traces of the object.
         run_graphs: runs graphs to their end.
         before: emitter passes already made.
 
     Raises:
         InvalidInput: as ``plan_reflection``.
     """
-    count = pairs.count(dataset, settings)
+    dataset = source.dataset()
     speeds = _slices(result.speed)
-    losses = [None] * count if result.attenuation is None else _slices(result.attenuation)
     origin = (result.origin_m[0], result.origin_m[1])
     rate = dataset.sampling_rate_hz
     assert rate is not None
     graphs, envelopes, plans = [], [], []
-    for index, (speed, loss) in enumerate(zip(speeds, losses, strict=True)):
-        plan = plan_reflection(dataset.slice(index), settings, speed, loss, result.spacing_m[0], origin)
-        graph = ReflectionGraph(echoes.scan_of(index), plan, echoes.samples, rate, result.history)
-        run_graphs([graph], before, graph.total * (count - 1 - index))
+    for index, speed in enumerate(speeds):
+        plan = plan_reflection(dataset.slice(index), settings, speed, result.spacing_m[0], origin)
+        graph = ReflectionGraph(EchoScan(source, index), plan, source.samples, rate, result.history)
+        run_graphs([graph], before, graph.total * (len(speeds) - 1 - index))
         before += graph.total
         plans.append(plan)
         graphs.append(graph)
-        own = plan.settings
-        envelopes.append(envelope_of(graph.sums, graph.total, coherence_factor=own.coherence_factor))
+        envelopes.append(envelope_of(graph.sums, graph.total))
     images = in_decibels(envelopes)
     stacked = result.speed.ndim == 3
     plan, pulse = plans[0], graphs[0].pulse
@@ -64,7 +59,7 @@ def with_reflection(
     )
     assert pulse is not None
     nx, ny = plan.pixels.inside.shape
-    medium = "water" if plan.settings.delays == "water" else "the reconstructed speed"
+    medium = "water" if settings.numerics.delays == "water" else "the reconstructed speed"
     summary = (
         f"{nx} by {ny} pixels of {1e3 * plan.pixel_m:.3g} mm; delays in {medium}; pulse "
         f"{1e6 * pulse.delay_s:.3g} us after its travel time, muted for {1e6 * pulse.length_s:.3g} us"

@@ -17,7 +17,7 @@ from ..solver_choice import sart_engine
 from .device_slices import DeviceSlices, Emissions, SliceSize, Update, slices_in_flight
 from .emitter_pass import gaussian
 from .sart_step import State, advance, advanced, batch_of
-from .sart_update import bounds_of, relaxation_of
+from .sart_update import bounds_of
 
 
 class SliceCall(NamedTuple):
@@ -109,7 +109,7 @@ def _advance(session: Session, calls: Sequence[SliceCall], settings: Settings) -
         first.spacing,
         first.spacing / first.water_speed,
         settings.numerics.subset,
-        gaussian(settings.sart.smoothing_nodes),
+        gaussian(settings.numerics.smoothing_nodes),
         bounds_of(settings),
     )
     with session.lock:
@@ -120,7 +120,7 @@ def _advance(session: Session, calls: Sequence[SliceCall], settings: Settings) -
             np.stack([call.problem.region for call in calls]),
             emissions,
             update,
-            np.array([relaxation_of(settings, call.state.iteration) for call in calls]),
+            np.full(len(calls), settings.sart.relaxation),
         )
         slices.run()
         slowness, coverage = slices.images()

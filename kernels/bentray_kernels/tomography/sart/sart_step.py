@@ -82,7 +82,7 @@ def advance(problem: Problem, settings: Settings, state: State, emitters: int, s
 
 def batch_of(problem: Problem, settings: Settings, state: State, emitters: int, slice_index: int = 0) -> Ints:
     """The next emitters of the current iteration, in order; see ``advance``."""
-    order = emitter_order(problem, settings.seed, slice_index, state.iteration)
+    order = emitter_order(problem, settings.numerics.seed, slice_index, state.iteration)
     size = settings.numerics.subset
     return order[state.emitter : state.emitter + -(-emitters // size) * size]
 

@@ -37,7 +37,7 @@ def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, wa
     stretched to this range of the object (data-driven speed), so that rays bend fully before the contrast of
     the image has grown; not in the first iteration, before which there is no contrast (``warm``).
     """
-    speed = smoothed(1.0 / slowness, settings.numerics.front_smoothing_nodes)
+    speed = 1.0 / slowness
     if settings.sart.speed_range_mps is None or not warm:
         return speed
     low, high = settings.sart.speed_range_mps
@@ -51,14 +51,6 @@ def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, wa
     return speed
 
 
-def smoothed(speed: Floats, nodes: float) -> Floats:
-    """The speed blurred by a Gaussian of that standard deviation.
-
-    A wave averages over its Fresnel zone; a ray follows every edge.
-    """
-    return np.asarray(gaussian_filter(speed, nodes, mode="nearest") if nodes > 0.0 else speed)
-
-
 def _compiled(problem: Problem, settings: Settings) -> Update:
     """As ``_traced`` for a slice, several times as fast: see ``EmitterPass``."""
     rows, columns = problem.region.shape
@@ -67,11 +59,11 @@ def _compiled(problem: Problem, settings: Settings) -> Update:
     def update(slowness: Floats, coverage: Floats, emitters: Ints, iteration: int) -> Floats:
         residuals = []
         for emitter in emitters:
-            source, receivers, measured, _ = valid_receivers(problem, int(emitter))
+            source, receivers, measured = valid_receivers(problem, int(emitter))
             front = None
             if settings.rays == "curved":
                 front = slowness
-                if settings.sart.speed_range_mps is not None or settings.numerics.front_smoothing_nodes > 0.0:
+                if settings.sart.speed_range_mps is not None:
                     front = 1.0 / propagation_speed(slowness, problem.region, settings, warm=iteration > 0)
             residuals.append(work.trace(slowness, front, problem.spacing, source, receivers, measured))
         work.update(
@@ -79,8 +71,8 @@ def _compiled(problem: Problem, settings: Settings) -> Update:
             coverage,
             problem.region,
             problem.spacing,
-            relaxation_of(settings, iteration),
-            settings.sart.smoothing_nodes,
+            settings.sart.relaxation,
+            settings.numerics.smoothing_nodes,
             bounds_of(settings),
         )
         return np.concatenate(residuals)
@@ -95,20 +87,19 @@ def _traced(
     corrections, weights = np.zeros_like(slowness), np.zeros_like(slowness)
     residuals = []
     for emitter in emitters:
-        source, receivers, measured, slab = valid_receivers(problem, int(emitter))
-        inside = np.ascontiguousarray(slowness[..., slab])
-        tof = inside  # only the shape counts: straight rays need no travel time
+        source, receivers, measured = valid_receivers(problem, int(emitter))
+        tof = slowness  # only the shape counts: straight rays need no travel time
         if settings.rays != "straight":
-            speed = propagation_speed(inside, problem.region[..., slab], settings, warm=iteration > 0)
+            speed = propagation_speed(slowness, problem.region, settings, warm=iteration > 0)
             tof = solve(speed, problem.spacing, source, settings.ray_eikonal)
         gradient = settings.numerics.ray_gradient
         fan = Fan.checked(tof, problem.spacing, receivers, source, settings.rays, gradient)
-        correction, weight, residual = _back_project(fan, inside.ravel() * problem.spacing, measured)
-        corrections[..., slab] += correction.reshape(inside.shape)
-        weights[..., slab] += weight.reshape(inside.shape)
+        correction, weight, residual = _back_project(fan, slowness.ravel() * problem.spacing, measured)
+        corrections += correction.reshape(slowness.shape)
+        weights += weight.reshape(slowness.shape)
         residuals.append(residual)
     update = smoothed_update(corrections, weights, problem.region, problem.spacing, settings)
-    apply_update(slowness, update, problem.region, settings, iteration)
+    apply_update(slowness, update, problem.region, settings)
     coverage += weights * problem.spacing
     return np.concatenate(residuals)
 
@@ -122,46 +113,37 @@ def smoothed_update(
         corrections, weights: Σ c·w (s) and Σ w (nodes of ray) of each node.
         region: as these, nodes that may change.
         spacing: m.
-        settings: ``sart.smoothing_nodes``.
+        settings: ``numerics.smoothing_nodes``.
     """
     seen = weights > 0.0
     update = np.zeros_like(corrections)
     update[seen] = corrections[seen] / (weights[seen] * spacing)
     update[~region] = 0.0
-    if settings.sart.smoothing_nodes > 0.0:
-        deviation = settings.sart.smoothing_nodes
+    if settings.numerics.smoothing_nodes > 0.0:
+        deviation = settings.numerics.smoothing_nodes
         update = np.asarray(gaussian_filter(update, deviation, mode="nearest", truncate=TRUNCATE))
     return update
 
 
 def smoothing_reach(settings: Settings) -> int:
     """Nodes on either side of a node that the Gaussian of its update reads."""
-    return int(TRUNCATE * settings.sart.smoothing_nodes + 0.5)
+    return int(TRUNCATE * settings.numerics.smoothing_nodes + 0.5)
 
 
-def apply_update(slowness: Floats, update: Floats, region: Flags, settings: Settings, iteration: int) -> None:
+def apply_update(slowness: Floats, update: Floats, region: Flags, settings: Settings) -> None:
     """Change the slowness in place, within its bounds; the arguments are as of ``smoothed_update``."""
-    updated = slowness + relaxation_of(settings, iteration) * update
+    updated = slowness + settings.sart.relaxation * update
     slowness[region] = np.clip(updated, *bounds_of(settings))[region]
 
 
-def valid_receivers(problem: Problem, emitter: int) -> tuple[Floats, Floats, Floats, slice]:
-    """An emitter and its receivers in its slab, m, the times measured, s, and the slab."""
-    slab = problem.slab(emitter)
+def valid_receivers(problem: Problem, emitter: int) -> tuple[Floats, Floats, Floats]:
+    """An emitter and its receivers, m, and the times measured, s."""
     delta = problem.delta_tof[emitter]
     valid = np.flatnonzero(np.isfinite(delta))
     source, receivers = problem.emitters[emitter], problem.receivers_of(emitter)[valid]
     offset = receivers - source
     measured = delta[valid] + np.sqrt((offset * offset).sum(axis=1)) / problem.water_speed
-    if slab.start:
-        corner = np.zeros(source.size)
-        corner[-1] = slab.start * problem.spacing
-        source, receivers = source - corner, receivers - corner
-    return source, receivers, measured, slab
-
-
-def relaxation_of(settings: Settings, iteration: int) -> float:
-    return settings.sart.relaxation * settings.numerics.relaxation_decay**iteration
+    return source, receivers, measured
 
 
 def bounds_of(settings: Settings) -> tuple[float, float]:

@@ -101,7 +101,7 @@ def ray_uncertainty(
         max(problem.mean_in_region(density), 1e-300),
         width_in_nodes(problem, settings),
     )
-    random = np.random.default_rng((settings.seed, index))
+    random = np.random.default_rng((settings.numerics.seed, index))
     changes = []
     for batch in range(BATCHES):
         prior = random.standard_normal((LANES, *region.shape))

@@ -118,7 +118,7 @@ def wave_settings(scale: WaveScale, settings: Settings) -> WaveSettings:
         window_s=(BEFORE * across + pulse, AFTER * across + pulse),
         nearest_m=NEAREST * scale.width_m,
         speed_bounds_mps=settings.speed_bounds_mps,
-        seed=settings.seed,
+        seed=settings.numerics.seed,
         roi=settings.roi,
         opening_angle_deg=settings.opening_angle_deg,
         engine=wave_engine(settings),

@@ -3,68 +3,55 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...acquisition import Dataset
-from .. import pairs
 from ..attenuation import EXPERIMENTAL
 from ..cautions import bound_cautions
 from ..numerics import recorded
 from ..reconstruction_graph import Run, progress_of
 from ..result import Reconstruction
+from ..scan import Source
 from ..settings import Settings
 from . import half_runs
-from .automatic_settings import scale_of, wave_settings
+from .automatic_settings import WaveScale, wave_settings
 from .grid_change import resampled
 from .inversion_state import BandEnd, Image
-from .refinement_graph import RefinementGraph, WaveScan
+from .refinement_graph import RefinementGraph
 from .validation import ValidationGraph, evaluations, validation_settings
+from .wave_scan import WaveScan
 from .waveform_cost import advice
 from .waveform_settings import WaveSettings
 
 # ``auto`` gives the refined image if its misfit of held-out emitters is below this part of that before.
 CLEARLY = 0.92
 
-# Creates the scan from which the tasks of one slice read their data.
-WaveScanOf = Callable[[WaveSettings, int], WaveScan]
-
 
 class Refinement:
     """The refinement of a scan.
 
     Args:
-        dataset: its traces may still be in its file.
-        settings: as requested.
-        samples: of each trace of object and water; 0: none.
-        scan_of: see ``WaveScanOf``.
+        source: of the scan.
+        scale: of the scan.
+        settings: with bands and emitters within the time budget.
+        whole_minutes: estimated time without a budget, which ``advised`` reports.
 
     Attributes:
         total: largest number of emitter passes.
-        within_budget: whether there is a time budget that allows it.
-
-    Raises:
-        InvalidInput: as ``automatic_settings.scale_of``.
     """
 
-    def __init__(self, dataset: Dataset, settings: Settings, samples: int, scan_of: WaveScanOf) -> None:
-        self._scan_of = scan_of
+    def __init__(self, source: Source, scale: WaveScale, settings: Settings, whole_minutes: float) -> None:
+        self._source, self._settings, self._whole_minutes = source, settings, whole_minutes
+        dataset = source.dataset()
         self._water_np_m = dataset.water_attenuation_np_m or 0.0
-        slices = pairs.count(dataset, settings)
-        scale = scale_of(dataset, settings, samples, slices)
-        self._settings = scale.budgeted(settings)
-        self._plan = wave_settings(scale, self._settings)
-        # ``advised`` reports the time without a budget.
-        self._whole_minutes = scale.minutes(settings)
-        budget = -1.0 if settings.minutes is None else settings.minutes
-        self.within_budget = scale.minutes(self._settings) <= budget
+        self._plan = replace(wave_settings(scale, settings), estimates_source=source.estimates_source)
         self._of_halves = half_runs.passes(self._plan) if settings.uncertainty else 0
         self._of_image = sum(band.evaluations(self._plan.held_out) for band in self._plan.bands)
         self._water_mps = dataset.water_speed_mps
-        self.total = slices * (self._of_image + self._of_halves)
+        self.total = scale.slices * (self._of_image + self._of_halves)
 
     def refined(self, rays: Reconstruction, run_graphs: Run, before: int) -> Reconstruction:
         """The refined reconstruction, slice after slice: the emitters of one slice occupy many workers.
@@ -79,7 +66,7 @@ class Refinement:
         stage = 1 + max(record.stage for record in rays.history)
         history, graphs = rays.history, []
         for index, image in enumerate(images):
-            scan = self._scan_of(self._plan, index)
+            scan = WaveScan(self._source, self._plan, index)
             graphs.append(RefinementGraph(scan, image, index, history, stage))
             run_graphs(graphs[-1:], made, self._of_image * (len(images) - 1 - index) + after)
             made += graphs[-1].total
@@ -106,7 +93,8 @@ class Refinement:
             if not plans:
                 return result
             runs = [
-                half_runs.HalfRun(self._scan_of(plan, index), before, earlier=graph.history) for plan in plans
+                half_runs.HalfRun(WaveScan(self._source, plan, index), before, earlier=graph.history)
+                for plan in plans
             ]
             for number, run in enumerate(runs):
                 run_graphs([run], made, self._of_halves // 2 * (2 * (len(images) - index) - 1 - number))
@@ -138,7 +126,7 @@ class Refinement:
         """
         images = _slices(rays, rays.speed)
         index = len(images) // 2
-        scan = self._scan_of(validation_settings(self._plan), index)
+        scan = WaveScan(self._source, validation_settings(self._plan), index)
         graph = ValidationGraph(scan, images[index], rays.history)
         run_graphs([graph], before, 0)
         sentence = advice(graph.validation, rays.trials[0], noise_s, self._whole_minutes)

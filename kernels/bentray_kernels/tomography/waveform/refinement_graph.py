@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from .grid_change import resampled, resampled_pairs
 from .inversion_state import ActiveBand, BandEnd, Curvature, Image, RefinementCheckpoint
 from .iterations import iteration_records
 from .source_estimation import estimate_source
+from .wave_scan import WaveScan
 from .waveform_problem import WaveProblem
 from .waveform_settings import WaveSettings
 
@@ -28,16 +29,6 @@ EMITTERS_OF_A_TASK: dict[Engine, int] = {"compiled": 1, "opencl": 64}
 # Bands whose simulated water shots have a lower correlation with the recorded ones are skipped: their waves
 # are too long for the array and its absorbing edges, or were not emitted.
 MIN_WATER_CORRELATION = 0.9
-
-
-class WaveScan(Protocol):
-    """The data source of tasks; it is sent with them, so it holds a path or the dataset itself."""
-
-    def settings(self) -> WaveSettings:
-        """Settings of the refinement."""
-
-    def problem(self, number: int) -> WaveProblem:
-        """The problem of a band, from 0; made once in a process."""
 
 
 class RefinementGraph:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from ...task_graph import Task
 from ..result import Iteration
 from .inversion_state import Image
-from .refinement_graph import WaveScan, held_out_misfit, starting_models
+from .refinement_graph import held_out_misfit, starting_models
+from .wave_scan import WaveScan
 from .waveform_settings import WaveSettings
 
 # Number of the band of the continuation, from 1, around the centre of the pulse, where noise matters least.

@@ -16,7 +16,7 @@ from bentray_kernels.request_fields import choices_of
 Command = Callable[..., None]
 
 # Left off the name of an option: ``--side`` is in metres, as its help says.
-UNITS = ("_mps", "_m", "_nodes", "_deg", "_c")
+UNITS = ("_mps", "_m", "_nodes", "_deg", "_c", "_hz")
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,14 @@ class Option:
     default: str
     help: str
     metavar: str | None = None
+    hidden: bool = False
 
     def parameter(self, setting: str) -> inspect.Parameter:
         """As a parameter of a Typer command, None where it is not given."""
         shown: Any = self.default or False
-        how = typer.Option(self.name, show_default=shown, help=self.help, metavar=self.metavar)
+        how = typer.Option(
+            self.name, show_default=shown, help=self.help, metavar=self.metavar, hidden=self.hidden
+        )
         return inspect.Parameter(
             setting, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[self.kind | None, how]
         )
@@ -99,8 +102,7 @@ def option_of(field: Field[Any], hint: Any, choices: tuple[str, ...], name: str,
         name: of the option, without hyphens at its beginning.
         more: a further sentence of the help.
     """
-    unit = next((unit for unit in UNITS if name.endswith(unit)), "")
-    flag = "--" + name.removesuffix(unit).replace("_", "-")
+    flag = flag_of(name)
     kind, metavar, text = hint, None, field.metadata["description"]
     if field.default is None:
         (kind,) = (part for part in get_args(hint) if part is not type(None))
@@ -119,6 +121,12 @@ def option_of(field: Field[Any], hint: Any, choices: tuple[str, ...], name: str,
         # Not capitalize(), which turns °C and MHz into °c and mhz.
         text = f"{text} {words[:1].upper()}{words[1:]}."
     return Option(flag, kind, default_of(field), f"{text} {more}".rstrip(), metavar)
+
+
+def flag_of(name: str) -> str:
+    """The option of a field: without the unit, with hyphens."""
+    unit = next((unit for unit in UNITS if name.endswith(unit)), "")
+    return "--" + name.removesuffix(unit).replace("_", "-")
 
 
 def default_of(field: Field[Any]) -> str:

@@ -7,8 +7,9 @@ from typing import Any, get_type_hints
 
 from bentray_kernels.request_fields import choices_of
 from bentray_kernels.tomography.settings import PLACES, Settings
+from bentray_kernels.tomography.stored_settings import WITHDRAWN
 
-from .option_tables import Command, Option, option_of, with_options
+from .option_tables import Command, Option, flag_of, option_of, with_options
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,25 @@ def _options() -> dict[str, Option]:
     return found
 
 
+def _withdrawn() -> dict[str, Option]:
+    """Options of earlier versions, hidden: each ends in the line that says what replaced it."""
+    switches = ("focusing", "coherence_factor")
+    flags = {name: flag_of(name) for name in WITHDRAWN}
+    return {
+        name: Option(f"{flag}/--no-{flag[2:]}", bool, "", "", hidden=True)
+        if name in switches
+        else Option(flag, str, "", "", hidden=True)
+        for name, flag in flags.items()
+    }
+
+
 # By the names of ``PLACES``, in the order of the help.
 OPTIONS = _options()
 
 
 def with_settings_options(command: Command) -> Command:
     """The command with one CLI option per setting in place of its parameter ``options``."""
-    return with_options(OPTIONS, SettingsOptions)(command)
+    return with_options({**OPTIONS, **_withdrawn()}, SettingsOptions)(command)
 
 
 def settings_from(options: SettingsOptions) -> Settings:

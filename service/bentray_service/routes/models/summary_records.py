@@ -81,4 +81,7 @@ class SummaryRecord(BaseModel):
     )
     candidates: list[CandidateRecord] = Field(description="The chosen one first; empty unless auto chose.")
     reason: str = Field(description="Reason of this choice; empty without candidates.")
+    automatic: str = Field(
+        description="What was decided automatically, and why; empty for results of earlier versions."
+    )
     truth: TruthErrors | None = Field(description="Null for a scan without truth.")

@@ -203,34 +203,6 @@ def test_noise_alone_is_not_picked(picker):
     assert np.isnan(delta).mean() > 0.995
 
 
-@every_picker
-def test_a_prediction_leads_past_an_earlier_pulse(picker):
-    """A louder pulse that comes early, by a path that the model does not have, is not taken."""
-    dataset, early = scan(8.0e-7, elements=16), scan(-26.0e-7, elements=16, gain=1.5)
-    wide = dataset.distance_m() > 0.05
-    both = Waveform(dataset.waveform.object + early.waveform.object, dataset.waveform.water)
-    mixed = replace(dataset, waveform=both)
-    expected = np.full(wide.shape, 7.0e-7)
-    guided = pick(mixed, picker, predicted_s=expected, reach_s=5.0e-7).delta_tof_s[wide]
-    alone = pick(mixed, picker).delta_tof_s[wide]
-    assert np.isfinite(guided).mean() > 0.9
-    assert np.nanmax(np.abs(guided - 8.0e-7)) < 2.0e-7
-    assert not (np.abs(alone - 8.0e-7) < 2.0e-7).any()
-
-
-def test_missing_predictions_are_ignored_and_shapes_are_checked():
-    dataset = scan(3.0e-7, elements=16)
-    wide = far(dataset)
-    nothing = np.full(wide.shape, np.nan)
-    np.testing.assert_array_equal(pick(dataset, predicted_s=nothing).delta_tof_s, pick(dataset).delta_tof_s)
-    wrong = pick(dataset, predicted_s=np.full(wide.shape, 1.5e-6), reach_s=5.0e-7).delta_tof_s
-    assert np.isnan(wrong).all()
-    with pytest.raises(InvalidInput, match="predicted_s"):
-        pick(dataset, predicted_s=nothing[1:])
-    with pytest.raises(InvalidInput, match="reach_s"):
-        pick(dataset, predicted_s=nothing, reach_s=0.0)
-
-
 @pytest.fixture(scope="module")
 def by_another_team():
     """A scan by another team's wave solver, and by emission how much the true map delays the wave front."""

@@ -86,7 +86,7 @@ def test_pairs_without_data_have_no_row(problem):
     assert len(rows.residual) == 4
 
 
-def test_rays_of_a_ring_in_a_volume_stay_in_its_slab():
+def test_rays_of_a_ring_in_a_volume_stay_at_its_height():
     """Straight rays between elements of one height, as far below the top of the volume as above its floor."""
     centre, nodes, heights = 0.5 * 15 * SPACING, 16, 13
     angle = 2.0 * np.pi * np.arange(6) / 6
@@ -95,9 +95,7 @@ def test_rays_of_a_ring_in_a_volume_stay_in_its_slab():
     )
     delta = np.where(np.eye(6, dtype=bool), np.nan, 0.0)
     region = np.ones((nodes, nodes, heights), dtype=bool)
-    volume = Problem(
-        ring, ring[None], np.zeros(6, int), delta, region, SPACING, (0.0,) * 3, WATER, axial_margin=2
-    )
+    volume = Problem(ring, ring[None], np.zeros(6, int), delta, region, SPACING, (0.0,) * 3, WATER)
     rows = linearise(
         volume, Settings(method="sart", rays="straight"), np.full(region.shape, 1 / WATER), np.arange(6)
     )

@@ -12,11 +12,11 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Candidate, Settings, reconstruct
 from bentray_kernels.tomography.gauss_newton.gauss_newton_step import trace_rays
+from bentray_kernels.tomography.held_out import part_of
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import (
     choose_finite_frequency,
     finite_frequency_candidates,
 )
-from bentray_kernels.tomography.model_selection.held_out import part_of
 from bentray_kernels.tomography.model_selection.selection import (
     CANDIDATES,
     advice_of,
@@ -26,7 +26,7 @@ from bentray_kernels.tomography.model_selection.selection import (
     final_settings,
     rejection,
 )
-from bentray_kernels.tomography.reconstruction import MemoryScan
+from bentray_kernels.tomography.scan import MemorySource, Scan
 from bentray_kernels.tomography.stopping import stop_at_noise, travel_time_noise
 
 WATER = 1375.0
@@ -121,7 +121,7 @@ def test_straight_times_select_straight_rays(scan):
     """Times integrated along straight lines, as a picker of late arrivals gives them."""
     straight = replace(PLAN, method="sart", rays="straight", iterations=1)
 
-    problem = MemoryScan(scan, straight, "all").problem(0)
+    problem = Scan(MemorySource(scan), straight).problem(0)
     axis = np.arange(48) * problem.spacing
     x, y = np.meshgrid(axis - axis.mean(), axis - axis.mean(), indexing="ij")
     image = 1.0 / (WATER + 100.0 * (np.hypot(x, y) < 0.05) + 60.0 * (np.hypot(x - 0.02, y) < 0.01))
@@ -312,7 +312,7 @@ def test_held_out_pairs_are_the_same_times_for_every_method(scan):
     noisy = replace(scan, delta_tof_s=scan.delta_tof_s + noise)
     for part in ("held-out", "views"):
         sart, gauss_newton = (
-            MemoryScan(noisy, PLAN.changed(method=method), part).problem(0).delta_tof
+            Scan(MemorySource(noisy), PLAN.changed(method=method), part).problem(0).delta_tof
             for method in ("sart", "gauss-newton")
         )
         assert np.array_equal(sart, gauss_newton, equal_nan=True)

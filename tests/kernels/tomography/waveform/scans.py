@@ -7,9 +7,10 @@ import numpy as np
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.waveform import Waveform
 from bentray_kernels.task_graph import ThreadPool, run
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform.inversion_state import Image
-from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.refinement_graph import RefinementGraph
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
@@ -108,7 +109,7 @@ def water(nodes=60):
 
 def refine(dataset, settings, start, threads=1):
     """The finished graph of a refinement in this process."""
-    graph = RefinementGraph(MemoryWaveScan(dataset, settings), start)
+    graph = RefinementGraph(WaveScan(MemorySource(dataset), settings), start)
     run({"refinement": graph}, ThreadPool(threads))
     return graph
 

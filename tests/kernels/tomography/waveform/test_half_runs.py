@@ -8,11 +8,12 @@ from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.acquisition import pick
 from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform import half_runs
 from bentray_kernels.tomography.waveform.automatic_settings import scale_of
 from bentray_kernels.tomography.waveform.half_runs import deviation, half_plans, half_plans_after
 from bentray_kernels.tomography.waveform.inversion_state import BandEnd, Image
-from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.tomography.waveform.waveform_settings import WaveSettings, bands, loss_band
 
 from .scans import CENTRE_HZ, WATER, blob, scan
@@ -27,10 +28,10 @@ def recorded():
 
 def test_halves_share_no_emitter_and_leave_none_out():
     few = replace(PLAN, bands=tuple(replace(band, emitters=8) for band in PLAN.bands))
-    used = [MemoryWaveScan(recorded(), plan).problem(0).used for plan in half_plans(few)]
+    used = [WaveScan(MemorySource(recorded()), plan).problem(0).used for plan in half_plans(few)]
     assert len(used[0]) == len(used[1]) == 4
     assert not set(used[0]) & set(used[1])
-    whole = MemoryWaveScan(recorded(), replace(few, bands=few.bands[2:4], held_out=0)).problem(0).used
+    whole = WaveScan(MemorySource(recorded()), replace(few, bands=few.bands[2:4], held_out=0)).problem(0).used
     assert sorted(np.concatenate(used)) == sorted(whole)
 
 

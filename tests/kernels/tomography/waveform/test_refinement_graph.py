@@ -8,22 +8,23 @@ import pytest
 
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Iteration
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.inversion_state import Image
-from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.refinement_graph import (
     RefinementGraph,
     start_band,
     starting_models,
     update_image,
 )
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 
 from ..graph_runs import run_in_random_order
 from .scans import RIM_MPS, SETTINGS, WATER, refined, scan, water, within_rim
 
 
 def begun():
-    return RefinementGraph(MemoryWaveScan(scan(), SETTINGS), water())
+    return RefinementGraph(WaveScan(MemorySource(scan()), SETTINGS), water())
 
 
 def test_tasks_may_finish_in_any_order():
@@ -35,7 +36,7 @@ def test_tasks_may_finish_in_any_order():
 
 def test_progress_is_monotonic_and_history_records_the_bands():
     graph = RefinementGraph(
-        MemoryWaveScan(scan(), SETTINGS),
+        WaveScan(MemorySource(scan()), SETTINGS),
         water(),
         2,
         (Iteration(2, 1, 1e-7, 24), Iteration(2, 1, 1e-7, 24, 1)),
@@ -74,7 +75,7 @@ def test_progress_is_monotonic_and_history_records_the_bands():
 
 
 def test_state_of_a_step_holds_no_problem():
-    class Remote(MemoryWaveScan):
+    class Remote(WaveScan):
         def problem(self, number):
             assert self.called, "the graph asked for a problem"
             return super().problem(number)
@@ -128,7 +129,7 @@ def test_after_a_stop_bands_of_the_speed_are_left_out_and_the_loss_is_not():
 @pytest.mark.parametrize("slow", [True, False])
 def test_near_the_array_the_band_begins_with_what_explains_the_scan(slow):
     """Oil of 1420 m/s that reaches the array, or an artefact of the rays in the place of water."""
-    scan_of = MemoryWaveScan(scan(rim=slow), SETTINGS)
+    scan_of = WaveScan(MemorySource(scan(rim=slow)), SETTINGS)
     rim = np.where(within_rim(*_nodes(water())), RIM_MPS, WATER)
     problem, band = scan_of.problem(0), start_band(scan_of, 0, replace(water(), speed=rim))
     grid = Image(problem.region, problem.band.spacing_m, problem.origin)
@@ -148,7 +149,7 @@ def _nodes(image):
 
 
 def test_a_finer_grid_keeps_an_image():
-    problem = MemoryWaveScan(scan(), SETTINGS).problem(1)
+    problem = WaveScan(MemorySource(scan()), SETTINGS).problem(1)
     x = np.linspace(-0.03, 0.03, 60)
     image = replace(water(), speed=1500.0 + 20.0 * np.sin(200.0 * x)[:, None] * np.cos(150.0 * x)[None])
     there = problem.origin[0] + problem.band.spacing_m * np.arange(problem.region.shape[0])

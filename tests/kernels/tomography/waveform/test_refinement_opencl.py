@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform.band_inversion import Model, emitters, evaluate
-from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.refinement_graph import starting_models
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 
 from .scans import SETTINGS, error, refine, refined, scan, water
 
@@ -17,7 +18,7 @@ ON_A_DEVICE = replace(SETTINGS, engine="opencl")
 @pytest.mark.opencl
 @pytest.mark.parametrize("number", [1, 2])
 def test_misfits_of_all_emitters_are_those_of_compiled_code(number):
-    problem = MemoryWaveScan(scan(), SETTINGS).problem(number)
+    problem = WaveScan(MemorySource(scan()), SETTINGS).problem(number)
     speed = starting_models(water(), problem, SETTINGS)[0].speed
     model = Model(speed, None if problem.band.of == "speed" else np.full_like(speed, 10.0))
     some = emitters(problem)

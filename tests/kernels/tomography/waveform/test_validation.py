@@ -7,9 +7,9 @@ import pytest
 
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.checkpoint import pack, unpack
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wave_settings
 from bentray_kernels.tomography.waveform.inversion_state import Image
-from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.validation import (
     MIN_VALID_CORRELATION,
     SHOTS,
@@ -19,6 +19,7 @@ from bentray_kernels.tomography.waveform.validation import (
     validate_image,
     validation_settings,
 )
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
 from .scans import WATER, blob, scan
@@ -40,7 +41,7 @@ def plan_for(data):
 @pytest.fixture(scope="module")
 def heard():
     data = scan()
-    return MemoryWaveScan(data, validation_settings(plan_for(data)))
+    return WaveScan(MemorySource(data), validation_settings(plan_for(data)))
 
 
 def test_images_are_ranked_as_the_truth_ranks_them(heard):
@@ -54,7 +55,7 @@ def test_images_are_ranked_as_the_truth_ranks_them(heard):
 
 def test_noise_counts_as_it_does_in_water():
     data = scan(seed=1, noise=0.1)
-    noisy = MemoryWaveScan(data, validation_settings(plan_for(data)))
+    noisy = WaveScan(MemorySource(data), validation_settings(plan_for(data)))
     found = validate_image(noisy, images()[0])
     assert 0.5 * found.water < found.misfit < 2.0 * found.water
 
@@ -63,7 +64,7 @@ def test_no_report_where_water_shots_cannot_be_simulated():
     data = scan()
     random = np.random.default_rng(0).normal(size=data.waveform.water.shape).astype(np.float32)
     deaf = replace(data, waveform=replace(data.waveform, water=random))
-    here = MemoryWaveScan(deaf, validation_settings(plan_for(deaf)))
+    here = WaveScan(MemorySource(deaf), validation_settings(plan_for(deaf)))
     assert here.problem(0).water_correlation < MIN_VALID_CORRELATION
     assert validate_image(here, images()[0]) == Validation()
 

@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.tomography.checkpoint import pack, unpack
-from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform.refinement_graph import RefinementGraph
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
 from ....effort import effort
@@ -19,7 +20,7 @@ from .scans import SETTINGS, refined, scan, water
 
 @functools.cache
 def memory_scan():
-    return MemoryWaveScan(scan(), SETTINGS)
+    return WaveScan(MemorySource(scan()), SETTINGS)
 
 
 def begun():

@@ -14,9 +14,10 @@ from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.cluster.capacities import MIB, USABLE, WARM_BYTES, WorkerCapacity
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import Summary
-from bentray_workers.reconstruction import reconstruction_run
-from bentray_workers.reconstruction.blocks import block_choice
-from bentray_workers.reconstruction.blocks.block_choice import largest_bytes, with_blocks
+from bentray_workers.files.dataset.scan import read_scan
+from bentray_workers.files.dataset.summary import counts_in
+from bentray_workers.reconstruction import job_machine, reconstruction_run
+from bentray_workers.reconstruction.blocks.block_choice import fitting_blocks, largest_bytes
 from bentray_workers.reconstruction.planning import plan
 
 SCAN = Summary(64, 64, 16 * 64**2, 16, False, 0.06, 0.16, 0, False, decomposition="volume")
@@ -29,15 +30,14 @@ def worker(task_bytes):
 
 def test_the_fewest_blocks_that_fit_are_chosen():
     whole = largest_bytes(SCAN, VOLUME)
-    assert with_blocks(SCAN, VOLUME, [worker(whole)]) == VOLUME
-    assert with_blocks(SCAN, VOLUME, []) == VOLUME
-    found = with_blocks(SCAN, VOLUME, [worker(whole - MIB), worker(1)])
-    assert found.numerics.blocks == 2
+    assert fitting_blocks(SCAN, VOLUME, [worker(whole)]) == 1
+    assert fitting_blocks(SCAN, VOLUME, []) == 1
+    assert fitting_blocks(SCAN, VOLUME, [worker(whole - MIB), worker(1)]) == 2
     for blocks in (3, 7, 15):
         needed = largest_bytes(SCAN, VOLUME.changed(blocks=blocks))
-        assert with_blocks(SCAN, VOLUME, [worker(needed)]).numerics.blocks == blocks
+        assert fitting_blocks(SCAN, VOLUME, [worker(needed)]) == blocks
     # Blocks thinner than what they read of their neighbours are none.
-    assert with_blocks(SCAN, VOLUME, [worker(MIB)]) == VOLUME
+    assert fitting_blocks(SCAN, VOLUME, [worker(MIB)]) == 1
 
 
 def test_memory_of_a_task_falls_with_the_blocks():
@@ -99,14 +99,14 @@ def test_a_run_is_in_blocks_where_memory_is_short_and_stays_so(path, tmp_path, m
     work = tmp_path / "work"
 
     def memory(scale):
-        needed = largest_bytes(block_choice.counts_in(path).summary(settings), settings)
-        monkeypatch.setattr(block_choice, "MEMORY_LIMIT", worker(scale * needed).memory_bytes)
+        needed = largest_bytes(counts_in(path).summary(settings), settings)
+        monkeypatch.setattr(job_machine, "MEMORY_LIMIT", worker(scale * needed).memory_bytes)
 
     memory(0.97)
     result = reconstruction_run.reconstruct(None, path, settings, work_dir=work)
     blocks = result.settings.numerics.blocks
     assert blocks > 1
-    expected = reconstruct_here(reconstruction_run.read_scan(path), settings.changed(eikonal="fsm"))
+    expected = reconstruct_here(read_scan(path), settings.changed(eikonal="fsm"))
     assert np.allclose(result.speed, expected.speed, rtol=1e-12, atol=0.0)
     memory(10.0)
     again = reconstruction_run.reconstruct(None, path, settings, work_dir=work)

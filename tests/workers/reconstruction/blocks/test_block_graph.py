@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.task_graph import ThreadPool, run
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
-from bentray_kernels.tomography.reconstruction import MemoryScan
+from bentray_kernels.tomography.scan import MemorySource, Scan
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.reconstruction.blocks.block_files import BLOCKS
@@ -96,7 +96,7 @@ def test_the_order_of_results_does_not_matter(scan, tmp_path):
     plan = PLAN.changed(blocks=4, iterations=1)
     found = []
     for turn in (1, -1):
-        graph = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / f"{turn}")
+        graph = BlockSartGraph(Scan(MemorySource(scan), plan), 0, tmp_path / f"{turn}")
         tasks = graph.first()
         while tasks:
             results = [(task, task.function(*task.arguments)) for task in tasks]
@@ -110,18 +110,18 @@ def test_the_order_of_results_does_not_matter(scan, tmp_path):
 
 def test_a_run_whose_files_are_gone_begins_again(scan, tmp_path):
     plan = PLAN.changed(blocks=2, iterations=1)
-    graph = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)
+    graph = BlockSartGraph(Scan(MemorySource(scan), plan), 0, tmp_path / BLOCKS)
     run({"": graph}, ThreadPool(1))
     reached = graph.checkpoint
-    again = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)
+    again = BlockSartGraph(Scan(MemorySource(scan), plan), 0, tmp_path / BLOCKS)
     again.restore(reached)
     assert again.done == again.total == 7
     assert again.first() == []
     assert np.array_equal(again.state.slowness, graph.state.slowness)
-    other = BlockSartGraph(MemoryScan(scan, plan.changed(blocks=3), "all"), 0, tmp_path / BLOCKS)
+    other = BlockSartGraph(Scan(MemorySource(scan), plan.changed(blocks=3)), 0, tmp_path / BLOCKS)
     other.restore(reached)
     shutil.rmtree(tmp_path / BLOCKS)
-    gone = BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)
+    gone = BlockSartGraph(Scan(MemorySource(scan), plan), 0, tmp_path / BLOCKS)
     gone.restore(reached)
     assert other.done == gone.done == 0
 
@@ -152,8 +152,8 @@ def test_an_unfinished_volume_has_a_preview(path, tmp_path, monkeypatch):
         ({"decomposition": "slices"}, "1, with decomposition slices"),
         ({"eikonal": "hafmm"}, "1, with eikonal hafmm"),
         ({"speed_range_mps": (1400.0, 1600.0)}, "speed_range"),
-        ({"axial_margin_nodes": 2}, "1, with stages or margins"),
-        ({"straight_iterations": 1}, "1, with stages or margins"),
+        ({"ray_gradient": "bspline"}, "1, with other gradients"),
+        ({"coarser_grids": 1, "nodes": 32}, "1, with coarser grids"),
         ({"uncertainty": True}, "uncertainty"),
         ({"resolution_check": True}, "resolution_check"),
     ],
@@ -161,4 +161,4 @@ def test_an_unfinished_volume_has_a_preview(path, tmp_path, monkeypatch):
 def test_what_has_no_blocks_is_refused(scan, tmp_path, changes, words):
     plan = PLAN.changed(blocks=2, **changes)
     with pytest.raises(InvalidInput, match=f"blocks: found 2.*{words}"):
-        BlockSartGraph(MemoryScan(scan, plan, "all"), 0, tmp_path / BLOCKS)
+        BlockSartGraph(Scan(MemorySource(scan), plan), 0, tmp_path / BLOCKS)

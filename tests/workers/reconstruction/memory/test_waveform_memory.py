@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 
 from bentray_kernels.opencl import session_or_warning
 from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wave_settings
 from bentray_kernels.tomography.waveform.band_inversion import Model
-from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.refinement_graph import evaluate_emitter
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.wave.device_waves import DeviceWaves, Scan
 from bentray_kernels.wave.simulation import place_elements
 from bentray_workers.cluster.capacities import MIB
@@ -96,7 +97,7 @@ def test_the_plan_holds_the_arrays_of_a_device():
     data = scan()
     plan = wave_settings(scale_of(data, settings, data.waveform.object.shape[-1], 1), settings)
     assert plan.engine == "opencl"
-    waves = MemoryWaveScan(data, plan)
+    waves = WaveScan(MemorySource(data), plan)
     looks = plan.bands[1].emitters + plan.held_out
     problem = waves.problem(1)
     model = Model(np.full(problem.region.shape, WATER))

@@ -21,12 +21,13 @@ from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.emissions import Emissions
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform import refinement_graph as waves
 from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wave_settings
 from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.inversion_state import Image
-from bentray_kernels.tomography.waveform.memory_scan import MemoryWaveScan
 from bentray_kernels.tomography.waveform.validation import validate_image, validation_settings
+from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 
@@ -73,12 +74,12 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     number = len(plan.bands) - 1
     start = Image(np.full((32, 32), WATER), 2.2 * RADIUS_M / 31, (-1.1 * RADIUS_M, -1.1 * RADIUS_M))
     nothing = peak(lambda: None)
-    fresh = MemoryWaveScan(dataset, plan)
+    fresh = WaveScan(MemorySource(dataset), plan)
     # Measured first, for what was read once stays.
     found = {"start_band": peak(lambda: waves.start_band(fresh, number, start)) - nothing}
-    judged = MemoryWaveScan(dataset, validation_settings(plan))
+    judged = WaveScan(MemorySource(dataset), validation_settings(plan))
     found["validate_image"] = peak(lambda: validate_image(judged, start)) - nothing
-    here = MemoryWaveScan(dataset, plan)
+    here = WaveScan(MemorySource(dataset), plan)
     entered = waves.start_band(here, number, start)
     assert entered is not None
     # As ``held`` counts the problem, and the traces that it holds.

@@ -186,9 +186,8 @@ class DatasetCounts:
         wavelength = self.water_mps / self.frequency_hz if self.frequency_hz else None
         # The noise of the times, unknown here, may allow fewer.
         pitch = self.pitch_m or math.pi * self.width_m / self.elements
-        if settings.decomposition is None:
-            settings = settings.changed(decomposition=self.decomposition)
-        return automatic_nodes(settings, self.width_m, pitch, wavelength)
+        volume = (settings.decomposition or self.decomposition) == "volume"
+        return automatic_nodes(settings.side_m or self.width_m, pitch, wavelength, volume=volume)[0]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; ``DatasetCounts(**plain)`` gives the same."""

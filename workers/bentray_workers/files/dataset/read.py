@@ -113,7 +113,7 @@ def dataset_of(
         **fields,
     )
     if plausible:
-        _check_plausible(dataset)
+        check_readable(dataset)
     return dataset
 
 
@@ -128,7 +128,7 @@ def _impossible_times(reader: Reader) -> dict[str, int]:
         raise InvalidInput(f"traveltime@{IMPOSSIBLE}", repr(stated)[:60], accepted) from None
 
 
-def _check_plausible(dataset: Dataset) -> None:
+def check_readable(dataset: Dataset) -> None:
     """Like ``check_plausible``; for a likely unit or order the error also states the correcting command."""
     try:
         check_plausible(dataset)

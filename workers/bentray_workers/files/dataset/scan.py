@@ -4,17 +4,34 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.pulse_spectrum import PulseSpectrum, estimate_spectrum
 
 from ..hdf5_reading import Limits, Reader, opened
-from .read import read_dataset
-from .traces import emissions_in
+from .read import dataset_of
+from .traces import emissions_in, lacks_water_in, samples_in
 
 
-def read_scan(path: Path, *, plausible: bool = True) -> Dataset:
-    """A dataset without its traces; a missing centre frequency is estimated from them.
+class ScanHeader(NamedTuple):
+    """What is known of a scan without its traces.
+
+    Attributes:
+        dataset: without traces; a missing centre frequency is estimated from them.
+        samples: of each trace of the object; 0 without traces.
+        lacks_water: whether there are traces of the object, but no water shot.
+        spectrum: of the pulse, where the frequency was estimated.
+    """
+
+    dataset: Dataset
+    samples: int
+    lacks_water: bool
+    spectrum: PulseSpectrum | None
+
+
+def read_header(path: Path, *, plausible: bool = True) -> ScanHeader:
+    """What a file says of a scan, read at one opening.
 
     Args:
         path: of the HDF5 file.
@@ -23,11 +40,19 @@ def read_scan(path: Path, *, plausible: bool = True) -> Dataset:
     Raises:
         InvalidInput: as ``read_dataset``, and for traces without a pulse where the frequency is missing.
     """
-    dataset = read_dataset(path, traces=False, plausible=plausible)
-    spectrum = spectrum_of(path, dataset)
-    if spectrum is None:
-        return dataset
-    return replace(dataset, center_frequency_hz=spectrum.center_frequency_hz)
+    with opened(path, Limits()) as reader:
+        dataset, spectrum = dataset_of(reader, None, plausible=plausible), None
+        if dataset.center_frequency_hz is None:
+            spectrum = spectrum_in(reader, stacked=dataset.slice_z_m is not None)
+        samples, lacking = samples_in(reader), lacks_water_in(reader)
+    if spectrum is not None:
+        dataset = replace(dataset, center_frequency_hz=spectrum.center_frequency_hz)
+    return ScanHeader(dataset, samples, lacking, spectrum)
+
+
+def read_scan(path: Path) -> Dataset:
+    """The dataset of ``read_header``."""
+    return read_header(path).dataset
 
 
 def spectrum_of(path: Path, dataset: Dataset) -> PulseSpectrum | None:

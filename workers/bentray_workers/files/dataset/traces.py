@@ -29,7 +29,12 @@ def trace_samples(path: Path) -> int:
 def lacks_water(path: Path) -> bool:
     """Whether a dataset file has traces of the object, but no water shot."""
     with opened(path, Limits()) as reader:
-        stored = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
+        return lacks_water_in(reader)
+
+
+def lacks_water_in(reader: Reader) -> bool:
+    """Like ``lacks_water`` for an open file."""
+    stored = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
     return stored[0] is not None and stored[1] is None
 
 

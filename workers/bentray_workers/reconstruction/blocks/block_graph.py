@@ -17,8 +17,8 @@ from bentray_kernels.tomography.result import Iteration, residual_counts
 from bentray_kernels.tomography.sart.block_checkpoint import BlockCheckpoint
 from bentray_kernels.tomography.sart.sart_step import State, advanced, batch_of, begin
 from bentray_kernels.tomography.sart.sart_update import valid_receivers
+from bentray_kernels.tomography.scan import Scan
 from bentray_kernels.tomography.solver_choice import undivided_reason
-from bentray_kernels.tomography.stage_graphs import Scan
 
 from .block_files import COVERAGE, SLOWNESS, BlockFiles, write_first
 from .block_rays import RaysInBlocks, in_nodes
@@ -54,7 +54,7 @@ class BlockSartGraph:
         self._problem, self._index = scan.problem(index), index
         amplitudes = self._problem.log_ratio is not None
         reason = undivided_reason(self._settings, amplitudes=amplitudes)
-        reason = reason or ("stages or margins" if len(scan.stages()) > 1 else "")
+        reason = reason or ("coarser grids" if len(scan.stages()) > 1 else "")
         if reason:
             raise InvalidInput("blocks", self._settings.numerics.blocks, f"1, with {reason}")
         shape = self._problem.region.shape
@@ -140,7 +140,7 @@ class BlockSartGraph:
                 residual, blocks = yield from self._emitter(name, int(emitter))
                 residuals.append(residual)
                 sums.append((name, blocks))
-            common = problem.spacing, sums, settings, state.iteration, state.emitter == 0
+            common = problem.spacing, sums, settings, state.emitter == 0
             yield [Task(update_block, (files, update, block, *common)) for block in range(files.blocks)]
             squares = state.squares + float(sum((residual * residual).sum() for residual in residuals))
             counts = residual_counts(np.concatenate(residuals))
@@ -152,7 +152,7 @@ class BlockSartGraph:
     def _emitter(self, name: str, emitter: int) -> Generator[list[Task], list[Any], tuple[Floats, list[int]]]:
         """Travel time, rays and back-projection; returns the residuals, s, and the blocks with rays."""
         files, problem, update = self._files, self._problem, self._updates
-        source, receivers, measured, _ = valid_receivers(problem, emitter)
+        source, receivers, measured = valid_receivers(problem, emitter)
         curved = self._settings.rays == "curved"
         versions: list[str] = []
         if curved:

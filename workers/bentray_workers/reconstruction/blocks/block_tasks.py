@@ -148,7 +148,6 @@ def update_block(
     spacing: float,
     sums: Sequence[tuple[str, Sequence[int]]],
     settings: Settings,
-    iteration: int,
     first: bool,
 ) -> None:
     """Task: the slowness and coverage of one block after an update.
@@ -157,8 +156,7 @@ def update_block(
         files, update, block, spacing: as of ``trace_rays_in_block``.
         sums: of each emitter of the update its name, and the blocks with rays.
         settings: of SART.
-        iteration: finished iterations.
-        first: whether the iteration begins, and with it the coverage.
+        first: whether an iteration begins, and with it the coverage.
     """
     start, stop = files.bounds(block)
     reach = smoothing_reach(settings)
@@ -177,7 +175,7 @@ def update_block(
     change = smoothed_update(corrections, weights, region, spacing, settings)[own]
     before, after = files.state(update), files.state(update + 1)
     slowness = read_planes(before / file_name(SLOWNESS, block))
-    apply_update(slowness, change, region[own], settings, iteration)
+    apply_update(slowness, change, region[own], settings)
     write_array(after / file_name(SLOWNESS, block), slowness, lasting=True)
     coverage = np.zeros_like(slowness) if first else read_planes(before / file_name(COVERAGE, block))
     coverage += weights[own] * spacing

@@ -59,7 +59,7 @@ def picking_tasks(traces: Traces | None, slices: int, settings: Settings) -> int
     parts = -(-traces.emissions // emissions_per_task(traces.receivers * traces.samples))
     examined = slices * (parts + 1) if settings.picking.examine or not traces.water_shot else 0
     examined += 0 if traces.water_shot else slices * (parts + 1)
-    return examined + (slices * (parts + 1) + 1) * (1 + settings.numerics.guided_rounds)
+    return examined + slices * (parts + 1) + 1
 
 
 def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) -> dict[str, int]:

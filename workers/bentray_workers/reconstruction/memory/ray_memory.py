@@ -21,7 +21,7 @@ from bentray_kernels.tomography.uncertainty.ray_uncertainty import BATCHES
 from ...cluster.capacities import MIB, REAL
 from ...files.dataset.counts import Summary
 from .block_memory import block_task_parts
-from .picking_memory import emissions_per_task, finish_slice_bytes, picking_task_bytes
+from .picking_memory import finish_slice_bytes, picking_task_bytes
 
 # Overhead of Python in any task: half of it on 3.11 and 3.12, all of it on 3.13.
 FLOOR_BYTES = 7 * MIB
@@ -114,14 +114,6 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     sizes: dict[str, int] = {}
     if scan.traces_bytes:
         sizes |= picking_task_bytes(scan.traces, scan.pairs, settings)
-        if settings.numerics.guided_rounds and scan.traces is not None:
-            # The rays of its emissions through the guiding image.
-            part = emissions_per_task(scan.traces.receivers * scan.traces.samples)
-            part = min(part, scan.traces.emissions)
-            predicted = part * scan.traces.receivers
-            shape = shape_of(scan, settings)
-            rays = 2 * REAL * math.prod(shape) + 2 * rows_bytes(scan, settings, predicted)
-            sizes["pick_emissions"] += _field_of_task(scan, settings) + rays
     elif scan.period and settings.picking.examine:
         sizes["finish_slice"] = finish_slice_bytes(scan.pairs // scan.slices)
     return sizes | {name: sum(parts.values()) for name, parts in ray_task_parts(scan, settings).items()}
@@ -214,10 +206,6 @@ def _parts_together(scan: Summary, settings: Settings, data: int) -> dict[str, i
 def _field_of_task(scan: Summary, settings: Settings) -> int:
     """Memory of the travel time of one emitter, in the slab where it is tracked, bytes."""
     tracked = shape_of(scan, settings)
-    margin = settings.numerics.axial_margin_nodes
-    # The receivers of an emitter of an array in space are at all heights.
-    if margin is not None and len(tracked) == 3 and not scan.in_space:
-        tracked = (*tracked[:2], min(tracked[2], 2 * margin + 2))
     if settings.rays == "straight":
         return 2 * REAL * math.prod(tracked)
     return field_bytes(tracked, settings.ray_eikonal)

@@ -51,7 +51,7 @@ def reflection_task_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     if traces is None or not settings.reflection.enabled:
         return {}
     nodes, elements = settings.grid_nodes, scan.emitters
-    field = 4 * (nodes + 3) ** 2 * (2 if settings.reflection.gain == "attenuation" else 1)
+    field = 4 * (nodes + 3) ** 2
     side = pixels_of(traces, scan.width_m, settings)
     factor = upsampling(traces.rate_hz, traces.frequency_hz)
     signals = traces.receivers * traces.samples * factor

@@ -30,11 +30,10 @@ void jet(global const float *spline, int stored_x, int stored_y, double x, doubl
     }
 }
 
-// Time, direction and gain of some pixels as seen from each element, (elements, pixels).
+// Time and direction of some pixels as seen from each element, (elements, pixels).
 kernel void view_pixels(global const double *places, global const float *slowness,
-                        global const float *loss, int lossy, int stored_x, int stored_y, double spacing,
-                        int spreading, global const double *px, global const double *py, int pixels,
-                        global float4 *views)
+                        int stored_x, int stored_y, double spacing, global const double *px,
+                        global const double *py, int pixels, global float4 *views)
 {
     int p = get_global_id(0), k = get_global_id(1);
     if (p >= pixels)
@@ -46,13 +45,8 @@ kernel void view_pixels(global const double *places, global const float *slownes
     jet(slowness + spline, stored_x, stored_y, px[p], py[p], &mean, &in_x, &in_y);
     double gx = mean * x / distance + distance * in_x, gy = mean * y / distance + distance * in_y;
     double length = sqrt(gx * gx + gy * gy);
-    double gain = spreading ? sqrt(spacing * distance) : 1.0;
     double time = spacing * distance * mean;
-    if (lossy) {
-        jet(loss + spline, stored_x, stored_y, px[p], py[p], &mean, &in_x, &in_y);
-        gain *= exp(spacing * distance * mean);
-    }
-    views[(size_t)k * pixels + p] = (float4)(time, gx / length, gy / length, gain);
+    views[(size_t)k * pixels + p] = (float4)(time, gx / length, gy / length, 0.0);
 }
 
 // b_e(x) and the sum of the weights of one emission at each pixel, over the receivers in their order.
@@ -75,10 +69,10 @@ kernel void sum_receivers(global const float *signals, global const uchar *used,
             continue;
         float place = fmin(fmax(rate * (sent.x + back.x) - first, 0.0f), last);
         int k = (int)place;
-        float part = place - k, w = weight * sent.w * back.w;
+        float part = place - k;
         global const float *trace = signals + ((size_t)e * count + r) * 2 * samples + k;
-        real += w * (trace[0] + part * (trace[1] - trace[0]));
-        imaginary += w * (trace[samples] + part * (trace[samples + 1] - trace[samples]));
+        real += weight * (trace[0] + part * (trace[1] - trace[0]));
+        imaginary += weight * (trace[samples] + part * (trace[samples + 1] - trace[samples]));
         total += weight;
     }
     found[(size_t)e * pixels + p] = (float4)(real, imaginary, total, 0.0f);

@@ -8,24 +8,20 @@ import { html, useRead } from "./view.js";
 
 const SOFTWARE = { bentray: "Bentray", python: "Python", numpy: "NumPy", numba: "Numba", scipy: "SciPy" };
 const SAID = {
+  automatic: "Decided automatically",
   water: "Water", pulse: "Pulse", quality: "Quality of the scan", geometry: "Geometry", waveform: "Full waveform", attenuation: "Attenuation",
   reflection: "Reflection", uncertainty: "Uncertainty",
   frequency_hz: "Centre frequency", amplitudes: "Amplitudes",
 };
 // What a parameter of no value means: the automatic decision, unless stated here.
 const NUMERICS = {
-  axial_margin_nodes: ["Axial margin", "nodes", "everywhere"],
-  straight_iterations: ["Iterations with straight rays first"],
   coarser_grids: ["Coarser grids first"],
   stop_rms_s: ["Stop at a residual of", "s", "not early"],
-  front_smoothing_nodes: ["Smoothing for the wave front", "nodes"],
   ray_width_m: ["Width of rays", "m"],
   ray_gradient: ["Gradient along rays"],
-  relaxation_decay: ["Decay of the relaxation per iteration"],
   subset: ["Emitters per update"],
   huber_scale: ["Residuals are weighed linearly beyond", "standard deviations"],
   reciprocity: ["Reverse pairs fill missing ones"],
-  guided_rounds: ["Arrivals picked again"],
   bands: ["Frequency bands"],
   emitters: ["Emitters per band"],
 };

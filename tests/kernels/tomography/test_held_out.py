@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.array_shapes import arc, facing_lines
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
-from bentray_kernels.tomography.model_selection.held_out import part_of
+from bentray_kernels.tomography.held_out import part_of
 
 PARTS = ("shown", "held-out", "views")
 SPARSE = ("shown-sparse", "views-sparse")

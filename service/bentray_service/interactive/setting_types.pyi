@@ -1,19 +1,15 @@
-"""The settings of jobs as types, for editors and type checkers; a test compares them with the records."""
-
-from __future__ import annotations
+"""The settings of jobs as types, for editors and type checkers; written by ``setting_stubs``."""
 
 from typing import Literal, TypedDict
 
+from bentray_kernels.device_request import DeviceRequest
 from bentray_kernels.picker_names import PickerName
 from bentray_kernels.solver_names import SolverName
 
 Method = Literal["sart", "gauss-newton", "auto", "waveform"]
 PhantomName = Literal["table6", "table6-vertical", "detailed", "table7"]
 
-
 class ReconstructionSettings(TypedDict, total=False):
-    """The settings of a reconstruction beside its method, each by its own name; see the table of settings."""
-
     rays: Literal["curved", "straight"]
     eikonal: SolverName
     decomposition: Literal["slices", "volume"] | None
@@ -25,34 +21,21 @@ class ReconstructionSettings(TypedDict, total=False):
     speed_bounds_mps: tuple[float, float]
     roi: bool
     device: Literal["auto", "cpu", "opencl"]
-    seed: int
     resolution_check: bool
     uncertainty: bool
     minutes: float | None
     relaxation: float
-    smoothing_nodes: float
     speed_range_mps: tuple[float, float] | None
-    penalty: Literal["total-variation", "laplacian", "tikhonov"]
     penalty_strength: float
-    edge_mps: float
     picker: PickerName
     examine: bool
     max_left_out: float
     attenuation: bool
     amplitudes: Literal["recorded", "ratio", "spectrum"]
-    attenuation_solver: Literal["penalised", "sart"]
-    focusing: bool
     reflection: bool
-    delays: Literal["reconstructed", "water"]
     pixel_m: float | None
-    pair_angle_deg: float
-    coherence_factor: bool
-    gain: Literal["none", "spreading", "attenuation"]
-
 
 class SimulationSettings(TypedDict, total=False):
-    """The settings of a simulated scan beside its phantom."""
-
     waveform: bool
     nodes: int
     elements: int
@@ -69,10 +52,7 @@ class SimulationSettings(TypedDict, total=False):
     emissions: int | None
     side_m: float | None
 
-
 class RefractionSettings(TypedDict, total=False):
-    """The settings of a refractive rendering of a volume."""
-
     iso: tuple[float, ...]
     index: tuple[float, ...]
     outside: float
@@ -94,4 +74,4 @@ class RefractionSettings(TypedDict, total=False):
     width: int
     height: int
     depth: int
-    device: Literal["auto", "cpu", "opencl"]
+    device: DeviceRequest

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from ...acquisition import Dataset
-from ...arrays import Flags, Ints
+from ..acquisition import Dataset
+from ..arrays import Flags, Ints
 
 Part = Literal["all", "shown", "held-out", "views", "shown-sparse", "views-sparse"]
 

@@ -8,22 +8,14 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import Device, device_selection, engine_selection
 from bentray_kernels.tomography import Settings, device_choice
-from bentray_kernels.tomography.device_choice import ScanSize, device_work, with_device
+from bentray_kernels.tomography.device_choice import ScanSize, choose_device, device_work
 from bentray_workers.cluster import capacities
 from bentray_workers.cluster.connection import open_cluster
-from bentray_workers.files.dataset import write_dataset
-from bentray_workers.reconstruction.device_of_job import DECISION, settled
+from bentray_workers.reconstruction.job_machine import DECISIONS, JobMachine
 
 GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True)
 SIZE = ScanSize(40, 256, 256, 0)
 SART = Settings(method="sart", nodes=32, decomposition="slices")
-
-
-@pytest.fixture
-def path(scan, tmp_path):
-    file = tmp_path / "scan.h5"
-    write_dataset(file, scan)
-    return file
 
 
 @pytest.fixture
@@ -43,22 +35,22 @@ def trial(monkeypatch):
 
 def test_auto_takes_the_device_where_the_trial_was_faster(trial):
     asked, answer = trial
-    assert with_device(SIZE, SART).device == "opencl"
+    assert choose_device(SIZE, SART)[0] == "opencl"
     answer[0] = None
-    assert with_device(SIZE, SART) == SART
+    assert choose_device(SIZE, SART) == ("auto", "no OpenCL device of this machine was faster in a trial")
     assert {work.engine for work in asked} == {"sart"}
     assert asked[0].size == 8 * 40 * 32**2
     assert asked[0].memory_bytes > asked[0].buffer_bytes > 0
-    assert with_device(SIZE, SART.changed(device="cpu")).device == "cpu"
+    assert choose_device(SIZE, SART.changed(device="cpu"))[0] == "cpu"
     assert len(asked) == 2
 
 
 def test_auto_leaves_the_processor_to_compiled_tasks(trial, monkeypatch):
     _, answer = trial
     answer[0] = SimpleNamespace(device=replace(GPU, kind="cpu"))
-    assert with_device(SIZE, SART).device == "auto"
+    assert choose_device(SIZE, SART)[0] == "auto"
     monkeypatch.setenv("BENTRAY_DEVICE", "opencl")
-    assert with_device(SIZE, SART).device == "opencl"
+    assert choose_device(SIZE, SART)[0] == "opencl"
 
 
 @pytest.mark.parametrize(
@@ -83,42 +75,40 @@ def test_the_part_that_takes_longest_decides(changes, samples, engine):
     assert (work.engine if work else None) == engine
 
 
-def test_a_resumed_job_keeps_its_device(trial, path, tmp_path):
+def test_a_resumed_job_keeps_its_device(trial, tmp_path):
     asked, answer = trial
-    assert settled(None, tmp_path, path, SART).device == "opencl"
+    assert JobMachine(None, tmp_path).device(SIZE, SART)[0] == "opencl"
     answer[0] = None
-    assert settled(None, tmp_path, path, SART).device == "opencl"
+    assert JobMachine(None, tmp_path).device(SIZE, SART)[0] == "opencl"
     assert len(asked) == 1
-    (tmp_path / DECISION).write_text("damaged")
-    assert settled(None, tmp_path, path, SART).device == "auto"
+    (tmp_path / DECISIONS).write_text("damaged")
+    assert JobMachine(None, tmp_path).device(SIZE, SART)[0] == "auto"
 
 
-def test_embedded_workers_offer_the_device_that_is_chosen(trial, path, tmp_path, monkeypatch):
+def test_embedded_workers_offer_the_device_that_is_chosen(trial, tmp_path, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: True)
     with open_cluster(workers=1, local_directory=tmp_path / "local", processes=False) as cluster:
-        chosen = settled(cluster.client, tmp_path, path, SART)
-        assert chosen.device == "opencl"
+        assert JobMachine(cluster.client, tmp_path).device(SIZE, SART)[0] == "opencl"
         assert "opencl" in capacities.capacities_of(cluster.client)[0].resources
         # A device that has gone since is not waited for.
         monkeypatch.setattr(capacities, "_has_device", lambda: False)
     with open_cluster(workers=1, local_directory=tmp_path / "other", processes=False) as cluster:
-        assert settled(cluster.client, tmp_path, path, SART).device == "auto"
+        assert JobMachine(cluster.client, tmp_path).device(SIZE, SART)[0] == "auto"
 
 
-def test_without_a_device_nothing_is_read_or_written(path, tmp_path, monkeypatch):
+def test_without_a_device_nothing_is_decided_or_written(tmp_path, monkeypatch):
     monkeypatch.setenv("BENTRAY_DEVICE", "cpu")
-    path.unlink()
-    assert settled(None, tmp_path, path, SART) == SART
-    assert not (tmp_path / DECISION).exists()
+    assert JobMachine(None, tmp_path).device(SIZE, SART) == ("auto", "")
+    assert not (tmp_path / DECISIONS).exists()
 
 
-def test_a_requested_device_that_is_missing_is_an_error(path, tmp_path, monkeypatch):
+def test_a_requested_device_that_is_missing_is_an_error(tmp_path, monkeypatch):
     monkeypatch.delenv("BENTRAY_DEVICE", raising=False)
     monkeypatch.setenv("BENTRAY_OPENCL_DEVICE", "none")
     with pytest.raises(InvalidInput, match="device: found 'opencl', but BENTRAY_OPENCL_DEVICE=none"):
-        settled(None, tmp_path, path, SART.changed(device="opencl"))
+        JobMachine(None, tmp_path).device(SIZE, SART.changed(device="opencl"))
     monkeypatch.setenv("BENTRAY_DEVICE", "cpu")
     with pytest.raises(InvalidInput, match="because this machine has BENTRAY_DEVICE=cpu"):
-        settled(None, tmp_path, path, SART.changed(device="opencl"))
+        JobMachine(None, tmp_path).device(SIZE, SART.changed(device="opencl"))
     assert device_selection.hidden()
     assert not engine_selection.may_select_device()
