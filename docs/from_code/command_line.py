@@ -52,6 +52,8 @@ def _row(param: Any, context: Any) -> tuple[str, str, str] | None:
     if param.param_type_name == "option":
         names = [*param.opts, *param.secondary_opts]
     opts = ", ".join(f"`{name}`" for name in names)
+    if "|" in (accepted := param.display_type_rich(context) or ""):
+        opts += f" `{accepted}`"
     return opts, _default(param, context), _plain(param.help or "")
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 
@@ -49,33 +50,34 @@ app = typer.Typer(
     epilog="Start with: bentray demo. Exit codes: 0 success, 1 failure, 2 invalid input, 3 doubtful result.",
 )
 
-for command in (
-    demo.demo,
-    serve.serve,
-    worker.worker,
-    submit.submit,
-    download.download,
-    reconstruct.reconstruct,
-    reproduce.reproduce,
-    quality.quality,
-    convert.convert,
-    correct.correct,
-    compare.compare,
-    export.export,
-    simulate.simulate,
-    bench.bench,
-    geometry_field.geometry_field,
-    devices.devices,
-    audit.audit,
-    verify.verify,
-    backup.backup,
-    backup.restore,
-):
-    app.command()(command)
-app.command(cls=RepeatedSpacing)(render.render)
-app.add_typer(keys.keys, name="keys")
-app.add_typer(projects.projects, name="projects")
-app.add_typer(webhooks.webhooks, name="webhooks")
+# Commands by the panels of the help.
+PANELS: dict[str, tuple[Callable[..., Any], ...]] = {
+    "Reconstruct": (
+        demo.demo,
+        reconstruct.reconstruct,
+        quality.quality,
+        compare.compare,
+        reproduce.reproduce,
+        simulate.simulate,
+        geometry_field.geometry_field,
+    ),
+    "Data": (convert.convert, correct.correct, export.export),
+    "Service": (serve.serve, worker.worker, submit.submit, download.download),
+    "Administration": (
+        audit.audit,
+        backup.backup,
+        backup.restore,
+        verify.verify,
+        devices.devices,
+        bench.bench,
+    ),
+}
+for panel, commands in PANELS.items():
+    for command in commands:
+        app.command(rich_help_panel=panel)(command)
+app.command(cls=RepeatedSpacing, rich_help_panel="Reconstruct")(render.render)
+for name, group in {"keys": keys.keys, "projects": projects.projects, "webhooks": webhooks.webhooks}.items():
+    app.add_typer(group, name=name, rich_help_panel="Administration")
 
 
 def _version(requested: bool) -> None:

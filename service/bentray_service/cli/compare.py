@@ -32,7 +32,7 @@ def compare(
             ".nii or a volume in HDF5."
         ),
     ],
-    quantity: Annotated[str, typer.Option(help="Quantity: speed or attenuation.")] = "speed",
+    quantity: Annotated[str, typer.Option(metavar="<speed|attenuation>", help="Quantity.")] = "speed",
     region: Annotated[
         list[str] | None,
         typer.Option(

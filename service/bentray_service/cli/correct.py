@@ -11,21 +11,23 @@ from .options.paths import check_apart, output_file
 from .options.scan_options import input_scan
 from .output.terminal import AsJson, print_json, print_lines
 
+TIMES, LENGTHS = "<s|ms|us|ns>", "<m|cm|mm|um>"
+
 
 def correct(
     file: Annotated[Path, typer.Argument(help="Dataset file; it stays as it is.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Corrected dataset file to write (.h5).")],
     times_in: Annotated[
-        str | None, typer.Option("--times-in", help="Unit of the times in the original file: s, ms, us, ns.")
+        str | None, typer.Option("--times-in", metavar=TIMES, help="Unit of the times in the original file.")
     ] = None,
     times_read_as: Annotated[
-        str, typer.Option("--times-read-as", help="Unit in which they were read.")
+        str, typer.Option("--times-read-as", metavar=TIMES, help="Unit in which they were read.")
     ] = "s",
     positions_in: Annotated[
-        str | None, typer.Option("--positions-in", help="Unit of the lengths in it: m, cm, mm, um.")
+        str | None, typer.Option("--positions-in", metavar=LENGTHS, help="Unit of the lengths in it.")
     ] = None,
     positions_read_as: Annotated[
-        str, typer.Option("--positions-read-as", help="Unit in which they were read.")
+        str, typer.Option("--positions-read-as", metavar=LENGTHS, help="Unit in which they were read.")
     ] = "m",
     sampling_rate_hz: Annotated[
         float | None, typer.Option("--sampling-rate", help="Sampling rate of the traces, Hz.")

@@ -24,7 +24,7 @@ Quantity = Annotated[
         "but for the reflection, which has a grid of its own."
     ),
 ]
-AttenuationUnit = Annotated[str, typer.Option("--attenuation", help="Its unit: Np/m or dB/cm/MHz.")]
+AttenuationUnit = Annotated[str, typer.Option("--attenuation", metavar="<Np/m|dB/cm/MHz>", help="Its unit.")]
 AttenuationFrequency = Annotated[
     float | None,
     typer.Option("--frequency", show_default="of the scan", help="Frequency for dB/cm/MHz, Hz."),

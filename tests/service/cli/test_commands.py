@@ -50,14 +50,44 @@ def test_help_fits_a_narrow_terminal_and_gives_an_example_that_parses(
     assert [word for word in options if word.startswith("-") and word not in shown] == []
 
 
-@pytest.mark.parametrize("group", ["", "keys", "projects", "webhooks"])
-def test_no_summary_of_a_command_is_cut(
-    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, group: str
+@pytest.mark.parametrize(
+    ("group", "panels"),
+    [
+        ("", ["Reconstruct", "Data", "Service", "Administration"]),
+        *((group, ["Commands"]) for group in ("keys", "projects", "webhooks")),
+    ],
+)
+def test_summaries_of_commands_stand_in_groups_and_are_not_cut(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, group: str, panels: list[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     said = bentray(*group.split(), "--help").stdout
-    assert len(said.partition("\nCommands:")[2].split()) > 10
-    assert "..." not in said.partition("\nCommands:")[2]
+    assert [line[:-1] for line in said.splitlines() if line.endswith(":") and line[0] != " "] == [
+        "Options",
+        *panels,
+    ]
+    listed = said.partition("\nOptions:")[2]
+    assert len(listed.split()) > 10
+    assert "..." not in listed
+
+
+@pytest.mark.parametrize(
+    ("command", "choices"),
+    [
+        ("reconstruct", "--picker <aic|threshold|energy-ratio|sta-lta|correlation|matched>"),
+        ("reconstruct", "--rays <curved|straight>"),
+        ("correct", "--times-in <s|ms|us|ns>"),
+        ("quality", "--picker <aic|threshold|energy-ratio|sta-lta|correlation|matched>"),
+        ("render", "--camera <orthographic|perspective>"),
+    ],
+)
+def test_choices_are_shown_as_choices(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, command: str, choices: str
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    said = bentray(command, "--help").stdout
+    assert choices in said
+    assert max(map(len, said.partition("Options:")[2].splitlines())) <= 80
 
 
 @pytest.mark.parametrize("command", COMMANDS)

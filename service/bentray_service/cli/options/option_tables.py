@@ -17,6 +17,8 @@ Command = Callable[..., None]
 
 # Left off the name of an option: ``--side`` is in metres, as its help says.
 UNITS = ("_mps", "_m", "_nodes", "_deg", "_c", "_hz")
+# More do not fit a line of 80 columns beside the name of the option.
+LONGEST_CHOICES = 64
 
 
 @dataclass(frozen=True)
@@ -107,8 +109,8 @@ def option_of(field: Field[Any], hint: Any, choices: tuple[str, ...], name: str,
     if field.default is None:
         (kind,) = (part for part in get_args(hint) if part is not type(None))
     if choices:
-        kind = str
-        if not all(word in text for word in choices):
+        kind, metavar = str, shown_choices(choices)
+        if metavar is None and not all(word in text for word in choices):
             text = f"{text} One of: {', '.join(choices)}."
     elif kind is bool:
         flag = f"{flag}/--no-{flag[2:]}"
@@ -127,6 +129,12 @@ def flag_of(name: str) -> str:
     """The option of a field: without the unit, with hyphens."""
     unit = next((unit for unit in UNITS if name.endswith(unit)), "")
     return "--" + name.removesuffix(unit).replace("_", "-")
+
+
+def shown_choices(choices: tuple[str, ...]) -> str | None:
+    """Choices as the help shows them, ``<a|b>``; None if they are too long for a line."""
+    shown = f"<{'|'.join(choices)}>"
+    return shown if len(shown) <= LONGEST_CHOICES else None
 
 
 def default_of(field: Field[Any]) -> str:

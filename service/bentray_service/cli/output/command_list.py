@@ -21,8 +21,11 @@ class CommandList(TyperGroup):
                 command.help = command.help.replace("\n\nExample:", "\n\n\b\nExample:")
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the commands with their whole summaries."""
-        found = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
-        rows = [(name, one.get_short_help_str(WHOLE)) for name, one in found if one is not None]
-        with formatter.section("Commands"):
-            formatter.write_dl(rows)
+        """Write the commands with their whole summaries, below the names of their panels."""
+        panels: dict[str, list[tuple[str, str]]] = {}
+        for name, command in self.commands.items():
+            rows = panels.setdefault(getattr(command, "rich_help_panel", None) or "Commands", [])
+            rows.append((name, command.get_short_help_str(WHOLE)))
+        for panel, rows in panels.items():
+            with formatter.section(panel):
+                formatter.write_dl(rows)

@@ -26,7 +26,8 @@ def test_every_field_has_an_option_with_default_and_choices(options, kind) -> No
         option = options[field.name]
         shown = words.get(str(field.default), str(field.default))
         assert option.default == (field.metadata["unset"] if field.default in (None, ()) else shown)
-        assert all(choice in option.help for choice in choices_of(kind).get(field.name, ()))
+        shown = option.help + (option.metavar or "")
+        assert all(choice in shown for choice in choices_of(kind).get(field.name, ()))
 
 
 def test_omitted_options_take_defaults() -> None:
