@@ -81,7 +81,7 @@ def compared(size: FatScan, images: dict[str, Reflection], speed: Reconstruction
         name: [echo_near(image, point, WINDOW_WAVES * wave) for point in POINTS]
         for name, image in images.items()
     }
-    moved = {name: [one.away_m / wave for one in echoes] for name, echoes in found.items()}
+    moved = {name: [echo.away_m / wave for echo in echoes] for name, echoes in found.items()}
     each = "; ".join(f"{name}: " + ", ".join(f"{one:.2f}" for one in away) for name, away in moved.items())
     made = f"{size.elements} elements, {size.emissions} emit, {1e-6 * size.frequency_hz:g} MHz; "
     made += f"speed by {speed.settings.rays} {speed.settings.method}, {speed.speed.shape[0]} nodes; "
@@ -102,10 +102,10 @@ def compared(size: FatScan, images: dict[str, Reflection], speed: Reconstruction
         each,
     )
     lines = {name: line_offset(image, LINE, WINDOW_WAVES * wave) / wave for name, image in images.items()}
-    beside = "; ".join(f"{name}: {one:.2f}" for name, one in lines.items())
+    beside = "; ".join(f"{name}: {error:.2f}" for name, error in lines.items())
     yield Row("F1 line behind fat, error of place", lines[RECONSTRUCTED], 0.5, "<=", "wavelengths", beside)
     widths = {name: float(np.mean([one.width_m for one in echoes])) / wave for name, echoes in found.items()}
-    beside = "; ".join(f"{name}: {one:.2f} wavelengths" for name, one in widths.items())
+    beside = "; ".join(f"{name}: {width:.2f} wavelengths" for name, width in widths.items())
     yield Row(
         "F1 points behind fat, -6 dB width over that without fat",
         widths[RECONSTRUCTED] / widths[REFERENCE],
@@ -115,7 +115,7 @@ def compared(size: FatScan, images: dict[str, Reflection], speed: Reconstruction
         beside,
     )
     contrasts = {name: cyst_contrast(image, CYST, CYST_M) for name, image in images.items()}
-    beside = "; ".join(f"{name}: {one:.2f}" for name, one in contrasts.items())
+    beside = "; ".join(f"{name}: {value:.2f}" for name, value in contrasts.items())
     yield Row(
         "F1 cyst behind fat, contrast over that with delays in water",
         contrasts[RECONSTRUCTED] / contrasts[WATER],
@@ -128,18 +128,18 @@ def compared(size: FatScan, images: dict[str, Reflection], speed: Reconstruction
 
 def other_solver(context: BenchmarkContext) -> Iterator[Row]:
     """Places of the targets in a scan by k-Wave, where it is installed."""
-    found, why = installed()
+    peers, why = installed()
     targets = (
         "F1 k-Wave, points behind fat, largest error of place",
         "F1 k-Wave, line behind fat, error of place",
     )
     if context.quick:
         return
-    if not found:
+    if not peers:
         for target in targets:
             yield Row(target, None, 0.5, "<=", "wavelengths", why["k-Wave"])
         return
-    size = FatScan(OTHER_HZ, OTHER_ELEMENTS, OTHER_EMISSIONS, found["k-Wave"])
+    size = FatScan(OTHER_HZ, OTHER_ELEMENTS, OTHER_EMISSIONS, peers["k-Wave"])
     scan = size.simulated(context.progress, ("behind fat",))["behind fat"]
     picked = replace(pick(scan), waveform=scan.waveform)
     wanted, wave = Settings.of(reflection=True, attenuation=False), size.wavelength_m
@@ -151,12 +151,12 @@ def other_solver(context: BenchmarkContext) -> Iterator[Row]:
     for delays, image in images.items():
         assert image is not None
         echoes = [echo_near(image, point, OTHER_WINDOW * wave) for point in POINTS]
-        moved[delays] = [one.away_m / wave for one in echoes]
+        moved[delays] = [echo.away_m / wave for echo in echoes]
         lines[delays] = line_offset(image, LINE, OTHER_WINDOW * wave) / wave
     made = f"{size.elements} elements, {size.emissions} emit, {1e-6 * size.frequency_hz:g} MHz; "
     each = "; ".join(f"{name}: " + ", ".join(f"{one:.2f}" for one in away) for name, away in moved.items())
     yield Row(targets[0], max(moved["reconstructed"]), 0.5, "<=", "wavelengths", made + each)
-    each = "; ".join(f"{name}: {one:.2f}" for name, one in lines.items())
+    each = "; ".join(f"{name}: {error:.2f}" for name, error in lines.items())
     yield Row(targets[1], lines["reconstructed"], 0.5, "<=", "wavelengths", made + each)
 
 
@@ -170,10 +170,10 @@ def timed(context: BenchmarkContext) -> Iterator[Row]:
     inside = np.hypot(line[:, None], line[None, :]) < 0.49 * SIDE_M
     pixels = Pixels(np.full(2, middle + line[0]) / spacing, step / spacing, inside)
     everyone = np.arange(ELEMENTS)
-    parts = np.random.default_rng(1).standard_normal((BATCH, ELEMENTS, 2, SAMPLES)).astype(np.float32)
+    samples = np.random.default_rng(1).standard_normal((BATCH, ELEMENTS, 2, SAMPLES)).astype(np.float32)
     used = np.ones((BATCH, ELEMENTS), dtype=bool)
     # A sample of each record beyond the longest way.
-    signals = Signals(parts, used, 0.0, 0.9 * SAMPLES * WATER_MPS / (2.2 * SIDE_M))
+    signals = Signals(samples, used, 0.0, 0.9 * SAMPLES * WATER_MPS / (2.2 * SIDE_M))
     speed = np.full((NODES, NODES), WATER_MPS)
     batches = range(0, ELEMENTS // (8 if context.quick else 1), BATCH)
 

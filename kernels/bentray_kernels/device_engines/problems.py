@@ -148,9 +148,9 @@ def traces_in_space(nodes: int, steps: int) -> Engine:
     speed = np.random.default_rng(0).uniform(1400.0, 1600.0, (nodes,) * 3)
     medium = Medium.from_speed(speed, spacing, step, dtype=np.float32)
     middle = 0.5 * spacing * (nodes - 1)
-    places = np.array([[middle, middle, middle], [middle, middle, middle + 4.0 * spacing]])
+    points = np.array([[middle, middle, middle], [middle, middle, middle + 4.0 * spacing]])
     pulse = np.exp(-(((np.arange(steps) - 0.5 * steps) * 6.0 / steps) ** 2))
-    emissions = Emissions(places[:1], places, [np.arange(2)], pulse)
+    emissions = Emissions(points[:1], points, [np.arange(2)], pulse)
     work = float(steps * medium.keep.size)
 
     def simulated(engine: WaveEngine) -> Floats:
@@ -180,8 +180,8 @@ def gradients(nodes: int, steps: int, emitters: int) -> Engine:
         return 0.5 * float((samples**2).sum()), samples
 
     def summed(engine: WaveEngine) -> Floats:
-        parts = misfit_gradients(medium, emissions, energy, 4, engine=engine)
-        return np.stack([part.gradient for part in parts])
+        shots = misfit_gradients(medium, emissions, energy, 4, engine=engine)
+        return np.stack([shot.gradient for shot in shots])
 
     return Engine(
         "wave",
@@ -239,11 +239,11 @@ def sart_scan(nodes: int, slices: int) -> tuple[list[SliceCall], Settings]:
     positions = ring.positions()
     speed, spacing = table6(WATER_MPS).speed(nodes, TABLE6_SIDE_M), TABLE6_SIDE_M / (nodes - 1)
     senders = np.linspace(0, ring.elements, TRIAL_EMITTERS, endpoint=False).astype(int)
-    places = positions / spacing + 0.5 * (nodes - 1)
+    positions_n = positions / spacing + 0.5 * (nodes - 1)
     times = eikonal.solve_many(
-        np.broadcast_to(speed, (TRIAL_EMITTERS, *speed.shape)), spacing, spacing * places[senders], "fsm"
+        np.broadcast_to(speed, (TRIAL_EMITTERS, *speed.shape)), spacing, spacing * positions_n[senders], "fsm"
     )
-    measured = np.stack([map_coordinates(time, places.T, order=1) for time in times])
+    measured = np.stack([map_coordinates(time, positions_n.T, order=1) for time in times])
     offset = positions[senders, None] - positions
     delta = measured - np.sqrt((offset**2).sum(axis=2)) / WATER_MPS
     delta[sending, senders] = np.nan
@@ -264,9 +264,9 @@ def echoes(pixels: int, elements: int, emissions: int) -> Engine:
     line = step * (np.arange(pixels) - 0.5 * (pixels - 1))
     inside = np.hypot(line[:, None], line[None, :]) < 0.048
     grid = Pixels(np.full(2, (middle + line[0]) / spacing), step / spacing, inside)
-    parts = np.random.default_rng(2).standard_normal((emissions, elements, 2, 2000)).astype(np.float32)
-    parts[..., [0, -1]] = 0.0
-    signals = Signals(parts, np.ones((emissions, elements), bool), 0.0, 1e7)
+    samples = np.random.default_rng(2).standard_normal((emissions, elements, 2, 2000)).astype(np.float32)
+    samples[..., [0, -1]] = 0.0
+    signals = Signals(samples, np.ones((emissions, elements), bool), 0.0, 1e7)
     receivers = np.arange(elements)
     senders = receivers[np.linspace(0, elements, emissions, endpoint=False).astype(int)]
     scan = signals, times, spacing, senders, receivers, grid, PAIR_ANGLE_DEG

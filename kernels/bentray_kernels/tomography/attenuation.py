@@ -80,7 +80,7 @@ def _without_focusing(problem: Problem, settings: Settings, slowness: Floats, em
     return replace(problem, log_ratio=ratio)
 
 
-def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats:
+def solve(problem: Problem, settings: Settings, blocks: Sequence[Rows]) -> Floats:
     """The attenuation from the rows of all emitters, in their order.
 
     The rays are fixed, so the problem is linear: log ratios are integrals of the attenuation, once focusing
@@ -94,12 +94,12 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
     """
     shape = problem.region.shape
     water = np.full(shape, problem.water_attenuation * problem.spacing)
-    density = problem.mean_in_region(ray_density(problem, parts))
+    density = problem.mean_in_region(ray_density(problem, blocks))
     if density == 0.0:
         return water / problem.spacing
     bounds = (0.0, MAX_NP_M * problem.spacing)
     if settings.numerics.attenuation_solver == "sart":
-        return attenuation_sart.solve(parts, water, problem.region, settings, bounds) / problem.spacing
+        return attenuation_sart.solve(blocks, water, problem.region, settings, bounds) / problem.spacing
     image, dual = water, np.zeros((len(shape), *shape))
     # Rays through a blurred speed image are all somewhat off, and none is an outlier: on Table 6 after SART
     # the limit made the error larger, after Gauss–Newton a third smaller.
@@ -108,8 +108,8 @@ def solve(problem: Problem, settings: Settings, parts: Sequence[Rows]) -> Floats
     if settings.reads_amplitudes:
         spreads, smooth = settings.numerics.huber_scale / TRACES_STRICTER, _smoothing(problem, settings)
     for _ in range(ROBUST_PASSES if spreads and smooth is None else PASSES):
-        remaining = [replace(part, residual=part.residual - part.project(image - water)) for part in parts]
-        residual = np.concatenate([part.residual for part in remaining])
+        remaining = [replace(part, residual=part.residual - part.project(image - water)) for part in blocks]
+        residual = np.concatenate([block.residual for block in remaining])
         limit = huber.limit(residual, spreads)
         misfit = huber.clipped_rms(residual, limit)
         image, dual = Linearised(

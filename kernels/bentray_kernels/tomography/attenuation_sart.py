@@ -13,7 +13,7 @@ from .settings import Settings
 
 
 def solve(
-    parts: Sequence[Rows], water: Floats, region: Flags, settings: Settings, bounds: tuple[float, float]
+    blocks: Sequence[Rows], water: Floats, region: Flags, settings: Settings, bounds: tuple[float, float]
 ) -> Floats:
     """The attenuation after ``settings.iterations`` iterations over all emitters (equation 1).
 
@@ -21,7 +21,7 @@ def solve(
     the rays, weighted by the length of each in the node. The rays do not change.
 
     Args:
-        parts: rows of all emitters, in their order; residuals are log ratios minus those of water, Np.
+        blocks: rows of all emitters, in their order; residuals are log ratios minus those of water, Np.
         water: the image of the water, in which iterations start, (nx, ny[, nz]), Np per node.
         region: as ``water``, nodes that may change.
         settings: ``sart``, ``iterations`` and ``numerics``.
@@ -31,7 +31,7 @@ def solve(
         as ``water``, Np per node.
     """
     image = water.copy()
-    emitters = [rows for part in parts for rows in part.by_emitter() if rows.residual.size]
+    emitters = [rows for block in blocks for rows in block.by_emitter() if rows.residual.size]
     for iteration in range(settings.iterations):
         for k in np.random.default_rng((settings.numerics.seed, iteration)).permutation(len(emitters)):
             change = _smoothed(_update(emitters[k], image - water), settings.numerics.smoothing_nodes)

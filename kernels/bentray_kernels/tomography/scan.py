@@ -83,8 +83,8 @@ class Scan(NamedTuple):
 
     def stages(self) -> tuple[Settings, ...]:
         """Settings of each stage, see ``grid_schedule``."""
-        known: tuple[Settings, ...] = self.source.once(stages_of, self)
-        return known
+        stages: tuple[Settings, ...] = self.source.once(stages_of, self)
+        return stages
 
     def problem(self, index: int, stage: int = -1) -> Problem:
         """The problem of one slice at a stage, the last by default."""

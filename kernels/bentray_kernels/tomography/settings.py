@@ -362,8 +362,8 @@ class Settings:
                 own[name] = value
         fixed = inner.pop("numerics", {})
         numerics = replace(self.numerics, **fixed) if fixed else self.numerics
-        for record, parts in inner.items():
-            own[record] = replace(own[record], **parts)
+        for record, changes in inner.items():
+            own[record] = replace(own[record], **changes)
         return Settings(**own) if numerics == AUTOMATIC else FixedSettings(**own, numerics=numerics)
 
     @property
@@ -425,10 +425,10 @@ class FixedSettings(Settings):
             raise InvalidInput("ray_width_m", fixed.ray_width_m, "0, unless method is gauss-newton")
 
 
-PUBLIC = tuple(one.name for one in fields(Settings))
-NUMERICAL = tuple(one.name for one in fields(Numerics))
+PUBLIC = tuple(field.name for field in fields(Settings))
+NUMERICAL = tuple(field.name for field in fields(Numerics))
 # Where each setting is, by the name that is its own: ``relaxation`` is ``sart.relaxation``.
-PLACES = {name: one.place for name, one in declared(Settings).items()}
+PLACES = {name: setting.place for name, setting in declared(Settings).items()}
 
 
 def _check_speeds(name: str, pair: tuple[float, float]) -> None:

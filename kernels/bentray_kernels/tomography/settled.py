@@ -94,16 +94,16 @@ def settled(source: Source, settings: Settings, machine: Machine | None = None) 
     if nodes is None:
         nodes, why = _nodes(dataset, settings.side_m, decomposition)
         reasons["nodes"] = f"{nodes} along a side, {why}"
-    known = settings.changed(decomposition=decomposition, nodes=nodes)
-    pairs.count(dataset, known)
+    sized = settings.changed(decomposition=decomposition, nodes=nodes)
+    pairs.count(dataset, sized)
     size = ScanSize(dataset.slices, len(dataset.tx), len(dataset.rx), source.samples)
-    device, why = here.device(size, known)
+    device, why = here.device(size, sized)
     if why:
         reasons["device"] = f"{'OpenCL' if device == 'opencl' else 'compiled code'}, {why}"
-    blocks, why = here.blocks(dataset, known)
+    blocks, why = here.blocks(dataset, sized)
     if why:
         reasons["blocks"] = f"{blocks}, {why}"
-    chosen = known.changed(device=device, blocks=blocks)
+    chosen = sized.changed(device=device, blocks=blocks)
     waves = _waves(source, chosen)
     if waves is not None and waves.allowed and settings.minutes is not None:
         bands = waves.scale.bands(waves.settings)

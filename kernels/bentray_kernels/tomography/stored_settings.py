@@ -59,7 +59,7 @@ def from_stored(values: Mapping[str, Any], numerics: Mapping[str, Any] | None = 
     current: dict[str, Any] = {}
     for name, value in values.items():
         inner = value if isinstance(value, Mapping) else {name: value}
-        current |= {name if leaf == "enabled" else leaf: _plain(part) for leaf, part in inner.items()}
+        current |= {name if leaf == "enabled" else leaf: _plain(value) for leaf, value in inner.items()}
     current |= numerics or {}
     for name, left in FIXED.items():
         if (value := current.pop(name, left)) != left:

@@ -93,8 +93,8 @@ def digitised(scan: Dataset) -> Dataset:
     assert traces is not None
     assert traces.water is not None
     pair = (traces.object, traces.water)
-    step = max(float(np.abs(one).max()) for one in pair) / np.iinfo(np.int16).max
-    both = [(one / step).round().astype(np.int16) for one in pair]
+    step = max(float(np.abs(traces).max()) for traces in pair) / np.iinfo(np.int16).max
+    both = [(traces / step).round().astype(np.int16) for traces in pair]
     return replace(scan, waveform=Waveform(both[0], both[1], scale=step))
 
 
@@ -168,12 +168,12 @@ def _reconstruct(path: Path, scan: Dataset, candidates: Iterator[dict[str, Any]]
         )
 
 
-def compiled_in(parts: tuple[Callable[[Path], None], ...], folder: Path) -> int:
+def compiled_in(programs: tuple[Callable[[Path], None], ...], folder: Path) -> int:
     """How many kernels these parts have compiled, in a process of its own."""
     warnings.simplefilter("ignore")
     with compiled_kernels() as kernels:
-        for part in parts:
-            part(folder)
+        for program in programs:
+            program(folder)
     return len(kernels)
 
 
@@ -181,8 +181,8 @@ def marker() -> Path:
     """The file that says that all is compiled, beside what was: named for sources and processor."""
     key = hashlib.sha256(Path(__file__).read_bytes())
     processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
-    for part in (digest(__name__), sys.version, *processor):
-        key.update(part.encode())
+    for text in (digest(__name__), sys.version, *processor):
+        key.update(text.encode())
     folder = os.environ.get("NUMBA_CACHE_DIR") or ROOT / "__pycache__"
     return Path(folder) / f"compiled-{key.hexdigest()[:16]}"
 
@@ -197,8 +197,8 @@ def main() -> None:
         tempfile.TemporaryDirectory() as name,
         ProcessPoolExecutor(2, get_context("spawn")) as processes,
     ):
-        running = [processes.submit(compiled_in, parts, Path(name)) for parts in PARTS]
-        total = sum(part.result() for part in running)
+        running = [processes.submit(compiled_in, programs, Path(name)) for programs in PARTS]
+        total = sum(future.result() for future in running)
     done.parent.mkdir(parents=True, exist_ok=True)
     done.touch()
     sys.stdout.write(f"{total} kernels compiled\n")

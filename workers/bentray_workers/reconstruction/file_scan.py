@@ -77,8 +77,8 @@ class FileSource(NamedTuple):
     def traces(self, index: int, *, estimated_water: bool = False) -> Iterator[Dataset]:
         faults = read_findings(self.findings).of_traces(index)
         whole = read_once(self.recorded, self.recorded_stamp, self.water_temperature_c).dataset
-        with open_slice(self.recorded, whole, index, self.poll) as one:
-            put_right = apply(one, faults)
+        with open_slice(self.recorded, whole, index, self.poll) as dataset:
+            put_right = apply(dataset, faults)
             yield with_reference(put_right, self.findings.parent, index) if estimated_water else put_right
 
     def once(self, make: Callable[..., Any], /, *arguments: Any) -> Any:

@@ -141,14 +141,14 @@ class PickingSource(NamedTuple):
     @contextmanager
     def slice(self, index: int, findings: Sequence[Finding] = ()) -> Iterator[Dataset]:
         """One slice with traces that are read on access, with the findings corrected."""
-        with open_slice(self.path, self.dataset, index, partial(check_job_active, self.folder)) as one:
-            yield apply(one, findings)
+        with open_slice(self.path, self.dataset, index, partial(check_job_active, self.folder)) as dataset:
+            yield apply(dataset, findings)
 
     @contextmanager
     def with_water(self, index: int, findings: Sequence[Finding]) -> Iterator[Dataset]:
         """As ``slice``, with the estimated water shot where the file has none."""
-        with self.slice(index, findings) as one:
-            yield with_reference(one, self.folder, index)
+        with self.slice(index, findings) as dataset:
+            yield with_reference(dataset, self.folder, index)
 
 
 class PickingGraph:
@@ -172,8 +172,8 @@ class PickingGraph:
         self._parts: list[range] = []
         self._picks = False
         if source.reads_amplitudes or not dataset.picked:
-            with source.slice(0) as one:
-                require_traces(one, water=False)
+            with source.slice(0) as scan_2d:
+                require_traces(scan_2d, water=False)
             self._picks = True
         self._estimates = source.estimates_water
         if self._picks or self._estimates:
@@ -227,21 +227,21 @@ class PickingGraph:
             if len(finished) < len(self._slices):
                 return []
             return [Task(write_picked, (self._source, self._files, self._pop(finish_slice, 0)))]
-        part: range = task.arguments[-1]
-        self._emissions_done[task.function] += len(part)
-        self._results[task.function, index][part.start] = result
+        emissions: range = task.arguments[-1]
+        self._emissions_done[task.function] += len(emissions)
+        self._results[task.function, index][emissions.start] = result
         if len(self._results[task.function, index]) < len(self._parts):
             return []
-        parts = self._pop(task.function, index)
+        pieces = self._pop(task.function, index)
         if task.function is measure_traces:
-            self._measured[index] = parts if self._estimates else []
+            self._measured[index] = pieces if self._estimates else []
             if not self._examines:
                 return self._chords(index)
-            return [Task(examine_slice, (self._source, index, parts), keep_on_worker=True)]
+            return [Task(examine_slice, (self._source, index, pieces), keep_on_worker=True)]
         if task.function is read_chords:
-            found = task.arguments[2]
-            return [Task(estimate_slice_water, (self._source, index, found, parts), keep_on_worker=True)]
-        arguments = self._source, index, self._findings[index], parts
+            findings = task.arguments[2]
+            return [Task(estimate_slice_water, (self._source, index, findings, pieces), keep_on_worker=True)]
+        arguments = self._source, index, self._findings[index], pieces
         return [Task(finish_slice, arguments, keep_on_worker=True)]
 
     def _chords(self, index: int) -> list[Task]:
@@ -259,8 +259,8 @@ class PickingGraph:
     def _each_part(self, function: Callable[..., Any], index: int, *arguments: Any) -> list[Task]:
         """A task for each batch of emissions of a slice."""
         return [
-            Task(function, (self._source, index, *arguments, part), keep_on_worker=True)
-            for part in self._parts
+            Task(function, (self._source, index, *arguments, emissions), keep_on_worker=True)
+            for emissions in self._parts
         ]
 
     def _pop(self, function: Any, index: int) -> list[Any]:
@@ -268,84 +268,86 @@ class PickingGraph:
         return [result for _, result in sorted(self._results.pop((function, index)).items())]
 
 
-def measure_traces(source: PickingSource, index: int, part: range) -> Measured:
+def measure_traces(source: PickingSource, index: int, emissions: range) -> Measured:
     """Task: statistics of the traces of a batch of emissions."""
-    with source.slice(index) as one:
-        return Measured.from_dataset(one, part)
+    with source.slice(index) as dataset:
+        return Measured.from_dataset(dataset, emissions)
 
 
-def examine_slice(source: PickingSource, index: int, parts: list[Measured]) -> tuple[Finding, ...]:
+def examine_slice(source: PickingSource, index: int, measured: list[Measured]) -> tuple[Finding, ...]:
     """Task: findings in the traces of a slice; an unusable scan is rejected."""
-    with source.slice(index) as one:
-        findings, _ = check_traces(one, Measured.joined(parts))
+    with source.slice(index) as dataset:
+        findings, _ = check_traces(dataset, Measured.joined(measured))
     return _usable(source, index, findings)
 
 
 def find_chords(
-    source: PickingSource, index: int, findings: tuple[Finding, ...], parts: list[Measured]
+    source: PickingSource, index: int, findings: tuple[Finding, ...], measured: list[Measured]
 ) -> ExaminedChords:
     """Task: the chords of a slice through water, from which its water shot is estimated, and all findings."""
-    one = apply(source.dataset.slice(index), findings)
-    measures = Measured.joined(parts).object
+    dataset = apply(source.dataset.slice(index), findings)
+    measures = Measured.joined(measured).object
     if source.examine:
-        found, chords = examine_chords(one, measures)
-        return ExaminedChords((*findings, *_usable(source, index, found)), chords)
-    assert one.center_frequency_hz is not None
+        more, chords = examine_chords(dataset, measures)
+        return ExaminedChords((*findings, *_usable(source, index, more)), chords)
+    assert dataset.center_frequency_hz is not None
     return ExaminedChords(
-        findings, find_water_chords(one, measures.strongest_s, 1.0 / one.center_frequency_hz)
+        findings, find_water_chords(dataset, measures.strongest_s, 1.0 / dataset.center_frequency_hz)
     )
 
 
-def read_chords(source: PickingSource, index: int, found: ExaminedChords, part: range) -> ChordPulses:
+def read_chords(source: PickingSource, index: int, examined: ExaminedChords, emissions: range) -> ChordPulses:
     """Task: pulses of the chords through water in a batch of emissions."""
-    with source.slice(index, found.findings) as one:
-        assert one.center_frequency_hz is not None
-        return read_pulses(one, part, found.chords, 1.0 / one.center_frequency_hz)
+    with source.slice(index, examined.findings) as dataset:
+        assert dataset.center_frequency_hz is not None
+        return read_pulses(dataset, emissions, examined.chords, 1.0 / dataset.center_frequency_hz)
 
 
 def estimate_slice_water(
-    source: PickingSource, index: int, found: ExaminedChords, parts: list[ChordPulses]
+    source: PickingSource, index: int, examined: ExaminedChords, pulses_read: list[ChordPulses]
 ) -> tuple[Finding, ...]:
     """Task: estimate the water shot of a slice and write it; the findings with what was estimated."""
-    one = apply(source.dataset.slice(index), found.findings)
-    pulses = ChordPulses.joined(parts)
-    later, reference = estimate_from_pulses(one, found.chords, pulses, examine=source.examine)
+    dataset = apply(source.dataset.slice(index), examined.findings)
+    pulses = ChordPulses.joined(pulses_read)
+    later, reference = estimate_from_pulses(dataset, examined.chords, pulses, examine=source.examine)
     write_reference(reference_path(source.folder, index), reference)
-    return (*found.findings, *_usable(source, index, later))
+    return (*examined.findings, *_usable(source, index, later))
 
 
 def pick_emissions(
-    source: PickingSource, index: int, findings: tuple[Finding, ...], part: range
+    source: PickingSource, index: int, findings: tuple[Finding, ...], emissions: range
 ) -> EmissionPicks:
     """Task: times of a batch of emissions with standard deviations, and amplitudes if needed."""
-    with source.with_water(index, findings) as one:
-        if one.picked:
-            delta = one.differential_tof()[part.start : part.stop]
+    with source.with_water(index, findings) as dataset:
+        if dataset.picked:
+            delta = dataset.differential_tof()[emissions.start : emissions.stop]
             sigma = np.full_like(delta, np.nan)
         else:
-            require_traces(one)
-            delta, sigma = read_times(one, part, source.picker)
-        ratio = read_log_ratios(one, part, delta, source.amplitudes) if source.reads_amplitudes else None
+            require_traces(dataset)
+            delta, sigma = read_times(dataset, emissions, source.picker)
+        ratio = (
+            read_log_ratios(dataset, emissions, delta, source.amplitudes) if source.reads_amplitudes else None
+        )
         return EmissionPicks(delta, sigma, ratio)
 
 
 def finish_slice(
-    source: PickingSource, index: int, findings: tuple[Finding, ...], parts: list[EmissionPicks]
+    source: PickingSource, index: int, findings: tuple[Finding, ...], picks: list[EmissionPicks]
 ) -> tuple[Dataset, tuple[Finding, ...]]:
     """Task: one slice to reconstruct, without traces, and all findings in it."""
-    one = apply(source.dataset.slice(index), findings)
-    if parts and not one.picked:
-        delta, sigma = (np.concatenate(rows) for rows in zip(*(part[:2] for part in parts), strict=True))
-        delta, sigma = screen_times(one, delta, sigma, screened=not source.examine)
-        one = replace(one, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=source.picker)
+    dataset = apply(source.dataset.slice(index), findings)
+    if picks and not dataset.picked:
+        delta, sigma = (np.concatenate(rows) for rows in zip(*(pick[:2] for pick in picks), strict=True))
+        delta, sigma = screen_times(dataset, delta, sigma, screened=not source.examine)
+        dataset = replace(dataset, delta_tof_s=delta, sigma_s=sigma, tof_s=None, picker=source.picker)
     if source.reads_amplitudes:
-        ratio = np.concatenate([part.ratio for part in parts if part.ratio is not None])
-        ratio = np.where(np.isfinite(one.differential_tof()), ratio, np.nan)
-        one = replace(one, log_ratio_np=ratio, amplitude_frequency_hz=one.center_frequency_hz)
+        ratio = np.concatenate([pick.ratio for pick in picks if pick.ratio is not None])
+        ratio = np.where(np.isfinite(dataset.differential_tof()), ratio, np.nan)
+        dataset = replace(dataset, log_ratio_np=ratio, amplitude_frequency_hz=dataset.center_frequency_hz)
     if source.examines_times:
-        later = _usable(source, index, check_times(one))
-        one, findings = apply(one, later), (*findings, *later)
-    return one, findings
+        later = _usable(source, index, check_times(dataset))
+        dataset, findings = apply(dataset, later), (*findings, *later)
+    return dataset, findings
 
 
 def write_picked(
@@ -355,16 +357,16 @@ def write_picked(
     whole = source.dataset
     impossible = find_impossible(whole.impossible_times)
     if source.examine:
-        counted = [count_left_out(whole.slice(k), found) for k, (_, found) in enumerate(slices)]
+        counted = [count_left_out(whole.slice(k), of_slice) for k, (_, of_slice) in enumerate(slices)]
         too_few = find_too_few(counted, whole.impossible_times, source.max_left_out)
         _usable(source, 0, too_few)
-    of_slices = (replace(finding, slice=k) for k, (_, found) in enumerate(slices) for finding in found)
+    of_slices = (replace(finding, slice=k) for k, (_, faults) in enumerate(slices) for finding in faults)
     findings = (*impossible, *of_slices)
     corrected = any(finding.action != "reported" for finding in findings)
     changed = source.reads_amplitudes or not whole.picked or corrected
     if changed:
-        parts = [one for one, _ in slices]
-        picked = parts[0] if whole.slice_z_m is None else stacked(whole, parts)
+        datasets = [dataset for dataset, _ in slices]
+        picked = datasets[0] if whole.slice_z_m is None else stacked(whole, datasets)
         write_dataset(files.picked, replace(picked, truth=whole.truth))
     record = ScanFindings(findings, source.examines_times, changed)
     write_findings(files.findings, record, files.picked if changed else None)

@@ -108,7 +108,7 @@ def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters:
 
 
 def step(
-    problem: Problem, settings: Settings, state: Iterate, parts: Sequence[Rows], slice_index: int = 0
+    problem: Problem, settings: Settings, state: Iterate, blocks: Sequence[Rows], slice_index: int = 0
 ) -> Iterate:
     """The next image from the rows of all emitters, in their order; at the end, the best image.
 
@@ -119,7 +119,7 @@ def step(
     The strength of the total variation is proportional to the misfit: strong while the rays are inaccurate,
     so that their errors do not become structure, and finally as weak as the data are accurate.
     """
-    residual = np.concatenate([part.residual for part in parts])
+    residual = np.concatenate([block.residual for block in blocks])
     rms = math.sqrt(float((residual**2).mean()))
     number = len(state.history) + 1
     record = Iteration(slice_index, number, rms, len(problem.active_emitters), given=False)
@@ -143,11 +143,11 @@ def step(
         middle = 0.5 * (best.slowness + state.slowness)
         return replace(state, slowness=middle, halvings=state.halvings + 1, history=history)
     lowest, highest = settings.speed_bounds_mps
-    coverage = ray_density(problem, parts) * problem.spacing
+    coverage = ray_density(problem, blocks) * problem.spacing
     # Total variation is scaled by the misfit, s; quadratic penalties are relative to the data.
     unit = huber.clipped_rms(residual, limit) if settings.numerics.penalty == "total-variation" else 1.0
     image, dual = Linearised(
-        parts,
+        blocks,
         state.slowness * problem.spacing,
         problem.mean_in_region(coverage) / problem.spacing,
         problem.region,

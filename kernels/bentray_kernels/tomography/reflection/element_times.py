@@ -50,9 +50,9 @@ def solve_times(speed: Floats, spacing: float, elements: Floats) -> ElementTimes
     return ElementTimes(elements / spacing, splines)
 
 
-def joined(parts: list[ElementTimes]) -> ElementTimes:
+def joined(times: list[ElementTimes]) -> ElementTimes:
     """Those of several groups of elements, in their order."""
-    return ElementTimes(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    return ElementTimes(*(np.concatenate(arrays) for arrays in zip(*times, strict=True)))
 
 
 def times_between(times: ElementTimes, spacing: float, elements: Floats) -> Floats:

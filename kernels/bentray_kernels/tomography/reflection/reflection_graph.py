@@ -171,9 +171,9 @@ class ReflectionGraph:
         self._waiting[task.arguments[-1]] = result
         # In the order of the emitters, not of completion: floating-point sums depend on it.
         while (number := self._state.batches) in self._waiting:
-            parts = zip(self.sums, self._waiting.pop(number), strict=True)
+            pairs = zip(self.sums, self._waiting.pop(number), strict=True)
             self._state = ReflectionState(
-                self._state.pulse, number + 1, self._state.of, *(a + b for a, b in parts)
+                self._state.pulse, number + 1, self._state.of, *(a + b for a, b in pairs)
             )
         if self.done == self.total:
             self._times = {}
@@ -263,7 +263,7 @@ def echo_signals(
     at = _sample_times(dataset)
     factor, period = upsampling(rate, plan.frequency_hz), 1.0 / plan.frequency_hz
     used = plan.used[emissions].copy()
-    parts = np.zeros((len(emissions), len(plan.receivers), 2, factor * at.size), dtype=np.float32)
+    signals = np.zeros((len(emissions), len(plan.receivers), 2, factor * at.size), dtype=np.float32)
     for n, e in enumerate(emissions):
         traces = recorded.scale * np.asarray(recorded.object[e], dtype=np.float64)
         if recorded.object_scale is not None:
@@ -282,11 +282,11 @@ def echo_signals(
             water = high_pass(water, rate, plan.frequency_hz, later)
             traces = without_water_shot(traces, water, transmitted_s[n] + pulse.delay_s, window, at, period)
         # The beginning of the window has made low frequencies again, of equal phase in all traces.
-        parts[n] = analytic(high_pass(traces, rate, plan.frequency_hz), factor)
+        signals[n] = analytic(high_pass(traces, rate, plan.frequency_hz), factor)
     # Beyond the record the nearest sample is read.
-    parts[..., 0] = 0.0
-    parts[..., -1] = 0.0
-    return Signals(parts, used, at[0] - pulse.delay_s, factor * rate)
+    signals[..., 0] = 0.0
+    signals[..., -1] = 0.0
+    return Signals(signals, used, at[0] - pulse.delay_s, factor * rate)
 
 
 def _sample_times(dataset: Dataset) -> Floats:

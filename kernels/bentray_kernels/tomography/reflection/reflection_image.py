@@ -31,8 +31,8 @@ def envelope_of(sums: Sums, emissions: int) -> Float32s:
 
 def in_decibels(envelopes: Sequence[Float32s]) -> list[Floats]:
     """Envelopes relative to the largest value of all of them, dB, at least ``FLOOR_DB``."""
-    largest = max(float(one.max()) for one in envelopes)
+    largest = max(float(image.max()) for image in envelopes)
     floor = 10.0 ** (FLOOR_DB / 20.0)
     if largest == 0.0:
-        return [np.full(one.shape, FLOOR_DB) for one in envelopes]
-    return [20.0 * np.log10(np.maximum(one.astype(np.float64) / largest, floor)) for one in envelopes]
+        return [np.full(image.shape, FLOOR_DB) for image in envelopes]
+    return [20.0 * np.log10(np.maximum(image.astype(np.float64) / largest, floor)) for image in envelopes]

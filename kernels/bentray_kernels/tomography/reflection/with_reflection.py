@@ -70,4 +70,4 @@ def with_reflection(
 
 
 def _slices(values: Floats) -> list[Floats]:
-    return [np.ascontiguousarray(one) for one in np.moveaxis(np.atleast_3d(values), -1, 0)]
+    return [np.ascontiguousarray(plane) for plane in np.moveaxis(np.atleast_3d(values), -1, 0)]

@@ -64,17 +64,17 @@ def advance_slices(calls: Sequence[SliceCall], settings: Settings) -> list[State
     if session is not None:
         with computing_on(session):
             return _on_device(session, calls, settings)
-    return [advance(one.problem, settings, one.state, one.emitters, one.slice_index) for one in calls]
+    return [advance(call.problem, settings, call.state, call.emitters, call.slice_index) for call in calls]
 
 
 def _on_device(session: Session, calls: Sequence[SliceCall], settings: Settings) -> list[State]:
-    states = [one.state for one in calls]
-    left = [k for k, one in enumerate(calls) if not one.state.done]
+    states = [call.state for call in calls]
+    left = [k for k, call in enumerate(calls) if not call.state.done]
     while left:
         size = slice_size([calls[k] for k in left], settings)
         together = slices_in_flight(session, size)
-        some, left = left[:together], left[together:]
-        for k, state in zip(some, _advance(session, [calls[k] for k in some], settings), strict=True):
+        batch, left = left[:together], left[together:]
+        for k, state in zip(batch, _advance(session, [calls[k] for k in batch], settings), strict=True):
             states[k] = state
     return states
 
@@ -83,7 +83,7 @@ def slice_size(calls: Sequence[SliceCall], settings: Settings) -> SliceSize:
     """The memory of each of these slices."""
     problem = calls[0].problem
     nx, ny = problem.region.shape
-    emitters = max(min(one.emitters, len(one.problem.emitters)) for one in calls)
+    emitters = max(min(call.emitters, len(call.problem.emitters)) for call in calls)
     rings, receivers = problem.receivers.shape[:2]
     return SliceSize((nx, ny), emitters, receivers, rings, settings.numerics.subset)
 
@@ -126,14 +126,14 @@ def _advance(session: Session, calls: Sequence[SliceCall], settings: Settings) -
         slowness, coverage = slices.images()
         residuals = slices.residuals()
     states = []
-    for k, (call, found) in enumerate(zip(calls, residuals, strict=True)):
+    for k, (call, residual) in enumerate(zip(calls, residuals, strict=True)):
         squares = call.state.squares
         # One by one, so that the sum does not depend on how the emitters are distributed over calls.
-        for value in found.squares:
+        for value in residual.squares:
             squares += float(value)
-        images, number = (slowness[k], coverage[k]), len(found.squares)
+        images, number = (slowness[k], coverage[k]), len(residual.squares)
         state = advanced(
-            call.problem, settings, call.state, number, images, squares, found.bins, call.slice_index
+            call.problem, settings, call.state, number, images, squares, residual.bins, call.slice_index
         )
         states.append(state)
     return states

@@ -67,7 +67,7 @@ def trace_probed_rays(problem: Problem, settings: Settings, slowness: Floats, em
 
 
 def ray_uncertainty(
-    problem: Problem, settings: Settings, slowness: Floats, parts: Sequence[Rows], index: int = 0
+    problem: Problem, settings: Settings, slowness: Floats, blocks: Sequence[Rows], index: int = 0
 ) -> Uncertainty:
     """Uncertainty of an image from the linearised problem at that image.
 
@@ -80,21 +80,21 @@ def ray_uncertainty(
         problem: with each pair once.
         settings: of the image.
         slowness: of the region's shape, s/m.
-        parts: rows of all emitters, in their order; see ``trace_probed_rays``.
+        blocks: rows of all emitters, in their order; see ``trace_probed_rays``.
         index: of the slice, for the random numbers.
     """
     region, spacing = problem.region, problem.spacing
     speed = 1.0 / slowness
-    if not region.any() or not parts:
+    if not region.any() or not blocks:
         return Uncertainty(np.zeros(region.shape), 0.0)
-    residual = np.concatenate([part.residual for part in parts])
+    residual = np.concatenate([block.residual for block in blocks])
     limit = huber.limit(residual, settings.numerics.huber_scale)
     # Exact times of an image without error have no noise: a hundredth of a nanosecond is none.
     noise = max(huber.clipped_rms(residual, limit), problem.noise_s, 1e-11)
-    weights = [_huber_weights(part.residual, limit) / noise**2 for part in parts]
-    density = ray_density(problem, parts)
+    weights = [_huber_weights(block.residual, limit) / noise**2 for block in blocks]
+    density = ray_density(problem, blocks)
     posterior = Posterior(
-        parts,
+        blocks,
         weights,
         np.where(region, _prior(problem, slowness), 0.0),
         CORRELATION * (max(region.shape) - 1),
@@ -110,14 +110,14 @@ def ray_uncertainty(
         ]
         if batch == 0:
             prior[0] = 0.0
-            for error, part in zip(errors, parts, strict=True):
-                error[:, 0] = part.residual
+            for error, block in zip(errors, blocks, strict=True):
+                error[:, 0] = block.residual
         changes.append(posterior.solutions(errors, prior))
     # From s of crossing time to m/s, linearised as the problem is.
     mean, *samples = -np.concatenate(changes) * speed**2 / spacing
     squares, width = min(
         (_squares(speed, mean, samples, width) for width in WIDTHS),
-        key=lambda found: float(found[0][region].sum()),
+        key=lambda pair: float(pair[0][region].sum()),
     )
     errors_of_model = ModelErrors.from_misfit(
         speed, region, density, problem.noise_s, noise, spacing, problem.water_speed

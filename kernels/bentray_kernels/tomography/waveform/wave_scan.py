@@ -29,5 +29,5 @@ class WaveScan(NamedTuple):
 
 def wave_problem_of(scan: WaveScan, number: int) -> WaveProblem:
     """The problem of a band of one slice, see ``prepare``."""
-    with scan.source.traces(scan.slice, estimated_water=True) as one:
-        return prepare(one, scan.plan, number, poll=scan.source.poll)
+    with scan.source.traces(scan.slice, estimated_water=True) as dataset:
+        return prepare(dataset, scan.plan, number, poll=scan.source.poll)

@@ -26,7 +26,7 @@ def fitting_blocks(scan: Summary, settings: Settings, capacities: Sequence[Worke
     """
     if settings.numerics.blocks > 1 or undivided_reason(settings, amplitudes=scan.amplitudes):
         return settings.numerics.blocks
-    limit = max((one.task_bytes for one in capacities), default=math.inf)
+    limit = max((worker.task_bytes for worker in capacities), default=math.inf)
     most = shape_of(scan, settings)[0] // FEWEST_PLANES
     fits = (n for n in range(1, most + 1) if largest_bytes(scan, settings.changed(blocks=n)) <= limit)
     return next(fits, 1)
