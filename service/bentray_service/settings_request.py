@@ -46,7 +46,7 @@ def check_setting_names(settings: Any, kind: type[Any] = Settings, place: str = 
 
 
 def _replacement(name: str) -> str:
-    """What replaces a setting of earlier versions; empty for a name that they had not."""
+    """Replacement of a setting of the flat record of earlier versions; empty for an unknown name."""
     if name in WITHDRAWN:
         return WITHDRAWN[name]
     if name in NUMERICAL:
@@ -97,7 +97,7 @@ def settings_of(values: Mapping[str, Any]) -> Settings:
 
 
 def record_of(kind: type[Record], values: Mapping[str, Any]) -> Record:
-    """As ``settings_of`` for any dataclass of settings."""
+    """Read any dataclass of settings, by the rules of ``settings_of``."""
     try:
         record: Record = check_used(_adapter(kind)(check_setting_names(dict(values), kind)))
     except ValidationError as error:
@@ -110,7 +110,7 @@ def record_of(kind: type[Record], values: Mapping[str, Any]) -> Record:
 
 
 def plain_numbers(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The same values with Python's numbers in place of those of NumPy, which JSON does not know."""
+    """Values with Python's numbers in place of those of NumPy, which JSON does not know."""
     return {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
 
 

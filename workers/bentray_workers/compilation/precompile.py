@@ -73,13 +73,13 @@ def time_settings() -> Iterator[dict[str, Any]]:
 
 
 def slice_settings() -> Iterator[dict[str, Any]]:
-    """The same for several slices."""
+    """Settings for several slices."""
     for method, decomposition in product(("sart", "gauss-newton"), ("slices", "volume")):
         yield {"method": method, "decomposition": decomposition, "attenuation": False}
 
 
 def trace_settings() -> Iterator[dict[str, Any]]:
-    """The same for traces."""
+    """Settings for traces."""
     for picker in PICKERS:
         yield {"picker": picker, "attenuation": False}
     yield {"amplitudes": "ratio", "focusing": True}

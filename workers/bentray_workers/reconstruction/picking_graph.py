@@ -146,7 +146,7 @@ class PickingSource(NamedTuple):
 
     @contextmanager
     def with_water(self, index: int, findings: Sequence[Finding]) -> Iterator[Dataset]:
-        """As ``slice``, with the estimated water shot where the file has none."""
+        """Open a slice by ``slice``, with the estimated water shot where the file has none."""
         with self.slice(index, findings) as dataset:
             yield with_reference(dataset, self.folder, index)
 

@@ -101,7 +101,7 @@ def begin(slowness: Floats) -> Iterate:
 
 
 def trace_rays(problem: Problem, settings: Settings, slowness: Floats, emitters: Ints) -> Rows:
-    """As ``linearise``; in an image without contrast, such as the initial water, rays are straight."""
+    """Rows by ``linearise``; rays are straight in an image without contrast, such as the initial water."""
     if not slowness.min() < slowness.max():
         settings = replace(settings, rays="straight")
     return linearise(problem, settings, slowness, emitters)

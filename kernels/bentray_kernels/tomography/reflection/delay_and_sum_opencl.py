@@ -39,7 +39,7 @@ def sum_echoes_opencl(
     pixels: Pixels,
     pair_angle_deg: float,
 ) -> Sums:
-    """As ``sum_echoes``, on the chosen OpenCL device; there if none passes its self-test.
+    """Sum echoes by ``sum_echoes`` on the chosen OpenCL device; compiled code if none passes its self-test.
 
     The sums have the same order, and differ by rounding: within 1e-4 of the largest. The same bits on every
     run of one device.

@@ -123,7 +123,7 @@ class ReflectionGraph:
         return ReflectionCheckpoint(self._state)
 
     def restore(self, checkpoint: ReflectionCheckpoint) -> None:
-        """As ``task_graph.ResumableGraph``."""
+        """See ``task_graph.ResumableGraph``."""
         self._state = checkpoint.state
 
     @property
@@ -136,11 +136,11 @@ class ReflectionGraph:
 
     @property
     def pulse(self) -> Pulse | None:
-        """Of the scan, once it is measured."""
+        """Pulse of the scan, once it is measured."""
         return None if self._state is None else self._state.pulse
 
     def first(self) -> list[Task]:
-        """As ``task_graph.TaskGraph``."""
+        """See ``task_graph.TaskGraph``."""
         if self.done == self.total:
             return []
         plan = self._plan
@@ -154,7 +154,7 @@ class ReflectionGraph:
         ]
 
     def after(self, task: Task, result: Any) -> list[Task]:
-        """As ``task_graph.TaskGraph``."""
+        """See ``task_graph.TaskGraph``."""
         if task.function is solve_element_times:
             self._times[task.arguments[-1]] = result
             if len(self._times) < len(self._groups):

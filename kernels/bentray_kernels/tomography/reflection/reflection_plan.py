@@ -1,4 +1,4 @@
-"""What the tasks of a reflection image share: medium, elements, used pairs and pixels."""
+"""Plan of a reflection image, shared by its tasks: medium, elements, used pairs and pixels."""
 
 from __future__ import annotations
 

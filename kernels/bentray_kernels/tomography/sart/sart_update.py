@@ -52,7 +52,7 @@ def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, wa
 
 
 def _compiled(problem: Problem, settings: Settings) -> Update:
-    """As ``_traced`` for a slice, several times as fast: see ``EmitterPass``."""
+    """The update ``_traced`` for a slice, several times as fast: see ``EmitterPass``."""
     rows, columns = problem.region.shape
     work = EmitterPass.for_grid((rows, columns), problem.delta_tof.shape[1])
 

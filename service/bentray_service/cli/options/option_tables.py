@@ -33,7 +33,7 @@ class Option:
     hidden: bool = False
 
     def parameter(self, setting: str) -> inspect.Parameter:
-        """As a parameter of a Typer command, None where it is not given."""
+        """Convert to a parameter of a Typer command, None where it is not given."""
         shown: Any = self.default or False
         how = typer.Option(
             self.name, show_default=shown, help=self.help, metavar=self.metavar, hidden=self.hidden
