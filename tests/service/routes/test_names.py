@@ -1,5 +1,7 @@
 """PATCH of datasets and jobs: names and notes; what is refused; the place in the queue."""
 
+from itertools import product
+
 import pytest
 
 from bentray_service.rows.api_key import ApiKey
@@ -53,20 +55,18 @@ def test_a_result_has_the_name_of_its_scan(http, dataset, submitted, until):
     assert http.get(volume).json()["title"] == before
 
 
-@pytest.mark.parametrize(
-    ("changes", "field", "accepted"),
-    [
+def test_wrong_changes_are_refused_by_name(http, dataset, submitted):
+    job = submitted(http, dataset)["id"]
+    items = ((f"/v1/datasets/{dataset}", "title"), (f"/v1/jobs/{job}", "name"))
+    wrong = (
         ({"{name}": 201 * "x"}, "{name}", "at most 200 characters"),
         ({"notes": 4001 * "x"}, "notes", "at most 4000 characters"),
         ({"notes": "a\x00b"}, "notes", "match"),
         ({"{name}": 7}, "{name}", "string"),
         ({"colour": "red"}, "colour", "no such field; see /docs"),
         ([], "body", "a JSON object"),
-    ],
-)
-def test_wrong_changes_are_refused_by_name(http, dataset, submitted, changes, field, accepted):
-    job = submitted(http, dataset)["id"]
-    for here, name in ((f"/v1/datasets/{dataset}", "title"), (f"/v1/jobs/{job}", "name")):
+    )
+    for (here, name), (changes, field, accepted) in product(items, wrong):
         given = {key.format(name=name): value for key, value in changes.items()} if changes else changes
         before = http.get(here).json()
         answer = http.patch(here, json=given)

@@ -143,11 +143,8 @@ def test_the_place_in_the_queue(start, uploaded):
 @pytest.mark.parametrize(
     ("settings", "field"),
     [
-        ('{"nodes": 1}', "settings.nodes"),
         ('{"nodes": 1e400}', "settings.nodes"),
-        ('{"nodes": "\' OR 1=1 --"}', "settings.nodes"),
         ('{"iterations": 99999999999999999999999999}', "settings.iterations"),
-        ('{"sart": {"relaxation": 2}}', "settings.sart.relaxation"),
         ('{"eikonal": "fim-opencl"}', "eikonal"),
         ("[]", "settings"),
     ],

@@ -11,8 +11,6 @@ from sqlalchemy import text
 from bentray_kernels.limits import ELEMENTS, EMISSIONS, SAMPLES, SLICES
 from bentray_service.ingest.ingest_process import convert_upload
 
-HDF5 = {"Content-Type": "application/x-hdf5"}
-
 
 def packed(path, shape, dtype="f8", chunk=None):
     """A change that puts an array of zeros there, packed well: it is large only once it is read."""
@@ -86,21 +84,6 @@ def test_a_job_is_planned_without_its_file(start, uploaded, submitted, work, mon
     with http.app.state.stores.datasets._database.write() as connection:
         connection.execute(text("UPDATE datasets SET counts = NULL"))
     assert submitted(http, dataset)["plan"] == plan
-
-
-def test_a_scan_of_all_elements_in_one_place_or_of_none_is_rejected(start, scan):
-    http = start()
-
-    def change(value):
-        def spoil(file):
-            file["geometry/element_position_m"][...] = value
-
-        return spoil
-
-    for value in (0.0, 0.05, 1e300, -1e308, 5e-324, np.nan):
-        answer = http.post("/v1/datasets", content=scan(change(value)).read_bytes(), headers=HDF5)
-        assert answer.status_code == 422, answer.text
-        assert answer.json()["field"] == "geometry/element_position_m"
 
 
 @pytest.mark.parametrize("rate", [1e300, 1e-300, 5e-324, -1e6, 25.0])
