@@ -52,7 +52,7 @@ class StoreParts:
 
 @dataclass(frozen=True)
 class BackgroundParts:
-    """What works beside the requests: jobs, pictures, uploads, messages and clean-up."""
+    """Parts that work beside the requests: jobs, pictures, uploads, messages and clean-up."""
 
     runner: Runner
     pictures: Pictures
@@ -65,7 +65,7 @@ class BackgroundParts:
 
 @dataclass(frozen=True)
 class AccessParts:
-    """What decides on requests, and notes them."""
+    """Parts that decide on requests, and note them."""
 
     settings: ServiceSettings
     sign_in: SignIn
@@ -73,12 +73,12 @@ class AccessParts:
 
 
 def background_of(request: Request) -> BackgroundParts:
-    """What works beside the requests."""
+    """Make the parts that work beside the requests."""
     return cast(BackgroundParts, request.app.state.background)
 
 
 def access_of(scope: Scope) -> AccessParts:
-    """What decides on a request."""
+    """Make the parts that decide on a request."""
     return cast(AccessParts, scope["app"].state.access)
 
 

@@ -161,7 +161,7 @@ class HonestTenant:
         self._ask("GET", f"/v1/{listed}/{name}", 404)
 
     def _same(self, what: str, content: bytes) -> None:
-        """What is made of the same input is the same, whatever else goes on."""
+        """Check that equal inputs give equal results, whatever else goes on."""
         digest = hashlib.sha256(content).hexdigest()
         assert self._first.setdefault(what, digest) == digest, f"{what} differs from that of the first round"
 

@@ -13,7 +13,7 @@ from bentray_workers.reconstruction.file_scan import FileSource
 
 
 class PoisonedScan(NamedTuple):
-    """As ``bentray_kernels.tomography.scan.Scan``."""
+    """Stand-in for ``bentray_workers.reconstruction.file_scan.FileScan``."""
 
     path: Path
     settings: Settings

@@ -23,7 +23,7 @@ from .waveform.automatic_settings import WaveScale, scale_of
 
 
 class Machine(Protocol):
-    """What only the machines that compute can decide; an empty reason where there was nothing to decide."""
+    """Decisions of the machines that compute; an empty reason where there was nothing to decide."""
 
     def device(self, size: ScanSize, settings: Settings) -> tuple[str, str]:
         """The device, and why; see ``device_choice.choose_device``."""

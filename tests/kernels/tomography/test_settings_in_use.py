@@ -99,7 +99,7 @@ def test_a_setting_changes_the_result_where_it_has_an_effect(case: str) -> None:
 
 
 def test_a_device_is_refused_where_nothing_is_computed_on_it() -> None:
-    """What is computed on devices is decided by ``device_work``."""
+    """The rule ``device_work`` decides what is computed on devices."""
     size = ScanSize(1, 12, 12, 192)
     cases = [one | {"minutes": None} for one in CASES.values()]
     cases += [{"method": method} for method in ("auto", "waveform")]

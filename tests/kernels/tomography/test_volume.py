@@ -74,7 +74,7 @@ def test_the_ball_comes_back(scan, method):
 
 
 def test_between_slices_the_volume_is_more_accurate(scan):
-    """The same data as slices know nothing of what lies between the rings."""
+    """Slices of the same data know nothing of what lies between the rings."""
     dataset, speed = scan
     volume = reconstruct(dataset, replace(PLAN, method="gauss-newton"))
     slices = reconstruct(dataset, replace(PLAN, method="gauss-newton", decomposition="slices"))

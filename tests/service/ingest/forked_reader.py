@@ -26,7 +26,7 @@ SECONDS = 2.0
 
 @dataclass(frozen=True)
 class Read:
-    """What became of one file: ``status`` as ``os.wait4`` tells it, 0 for an orderly end."""
+    """End of one read: ``status`` by ``os.wait4``, 0 for an orderly end."""
 
     answer: dict[str, Any] | None
     status: int
@@ -40,7 +40,7 @@ class Read:
 
 
 def read_all(files: list[tuple[str, Path, dict[str, Any]]], folder: Path) -> list[Read]:
-    """What becomes of each file, in a process of its own apart from the caller's."""
+    """Read each file in a process of its own, apart from the caller's."""
     listed = folder / "files.json"
     listed.write_text(json.dumps([[what, str(path), given] for what, path, given in files]))
     command = [sys.executable, "-I", __file__, str(MEMORY_BYTES), str(SECONDS), str(listed)]

@@ -238,7 +238,7 @@ def traced(page, shared_service, shared_scan):
 
 @pytest.fixture
 def own_traced(page, address, tmp_path):
-    """The same of a scan that the test may change."""
+    """A traced scan that the test may change."""
     return opened(page, address, with_traces(address, tmp_path))
 
 

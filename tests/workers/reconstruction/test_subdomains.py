@@ -56,7 +56,7 @@ def test_source_at_a_block_corner_activates_all_blocks(cluster):
 
 
 def test_blocks_of_a_lost_worker_are_recomputed(tmp_path):
-    """What is asked of a block afterwards goes back as far as it must, to the same bits."""
+    """A later request for a block goes back as far as it must, to the same bits."""
     speed = np.random.default_rng(2).uniform(1.0, 2.0, (9, 8))
     expected = solve_by_blocks(PointSource.checked(speed, 1.0, (2.0, 2.0)), (2, 2))
     with open_cluster(workers=2, local_directory=tmp_path, processes=False) as cluster:

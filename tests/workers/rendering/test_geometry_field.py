@@ -146,7 +146,7 @@ def test_an_open_surface(tmp_path):
 
 
 def test_tasks_that_run_again_change_nothing(path, tmp_path, small_batches):
-    """As after the death of a worker whose results somebody still refers to."""
+    """They do after the death of a worker whose results somebody still refers to."""
     made(path, tmp_path)
     (tmp_path / "field").rename(tmp_path / "work" / "field")
     files, done = FieldFiles(tmp_path / "work" / "field"), tmp_path / "work" / "done"

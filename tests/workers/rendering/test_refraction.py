@@ -85,7 +85,7 @@ def test_a_ball_of_glass_bends_as_snell_says(tmp_path):
 
 
 def test_rays_that_meet_more_surfaces_than_allowed_show_dark_grey(path):
-    """As the description of ``depth`` says."""
+    """The description of ``depth`` says so."""
     image = whole(path, replace(SMALL, depth=1)).image
     assert (image[14:18, 22:26] == refraction.BEYOND).all()
     assert (whole(path, SMALL).image[14:18, 22:26] != refraction.BEYOND).any()

@@ -86,7 +86,7 @@ class FileSource(NamedTuple):
 
 
 def read_once(path: Path, stamp: int, water_temperature_c: float | None = None) -> ScanHeader:
-    """What is known of a scan without its traces.
+    """Facts about a scan without its traces.
 
     Args:
         path: of its file.

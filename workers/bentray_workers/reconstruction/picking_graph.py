@@ -119,7 +119,7 @@ class PickingSource(NamedTuple):
 
     @property
     def header(self) -> ScanHeader:
-        """What is known without the traces."""
+        """Facts about the scan without its traces."""
         return read_once(self.path, self.stamp, self.water_temperature_c)
 
     @property

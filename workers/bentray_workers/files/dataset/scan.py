@@ -15,7 +15,7 @@ from .traces import emissions_in, lacks_water_in, samples_in
 
 
 class ScanHeader(NamedTuple):
-    """What is known of a scan without its traces.
+    """Facts about a scan without its traces.
 
     Attributes:
         dataset: without traces; a missing centre frequency is estimated from them.
@@ -31,7 +31,7 @@ class ScanHeader(NamedTuple):
 
 
 def read_header(path: Path, *, plausible: bool = True) -> ScanHeader:
-    """What a file says of a scan, read at one opening.
+    """Facts in a file about a scan, read at one opening.
 
     Args:
         path: of the HDF5 file.

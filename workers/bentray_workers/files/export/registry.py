@@ -56,7 +56,7 @@ class ExportFormat:
 
     @property
     def download_extension(self) -> str:
-        """Of the file that a service sends, without a dot."""
+        """Extension of the file that a service sends, without a dot."""
         return self.extension or self.suffixes[0][1:]
 
     def write(self, path: Path, content: Content) -> None:
