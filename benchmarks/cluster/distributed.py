@@ -22,7 +22,7 @@ from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.terminal import Step
 from bentray_service.pictures import Pictures
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL
 from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.fair_shares import IN_FLIGHT
 from bentray_workers.cluster.task_pool import finished

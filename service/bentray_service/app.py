@@ -21,13 +21,13 @@ from .access.audit import Audit
 from .access.quota import Quota
 from .access.sign_in import SignIn
 from .compute import Cluster, Compute
+from .files.bucket_store import open_store
 from .files.checked_store import CheckedStore
 from .files.data_folder import Files, installation_of, lock
 from .files.deletion import Deletion
+from .files.disk import private_files
 from .files.folder_database import check_authentication, open_folder_database
-from .files.open_store import open_store
 from .files.orphans import Orphans
-from .files.private import private_files
 from .guard import Guard
 from .housekeeping import Housekeeper
 from .ingest.canonical import IngestLimits
@@ -43,7 +43,6 @@ from .readiness import Readiness, Threaded
 from .routes import (
     access,
     batches,
-    cluster_health,
     datasets,
     events,
     geometry_fields,
@@ -52,10 +51,7 @@ from .routes import (
     meshes,
     names,
     pages,
-    plans,
-    previews,
     projects,
-    refraction,
     sign_in,
     volumes,
 )
@@ -74,10 +70,8 @@ from .rows.stored_tables import Datasets, GeometryFields, Meshes, UploadedTable,
 from .rows.uploads import Uploads
 from .settings import ServiceSettings
 from .web import errors
-from .web.description import OpenApiApp
-from .web.headers import SecurityHeaders
-from .web.request_id import RequestIds
-from .web.tus_headers import TusHeaders
+from .web.middleware import identify, speak_tus
+from .web.reference import OpenApiApp
 from .webhooks.sender import Webhooks
 from .wiring import AccessParts, BackgroundParts, StoreParts
 
@@ -128,10 +122,9 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     # Set when the server stops, so that event streams end before it waits for them.
     app.state.leaving = threading.Event()
     errors.install_handlers(app, tuple(KINDS))
-    app.add_middleware(TusHeaders)
+    app.add_middleware(speak_tus)
     app.add_middleware(Guard)
-    app.add_middleware(SecurityHeaders)
-    app.add_middleware(RequestIds)
+    app.add_middleware(identify)
     app.state.metrics = Metrics()
     app.add_middleware(app.state.metrics.middleware)
     app.mount("/static", StaticFiles(directory=pages.WEB / "static"), name="static")
@@ -151,20 +144,17 @@ def _routes() -> tuple[BaseRoute, ...]:
         datasets,
         jobs,
         batches,
-        plans,
         names,
-        previews,
         events,
         volumes,
-        refraction,
         meshes,
         geometry_fields,
         access,
         projects,
-        cluster_health,
     ):
         router.include_router(part.router, **CLOSED)
-    router.include_router(health.metrics_router, **CLOSED)
+    for protected in (jobs.plans_router, health.metrics_router, health.cluster_router):
+        router.include_router(protected, **CLOSED)
     for public in (health, pages, sign_in):
         router.include_router(public.router)
     return tuple(router.routes)
@@ -179,7 +169,6 @@ def _open(
     files.prepare()
     locked = stack.enter_context(lock(files.root))
     files.check_restored()
-    files.give_to_local()
     files.drop_leftovers()
     database = open_folder_database(files, settings.database)
     stack.callback(database.close)
@@ -274,7 +263,7 @@ def _open(
     )
     housekeeper.start()
     stack.callback(housekeeper.stop)
-    pictures = Pictures(cluster, accounts, store.fetch)
+    pictures = Pictures(cluster, accounts, files)
     stack.callback(pictures.stop)
     webhooks = Webhooks(database, settings, alone=settings.database_url is None)
     webhooks.start()

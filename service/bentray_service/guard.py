@@ -16,6 +16,7 @@ from .access.caller import Caller
 from .access.key_watch import answer_while_valid
 from .errors import PackedBody
 from .web.errors import problem_response
+from .web.middleware import route_of
 from .wiring import access_of
 
 log = logging.getLogger("bentray.access")
@@ -38,8 +39,6 @@ PUBLIC = frozenset(
     }
 )
 PUBLIC_FOLDERS = ("/static/", "/problems/", "/documentation/")
-
-UNMATCHED = "unmatched"
 
 
 class Guard:
@@ -125,10 +124,9 @@ class _RequestLog:
 
     def log_request(self) -> None:
         """Write a log line, and an entry of the audit log for an authenticated request."""
-        route = str(getattr(self._scope.get("route"), "path", UNMATCHED))
         figures: dict[str, Any] = {
             "method": self._scope["method"],
-            "route": route,
+            "route": route_of(self._scope),
             "status": self.status,
             "received": self.received,
             "sent": self.sent,

@@ -18,8 +18,8 @@ from .files.direct_uploads import DirectUploads
 from .files.orphans import Orphans
 from .ingest.append import UploadLocks, remove
 from .rows.ages import ExpiredItem, ExpiryMarks, ObservedTime
+from .rows.ids import Tenant
 from .rows.tables import UploadRow
-from .rows.tenants import Tenant
 from .rows.uploads import Uploads
 
 log = logging.getLogger("bentray.housekeeping")

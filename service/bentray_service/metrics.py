@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cryptography import x509
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
@@ -25,6 +25,7 @@ from .rows import usage
 from .rows.checksums import Checksums
 from .rows.keys import Keys
 from .rows.tables import STATES
+from .web.middleware import route_of
 
 if TYPE_CHECKING:
     from .wiring import AccessParts, BackgroundParts, StoreParts
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 # From a status poll to a rendered image.
 BUCKETS_S = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
 
-UNMATCHED = "unmatched"
 # Tenants with labels of their own.
 TENANTS = 20
 
@@ -96,7 +96,7 @@ class Metrics:
                 await app(scope, receive_counted, send_seen)
             finally:
                 self._in_flight.dec()
-                method, route = _method(scope), _route(scope)
+                method, route = _method(scope), route_of(scope)
                 self._requests.labels(method, route, str(status)).inc()
                 self._seconds.labels(method, route).observe(time.perf_counter() - begun)
                 self._received.labels(method, route).inc(received)
@@ -107,11 +107,6 @@ class Metrics:
 def _method(scope: Scope) -> str:
     known = {"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"}
     return scope["method"] if scope["method"] in known else "other"
-
-
-def _route(scope: Scope) -> str:
-    """The path template of the route, e.g. ``/v1/jobs/{job_id}``."""
-    return str(getattr(scope.get("route"), "path", UNMATCHED))
 
 
 class _ServiceCollector(Collector):
@@ -129,69 +124,66 @@ class _ServiceCollector(Collector):
         yield from self._from_cluster()
         yield from self._background.runner.metrics.collect()
         up = float(files.store.fault() is None)
-        yield _gauge("bentray_storage_up", "Whether the store is available.", up)
         disk, least = shutil.disk_usage(files.root), settings.min_free_bytes
-        yield _gauge("bentray_disk_free_bytes", "Free space in the data folder.", disk.free)
-        yield _gauge("bentray_disk_total_bytes", "Size of the disk of the data folder.", disk.total)
-        yield _gauge("bentray_disk_needed_bytes", "Free space without which no job starts.", least)
-        threads = GaugeMetricFamily(
-            "bentray_threads_up", "Whether all threads of a part are alive.", labels=["part"]
+        threads = self._background.readiness.threads
+        alive = {name: float(part.alive()) for name, part in threads.items()}
+        yield GaugeMetricFamily("bentray_storage_up", "Whether the store is available.", up)
+        yield GaugeMetricFamily("bentray_disk_free_bytes", "Free space in the data folder.", disk.free)
+        yield GaugeMetricFamily(
+            "bentray_disk_total_bytes", "Size of the disk of the data folder.", disk.total
         )
-        for name, part in self._background.readiness.threads.items():
-            threads.add_metric([name], float(part.alive()))
-        yield threads
-        lost = CounterMetricFamily("bentray_audit_lost_total", "Entries missing from the audit log.")
-        lost.add_metric([], self._access.audit.lost)
-        yield lost
+        yield GaugeMetricFamily("bentray_disk_needed_bytes", "Free space without which no job starts.", least)
+        yield _by_label("bentray_threads_up", "Whether all threads of a part are alive.", "part", alive)
+        lost = self._access.audit.lost
+        yield CounterMetricFamily("bentray_audit_lost_total", "Entries missing from the audit log.", lost)
         newest = newest_backup(files.root)
         if newest is not None:
-            yield _gauge(
-                "bentray_backup_timestamp_seconds", "End of the newest backup, since 1970 UTC.", newest
-            )
+            words = "End of the newest backup, since 1970 UTC."
+            yield GaugeMetricFamily("bentray_backup_timestamp_seconds", words, newest)
 
     def _from_cluster(self) -> Iterator[Metric]:
         """The metrics of scheduler and workers; workers are added up, since there may be hundreds."""
         compute = self._background.runner.compute
         workers = compute.health()
         memory = [(one.memory_bytes or 0, one.memory_limit_bytes) for one in workers]
-        yield from _gauges(
-            ("bentray_workers", "Connected Dask workers.", len(workers)),
-            ("bentray_workers_memory_bytes", "Memory of all workers.", sum(used for used, _ in memory)),
-            ("bentray_workers_memory_limit_bytes", "Its limit.", sum(limit for _, limit in memory)),
-            (
-                "bentray_workers_fullest_ratio",
-                "Memory of the worker that is nearest to its limit, as a part of it.",
-                max((used / limit for used, limit in memory if limit), default=0.0),
-            ),
-            ("bentray_workers_threads", "Threads that run tasks.", sum(one.threads or 0 for one in workers)),
-            ("bentray_workers_running_tasks", "Running tasks.", sum(one.running_tasks for one in workers)),
-            ("bentray_workers_paused", "Workers without free memory.", sum(one.paused for one in workers)),
-        )
-        lost = CounterMetricFamily("bentray_workers_lost_total", "Workers that left, also to be restarted.")
-        lost.add_metric([], compute.lost_workers())
-        yield lost
+        fullest = max((used / limit for used, limit in memory if limit), default=0.0)
+        used, limit = sum(used for used, _ in memory), sum(limit for _, limit in memory)
+        threads, tasks = sum(one.threads or 0 for one in workers), sum(one.running_tasks for one in workers)
+        yield GaugeMetricFamily("bentray_workers", "Connected Dask workers.", len(workers))
+        yield GaugeMetricFamily("bentray_workers_memory_bytes", "Memory of all workers.", used)
+        yield GaugeMetricFamily("bentray_workers_memory_limit_bytes", "Its limit.", limit)
+        words = "Memory of the worker that is nearest to its limit, as a part of it."
+        yield GaugeMetricFamily("bentray_workers_fullest_ratio", words, fullest)
+        yield GaugeMetricFamily("bentray_workers_threads", "Threads that run tasks.", threads)
+        yield GaugeMetricFamily("bentray_workers_running_tasks", "Running tasks.", tasks)
+        paused = sum(one.paused for one in workers)
+        yield GaugeMetricFamily("bentray_workers_paused", "Workers without free memory.", paused)
+        words, lost = "Workers that left, also to be restarted.", compute.lost_workers()
+        yield CounterMetricFamily("bentray_workers_lost_total", words, lost)
         load = compute.scheduler_load()
-        yield _gauge("bentray_scheduler_up", "Whether the scheduler answers.", float(load is not None))
+        yield GaugeMetricFamily(
+            "bentray_scheduler_up", "Whether the scheduler answers.", float(load is not None)
+        )
         if load is not None:
-            yield from _gauges(
-                ("bentray_scheduler_tasks", "Tasks that the scheduler holds.", load.tasks),
-                ("bentray_scheduler_waiting_tasks", "Tasks that no worker can run now.", load.waiting_tasks),
-                ("bentray_scheduler_memory_bytes", "Memory of its process.", load.memory_bytes),
+            waiting = load.waiting_tasks
+            yield GaugeMetricFamily("bentray_scheduler_tasks", "Tasks that the scheduler holds.", load.tasks)
+            yield GaugeMetricFamily(
+                "bentray_scheduler_waiting_tasks", "Tasks that no worker can run now.", waiting
+            )
+            yield GaugeMetricFamily(
+                "bentray_scheduler_memory_bytes", "Memory of its process.", load.memory_bytes
             )
         folder = self._access.settings.tls_dir
         if folder is not None and (end := _end_of(folder / "certificate.pem")) is not None:
-            yield _gauge(
-                "bentray_certificate_expiry_timestamp_seconds",
-                "End of the certificate of scheduler and workers, since 1970 UTC.",
-                end,
-            )
+            words = "End of the certificate of scheduler and workers, since 1970 UTC."
+            yield GaugeMetricFamily("bentray_certificate_expiry_timestamp_seconds", words, end)
 
     def _from_database(self) -> Iterator[Metric]:
         """The metrics of stored jobs, files, tenants and keys."""
         database, queue = self._stores.database, self._background.runner.queue
         in_use, most = database.connections()
-        yield _gauge("bentray_database_connections", "Connections to the database in use.", in_use)
-        yield _gauge("bentray_database_connections_limit", "Maximum number of these.", most)
+        yield GaugeMetricFamily("bentray_database_connections", "Connections to the database in use.", in_use)
+        yield GaugeMetricFamily("bentray_database_connections_limit", "Maximum number of these.", most)
         try:
             counts, oldest = queue.load()
             damaged = Checksums(database).count_damaged()
@@ -202,42 +194,25 @@ class _ServiceCollector(Collector):
                 sizes = usage.largest(connection, TENANTS)
         except SQLAlchemyError:
             return
-        stored = GaugeMetricFamily(
-            "bentray_tenant_used_bytes",
-            f"Bytes stored and reserved by the {TENANTS} tenants that use most, with their projects.",
-            labels=["tenant"],
-        )
-        for tenant, size in sizes.items():
-            stored.add_metric([tenant], size)
-        yield stored
-        yield _gauge(
+        words = f"Bytes stored and reserved by the {TENANTS} tenants that use most, with their projects."
+        yield _by_label("bentray_tenant_used_bytes", words, "tenant", sizes)
+        yield GaugeMetricFamily(
             "bentray_tenant_quota_bytes", "Quota of each tenant.", self._access.settings.max_tenant_bytes
         )
-        unfinished = GaugeMetricFamily(
-            "bentray_tenant_jobs",
-            f"Unfinished jobs by state, of the {TENANTS} tenants that have most.",
-            labels=["tenant", "state"],
-        )
-        for (tenant, state), number in queues.items():
-            unfinished.add_metric([tenant, state], number)
+        words = f"Unfinished jobs by state, of the {TENANTS} tenants that have most."
+        unfinished = GaugeMetricFamily("bentray_tenant_jobs", words, labels=["tenant", "state"])
+        for labels, number in queues.items():
+            unfinished.add_metric(labels, number)
         yield unfinished
         if expiry is not None:
-            yield _gauge(
-                "bentray_keys_next_expiry_timestamp_seconds",
-                "When the next key expires, since 1970 UTC.",
-                expiry,
-            )
-        waiting = GaugeMetricFamily("bentray_jobs", "Jobs by state.", labels=["state"])
-        for state in STATES:
-            waiting.add_metric([state], counts.get(state, 0))
-        yield waiting
+            words = "When the next key expires, since 1970 UTC."
+            yield GaugeMetricFamily("bentray_keys_next_expiry_timestamp_seconds", words, expiry)
+        jobs = {state: counts.get(state, 0) for state in STATES}
+        yield _by_label("bentray_jobs", "Jobs by state.", "state", jobs)
         age = 0.0 if oldest is None else max(0.0, time.time() - oldest)
-        yield _gauge("bentray_jobs_oldest_queued_seconds", "Age of the oldest queued job.", age)
-        yield _gauge("bentray_files_damaged", "Stored items known to be damaged.", damaged)
-        messages = GaugeMetricFamily("bentray_webhooks", "Messages to webhooks by state.", labels=["state"])
-        for state, count in sent.items():
-            messages.add_metric([state], count)
-        yield messages
+        yield GaugeMetricFamily("bentray_jobs_oldest_queued_seconds", "Age of the oldest queued job.", age)
+        yield GaugeMetricFamily("bentray_files_damaged", "Stored items known to be damaged.", damaged)
+        yield _by_label("bentray_webhooks", "Messages to webhooks by state.", "state", sent)
 
 
 class _Sentences(Collector):
@@ -263,10 +238,8 @@ def _end_of(certificate: Path) -> float | None:
         return None
 
 
-def _gauge(name: str, words: str, value: float) -> GaugeMetricFamily:
-    return GaugeMetricFamily(name, words, value=value)
-
-
-def _gauges(*described: tuple[str, str, float]) -> Iterator[GaugeMetricFamily]:
-    for one in described:
-        yield _gauge(*one)
+def _by_label(name: str, words: str, label: str, values: Mapping[Any, float]) -> GaugeMetricFamily:
+    family = GaugeMetricFamily(name, words, labels=[label])
+    for text, value in values.items():
+        family.add_metric([text], value)
+    return family

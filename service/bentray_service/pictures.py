@@ -35,10 +35,11 @@ from bentray_workers.rendering.tiles import PictureTasks
 
 from .compute import Cluster
 from .errors import Busy, StorageFull
+from .files.data_folder import Files
 from .picture_queue import LONG_S, PictureQueue
 from .rows.accounts import Account, Accounts
+from .rows.ids import Tenant
 from .rows.tables import DatasetRow, FieldRow, VolumeRow
-from .rows.tenants import Tenant
 
 # Time limit of an image, s.
 RENDER_SECONDS = 120.0
@@ -53,6 +54,8 @@ MAX_HISTOGRAMS = 256
 MAX_TRIES = 2
 
 Found = TypeVar("Found")
+# What is drawn or exported.
+Input = DatasetRow | VolumeRow | FieldRow
 
 
 class Pictures:
@@ -63,149 +66,106 @@ class Pictures:
     and Busy after the time limit.
     """
 
-    def __init__(self, cluster: Cluster, accounts: Accounts, fetch: Callable[[Path], Path]) -> None:
+    def __init__(self, cluster: Cluster, accounts: Accounts, files: Files) -> None:
         """Args:
         cluster: with the workers.
         accounts: who take turns.
-        fetch: makes an input file available at its path; see ``Store.fetch``.
+        files: of the stored items.
         """
-        self._cluster, self._accounts = cluster, accounts
-        self._fetch = fetch
+        self._cluster, self._accounts, self._files = cluster, accounts, files
         self._threads = ThreadPoolExecutor(THREADS, "pictures")
         self._asker = ThreadPoolExecutor(1, "workers")
         self._asking: asyncio.Future[dict[str, WorkerCapacity]] | None = None
         self._queue = PictureQueue(self._workers)
         self._histograms: dict[tuple[Any, ...], dict[str, Any]] = {}
 
-    async def slice_png(self, tenant: Tenant, volume: VolumeRow, path: Path, how: dict[str, Any]) -> bytes:
+    async def slice_png(self, volume: VolumeRow, how: dict[str, Any]) -> bytes:
         """Render one slice of a volume as PNG.
 
         Args:
-            tenant: owner.
             volume: its row.
-            path: of its file.
             how: arguments of the functions in ``bentray_workers.images.slice``.
         """
         cost = picture_cost.slice_cost(VolumeFile.of(volume.values()), how.get("size"))
         draw = drawing_tasks.slice_png if volume.job_id is not None else drawing_tasks.volume_slice_png
-        return bytes(await self._one(tenant, ("size", "this slice", cost), path, draw, how))
+        return bytes(await self._one(volume, cost, draw, how, refused=("size", "this slice")))
 
-    async def refraction_png(
-        self, tenant: Tenant, volume: VolumeRow, path: Path, view: RefractionView
-    ) -> bytes:
+    async def refraction_png(self, volume: VolumeRow, view: RefractionView) -> bytes:
         """Render a volume with refraction."""
         cost = picture_cost.refraction_cost(VolumeFile.of(volume.values()), view)
-        what = "volume", f"shape {tuple(volume.shape)}", cost
-        return bytes(await self._made(tenant, what, path, lambda here: refraction.tasks_of(here, view)))
+        return bytes(await self._made(volume, cost, lambda here: refraction.tasks_of(here, view)))
 
-    async def coefficients(
-        self, tenant: Tenant, volume: VolumeRow, path: Path, view: RefractionView
-    ) -> bytes:
+    async def coefficients(self, volume: VolumeRow, view: RefractionView) -> bytes:
         """Filter a volume, see ``bentray_workers.rendering.coefficients``."""
         cost = picture_cost.coefficients_cost(VolumeFile.of(volume.values()))
-        what = "volume", f"shape {tuple(volume.shape)}", cost
-        return bytes(await self._one(tenant, what, path, coefficients_npy, {"view": view}))
+        return bytes(await self._one(volume, cost, coefficients_npy, {"view": view}))
 
-    async def histogram(
-        self, tenant: Tenant, volume: VolumeRow, path: Path, quantity: str, bins: int
-    ) -> dict[str, Any]:
+    async def histogram(self, volume: VolumeRow, quantity: str, bins: int) -> dict[str, Any]:
         """Compute the histogram of a volume, see ``volume_histogram``; recent ones are kept."""
         key = volume.id, volume.created, quantity, bins
         if key not in self._histograms:
-            what = (
-                "volume",
-                f"shape {tuple(volume.shape)}",
-                picture_cost.histogram_cost(VolumeFile.of(volume.values())),
-            )
+            cost = picture_cost.histogram_cost(VolumeFile.of(volume.values()))
             how = {"quantity": quantity, "bins": bins}
-            self._histograms[key] = dict(await self._one(tenant, what, path, volume_histogram, how))
+            self._histograms[key] = dict(await self._one(volume, cost, volume_histogram, how))
             while len(self._histograms) > MAX_HISTOGRAMS:
                 del self._histograms[next(iter(self._histograms))]
         return self._histograms[key]
 
-    async def field_png(self, tenant: Tenant, field: FieldRow, folder: Path, view: FieldView) -> bytes:
+    async def field_png(self, field: FieldRow, view: FieldView) -> bytes:
         """Render a scene with a geometry field."""
-        what = "field", str(field.id), picture_cost.field_cost(field.figures, view)
-        return bytes(await self._made(tenant, what, folder, lambda here: field_picture.tasks_of(here, view)))
+        cost = picture_cost.field_cost(field.figures, view)
+        return bytes(await self._made(field, cost, lambda here: field_picture.tasks_of(here, view)))
 
-    async def field_map_png(self, tenant: Tenant, field: FieldRow, folder: Path, which: str) -> bytes:
+    async def field_map_png(self, field: FieldRow, which: str) -> bytes:
         """Render the geometry image of a field, see ``bentray_workers.rendering.field_picture.map_png``."""
-        what = "field", str(field.id), picture_cost.map_cost(field.figures)
-        return bytes(await self._one(tenant, what, folder, field_picture.map_png, {"quantity": which}))
+        cost = picture_cost.map_cost(field.figures)
+        return bytes(await self._one(field, cost, field_picture.map_png, {"quantity": which}))
 
-    async def quality(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> dict[str, Any]:
+    async def quality(self, dataset: DatasetRow, picker: str) -> dict[str, Any]:
         """Create the quality report of a dataset, see ``bentray_workers.reconstruction.quality_report``."""
-        what = "dataset", str(dataset.id), picture_cost.quality_cost(dataset.values())
-        return dict(
-            await self._one(tenant, what, path, quality_report, {"picker": picker, **_water(dataset)})
-        )
+        cost = picture_cost.quality_cost(dataset.values())
+        return dict(await self._one(dataset, cost, quality_report, {"picker": picker, **_water(dataset)}))
 
-    async def quality_png(self, tenant: Tenant, dataset: DatasetRow, path: Path, picker: str) -> bytes:
+    async def quality_png(self, dataset: DatasetRow, picker: str) -> bytes:
         """Render the quality report of a dataset."""
-        what = "dataset", str(dataset.id), picture_cost.quality_cost(dataset.values())
-        return bytes(await self._one(tenant, what, path, quality_page, {"picker": picker, **_water(dataset)}))
+        cost = picture_cost.quality_cost(dataset.values())
+        return bytes(await self._one(dataset, cost, quality_page, {"picker": picker, **_water(dataset)}))
 
-    async def scan_geometry(self, tenant: Tenant, dataset: DatasetRow, path: Path) -> dict[str, Any]:
+    async def scan_geometry(self, dataset: DatasetRow) -> dict[str, Any]:
         """Read the geometry of a dataset, see ``bentray_workers.reconstruction.scan_views``."""
-        what = "dataset", str(dataset.id), picture_cost.geometry_cost(dataset.values())
-        return dict(await self._one(tenant, what, path, scan_geometry, _water(dataset)))
+        cost = picture_cost.geometry_cost(dataset.values())
+        return dict(await self._one(dataset, cost, scan_geometry, _water(dataset)))
 
-    async def emission_traces(
-        self, tenant: Tenant, dataset: DatasetRow, path: Path, how: dict[str, Any]
-    ) -> dict[str, Any]:
+    async def emission_traces(self, dataset: DatasetRow, how: dict[str, Any]) -> dict[str, Any]:
         """Read the traces of one emission; ``how``: arguments of ``scan_views.emission_traces``."""
-        what = "dataset", str(dataset.id), picture_cost.emission_cost(dataset.values())
-        return dict(await self._one(tenant, what, path, emission_traces, {**how, **_water(dataset)}))
+        cost = picture_cost.emission_cost(dataset.values())
+        return dict(await self._one(dataset, cost, emission_traces, {**how, **_water(dataset)}))
 
     async def mesh_volume(
-        self, tenant: Tenant, volume: VolumeRow, path: Path, iso: float | None, step: int, target: Path
+        self, volume: VolumeRow, iso: float | None, step: int, target: Path
     ) -> dict[str, Any]:
         """Extract the iso-surface of a volume to a mesh file, see ``isosurface_mesh.mesh_volume``."""
-        what = (
-            "volume",
-            f"shape {tuple(volume.shape)}",
-            picture_cost.mesh_cost(VolumeFile.of(volume.values())),
-        )
-        how = {"iso": iso, "step": step, "target": target}
-        return dict(await self._one(tenant, what, path, mesh_volume, how))
+        cost = picture_cost.mesh_cost(VolumeFile.of(volume.values()))
+        return dict(await self._one(volume, cost, mesh_volume, {"iso": iso, "step": step, "target": target}))
 
     async def export(
-        self,
-        tenant: Tenant,
-        volume: VolumeRow,
-        path: Path,
-        target: Path,
-        name: FormatName,
-        selection: volume_export.Selection,
+        self, volume: VolumeRow, target: Path, name: FormatName, selection: volume_export.Selection
     ) -> None:
         """Export a volume to another format, a key of ``EXPORTED``."""
         cost = picture_cost.export_cost(VolumeFile.of(volume.values()), name)
-        what = "volume", f"shape {tuple(volume.shape)}", cost
         how = {"target": target, "name": name, "selection": selection}
-        await self._one(tenant, what, path, volume_export.export_volume, how)
+        await self._one(volume, cost, volume_export.export_volume, how)
 
-    async def export_truth(
-        self,
-        tenant: Tenant,
-        volume: VolumeRow,
-        dataset: DatasetRow,
-        path: Path,
-        scan: Path,
-        target: Path,
-        name: FormatName,
-    ) -> None:
+    async def export_truth(self, volume: VolumeRow, scan: DatasetRow, target: Path, name: FormatName) -> None:
         """Export the truth of a scan at the nodes of a reconstruction, see ``images.truth_export``."""
-        cost = picture_cost.truth_cost(VolumeFile.of(volume.values()), dataset.values())
-        how = {"scan": scan, "target": target, "name": name}
-        await self._one(tenant, ("quantity", "truth", cost), path, export_truth, how)
+        cost = picture_cost.truth_cost(VolumeFile.of(volume.values()), scan.values())
+        how = {"scan": await self._fetched(scan), "target": target, "name": name}
+        await self._one(volume, cost, export_truth, how, refused=("quantity", "truth"))
 
-    async def summary(
-        self, tenant: Tenant, volume: VolumeRow, path: Path, dataset: DatasetRow, scan: Path
-    ) -> dict[str, Any]:
+    async def summary(self, volume: VolumeRow, scan: DatasetRow) -> dict[str, Any]:
         """Summarise a reconstruction, see ``images.result_summary``."""
-        cost = picture_cost.truth_cost(VolumeFile.of(volume.values()), dataset.values())
-        what = "volume", f"shape {tuple(volume.shape)}", cost
-        return dict(await self._one(tenant, what, path, result_summary, {"scan": scan}))
+        cost = picture_cost.truth_cost(VolumeFile.of(volume.values()), scan.values())
+        return dict(await self._one(volume, cost, result_summary, {"scan": await self._fetched(scan)}))
 
     def waiting(self, tenant: Tenant) -> int:
         """Number of waiting tasks of the account of a tenant."""
@@ -222,48 +182,52 @@ class Pictures:
 
     async def _one(
         self,
-        tenant: Tenant,
-        what: tuple[str, str, Cost],
-        path: Path,
+        item: Input,
+        cost: Cost,
         task: Callable[..., Any],
         how: dict[str, Any],
+        refused: tuple[str, str] | None = None,
     ) -> Any:
-        return await self._made(tenant, what, path, lambda here: PictureTasks([(task, here)], None), how)
+        return await self._made(item, cost, lambda here: PictureTasks([(task, here)], None), how, refused)
 
     async def _made(
         self,
-        tenant: Tenant,
-        what: tuple[str, str, Cost],
-        path: Path,
+        item: Input,
+        cost: Cost,
         tasks_of: Callable[[Path], PictureTasks],
         how: Mapping[str, Any] | None = None,
+        refused: tuple[str, str] | None = None,
     ) -> Any:
         """Run tasks and return the result of the last one.
 
         Args:
-            tenant: owner.
-            what: field and value for a refusal, and the cost.
-            path: input, fetched from the store first.
-            tasks_of: creates the tasks for the path.
+            item: input, fetched from the store first.
+            cost: of the tasks.
+            tasks_of: creates the tasks for the path of the input.
             how: further arguments of each task.
+            refused: field and value of a refusal; None: those of the item.
         """
-        field, found, cost = what
-        account = self._accounts.of(tenant)
+        account = self._accounts.of(item.tenant)
         workers = await self._queue.workers()
-        picture_cost.check_memory(field, found, cost, list(workers.values()))
+        picture_cost.check_memory(*(refused or _named(item)), cost, list(workers.values()))
         try:
             async with self._queue.admitted(account, cost.seconds), asyncio.timeout(RENDER_SECONDS):
-                tasks = tasks_of(await self._in_thread(lambda: self._fetch(path)))
+                tasks = tasks_of(await self._fetched(item))
                 try:
                     return await _Run(self, account, cost, dict(how or {})).all(tasks)
                 except (InvalidInput, FileNotFoundError):
                     # Report an input that was deleted or damaged in the meantime.
-                    await self._in_thread(lambda: self._fetch(path))
+                    await self._fetched(item)
                     raise
         except TimeoutError:
             raise Busy(
                 "workers", f"no answer in {RENDER_SECONDS:g} s", "a later request, or more workers"
             ) from None
+
+    async def _fetched(self, item: Input) -> Path:
+        """The path of an item, where the store makes it available."""
+        path = self._files.of(item.tenant).stored(item.id)
+        return await self._in_thread(lambda: self._files.store.fetch(path))
 
     async def _in_thread(self, work: Callable[[], Found]) -> Found:
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
@@ -278,6 +242,13 @@ class Pictures:
             async with asyncio.timeout(ASK_S):
                 return await asyncio.shield(self._asking)
         return {}
+
+
+def _named(item: Input) -> tuple[str, str]:
+    """Field and value of an item in a refusal."""
+    if isinstance(item, DatasetRow):
+        return "dataset", item.id
+    return ("field", item.id) if isinstance(item, FieldRow) else ("volume", f"shape {tuple(item.shape)}")
 
 
 def _water(dataset: DatasetRow) -> dict[str, float]:

@@ -272,12 +272,22 @@ class ServiceSettings(BaseSettings):
             raise InvalidInput(
                 "BENTRAY_DATABASE_PASSWORD_FILE", self.database_password_file, "none without a database_url"
             )
+        text = read_secret(self.database_password_file, "BENTRAY_DATABASE_PASSWORD_FILE")
         try:
-            password = self.database_password_file.read_text().partition("\n")[0]
-            address = make_url(self.database_url).set(password=password)
-        except OSError as error:
-            found = f"{self.database_password_file} ({error.strerror})"
-            raise InvalidInput("BENTRAY_DATABASE_PASSWORD_FILE", found, "a readable file") from error
+            address = make_url(self.database_url).set(password=text.partition("\n")[0])
         except ArgumentError as error:
             raise InvalidInput("BENTRAY_DATABASE_URL", self.database_url, "a SQLAlchemy address") from error
         return address.render_as_string(hide_password=False)
+
+
+def read_secret(path: Path, setting: str) -> str:
+    """The text of a file with a secret.
+
+    Raises:
+        InvalidInput: naming the setting, for a file that cannot be read.
+    """
+    try:
+        return path.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        found = f"{path} ({getattr(error, 'strerror', None) or 'not text'})"
+        raise InvalidInput(setting, found, "a readable file") from error

@@ -18,6 +18,8 @@ from bentray_kernels.tomography.stored_settings import WITHDRAWN
 Record = TypeVar("Record")
 # The record of a reconstruction and those in it.
 RECORDS = {Settings, *(type(field.default) for field in fields(Settings) if is_dataclass(field.default))}
+# Description of the settings of a request.
+DEFAULTS = "Omitted settings take their defaults."
 _ADAPTERS: dict[type, TypeAdapter[Any]] = {}
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-from typing import Annotated, Generic, NamedTuple, TypeVar, cast
+from typing import Annotated, TypeVar, cast
 
 from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
@@ -26,10 +25,10 @@ from .pictures import Pictures
 from .readiness import Readiness
 from .rows.batches import Batches
 from .rows.database import Database
+from .rows.ids import Tenant
 from .rows.jobs import Jobs
 from .rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
 from .rows.tables import DatasetRow, FieldRow, VolumeRow
-from .rows.tenants import Tenant
 from .settings import ServiceSettings
 from .webhooks.sender import Webhooks
 
@@ -117,42 +116,20 @@ CallerTenant = Annotated[Tenant, Depends(_tenant)]
 
 
 Row = TypeVar("Row", DatasetRow, FieldRow, VolumeRow)
-
-
-class Requested(NamedTuple, Generic[Row]):
-    """The item that the path of a request names: its owner, its row, and its file or folder."""
-
-    tenant: Tenant
-    row: Row
-    path: Path
-
-
-# Awaited by a route, so that wrong parameters are named before an unknown id.
-Find = Callable[[], Awaitable[Requested[Row]]]
-
-
-def _find(
-    tenant: Tenant, name: str, get: Callable[[Tenant, str], Row], path_of: Callable[[str], Path]
-) -> Find[Row]:
-    def find() -> Requested[Row]:
-        row = get(tenant, name)
-        return Requested(tenant, row, path_of(row.id))
-
-    return partial(run_in_threadpool, find)
+# Finds the item that a path names; routes await it, so that wrong parameters are named before an unknown id.
+Find = Callable[[], Awaitable[Row]]
 
 
 async def _dataset(dataset_id: str, stores: Stores, tenant: CallerTenant) -> Find[DatasetRow]:
-    return _find(tenant, dataset_id, stores.datasets.get, lambda name: stores.files.of(tenant).dataset(name))
+    return partial(run_in_threadpool, stores.datasets.get, tenant, dataset_id)
 
 
 async def _volume(volume_id: str, stores: Stores, tenant: CallerTenant) -> Find[VolumeRow]:
-    return _find(tenant, volume_id, stores.volumes.get, lambda name: stores.files.of(tenant).volume(name))
+    return partial(run_in_threadpool, stores.volumes.get, tenant, volume_id)
 
 
 async def _field(field_id: str, stores: Stores, tenant: CallerTenant) -> Find[FieldRow]:
-    return _find(
-        tenant, field_id, stores.geometry_fields.get, lambda name: stores.files.of(tenant).field(name)
-    )
+    return partial(run_in_threadpool, stores.geometry_fields.get, tenant, field_id)
 
 
 FindDataset = Annotated[Find[DatasetRow], Depends(_dataset)]

@@ -15,7 +15,7 @@ import typer
 import yaml
 
 from bentray_service.cli import app
-from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import ApiKey
 from bentray_service.settings import OF_COMPOSE, OF_OTHER_PARTS, ServiceSettings
 from bentray_workers.cluster.dask_settings import SETTINGS
 

@@ -11,10 +11,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 
 from ..free_ports import free_port
 from .machine import PATIENCE_S, below, command_of, of_session

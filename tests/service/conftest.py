@@ -25,7 +25,7 @@ from bentray_service.ingest import canonical
 from bentray_service.ingest.ingest_process import convert_upload
 from bentray_service.ingest.sandbox import summary_in
 from bentray_service.rows.accounts import Account, Accounts
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
 from bentray_service.settings import ServiceSettings
 from bentray_service.web.server import configuration, listen
 from bentray_workers.cluster.fair_shares import Share

@@ -1,8 +1,7 @@
 """A volume stored as an upload leaves it, without the process that reads it."""
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
-from bentray_service.rows.ids import new_id
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_workers.files.volume import Volume, write_volume
 
 

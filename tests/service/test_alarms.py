@@ -12,9 +12,8 @@ import yaml
 from prometheus_client.parser import text_string_to_metric_families
 
 from bentray_service.backup.back_up import back_up
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL
+from bentray_service.rows.keys import ApiKey, Keys
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"

@@ -10,9 +10,8 @@ from sqlalchemy import update
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.app import create_app
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.tables import JobRow
-from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 

@@ -8,9 +8,8 @@ from distributed import batched
 
 from bentray_service import logs
 from bentray_service.logs import JsonFormatter, TextFormatter, about
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 
 log = logging.getLogger("bentray.test")
 

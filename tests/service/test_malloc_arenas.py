@@ -7,12 +7,12 @@ import sys
 
 import pytest
 
-from bentray_service.malloc_arenas import MAX_ARENAS
+from bentray_service.cli.serve import MAX_ARENAS
 
 # Prints how many arenas there are once many threads have allocated.
 PROGRAM = """
 import ctypes, sys, tempfile, threading
-from bentray_service.malloc_arenas import limit_arenas
+from bentray_service.cli.serve import limit_arenas
 
 if sys.argv[1] == "limited":
     limit_arenas()

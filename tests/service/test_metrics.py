@@ -11,9 +11,8 @@ from sqlalchemy import text
 
 from bentray_service.metrics import TENANTS
 from bentray_service.rows import usage
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.ids import LOCAL, Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 
 NAME = re.compile(r"bentray_[a-z]+(_[a-z]+)*")
 

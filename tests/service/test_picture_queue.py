@@ -8,7 +8,7 @@ import pytest
 from bentray_service import picture_queue
 from bentray_service.errors import RateLimited
 from bentray_service.picture_queue import LATEST_S, MAX_IN_TOTAL, MAX_PER_ACCOUNT, PictureQueue
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
 from bentray_workers.cluster.capacities import WorkerCapacity
 
 A, B, C = (Tenant(name) for name in "abc")

@@ -13,8 +13,7 @@ import pytest
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.app import create_app
-from bentray_service.rows.ids import new_id
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant, new_id
 from bentray_service.settings import ServiceSettings
 from bentray_workers.files.volume import Volume, write_volume
 

@@ -17,7 +17,7 @@ import pytest
 import trimesh
 
 from bentray_service.openapi import description
-from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import ApiKey
 
 from ..effort import effort
 

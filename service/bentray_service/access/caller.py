@@ -9,7 +9,7 @@ from typing import Literal
 
 from bentray_kernels.errors import InvalidInput
 
-from ..rows.tenants import LOCAL, Tenant
+from ..rows.ids import LOCAL, Tenant
 
 # Permissions of each scope.
 SCOPES: Mapping[str, str] = MappingProxyType(

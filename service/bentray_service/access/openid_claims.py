@@ -10,7 +10,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..errors import Forbidden
 from ..rows.claims import ClaimedTenants
-from ..rows.tenants import Tenant, checked_tenant
+from ..rows.ids import Tenant, checked_tenant
 from ..settings import ServiceSettings
 from .caller import USUAL, checked_scopes
 

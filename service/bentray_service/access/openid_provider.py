@@ -29,7 +29,7 @@ from joserfc.jwk import KeySet
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import NotAuthenticated, ProviderUnavailable
-from ..settings import ServiceSettings
+from ..settings import ServiceSettings, read_secret
 from ..web.addresses import names_loopback
 from ..web.outbound import Transport, certificates, proxy_for, through_proxy
 
@@ -269,13 +269,8 @@ def _signing(found: dict[str, Any] | None) -> Any:
 
 def _secret(settings: ServiceSettings) -> str | None:
     path = settings.oidc_client_secret_file
-    if path is None:
-        return None
-    try:
-        return path.read_text().partition("\n")[0].strip()
-    except (OSError, UnicodeDecodeError) as error:
-        found = f"{path} ({getattr(error, 'strerror', None) or 'not text'})"
-        raise InvalidInput("BENTRAY_OIDC_CLIENT_SECRET_FILE", found, "a readable file") from error
+    setting = "BENTRAY_OIDC_CLIENT_SECRET_FILE"
+    return None if path is None else read_secret(path, setting).partition("\n")[0].strip()
 
 
 def _is_safe(address: str) -> bool:

@@ -17,7 +17,7 @@ from starlette.concurrency import run_in_threadpool
 from ..files.data_folder import Files
 from ..rows import usage
 from ..rows.database import Database
-from ..rows.tenants import Tenant
+from ..rows.ids import Tenant
 from ..rows.usage import Lease, Usage
 
 log = logging.getLogger("bentray.access")

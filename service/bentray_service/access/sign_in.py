@@ -13,13 +13,12 @@ from bentray_kernels.errors import InvalidInput
 
 from ..errors import Forbidden, NotAuthenticated, RateLimited
 from ..rows.accounts import Accounts
-from ..rows.api_key import PREFIX, ApiKey
 from ..rows.claims import ClaimedTenants
-from ..rows.keys import Keys
+from ..rows.ids import LOCAL, Tenant
+from ..rows.keys import PREFIX, ApiKey, Keys
 from ..rows.projects import ROLES, Projects, membership
 from ..rows.sessions import Sessions
-from ..rows.tenants import LOCAL, Tenant
-from ..settings import ServiceSettings
+from ..settings import ServiceSettings, read_secret
 from ..web.addresses import is_loopback, names_loopback, networks, within
 from .browser_sessions import BrowserSessions
 from .caller import ANYONE, SCOPES, USUAL, Caller, scope_of
@@ -234,11 +233,7 @@ class SignIn:
     def _create_first_key(self, settings: ServiceSettings) -> None:
         path = settings.first_key_file
         assert path is not None
-        try:
-            text = path.read_text().strip()
-        except (OSError, UnicodeDecodeError) as error:
-            found = f"{path} ({getattr(error, 'strerror', None) or 'not text'})"
-            raise InvalidInput("BENTRAY_FIRST_KEY_FILE", found, "a file with a key") from error
+        text = read_secret(path, "BENTRAY_FIRST_KEY_FILE").strip()
         token = ApiKey.given("BENTRAY_FIRST_KEY_FILE", text)
         self._keys.add(token, LOCAL, "first", tuple(SCOPES))
         log.warning("created the first key, %s of the tenant %s, from %s", token.id, LOCAL, path)

@@ -139,12 +139,6 @@ def copy_file(source: Path, target: Path, limit: int | None = None) -> str:
     return digest.hexdigest()
 
 
-def digest_of_file(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def write_sums(folder: Path, sums: Mapping[str, str]) -> str:
     """Write the checksums by path; returns the SHA-256 of the list."""
     content = "".join(f"{sums[name]}  {name}\n" for name in sorted(sums)).encode()

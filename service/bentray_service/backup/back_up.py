@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 from sqlalchemy import Connection, select
 
@@ -22,28 +22,15 @@ from bentray_workers.files.atomic import sync, write_bytes
 
 from .. import __version__
 from ..errors import DatabaseUnavailable
+from ..files.bucket_store import open_store
 from ..files.data_folder import Files
-from ..files.digests import digest_of
-from ..files.disk import bytes_in, remove_path
-from ..files.open_store import open_store
-from ..files.private import private_files
+from ..files.disk import bytes_in, digest_of, private_files, remove_path, sha256_of
 from ..files.store import Store
-from ..files.tenant_files import TenantFiles
 from ..rows.checksums import Digest
 from ..rows.database import Database, open_database
+from ..rows.ids import Tenant
 from ..rows.table_copies import copy_to_file, snapshot
-from ..rows.tables import (
-    VERSION,
-    ChecksumRow,
-    DatasetRow,
-    FieldRow,
-    JobRow,
-    MeshRow,
-    ResultVolumeRow,
-    StoredRow,
-    UploadedVolumeRow,
-)
-from ..rows.tenants import Tenant
+from ..rows.tables import VERSION, WITH_FILES, ChecksumRow, JobRow, StoredRow
 from ..settings import ServiceSettings
 from .archive import (
     DATABASE,
@@ -53,7 +40,6 @@ from .archive import (
     UNFINISHED,
     Description,
     copy_file,
-    digest_of_file,
     unfinished_backup,
     write_sums,
 )
@@ -62,16 +48,6 @@ from .archive import (
 MOMENTS = 20
 
 Report = Callable[[int, int], None]
-
-
-# The tables whose rows have files, and the paths of these.
-STORED: tuple[tuple[type[StoredRow], Callable[[TenantFiles, str], Path]], ...] = (
-    (DatasetRow, TenantFiles.dataset),
-    (UploadedVolumeRow, TenantFiles.volume),
-    (ResultVolumeRow, TenantFiles.volume),
-    (MeshRow, TenantFiles.mesh),
-    (FieldRow, TenantFiles.field),
-)
 
 
 class Item(NamedTuple):
@@ -166,7 +142,7 @@ class _Copier:
             items = list(self._items(source))
         partial.replace(self._folder / DATABASE)
         sync(self._folder / DATABASE)
-        self.sums = {DATABASE: digest_of_file(self._folder / DATABASE)}
+        self.sums = {DATABASE: sha256_of(self._folder / DATABASE)}
         self.missing = []
         return items
 
@@ -175,9 +151,9 @@ class _Copier:
         digests = {
             (row.tenant, row.id): Digest(row.bytes, row.sha256) for row in source.execute(select(ChecksumRow))
         }
-        for table, place in STORED:
+        for table in get_args(StoredRow):
             for row in source.execute(select(table.tenant, table.id)):
-                path = place(self._files.of(row.tenant), row.id)
+                path = self._files.of(row.tenant).stored(row.id)
                 yield Item(row.tenant, row.id, path, digests.get((row.tenant, row.id)))
         finished = {"kind": "refraction", "state": "succeeded"}
         turntables = select(JobRow.tenant, JobRow.id, JobRow.settings).filter_by(**finished)
@@ -231,7 +207,7 @@ class _Copier:
         for path in _files_in(target):
             inside = str(path.relative_to(self._folder))
             whole = item.digest is not None and path == target
-            self.sums[inside] = item.digest.sha256 if item.digest and whole else digest_of_file(path)
+            self.sums[inside] = item.digest.sha256 if item.digest and whole else sha256_of(path)
 
     @staticmethod
     def _is_copied(path: Path, digest: Digest | None) -> bool:
@@ -242,7 +218,7 @@ class _Copier:
         with self._database.read() as session:
             return any(
                 session.scalar(select(table.id).filter_by(tenant=item.tenant, id=item.id))
-                for table in (*(table for table, _ in STORED), JobRow)
+                for table in WITH_FILES
             )
 
     def _check_space(self, items: list[Item]) -> None:

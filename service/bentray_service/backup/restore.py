@@ -19,10 +19,10 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import sync, write_bytes
 
 from ..errors import Damaged
+from ..files.bucket_store import open_store
 from ..files.data_folder import RESTORING, Files, lock
+from ..files.disk import private_files, sha256_of
 from ..files.folder_database import write_stamp
-from ..files.open_store import open_store
-from ..files.private import private_files
 from ..files.tenant_files import KEPT
 from ..rows.database import Database, new_mark, open_database
 from ..rows.table_copies import copy_to, has_tables, remove_database, snapshot
@@ -37,7 +37,7 @@ from ..rows.tables import (
     UploadRow,
 )
 from ..settings import ServiceSettings
-from .archive import DATABASE, Description, copy_file, digest_of_file, read_description, read_sums
+from .archive import DATABASE, Description, copy_file, read_description, read_sums
 
 Report = Callable[[int, int], None]
 
@@ -113,7 +113,7 @@ def _copy(source: Path, target: Path, expected: str, *, always: bool) -> None:
     Raises:
         Damaged: when it differs or is missing.
     """
-    if not always and target.is_file() and digest_of_file(target) == expected:
+    if not always and target.is_file() and sha256_of(target) == expected:
         return
     try:
         found = copy_file(source, target)

@@ -14,7 +14,6 @@ from . import (
     bench,
     compare,
     convert,
-    correct,
     demo,
     devices,
     download,
@@ -33,7 +32,7 @@ from . import (
     webhooks,
     worker,
 )
-from .options.repeated_words import RepeatedSpacing
+from .options.view_options import RepeatedSpacing
 from .output.exit_codes import INTERRUPTED, Commands
 from .output.terminal import show_warnings_on_one_line
 
@@ -61,7 +60,7 @@ PANELS: dict[str, tuple[Callable[..., Any], ...]] = {
         simulate.simulate,
         geometry_field.geometry_field,
     ),
-    "Data": (convert.convert, correct.correct, export.export),
+    "Data": (convert.convert, convert.correct, export.export),
     "Service": (serve.serve, worker.worker, submit.submit, download.download),
     "Administration": (
         audit.audit,

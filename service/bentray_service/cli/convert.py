@@ -1,4 +1,4 @@
-"""`bentray convert`: convert a scan of another program to a dataset file."""
+"""`bentray convert` and `bentray correct`: dataset files of scans of other programs, or with wrong units."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import typer
 
 from .options.paths import check_apart, output_file
 from .options.scan_options import ScanOptions, input_scan, with_scan_options
-from .output.terminal import AsJson, print_json, print_lines
+from .output.terminal import AsJson, print_result
+
+TIMES, LENGTHS = "<s|ms|us|ns>", "<m|cm|mm|um>"
 
 
 @with_scan_options
@@ -50,8 +52,54 @@ def convert(
         "travel_times": dataset.picked,
         "water_speed_mps": dataset.water_speed_mps,
     }
-    if as_json:
-        print_json(summary)
-        return
-    print_lines([f"{name}: {value}" for name, value in summary.items() if value not in (str(target), "")])
-    print_lines([str(target)])
+    lines = [f"{name}: {value}" for name, value in summary.items() if value not in (str(target), "")]
+    print_result(summary, [*lines, str(target)], as_json=as_json)
+
+
+def correct(
+    file: Annotated[Path, typer.Argument(help="Dataset file; it stays as it is.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Corrected dataset file to write (.h5).")],
+    times_in: Annotated[
+        str | None, typer.Option("--times-in", metavar=TIMES, help="Unit of the times in the original file.")
+    ] = None,
+    times_read_as: Annotated[
+        str, typer.Option("--times-read-as", metavar=TIMES, help="Unit in which they were read.")
+    ] = "s",
+    positions_in: Annotated[
+        str | None, typer.Option("--positions-in", metavar=LENGTHS, help="Unit of the lengths in it.")
+    ] = None,
+    positions_read_as: Annotated[
+        str, typer.Option("--positions-read-as", metavar=LENGTHS, help="Unit in which they were read.")
+    ] = "m",
+    sampling_rate_hz: Annotated[
+        float | None, typer.Option("--sampling-rate", help="Sampling rate of the traces, Hz.")
+    ] = None,
+    frequency_hz: Annotated[float | None, typer.Option("--frequency", help="Centre frequency, Hz.")] = None,
+    arrangement: Annotated[
+        str | None,
+        typer.Option(
+            "--arrangement",
+            help="Fault in the order of the elements or in their positions, as the refusal of the scan names "
+            "it, such as receivers-shifted-by-1, elements-grid-yx, positions-in-degrees.",
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write a corrected copy of a dataset file whose units, frequency or order of elements are wrong.
+
+    The copy passes the checks of an upload and states the correction in its source. The times are travel
+    times, their deviations, the time of the first sample and the sample interval.
+
+    Example:  bentray correct scan.h5 -o corrected.h5 --positions-in mm --positions-read-as cm
+    """
+    source, target = input_scan(file), output_file(output, force=force, suffix=".h5")
+    check_apart({"output": target}, {"file": source})
+
+    from bentray_workers.files.dataset import Correction, correct_dataset
+
+    units = times_in, times_read_as, positions_in, positions_read_as
+    correction = Correction(*units, sampling_rate_hz, frequency_hz, arrangement)
+    dataset = correct_dataset(source, target, correction)
+    figures = {"file": str(source), "output": str(target), "source": dataset.source}
+    print_result(figures, [dataset.source, str(target)], as_json=as_json)

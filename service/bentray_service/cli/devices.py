@@ -1,4 +1,4 @@
-"""`bentray devices`: list, test and measure the OpenCL devices."""
+"""`bentray devices`: list, test and measure the OpenCL devices; the command that installs one."""
 
 from __future__ import annotations
 
@@ -9,12 +9,20 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .opencl_help import help_of
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
     from bentray_kernels.device_engines import Comparison
     from bentray_kernels.opencl import Device, DeviceBenchmark, DeviceSelection, SelfTestResult
+import os
+import platform
+import shutil
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bentray_kernels.opencl import DeviceSelection
 
 
 def devices(
@@ -179,3 +187,24 @@ def _summary(choice: DeviceSelection, found: bool) -> list[str]:
         return [f"chosen: device {device.index}, {device.label}"]
     reason = "no device passed" if found else choice.reason
     return [f"{reason}; compiled code computes everything", f"suggestion: {help_of(choice)}"]
+
+
+def help_of(choice: DeviceSelection) -> str:
+    """The command, with a comment after ``#``; empty if a device is chosen."""
+    from bentray_kernels.opencl.devices import hidden
+
+    if choice.device is not None:
+        return ""
+    if reason := hidden():
+        return f"unset {reason.partition('=')[0]}  # shows the devices of this machine again"
+    if Path(sys.prefix, "conda-meta").is_dir():
+        return "conda install -c conda-forge pyopencl pocl  # a new PoCL, for x86-64 and Arm"
+    if shutil.which("apt-get"):
+        command = (
+            "apt-get install pocl-opencl-icd" if os.geteuid() == 0 else "sudo apt-get install pocl-opencl-icd"
+        )
+        return f"{command}  # the distribution's PoCL, for x86-64 and Arm"
+    if platform.machine() == "x86_64":
+        command = f"{sys.executable} -m pip install intel-opencl-rt intel-cmplr-lib-rt"
+        return f"{command}  # Intel's runtime; its licence forbids use in services for others"
+    return "install PoCL with this system's package manager"

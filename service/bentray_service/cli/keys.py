@@ -14,12 +14,11 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
-from .output.command_list import CommandList
-from .output.terminal import AsJson, print_json, print_lines, print_table, remark
+from .output.exit_codes import CommandList
+from .output.terminal import AsJson, print_json, print_lines, print_result, print_table, remark
 
 if TYPE_CHECKING:
     from ..rows.database import Database
-    from ..rows.keys import Keys
     from ..rows.tables import KeyRow
     from ..settings import ServiceSettings
 
@@ -59,16 +58,16 @@ def create(
     """
     from ..access.caller import checked_scopes
     from ..files.folder_database import remember_authentication
-    from ..rows.api_key import ApiKey
-    from ..rows.tenants import checked_tenant
+    from ..rows.ids import checked_tenant
+    from ..rows.keys import ApiKey, Keys
 
     requested, whose = checked_scopes(scopes), checked_tenant(tenant)
     if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
         raise InvalidInput("name", repr(name[:LONGEST_NAME]), f"1 to {LONGEST_NAME} printable characters")
     until = None if expires is None else time.time() + _seconds(expires)
     token = ApiKey.new()
-    with _opened(data) as store:
-        row = store.add(token, whose, name, requested, until)
+    with opened_database(data) as database:
+        row = Keys(database).add(token, whose, name, requested, until)
         remember_authentication(service_settings(data).data_dir)
     if as_json:
         print_json({**_shown(row), "key": token.shown()})
@@ -90,11 +89,12 @@ def list_keys(
 
     Example:  bentray keys list --tenant clinic
     """
-    from ..rows.tenants import checked_tenant
+    from ..rows.ids import checked_tenant
+    from ..rows.keys import Keys
 
     whose = None if tenant is None else checked_tenant(tenant)
-    with _opened(data) as store:
-        found = [_shown(row) for row in store.all(whose)]
+    with opened_database(data) as database:
+        found = [_shown(row) for row in Keys(database).all(whose)]
     if as_json:
         print_json(found)
         return
@@ -113,28 +113,19 @@ def revoke(
 
     Example:  bentray keys revoke 0f3a5c7e9b1d
     """
-    with _opened(data) as store:
-        row = _shown(store.revoke(key_id))
-    if as_json:
-        print_json(row)
-    else:
-        print_lines([f"{row['id']} of {row['tenant']} revoked"])
-
-
-@contextmanager
-def _opened(data: Path | None) -> Iterator[Keys]:
     from ..rows.keys import Keys
 
     with opened_database(data) as database:
-        yield Keys(database)
+        row = _shown(Keys(database).revoke(key_id))
+    print_result(row, [f"{row['id']} of {row['tenant']} revoked"], as_json=as_json)
 
 
 @contextmanager
 def opened_database(data: Path | None) -> Iterator[Database]:
     """The database of the service with this data folder, which may be running."""
     from ..files.data_folder import Files
+    from ..files.disk import private_files
     from ..files.folder_database import open_folder_database
-    from ..files.private import private_files
 
     settings = service_settings(data)
     with private_files():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -11,8 +9,8 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .keys import Data, opened_database, shown_time
-from .output.command_list import CommandList
-from .output.terminal import AsJson, print_json, print_lines, print_table
+from .output.exit_codes import CommandList
+from .output.terminal import AsJson, print_json, print_result, print_table
 
 if TYPE_CHECKING:
     from ..rows.projects import Projects
@@ -41,20 +39,18 @@ def create(
 
     Example:  bentray projects create Trial-7 --tenant clinic --owner user:alice
     """
-    from ..rows.projects import ACCEPTED, LONGEST_NAME, MEMBER
-    from ..rows.tenants import checked_tenant
+    from ..rows.ids import checked_tenant
+    from ..rows.projects import ACCEPTED, LONGEST_NAME, MEMBER, Projects
 
     whose = checked_tenant(tenant)
     if not MEMBER.fullmatch(owner):
         raise InvalidInput("owner", repr(owner[:80]), ACCEPTED)
     if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
         raise InvalidInput("name", repr(name[:80]), f"1 to {LONGEST_NAME} printable characters")
-    with _opened(data) as store:
+    with opened_database(data) as database:
+        store = Projects(database)
         made = _shown(store, store.add(whose, name, owner))
-    if as_json:
-        print_json(made)
-    else:
-        print_lines([made["id"]])
+    print_result(made, [made["id"]], as_json=as_json)
 
 
 @projects.command("list")
@@ -67,9 +63,11 @@ def list_projects(
 
     Example:  bentray projects list --tenant clinic
     """
-    from ..rows.tenants import checked_tenant
+    from ..rows.ids import checked_tenant
+    from ..rows.projects import Projects
 
-    with _opened(data) as store:
+    with opened_database(data) as database:
+        store = Projects(database)
         found = [_shown(store, row) for row in store.all(checked_tenant(tenant), None)]
     if as_json:
         print_json(found)
@@ -94,27 +92,19 @@ def member(
 
     Example:  bentray projects member project-… user:bob reader --tenant clinic
     """
-    from ..rows.tenants import checked_tenant
+    from ..rows.ids import checked_tenant
+    from ..rows.projects import Projects
 
-    with _opened(data) as store:
+    with opened_database(data) as database:
+        store = Projects(database)
         row = store.get(checked_tenant(tenant), project, None)
         if role == NOBODY:
             store.remove_member(row, name)
         else:
             store.put_member(row, name, role)
         found = _shown(store, row)
-    if as_json:
-        print_json(found)
-    else:
-        print_lines(f"{one} {what}" for one, what in found["members"].items())
-
-
-@contextmanager
-def _opened(data: Any) -> Iterator[Projects]:
-    from ..rows.projects import Projects
-
-    with opened_database(data) as database:
-        yield Projects(database)
+    lines = [f"{one} {what}" for one, what in found["members"].items()]
+    print_result(found, lines, as_json=as_json)
 
 
 def _shown(store: Projects, row: ProjectRow) -> dict[str, Any]:

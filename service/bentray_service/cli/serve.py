@@ -22,6 +22,7 @@ from .output.terminal import print_lines, remark
 
 if TYPE_CHECKING:
     from ..settings import ServiceSettings
+import ctypes
 
 log = logging.getLogger("bentray.serve")
 
@@ -38,6 +39,10 @@ OPTIONS = {
     "dask_scheduler_address": "--scheduler",
     "workers": "--workers",
 }
+# Parameter of ``mallopt`` in <malloc.h>.
+M_ARENA_MAX = -8
+# In addition to the main arena; threads rarely allocate at the same time because of the GIL.
+MAX_ARENAS = 2
 
 
 def serve(
@@ -125,7 +130,6 @@ def _run(settings: ServiceSettings, listening: socket.socket, unused: list[str],
 
     from .. import logs
     from ..app import create_app
-    from ..malloc_arenas import limit_arenas
     from ..web.server import configuration
 
     host, port = listening.getsockname()[:2]
@@ -218,3 +222,12 @@ def _reachability(*, required: bool) -> str:
         "Only this machine can reach the service, and no authentication is required; to require it, "
         "create a key with `bentray keys create`."
     )
+
+
+def limit_arenas() -> None:
+    """Set the limit; to be called before threads are started. No effect with other C libraries."""
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, TypeError):
+        return
+    mallopt(M_ARENA_MAX, MAX_ARENAS)

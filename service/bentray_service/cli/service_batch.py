@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +16,7 @@ from .options.scan_options import dataset_file
 from .output.batch_view import report
 from .output.exit_codes import client_errors
 from .output.results import write_results
-from .output.terminal import print_json, print_lines, progress_bar, remark
+from .output.terminal import print_result, progress_bar, remark
 
 if TYPE_CHECKING:
     from bentray_kernels.tomography import Settings
@@ -71,10 +70,8 @@ def submit_service_batch(
         waiting = _upload_all(client, entries, settings, given)
         batch = _start(client, folder.resolve().name, list(waiting), settings) if waiting else None
         if batch is not None and not wait:
-            if as_json:
-                print_json(batch.model_dump(mode="json"))
-            else:
-                print_lines([f"{batch.id} {batch.state}", f"{client.url}{batch.links['self']}"])
+            lines = [f"{batch.id} {batch.state}", f"{client.url}{batch.links['self']}"]
+            print_result(batch.model_dump(mode="json"), lines, as_json=as_json)
             return entries
         if batch is not None:
             remark(
@@ -98,6 +95,8 @@ def _upload_all(
     from bentray_workers.files.dataset import read_dataset
     from bentray_workers.files.dataset.traces import trace_samples
 
+    from ..files.disk import sha256_of
+
     known = {one.sha256: one.id for one in client.datasets(KNOWN) if one.job is None}
     uploaded: dict[str, list[Entry]] = {}
     left = [entry for entry in entries if entry.state == "waiting"]
@@ -108,8 +107,7 @@ def _upload_all(
             try:
                 with _dataset(entry, given) as scan:
                     check_scan(read_dataset(scan, traces=False), settings, trace_samples(scan))
-                    with scan.open("rb") as file:
-                        digest = hashlib.file_digest(file, "sha256").hexdigest()
+                    digest = sha256_of(scan)
                     if digest not in known:
                         known[digest] = client.upload(scan).id
             except InvalidInput as error:

@@ -31,12 +31,11 @@ def verify(
 
     Example:  bentray verify --data /srv/bentray --json
     """
-    from ..files.checked_store import CheckedStore
+    from ..files.bucket_store import open_store
+    from ..files.checked_store import CheckedStore, scrub
     from ..files.data_folder import Files, lock
     from ..files.folder_database import open_folder_database
-    from ..files.open_store import open_store
     from ..files.orphans import Orphans
-    from ..files.scrub import scrub
     from ..rows.checksums import Checksums
 
     settings = service_settings(data)

@@ -9,8 +9,8 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .keys import Data, opened_database, shown_time
-from .output.command_list import CommandList
-from .output.terminal import AsJson, print_json, print_lines, print_table, remark
+from .output.exit_codes import CommandList
+from .output.terminal import AsJson, print_json, print_lines, print_result, print_table, remark
 
 COLUMNS = ("id", "tenant", "job", "state", "attempts", "created", "last")
 
@@ -36,7 +36,7 @@ def create_secret(
     Example:  bentray webhooks create-secret --tenant clinic
     """
     from ..rows.deliveries import WebhookSecrets
-    from ..rows.tenants import checked_tenant
+    from ..rows.ids import checked_tenant
 
     whose = checked_tenant(tenant)
     with opened_database(data) as database:
@@ -63,7 +63,7 @@ def list_messages(
     Example:  bentray webhooks list --state failed
     """
     from ..rows.deliveries import Deliveries
-    from ..rows.tenants import checked_tenant
+    from ..rows.ids import checked_tenant
 
     whose = None if tenant is None else checked_tenant(tenant)
     with opened_database(data) as database:
@@ -91,10 +91,7 @@ def retry(
     if count < len(set(ids)):
         found = f"{len(set(ids)) - count} of {len(set(ids))} that have not failed"
         raise InvalidInput("id", found, "ids of failed messages, see `bentray webhooks list --state failed`")
-    if as_json:
-        print_json({"retried": count})
-    else:
-        print_lines([f"{count} messages are sent again"])
+    print_result({"retried": count}, [f"{count} messages are sent again"], as_json=as_json)
 
 
 def _shown(row: Any) -> dict[str, Any]:

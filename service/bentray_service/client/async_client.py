@@ -11,10 +11,9 @@ import httpx
 from tenacity import AsyncRetrying
 
 from ..web.outbound import AsyncTransport
-from .connection import ConnectionOptions
+from .connection import ConnectionOptions, saving
 from .errors import ClientError, from_response, no_answer
 from .operations import Operations
-from .saving import saving
 from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, FlowRun, PauseStep, RequestStep, Step
 
 T = TypeVar("T")

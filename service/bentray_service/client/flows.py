@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 from bentray_workers.files.export.registry import FormatName
 
 from ..interactive.progress_bar import progress_bar
-from ..interactive.result import Result
+from ..interactive.result import Result, result_of
 from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from ..routes.models.name_changes import LengthUnit, TimeUnit
 from ..routes.models.surface_records import MeshRecord
@@ -21,7 +21,6 @@ from ..settings_request import check_setting_names, nested, plain_numbers
 from .connection import Connection
 from .errors import ClientError
 from .lists import volume as volume_record
-from .results import read_result
 from .steps import DownloadStep, Flow, RequestStep
 from .stored import DatasetId, JobId, StoredId, VolumeId, id_of, volume_of
 from .uploading import PLACES, OnBytes, UploadKind, send_direct, send_file
@@ -268,10 +267,14 @@ def download_dataset(
 
 def result(connection: Connection, volume: VolumeId) -> Flow[Result]:
     """Get a volume, or the result of a job, as a :class:`Result`: arrays with coordinates and units."""
+    from bentray_workers.files.volume_export import read_image
+
     about = yield from volume_record(connection, volume)
     with tempfile.TemporaryDirectory() as folder:
         path = yield from download(connection, about.id, "hdf5", Path(folder) / "volume.h5")
-        return read_result(path, about)
+        named = ("id", "title", "job", "dataset", "sha256")
+        attributes = {name: str(value) for name in named if (value := getattr(about, name))}
+        return result_of(read_image(path), attributes, unit=about.unit)
 
 
 def delete(connection: Connection, stored: StoredId) -> Flow[None]:

@@ -1,8 +1,8 @@
-"""Flows that get records, one or a list, newest first."""
+"""Flows that get records, one or a list, newest first; and those of projects."""
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 from urllib.parse import parse_qsl, urlsplit
 
 from pydantic import BaseModel
@@ -20,6 +20,14 @@ from ..routes.models.job_records import (
     State,
     VolumeList,
     VolumeRecord,
+)
+from ..routes.models.project_records import (
+    MemberList,
+    MemberRecord,
+    ProjectDetails,
+    ProjectList,
+    ProjectRecord,
+    Role,
 )
 from ..routes.models.quality_records import QualityRecord
 from ..routes.models.surface_records import MeshList, MeshRecord
@@ -127,3 +135,46 @@ def get(model: type[Answer], path: str, params: dict[str, Any] | None = None) ->
 def _list(model: type[Answer], path: str, limit: int, text: str | None = None) -> Flow[Answer]:
     LIMIT.check("limit", limit)
     return (yield from get(model, path, {"limit": limit} | ({} if text is None else {"text": text})))
+
+
+ProjectId: TypeAlias = str | ProjectRecord
+
+
+def projects(connection: Connection) -> Flow[RecordList[ProjectRecord]]:
+    """List the projects that the caller is a member of."""
+    return RecordList((yield from get(ProjectList, "/v1/projects")).projects)
+
+
+def project(connection: Connection, project: ProjectId) -> Flow[ProjectDetails]:
+    """Get a project with its members."""
+    return (yield from get(ProjectDetails, _place(project)))
+
+
+def create_project(connection: Connection, name: str) -> Flow[ProjectDetails]:
+    """Create a project, whose owner is the caller. ``Client(url, project=…)`` works in it."""
+    response = yield RequestStep("POST", "/v1/projects", {"json": {"name": name}})
+    return ProjectDetails.model_validate_json(response.content)
+
+
+def set_member(
+    connection: Connection, project: ProjectId, member: str, role: Role | None
+) -> Flow[RecordList[MemberRecord]]:
+    """Add a member, change their role or remove them; the result are the members.
+
+    Args:
+        project: id or record.
+        member: ``key:`` and the id of a key, or ``user:`` and the name of a user.
+        role: ``reader``, ``contributor`` or ``owner``; None: no member any more.
+    """
+    request = {"json": {"member": member, "role": role}}
+    response = yield RequestStep("PUT", f"{_place(project)}/members", request, repeatable=True)
+    return RecordList(MemberList.model_validate_json(response.content).members)
+
+
+def delete_project(connection: Connection, project: ProjectId) -> Flow[None]:
+    """Delete an empty project."""
+    yield RequestStep("DELETE", _place(project))
+
+
+def _place(project: ProjectId) -> str:
+    return f"/v1/projects/{project if isinstance(project, str) else project.id}"

@@ -10,7 +10,6 @@ from typing import Any, Concatenate, Generic, ParamSpec, Protocol, TypeVar, over
 
 from . import batches as batch_flows
 from . import flows, lists, pictures
-from . import projects as project_flows
 from .connection import Connection
 from .steps import Flow
 
@@ -80,11 +79,11 @@ class Operations(Connection):
     download = _Operation(flows.download)
     download_dataset = _Operation(flows.download_dataset)
     delete = _Operation(flows.delete)
-    create_project = _Operation(project_flows.create_project)
-    set_member = _Operation(project_flows.set_member)
-    delete_project = _Operation(project_flows.delete_project)
-    project = _Operation(project_flows.project)
-    projects = _Operation(project_flows.projects)
+    create_project = _Operation(lists.create_project)
+    set_member = _Operation(lists.set_member)
+    delete_project = _Operation(lists.delete_project)
+    project = _Operation(lists.project)
+    projects = _Operation(lists.projects)
     datasets = _Operation(lists.datasets)
     jobs = _Operation(lists.jobs)
     volumes = _Operation(lists.volumes)

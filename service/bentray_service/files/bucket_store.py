@@ -1,4 +1,4 @@
-"""A store that keeps files in a bucket, with the data folder as a cache."""
+"""The store that the settings select: the data folder, or a bucket with the data folder as a cache."""
 
 from __future__ import annotations
 
@@ -9,16 +9,19 @@ import threading
 import time
 from collections.abc import Callable, Collection
 from concurrent.futures import Future
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+
+from bentray_kernels.errors import InvalidInput
 
 from ..errors import StorageUnavailable
-from ..rows.live_ids import LiveIds, Name
+from ..rows.database import Database, mark_of
+from ..rows.stored_tables import LiveIds
 from .bucket import Bucket
 from .cache import Cache
 from .direct_uploads import DirectUploads
-from .packing import metadata_of, packed, unpack
+from .disk import metadata_of, packed, unpack
 from .store import Store
-from .tenant_files import KEPT
+from .tenant_files import KEPT, owner_of
 
 log = logging.getLogger("bentray.storage")
 
@@ -29,6 +32,7 @@ FRESH_S = 5.0
 # Minimum age of orphaned objects and cached files before deletion, s; the clocks of buckets differ.
 FORGOTTEN_S = 86400.0
 LEFT_S = 3600.0
+FIELD = "BENTRAY_STORAGE_URL"
 
 
 class BucketStore(Store):
@@ -117,7 +121,7 @@ class BucketStore(Store):
         lying = list(self._cache.stored_paths())
         # Queried last, so that files created meanwhile have a row or are new.
         names, now = self._known.names(), time.time()
-        unknown = (key for key in held if _name(key) not in names)
+        unknown = (key for key in held if owner_of(PurePosixPath(key)) not in names)
         old = [key for key in unknown if now - held[key] > FORGOTTEN_S]
         if old:
             log.warning("deleting %d objects without a row in the database", len(old))
@@ -127,7 +131,7 @@ class BucketStore(Store):
                 return
             key = self._key(path)
             try:
-                if _name(key) not in names:
+                if owner_of(path) not in names:
                     if now - path.stat().st_ctime > LEFT_S:
                         self._cache.clear([path])
                 elif path.parent.name in KEPT and key not in held:
@@ -173,7 +177,36 @@ class BucketStore(Store):
         return path.relative_to(self._root).as_posix()
 
 
-def _name(key: str) -> Name:
-    """Tenant and id from the key ``tenants/TENANT/KIND/ID.…``."""
-    _, tenant, _, name = key.split("/", 3)
-    return tenant, name.partition(".")[0]
+def open_store(
+    url: str | None, root: Path, database: Database, cache_bytes: int, public_endpoint: str | None = None
+) -> Store:
+    """Open the store of a service.
+
+    Args:
+        url: ``s3://bucket/prefix``, or ``gs://`` or ``az://``; None for the data folder.
+        root: the data folder.
+        database: with the rows of the stored items.
+        cache_bytes: see ``BucketStore``.
+        public_endpoint: see ``Bucket``.
+
+    Raises:
+        InvalidInput: when the bucket is not readable and writable, or belongs to another database.
+    """
+    if url is None:
+        return Store()
+    mark = mark_of(database)
+    try:
+        bucket = Bucket(url, public_endpoint)
+        metadata = bucket.metadata(MARK)
+        if metadata is None and next(bucket.listed(), None) is not None:
+            raise InvalidInput(FIELD, f"{url}, which contains other objects", "an unused prefix")
+        if metadata is not None and metadata.get("database") != mark:
+            found = f"{url}, used by another database than BENTRAY_DATABASE_URL"
+            accepted = "the database that it was used with (see `bentray restore`), or a separate prefix"
+            raise InvalidInput(FIELD, found, accepted)
+        # Written even if present, to verify write access.
+        bucket.put_metadata(MARK, {"database": mark})
+    except StorageUnavailable as error:
+        found = f"{url} ({error.value})"
+        raise InvalidInput(FIELD, found, "a readable and writable bucket") from error
+    return BucketStore(root, bucket, mark, LiveIds(database), cache_bytes)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from .disk import bytes_in, remove_path
-from .tenant_files import KEPT
+from .tenant_files import KEPT, owner_of, stored_files
 
 # Exports are evicted together with their volume.
 MADE_OF_THEM = ("exports",)
@@ -86,9 +86,7 @@ class Cache:
 
     def stored_paths(self) -> Iterator[Path]:
         """All complete files and folders."""
-        for folder in self._root.glob("tenants/*/*"):
-            if folder.name in (*KEPT, *MADE_OF_THEM):
-                yield from (path for path in folder.iterdir() if path.suffix != ".partial")
+        return stored_files(self._root, (*KEPT, *MADE_OF_THEM))
 
     def _drop(self, thing: CachedItem) -> bool:
         """Evict an item, unless it was used in the meantime."""
@@ -107,7 +105,7 @@ class Cache:
                 state = path.stat()
             except FileNotFoundError:
                 continue
-            thing = items.setdefault((path.parts[-3], path.name.partition(".")[0]), CachedItem())
+            thing = items.setdefault(owner_of(path), CachedItem())
             thing.paths.append(path)
             thing.size += bytes_in(path) if path.is_dir() else state.st_size
             thing.used = max(thing.used, state.st_atime)

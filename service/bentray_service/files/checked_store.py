@@ -1,4 +1,4 @@
-"""A store that verifies checksums, so that damaged files are never served."""
+"""A store that verifies checksums, so that damaged files are never served; verification of all files."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ from contextlib import contextmanager, suppress
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
+from typing import NamedTuple
 
 from ..errors import Damaged, DatabaseFull, DatabaseUnavailable, Deleted
 from ..rows.checksums import Checksums, Digest
+from ..rows.ids import Tenant
 from ..rows.tables import ChecksumRow
-from ..rows.tenants import Tenant
-from .digests import digest_of, stamp_of
+from .data_folder import Files
+from .disk import digest_of, stamp_of
+from .orphans import Orphans
 from .store import Store
-from .tenant_files import KEPT
+from .tenant_files import KEPT, owner_of, stored_files
 
 log = logging.getLogger("bentray.storage")
 
@@ -154,10 +157,55 @@ class CheckedStore(Store):
             self._comparing.pop(path, None)
 
     def _named(self, path: Path) -> tuple[Tenant, str, str]:
-        """Tenant, id and relative path from ``tenants/TENANT/KIND/ID.…``."""
-        _, tenant, kind, name = path.relative_to(self._root).parts
-        return Tenant(tenant), name.partition(".")[0], f"{kind}/{name}"
+        """Tenant, id and path below the folder of the tenant."""
+        return *owner_of(path), f"{path.parent.name}/{path.name}"
 
 
 def _of(row: ChecksumRow) -> Digest:
     return Digest(row.bytes, row.sha256)
+
+
+class Finding(NamedTuple):
+    """The result for one stored item.
+
+    Attributes:
+        tenant, path: owner, and path below the folder of the tenant.
+        state: ``sound``, ``damaged``, ``first seen`` (checksum added) or ``orphan`` (no row).
+        found: description of the damage.
+    """
+
+    tenant: Tenant
+    path: str
+    state: str
+    found: str = ""
+
+
+def scrub(files: Files, checksums: Checksums, orphans: Orphans) -> Iterator[Finding]:
+    """Verify all stored items; damaged ones are marked and no longer served.
+
+    Args:
+        files: the data folder, with a store that has verified nothing yet.
+        checksums: the table of checksums.
+        orphans: finds files without a row.
+    """
+    assert isinstance(files.store, CheckedStore)
+    rows = {(row.tenant, row.path) for row in checksums.all()}
+    unknown = {_place(path) for path in orphans.found()}
+    lying = {_place(path) for path in stored_files(files.root, KEPT)}
+    for tenant, place in sorted(rows | lying | unknown):
+        if (tenant, place) in unknown:
+            yield Finding(tenant, place, "orphan")
+            continue
+        try:
+            files.store.fetch(files.of(tenant).root / place)
+        except Damaged as error:
+            yield Finding(tenant, place, "damaged", error.value.partition(", ")[2])
+        except Deleted:
+            # Deleted by a running service.
+            continue
+        else:
+            yield Finding(tenant, place, "sound" if (tenant, place) in rows else "first seen")
+
+
+def _place(path: Path) -> tuple[Tenant, str]:
+    return owner_of(path)[0], f"{path.parent.name}/{path.name}"

@@ -11,13 +11,11 @@ from pathlib import Path
 from typing import IO
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.atomic import sync
 
-from ..rows.tenants import LOCAL, Tenant, checked_tenant
-from .disk import remove_path
-from .private import close_to_others
+from ..rows.ids import Tenant, checked_tenant
+from .disk import close_to_others, remove_path
 from .store import Store
-from .tenant_files import KINDS, TenantFiles
+from .tenant_files import TenantFiles
 
 log = logging.getLogger("bentray.storage")
 
@@ -78,19 +76,6 @@ class Files:
         """Whether the folder has files of tenants, or a record of their requests."""
         paths = (path for pattern in ("tenants/*/*/*", "audit/*") for path in self.root.glob(pattern))
         return next(paths, None) is not None
-
-    def give_to_local(self) -> None:
-        """Move data of versions without tenants to the tenant ``local``; the folder must be locked."""
-        old = [self.root / name for name in KINDS if (self.root / name).is_dir()]
-        if not old:
-            return
-        log.warning("moving the data in %s to the tenant %s", self.root, LOCAL)
-        # Each move is independent and replaces an empty folder, so an interrupted move can be repeated.
-        local = self.of(LOCAL).root
-        for folder in old:
-            folder.replace(local / folder.name)
-        sync(local)
-        sync(self.root)
 
     def drop_leftovers(self) -> None:
         """Delete incomplete files of a dead process; the folder must be locked."""

@@ -11,9 +11,9 @@ from sqlalchemy.orm import Session
 
 from ..errors import DatabaseUnavailable, InUse, StorageUnavailable, UnknownId
 from ..rows import usage
-from ..rows.checksums import delete_checksums
+from ..rows.checksums import deletion_of
 from ..rows.database import Database
-from ..rows.ids import checked
+from ..rows.ids import Tenant, checked
 from ..rows.tables import (
     ENDED,
     BatchRow,
@@ -28,7 +28,6 @@ from ..rows.tables import (
     UploadedVolumeRow,
     UploadRow,
 )
-from ..rows.tenants import Tenant
 from .data_folder import Files
 
 log = logging.getLogger("bentray.storage")
@@ -161,7 +160,7 @@ def _forget(
     """Delete the rows, those with references first."""
     mine = FieldRow.tenant == tenant, FieldRow.id.in_(fields)
     session.execute(delete(FieldRow).where(*mine))
-    delete_checksums(session, tenant, {*names, *fields, *gone})
+    session.execute(deletion_of(tenant, {*names, *fields, *gone}))
     session.execute(delete(ExpiredRow).where(ExpiredRow.tenant == tenant, ExpiredRow.id.in_(names)))
     for table in (EventRow, DeliveryRow):
         session.execute(delete(table).where(table.job_id.in_(gone)))

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from sqlalchemy import select
 
 from ..rows.database import Database
-from ..rows.live_ids import LiveIds
+from ..rows.stored_tables import LiveIds
 from ..rows.tables import About
-from ..rows.tenants import Tenant
 from .data_folder import Files
 from .folder_database import read_stamp, write_stamp
-from .tenant_files import KEPT
+from .tenant_files import KEPT, owner_of, stored_files
 
 log = logging.getLogger("bentray.storage")
 
@@ -51,10 +50,10 @@ class Orphans:
 
     def found(self) -> list[Path]:
         """All files without a row; some may be new."""
-        lying = list(self._stored_files())
+        lying = list(stored_files(self._files.root, self._kinds))
         # Queried last, so that new files have a row.
         names = self._known.names() if lying else set()
-        return [path for path in lying if (path.parts[-3], path.name.partition(".")[0]) not in names]
+        return [path for path in lying if owner_of(path) not in names]
 
     def begin(self) -> None:
         """Remove orphans of a dead service; the folder must be locked, before anything is written."""
@@ -88,7 +87,7 @@ class Orphans:
         """Remove files."""
         for path in paths:
             log.warning("removing %s, which has no row", path.relative_to(self._files.root))
-            self._files.of(Tenant(path.parts[-3])).drop(path)
+            self._files.of(owner_of(path)[0]).drop(path)
 
     def _stamp(self) -> None:
         """Record that the folder and the database are used together."""
@@ -103,8 +102,3 @@ class Orphans:
             about = session.scalars(select(About)).one()
         stamp = read_stamp(self._files.root)
         return stamp is not None and stamp.database == about.database and stamp.begun <= about.begun
-
-    def _stored_files(self) -> Iterator[Path]:
-        for folder in self._files.root.glob("tenants/*/*"):
-            if folder.name in self._kinds and folder.is_dir():
-                yield from (path for path in folder.iterdir() if path.suffix != ".partial")

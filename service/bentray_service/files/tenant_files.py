@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from contextlib import suppress
-from pathlib import Path
+from pathlib import Path, PurePath
 
-from ..rows.ids import PREFIXES, checked
+from ..rows.ids import PREFIXES, Tenant, checked
 from .disk import bytes_in, remove_path
 from .store import Store
 
@@ -19,6 +19,18 @@ KEPT = ("datasets", "volumes", "animations", "meshes", "fields")
 ANIMATIONS = ("zip", "apng")
 # Folder of a reconstruction in its work folder, as in bentray_workers.reconstruction.reconstruction_run.
 CHECKPOINTS = "checkpoints"
+
+
+def stored_files(root: Path, folders: Collection[str]) -> Iterator[Path]:
+    """All complete files and folders in some folders of all tenants of the data folder ``root``."""
+    for folder in root.glob("tenants/*/*"):
+        if folder.name in folders and folder.is_dir():
+            yield from (path for path in folder.iterdir() if path.suffix != ".partial")
+
+
+def owner_of(path: PurePath) -> tuple[Tenant, str]:
+    """Tenant and id of the path ``tenants/TENANT/KIND/ID.…``, or of such a path in a bucket."""
+    return Tenant(path.parts[-3]), path.name.partition(".")[0]
 
 
 class TenantFiles:
@@ -52,17 +64,23 @@ class TenantFiles:
 
     def incoming(self, upload_id: str) -> Path:
         """Path of a one-shot upload before ingestion."""
-        return self.root / "incoming" / f"{self._canonical(upload_id).stem}.upload"
+        return self.root / "incoming" / f"{self.stored(upload_id).stem}.upload"
 
     def candidate(self, upload_id: str) -> Path:
         """Path of a new canonical file, in its own folder, which is created."""
         folder = self._reading(upload_id)
         folder.mkdir(exist_ok=True)
-        return folder / self._canonical(upload_id).name
+        return folder / self.stored(upload_id).name
 
     def upload(self, upload_id: str) -> Path:
         """Path of the data of a resumable upload."""
         return self.root / "uploads" / checked("upload", upload_id)
+
+    def stored(self, stored_id: str) -> Path:
+        """The canonical file of a dataset, volume or mesh, or the folder of a geometry field."""
+        place = {"volume": self.volume, "mesh": self.mesh, "field": self.field}
+        kind = next((what for what in place if stored_id.startswith(f"{PREFIXES[what]}-")), "")
+        return place.get(kind, self.dataset)(stored_id)
 
     def dataset(self, dataset_id: str) -> Path:
         """The canonical file of a dataset."""
@@ -122,7 +140,7 @@ class TenantFiles:
         Raises:
             StorageUnavailable: when that is not possible now; no file is left.
         """
-        target = self._canonical(upload_id)
+        target = self.stored(upload_id)
         self.candidate(upload_id).replace(target)
         try:
             self._store.publish(target)
@@ -165,15 +183,9 @@ class TenantFiles:
 
     def _kept(self, stored_id: str) -> list[Path]:
         """Paths where a store may have files of an id."""
-        place = {"vol": self.volume, "mesh": self.mesh, "field": self.field}
-        prefix = stored_id.partition("-")[0]
-        if prefix == PREFIXES["job"]:
+        if stored_id.startswith(f"{PREFIXES['job']}-"):
             return [self.animation(stored_id, extension) for extension in ANIMATIONS]
-        return [place.get(prefix, self.dataset)(stored_id)]
+        return [self.stored(stored_id)]
 
     def _reading(self, upload_id: str) -> Path:
-        return self.root / "incoming" / f"{self._canonical(upload_id).stem}.reading"
-
-    def _canonical(self, upload_id: str) -> Path:
-        place = {PREFIXES["volume"]: self.volume, PREFIXES["mesh"]: self.mesh}
-        return place.get(upload_id.partition("-")[0], self.dataset)(upload_id)
+        return self.root / "incoming" / f"{self.stored(upload_id).stem}.reading"

@@ -13,7 +13,7 @@ from dask.system import CPU_COUNT
 from distributed.system import MEMORY_LIMIT
 
 from ..rows.accounts import Account, Accounts
-from ..rows.tenants import Tenant
+from ..rows.ids import Tenant
 
 # Minimum number of threads, so that one account cannot occupy all of them.
 MIN_CONCURRENT = 3

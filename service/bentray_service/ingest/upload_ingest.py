@@ -22,12 +22,12 @@ from bentray_kernels.errors import InvalidInput
 from ..access.quota import Quota
 from ..errors import StorageFull, StorageUnavailable, UnknownId
 from ..files.data_folder import Files
-from ..files.digests import digest_of
 from ..files.direct_uploads import DirectUploads
+from ..files.disk import digest_of
 from ..rows.accounts import Account, Accounts
+from ..rows.ids import Tenant
 from ..rows.stored_tables import UploadedTable
 from ..rows.tables import UploadRow
-from ..rows.tenants import Tenant
 from ..rows.uploads import Uploads
 from ..web.errors import INTERNAL, make_problem, problem_of
 from ..web.problem import Problem

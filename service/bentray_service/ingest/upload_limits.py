@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from ..access.rate_limits import RateLimits
 from ..errors import Busy, RateLimited
 from ..rows.accounts import Account, Accounts
-from ..rows.tenants import Tenant
+from ..rows.ids import Tenant
 
 # Each upload has a connection and a reservation; only few are ingested at a time.
 MAX_PER_ACCOUNT = 32

@@ -314,7 +314,7 @@ class Result:
     def _repr_html_(self) -> str:
         from bentray_workers.images.captions import facts
 
-        from .result_drawing import pictures_png
+        from .plotting import pictures_png
 
         shown = list(self.values)[:1] + [name for name in ("attenuation",) if name in self.values]
         png = pictures_png(shown, lambda axes, name: self._draw(axes, name, ("z", None), (None, None)))
@@ -366,7 +366,7 @@ class Result:
         cut: tuple[str, int | None],
         limits: tuple[float | None, float | None],
     ) -> None:
-        from .result_drawing import draw_quantity
+        from .plotting import draw_quantity
 
         name = next(iter(self.values)) if quantity is None else quantity
         coverage = None if name == "reflection" else self.values.get("coverage")

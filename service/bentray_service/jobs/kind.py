@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
@@ -16,9 +16,10 @@ from bentray_workers.cluster.task_pool import JobControl
 from ..compute import Compute
 from ..files.data_folder import Files
 from ..files.tenant_files import TenantFiles
+from ..rows.ids import Tenant
+from ..rows.jobs import NewJob
 from ..rows.stored_tables import Datasets, Meshes, Volumes
 from ..rows.tables import JobRow, Plain, ResultRow
-from ..rows.tenants import Tenant
 from ..settings_request import check_setting_names
 
 
@@ -68,23 +69,6 @@ class Sources(Protocol):
 
 
 @dataclass(frozen=True)
-class Order:
-    """A validated request.
-
-    Attributes:
-        settings: to store with the job.
-        largest_bytes: maximum storage while it runs.
-        references: ids of inputs, by column of the table of jobs.
-        plan: decomposition into tasks, if planned in advance.
-    """
-
-    settings: Plain
-    largest_bytes: int
-    references: dict[str, str] = field(default_factory=dict)
-    plan: Plain | None = None
-
-
-@dataclass(frozen=True)
 class JobRun:
     """A job to run.
 
@@ -124,7 +108,7 @@ class Kind(ABC, Generic[R]):
     lane: ClassVar[str]
 
     @abstractmethod
-    def plan(self, request: R, tenant: Tenant, sources: Sources, compute: Compute) -> Order:
+    def plan(self, request: R, tenant: Tenant, sources: Sources, compute: Compute) -> NewJob:
         """Validate a request against the stored inputs and the connected workers.
 
         Raises:

@@ -27,11 +27,11 @@ from bentray_workers.simulation.simulation_run import simulate_to_file
 
 from ..compute import Compute, check_renderable
 from ..files.tenant_files import TenantFiles
-from ..rows.ids import dataset_of, field_of, volume_of
+from ..rows.ids import Tenant, dataset_of, field_of, volume_of
+from ..rows.jobs import NewJob
 from ..rows.tables import DatasetRow, FieldRow, JobRow, Plain, ResultVolumeRow
-from ..rows.tenants import Tenant
-from .kind import JobRequest, JobRun, Kind, Order, Sources
-from .request_words import DEFAULTS
+from ..settings_request import DEFAULTS
+from .kind import JobRequest, JobRun, Kind, Sources
 
 
 class ReconstructionRequest(JobRequest):
@@ -58,12 +58,13 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
 
     def plan(
         self, request: ReconstructionRequest, tenant: Tenant, sources: Sources, compute: Compute
-    ) -> Order:
+    ) -> NewJob:
         dataset = sources.datasets.get(tenant, request.dataset)
         path = sources.files.of(tenant).dataset(dataset.id)
         settings = in_stated_water(request.settings, dataset)
         plan = compute.plan(dataset.counts, path, settings)
-        return Order(settings.to_dict(), plan["stored_bytes"], {"dataset_id": dataset.id}, plan)
+        stored = {"dataset_id": dataset.id, "plan": plan, "reserved": plan["stored_bytes"]}
+        return NewJob(request.kind, settings.to_dict(), **stored)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
         return files.dataset(job.dataset_id or "")
@@ -115,10 +116,10 @@ class SimulationKind(Kind[SimulationRequest]):
         "value": {"kind": "simulation", "settings": {"nodes": 64, "elements": 64, "noise_s": 2e-8}},
     }
 
-    def plan(self, request: SimulationRequest, tenant: Tenant, sources: Sources, compute: Compute) -> Order:
+    def plan(self, request: SimulationRequest, tenant: Tenant, sources: Sources, compute: Compute) -> NewJob:
         plan = compute.plan_simulation(request.settings)
         # The parts, and the file assembled from them.
-        return Order(request.settings.plain(), 2 * plan["result_bytes"], plan=plan)
+        return NewJob(request.kind, request.settings.plain(), plan=plan, reserved=2 * plan["result_bytes"])
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
         return files.work(job.id)
@@ -154,13 +155,13 @@ class RefractionKind(Kind[RefractionRequest]):
         "value": {"kind": "refraction", "volume": "vol-0123456789abcdef0123", "settings": {"format": "zip"}},
     }
 
-    def plan(self, request: RefractionRequest, tenant: Tenant, sources: Sources, compute: Compute) -> Order:
+    def plan(self, request: RefractionRequest, tenant: Tenant, sources: Sources, compute: Compute) -> NewJob:
         volume, settings = sources.volumes.get(tenant, request.volume), request.settings
         check_renderable(volume)
         plan = compute.plan_turntable(volume.shape, settings)
         low, high = volume.value_range
-        stored = settings.within(low, high).plain()
-        return Order(stored, settings.largest_bytes, {"volume_id": volume.id}, plan)
+        stored, most = settings.within(low, high).plain(), settings.largest_bytes
+        return NewJob(request.kind, stored, volume_id=volume.id, plan=plan, reserved=most)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
         return files.volume(job.volume_id or "")
@@ -197,11 +198,11 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
 
     def plan(
         self, request: GeometryFieldRequest, tenant: Tenant, sources: Sources, compute: Compute
-    ) -> Order:
+    ) -> NewJob:
         mesh, settings = sources.meshes.get(tenant, request.mesh), request.settings
         check_faces(mesh.faces)
-        references = {"mesh_id": mesh.id, "field_id": field_of(settings.content(mesh.content))}
-        return Order(settings.plain(), settings.largest_bytes(mesh.faces), references)
+        field, most = field_of(settings.content(mesh.content)), settings.largest_bytes(mesh.faces)
+        return NewJob(request.kind, settings.plain(), mesh_id=mesh.id, field_id=field, reserved=most)
 
     def source(self, files: TenantFiles, job: JobRow) -> Path:
         return files.mesh(job.mesh_id or "")

@@ -1,19 +1,25 @@
-"""Progress of a running job: stored at a limited rate; polls for cancellation."""
+"""Progress of a running job, stored at a limited rate, and the problem of a failed one."""
 
 from __future__ import annotations
 
+import errno
 import logging
+import secrets
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from distributed import KilledWorker
 from sqlalchemy.exc import SQLAlchemyError
 
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.result import Iteration, Progress
 
 from ..errors import DatabaseUnavailable
 from ..rows.job_queue import Queue
+from ..web.errors import FAILED, INTERNAL, make_problem, problem_of
+from ..web.problem import Problem
 from .kinds import finite
 
 log = logging.getLogger("bentray.jobs")
@@ -130,3 +136,26 @@ def thin_history(history: Sequence[Iteration]) -> Sequence[Iteration]:
         return history
     last = len(history) - 1
     return [history[k * last // (MAX_SWEEPS - 1)] for k in range(MAX_SWEEPS)]
+
+
+CRASHED = make_problem(
+    FAILED, "the service crashed several times while it ran this job; the job is not repeated"
+)
+
+
+def explain(job_id: str, error: BaseException) -> Problem:
+    """Convert an error to a problem; unexpected errors are logged with a correlation id."""
+    instance = f"/v1/jobs/{job_id}"
+    if isinstance(error, InvalidInput):
+        return problem_of(error, instance)
+    if isinstance(error, MemoryError):
+        return make_problem(FAILED, "out of memory: use fewer nodes or fewer slices", instance=instance)
+    if isinstance(error, KilledWorker):
+        words = "the workers that ran this job died one after another, usually for lack of memory"
+        return make_problem(FAILED, words, instance=instance)
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return make_problem(FAILED, "the disk of the service is full", instance=instance)
+    number = secrets.token_hex(8)
+    log.error("job %s failed [%s]", job_id, number, exc_info=error)
+    words = f"internal error of the service; see the log entry {number}"
+    return make_problem(INTERNAL, words, instance=instance, correlation_id=number)

@@ -34,11 +34,10 @@ from ..rows.accounts import Accounts
 from ..rows.job_queue import LEASE_S, Queue
 from ..rows.tables import ENDED, JobRow, Plain
 from .estimate import estimate
-from .failures import CRASHED, explain
 from .job_metrics import JobMetrics
 from .kind import JobRun, Kind
 from .kinds import KINDS
-from .reporter import Reporter
+from .reporter import CRASHED, Reporter, explain
 from .traces import JobTraces
 
 log = logging.getLogger("bentray.jobs")

@@ -13,7 +13,7 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import InUse
 from ..files.deletion import StoredItem
 from ..jobs.kinds import KINDS, ReconstructionRequest
-from ..rows.jobs import NewJob, Submission
+from ..rows.jobs import Submission
 from ..rows.tables import ENDED
 from ..web.errors import problems
 from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
@@ -61,16 +61,7 @@ def start_batch(
     new = []
     for dataset in datasets:
         one = ReconstructionRequest(kind=KIND, dataset=dataset, settings=settings)
-        order = KINDS[KIND].plan(one, caller.tenant, stores, background.runner.compute)
-        new.append(
-            NewJob(
-                KIND,
-                order.settings,
-                order.references["dataset_id"],
-                plan=order.plan,
-                reserved=order.largest_bytes,
-            )
-        )
+        new.append(KINDS[KIND].plan(one, caller.tenant, stores, background.runner.compute))
     webhook = batch_request.webhook
     background.webhooks.check(caller.tenant, webhook)
     limits = stores.quota.most_bytes, access.settings.max_queued_jobs

@@ -1,24 +1,26 @@
-"""/v1/datasets: upload, list, download and delete scans."""
+"""/v1/datasets: upload, list, download, examine and delete scans."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 from pydantic import Field
 
 from bentray_kernels.limits import FREQUENCY_HZ, SPEED_MPS, TEMPERATURE_C
+from bentray_kernels.picker_names import DEFAULT_PICKER, PickerName
 from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
 
 from ..files.deletion import StoredItem
 from ..web.errors import problems
-from ..wiring import Access, Background, CallerTenant, Stores
-from . import quality, scan_views
+from ..wiring import Access, Background, CallerTenant, FindDataset, Stores
 from .bodies import Limit, accept_media_types
 from .downloads import download, download_of
 from .models.job_records import DatasetList, DatasetRecord
 from .models.name_changes import TEXT
+from .models.quality_records import EmissionRecord, GeometryRecord, QualityRecord
+from .pictures import PICTURE, check_render_rate, picture, while_connected
 from .record_conversion import dataset_record
 from .uploads.one_shot_uploads import body_of, receive_upload
 from .uploads.upload_metadata import scan_metadata
@@ -31,8 +33,6 @@ PAIR = "^(" + "|".join(FIELDS) + ")=[A-Za-z][A-Za-z0-9_]{0,60}$"
 UNIT = "^(" + "|".join(UNITS) + ")$"
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
-router.include_router(quality.router)
-router.include_router(scan_views.router)
 
 
 @router.post(
@@ -101,7 +101,7 @@ def list_datasets(
     ] = None,
 ) -> DatasetList:
     """List datasets, newest first; `next` is the address of the next page."""
-    rows = stores.datasets.found(tenant, limit + 1, before, text)
+    rows = stores.datasets.search(tenant, limit + 1, before, text)
     shown = [dataset_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
         return DatasetList(datasets=shown, next=None)
@@ -135,3 +135,72 @@ def dataset_file(dataset_id: str, request: Request, stores: Stores, tenant: Call
 def delete_dataset(dataset_id: str, stores: Stores, tenant: CallerTenant) -> None:
     """Delete a scan with its jobs and their volumes; rejected while an unfinished job needs it."""
     stores.deletion.delete(StoredItem(tenant, "dataset", dataset_id))
+
+
+@router.get(
+    "/{dataset_id}/geometry",
+    responses=problems(404, 422, 429, 503),
+    dependencies=[Depends(check_render_rate)],
+)
+async def show_geometry(find: FindDataset, request: Request, background: Background) -> GeometryRecord:
+    """Show the elements, the acquisition and the water of a scan, read by a worker."""
+    dataset = await find()
+    work = background.pictures.scan_geometry(dataset)
+    return GeometryRecord.model_validate(await while_connected(request, work))
+
+
+@router.get(
+    "/{dataset_id}/traces", responses=problems(404, 422, 429, 503), dependencies=[Depends(check_render_rate)]
+)
+async def show_traces(
+    find: FindDataset,
+    request: Request,
+    background: Background,
+    emission: Annotated[int, Query(ge=0, description="Index of the emission, from 0.")] = 0,
+    slice: Annotated[int, Query(ge=0, description="Index of the slice, from 0.")] = 0,  # noqa: A002
+    quantity: Annotated[
+        Literal["object", "water"], Query(description="Traces with the object, or of the water shot.")
+    ] = "object",
+) -> EmissionRecord:
+    """Show the traces of one emission, at most 512 receivers and 1024 samples, and their picks."""
+    dataset = await find()
+    how = {"emission": emission, "index": slice, "what": quantity}
+    work = background.pictures.emission_traces(dataset, how)
+    return EmissionRecord.model_validate(await while_connected(request, work))
+
+
+Picker = Annotated[
+    PickerName,
+    Query(description="Picker of first arrivals in traces; ignored for scans with travel times."),
+]
+
+
+@router.get(
+    "/{dataset_id}/quality",
+    responses=problems(404, 422, 429, 503),
+    dependencies=[Depends(check_render_rate)],
+)
+async def show_quality(
+    find: FindDataset,
+    request: Request,
+    background: Background,
+    picker: Picker = DEFAULT_PICKER,
+) -> QualityRecord:
+    """Check the quality of a scan on a worker: faulty elements and times, and the action taken for each."""
+    dataset = await find()
+    work = background.pictures.quality(dataset, picker)
+    return QualityRecord.model_validate(await while_connected(request, work))
+
+
+@router.head("/{dataset_id}/quality.png", include_in_schema=False)
+@router.get("/{dataset_id}/quality.png", response_class=Response, responses={**PICTURE, **problems(404, 422)})
+async def quality_png(
+    find: FindDataset,
+    request: Request,
+    background: Background,
+    picker: Picker = DEFAULT_PICKER,
+) -> Response:
+    """The quality report as an image: gathers with picks, matrix of times, findings."""
+    dataset = await find()
+    how = {"picker": picker, "what": "quality", "water_temperature_c": dataset.water_temperature_c}
+    return await picture(request, dataset, how, lambda: background.pictures.quality_png(dataset, picker))

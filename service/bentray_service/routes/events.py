@@ -13,8 +13,7 @@ from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from ..jobs.feed import EventFeed
-from ..jobs.watched import Watched, WatchedJob, WatchedTenant
+from ..jobs.feed import EventFeed, Watched, WatchedJob, WatchedTenant
 from ..rows.jobs import JobProgress
 from ..rows.tables import ENDED
 from ..web.errors import problems

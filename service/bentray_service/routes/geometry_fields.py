@@ -44,10 +44,8 @@ async def image_png(
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
     field = await find()
-    view.check_samples(field.row.settings["samples"])
-    return await picture(
-        request, field.row, view.plain(), lambda: background.pictures.field_png(*field, view)
-    )
+    view.check_samples(field.settings["samples"])
+    return await picture(request, field, view.plain(), lambda: background.pictures.field_png(field, view))
 
 
 @router.head("/{field_id}/geometry-image.png", include_in_schema=False)
@@ -66,5 +64,5 @@ async def normal_map_png(find: FindField, request: Request, background: Backgrou
 
 async def _map(find: FindField, request: Request, background: Background, which: str) -> Response:
     field = await find()
-    draw = partial(background.pictures.field_map_png, *field, which)
-    return await picture(request, field.row, {"map": which}, draw)
+    draw = partial(background.pictures.field_map_png, field, which)
+    return await picture(request, field, {"map": which}, draw)

@@ -1,14 +1,15 @@
-"""/health: liveness and readiness of the service."""
+"""/health: liveness and readiness of the service; /v1/cluster: health of the workers, lengths of queues."""
 
 from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.concurrency import run_in_threadpool
 
 from ..errors import NotReady
 from ..web.errors import problems
-from ..wiring import background_of
+from ..wiring import Background, CallerTenant, background_of
 
 router = APIRouter(prefix="/health", tags=["health"])
 metrics_router = APIRouter(tags=["health"])
@@ -53,3 +54,59 @@ async def ready(request: Request) -> Ready:
 def metrics(request: Request) -> Response:
     """Metrics of requests, jobs, workers and disk in the Prometheus text format."""
     return Response(generate_latest(request.app.state.metrics.registry), media_type=CONTENT_TYPE_LATEST)
+
+
+cluster_router = APIRouter(prefix="/v1/cluster", tags=["cluster"])
+
+
+class WorkerRecord(BaseModel):
+    """One worker at its last heartbeat."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    threads: int | None = Field(description="Threads that run tasks.")
+    memory_bytes: int | None = Field(description="Resident memory; null before the first heartbeat.")
+    memory_limit_bytes: int = Field(description="Its limit; 0: none.")
+    cpu_percent: float | None = Field(description="Of one processor core; null before the first heartbeat.")
+    running_tasks: int = Field(description="Tasks of all tenants that run now.")
+    paused: bool = Field(description="Whether it accepts no tasks, because its memory is nearly used up.")
+    opencl: bool = Field(
+        description="Whether an OpenCL device passed its self-test. Workers of the service itself test at "
+        "the first job that needs a device."
+    )
+    compiling: bool = Field(description="Whether it compiles kernels, once for each kind of processor.")
+
+
+class QueueRecord(BaseModel):
+    """Jobs that have not ended: of the tenant, and of all tenants together."""
+
+    queued: int = Field(description="Queued jobs of the tenant.")
+    running: int = Field(description="Running jobs of the tenant.")
+    all_queued: int = Field(description="Queued jobs of all tenants.")
+    all_running: int = Field(description="Running jobs of all tenants.")
+    waiting_images: int = Field(description="Images of the tenant that wait for a worker.")
+
+
+class ClusterRecord(BaseModel):
+    """Workers and queues; it names no host and no job of another tenant."""
+
+    workers: list[WorkerRecord]
+    queue: QueueRecord
+
+
+@cluster_router.get("", responses=problems(503))
+async def show_cluster(background: Background, tenant: CallerTenant) -> ClusterRecord:
+    """Show the health of the workers and the lengths of the queues."""
+    workers = await run_in_threadpool(background.runner.compute.health)
+    lengths = await run_in_threadpool(background.runner.queue.lengths, tenant)
+    (queued, all_queued), (running, all_running) = lengths["queued"], lengths["running"]
+    return ClusterRecord(
+        workers=[WorkerRecord.model_validate(one) for one in workers],
+        queue=QueueRecord(
+            queued=queued,
+            running=running,
+            all_queued=all_queued,
+            all_running=all_running,
+            waiting_images=background.pictures.waiting(tenant),
+        ),
+    )

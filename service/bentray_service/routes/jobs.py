@@ -1,4 +1,4 @@
-"""/v1/jobs: start, list, show, cancel and delete jobs."""
+"""/v1/jobs: start, list, show, preview, cancel and delete jobs; /v1/plans: what a job would be."""
 
 from __future__ import annotations
 
@@ -8,17 +8,22 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Body, Depends, Query, Request, Response, status
 
-from ..errors import NoAnimation
+from bentray_workers.reconstruction.preview import checkpoint_image
+
+from ..errors import NoAnimation, NoPreview
 from ..files.deletion import StoredItem
 from ..jobs.estimate import READ, estimate
 from ..jobs.kinds import KINDS
+from ..rows.ids import checked
+from ..rows.jobs import Submission
 from ..rows.tables import ENDED, JobRow
 from ..web.errors import problems
 from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
 from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types
 from .downloads import download, download_of
-from .models.job_records import JobList, JobRecord, State
+from .models.job_records import EstimateRecord, JobList, JobRecord, PlanRecord, PreviewRecord, State
 from .models.name_changes import TEXT
+from .pictures import check_render_rate
 from .record_conversion import job_record
 
 log = logging.getLogger("bentray.jobs")
@@ -61,20 +66,10 @@ def start_job(
     kind: str = job_request.kind
     tenant = caller.tenant
     background.webhooks.check(tenant, job_request.webhook)
-    order = KINDS[kind].plan(job_request, tenant, stores, background.runner.compute)
-    row = stores.jobs.add(
-        tenant,
-        kind,
-        order.settings,
-        **order.references,
-        plan=order.plan,
-        reserve=(order.largest_bytes, stores.quota.most_bytes),
-        most_queued=access.settings.max_queued_jobs,
-        key=idempotency_key,
-        started_by=caller.who,
-        webhook=job_request.webhook,
-    )
-    job = _shown(stores, background, row)
+    new = KINDS[kind].plan(job_request, tenant, stores, background.runner.compute)
+    limits = stores.quota.most_bytes, access.settings.max_queued_jobs
+    how = Submission(*limits, idempotency_key, caller.who, job_request.webhook)
+    job = _shown(stores, background, stores.jobs.add(tenant, new, how))
     log.info("%s queued, kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
     background.runner.notify(job.id)
     response.headers["Location"] = job.links["self"]
@@ -101,7 +96,9 @@ def list_jobs(
     ] = None,
 ) -> JobList:
     """List jobs, newest first; `next` is the address of the next page."""
-    rows = stores.jobs.newest(tenant, limit + 1, state, kind, before, text, batch)
+    batch_id = None if batch is None else checked("batch", batch)
+    equal = {"state": state, "kind": kind, "batch_id": batch_id}
+    rows = stores.jobs.search(tenant, limit + 1, before, text, **equal)
     shown = [job_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
         return JobList(jobs=shown, next=None)
@@ -170,3 +167,48 @@ def animation(job_id: str, request: Request, stores: Stores, tenant: CallerTenan
     extension = job.settings["format"]
     path = stores.files.store.fetch(stores.files.of(tenant).animation(job.id, extension))
     return download(request, path, repr((job.id, job.finished)), ANIMATIONS[extension])
+
+
+@router.get("/{job_id}/preview", responses=problems(404, 409, 429), dependencies=[Depends(check_render_rate)])
+def show_preview(job_id: str, response: Response, stores: Stores, tenant: CallerTenant) -> PreviewRecord:
+    """Show the image that a running reconstruction has reached, reduced to at most 256 nodes along a side.
+
+    There is one after the first iteration, or after some seconds of a longer one.
+    """
+    job = stores.jobs.get(tenant, job_id)
+    if job.kind != "reconstruction" or job.state not in ("running", "cancelling"):
+        raise NoPreview(job.id, job.kind, job.state)
+    image = checkpoint_image(stores.files.of(tenant).checkpoints(job.id))
+    if image is None:
+        raise NoPreview(job.id, "reconstruction", "before its first image")
+    response.headers["Cache-Control"] = "no-store"
+    return PreviewRecord.model_validate(image)
+
+
+plans_router = APIRouter(prefix="/v1/plans", tags=["jobs"], route_class=SmallBody)
+
+
+@plans_router.post(
+    "",
+    dependencies=[Depends(accept_media_types("application/json"))],
+    responses=problems(400, 404, 413, 415, 422, 503),
+)
+def plan_job(
+    job_request: JobRequest, stores: Stores, background: Background, tenant: CallerTenant
+) -> EstimateRecord:
+    """Plan a job without starting it: method, nodes, tasks, memory, estimated time and place in the queue.
+
+    A job that would be rejected is rejected here with the same error.
+    """
+    kind: str = job_request.kind
+    background.webhooks.check(tenant, job_request.webhook)
+    plan = KINDS[kind].plan(job_request, tenant, stores, background.runner.compute).plan
+    found = estimate(plan, stores.jobs.durations(tenant, kind, READ))
+    return EstimateRecord(
+        plan=None if plan is None else PlanRecord.model_validate(plan),
+        minutes=found.minutes,
+        rough=found.rough,
+        compared=found.compared,
+        basis=found.basis,
+        ahead=stores.jobs.next_place(tenant),
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,6 +14,7 @@ from bentray_workers.rendering.isosurface_mesh import MAX_STEP, check_nodes, lar
 
 from ..compute import check_renderable
 from ..files.deletion import StoredItem
+from ..files.disk import digest_of
 from ..rows.ids import new_id
 from ..rows.tables import MeshRow
 from ..web.errors import problems
@@ -110,19 +110,17 @@ async def mesh_of_volume(
         raise InvalidInput("iso", iso, f"{low:g} to less than {high:g}, the range of the volume")
     mesh_id, files = new_id("mesh"), stores.files.of(tenant)
     access.sign_in.check_render(caller)
-    path = files.volume(volume.id)
 
     def store(made: Path, summary: dict[str, Any]) -> MeshRow:
         stores.quota.resize(tenant, mesh_id, made.stat().st_size)
-        content = files.adopt(mesh_id).read_bytes()
-        digest = hashlib.sha256(content).hexdigest()
+        size, sha256 = digest_of(files.adopt(mesh_id))
         columns = summary | {"title": volume.title, "volume_id": volume.id}
-        return stores.meshes.add(tenant, mesh_id, size=len(content), sha256=digest, summary=columns)
+        return stores.meshes.add(tenant, mesh_id, size=size, sha256=sha256, summary=columns)
 
     async with stores.quota.reserved(tenant, mesh_id, largest_bytes(volume.shape, step)):
         try:
             made = files.candidate(mesh_id)
-            work = background.pictures.mesh_volume(tenant, volume, path, iso, step, made)
+            work = background.pictures.mesh_volume(volume, iso, step, made)
             row = await run_in_threadpool(store, made, await while_connected(request, work))
         finally:
             files.discard_candidate(mesh_id)

@@ -11,12 +11,10 @@ from starlette.concurrency import run_in_threadpool
 
 from bentray_workers.files.dataset.correct import Correction
 
-from ..ingest.canonical import IngestLimits
-from ..ingest.corrected_scan import add_corrected
-from ..rows.idempotency import RequestKey
-from ..rows.ids import new_id
+from ..ingest.canonical import IngestLimits, add_corrected
+from ..rows.ids import Tenant, new_id
+from ..rows.stored_tables import RequestKey
 from ..rows.tables import DatasetRow
-from ..rows.tenants import Tenant
 from ..web.errors import problems
 from ..wiring import Access, Background, CallerTenant, Stores
 from .bodies import IdempotencyKey, SmallBody, accept_media_types

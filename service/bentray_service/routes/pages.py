@@ -10,7 +10,7 @@ from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Resp
 
 from bentray_workers.files.export.registry import FORMATS
 
-from ..web.documentation import documentation_files, missing_page
+from ..web.documents import documentation_files, missing_page
 from ..web.reference import reference_page
 
 WEB = Path(__file__).parent.parent / "web"

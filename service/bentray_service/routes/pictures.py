@@ -61,6 +61,11 @@ def _share(how: Mapping[str, Any]) -> float:
     return min(1.0, max(LEAST_SHARE, rays / WHOLE_RAYS))
 
 
+async def check_render_rate(request: Request) -> None:
+    """Limit the rate of what workers compute like that of rendered images."""
+    access_of(request.scope).sign_in.check_render(caller_of(request))
+
+
 async def while_connected(request: Request, work: Awaitable[Made]) -> Made:
     """Await ``work``; it is cancelled when the client disconnects.
 

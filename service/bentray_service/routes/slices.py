@@ -89,16 +89,16 @@ async def slice_png(
     HEAD returns the ETag without rendering, so Content-Length is absent.
     """
     volume = await find()
-    check_plane(volume.row.shape, volume.row.spacing_m, axis, index)
+    check_plane(volume.shape, volume.spacing_m, axis, index)
     for name, value in (("low", low), ("high", high)):
         if value is not None:
             COLOUR_VALUE.check(name, value)
     how: dict[str, Any] = {"axis": axis, "index": index, "low": low, "high": high, **asdict(style)}
-    if volume.row.job_id is not None:
+    if volume.job_id is not None:
         if quantity == "value":
             accepted = "one of " + ", ".join(QUANTITIES)
             raise InvalidInput("quantity", "'value'", accepted)
         how["quantity"] = quantity or "speed"
     elif quantity not in (None, "value"):
         raise InvalidInput("quantity", repr(quantity), "value: this is an uploaded volume")
-    return await picture(request, volume.row, how, lambda: background.pictures.slice_png(*volume, how))
+    return await picture(request, volume, how, lambda: background.pictures.slice_png(volume, how))

@@ -117,10 +117,10 @@ async def volume_data(
         async with stores.quota.reserved(tenant, made.name, most):
             try:
                 if of_truth:
-                    dataset, scan = await run_in_threadpool(scan_of, stores, tenant, volume)
-                    work = background.pictures.export_truth(tenant, volume, dataset, path, scan, made, kind)
+                    scan = await run_in_threadpool(scan_of, stores, volume)
+                    work = background.pictures.export_truth(volume, scan, made, kind)
                 else:
-                    work = background.pictures.export(tenant, volume, path, made, kind, selection)
+                    work = background.pictures.export(volume, made, kind, selection)
                 await while_connected(request, work)
             except InvalidInput:
                 # Report a volume that was deleted in the meantime as unknown.

@@ -7,9 +7,9 @@ from typing import NewType
 from sqlalchemy import ColumnElement, SQLColumnExpression, func, select
 from sqlalchemy.orm import Session
 
-from .database import Database
+from .database import Database, Repository
+from .ids import Tenant
 from .tables import ProjectRow
-from .tenants import Tenant
 
 # A tenant with all its projects. Limits are counted by account and rows are owned by tenant: the two types
 # keep a limit from being counted for a project.
@@ -35,14 +35,14 @@ def family_of(session: Session, tenant: Tenant) -> list[Tenant]:
     return [Tenant(account), *(Tenant(project) for project in session.scalars(mine))]
 
 
-class Accounts:
+class Accounts(Repository):
     """Accounts of tenants outside of transactions.
 
     The account of a tenant never changes, and ids of projects are not used again: each is read once.
     """
 
     def __init__(self, database: Database) -> None:
-        self._database = database
+        super().__init__(database)
         self._known: dict[Tenant, Account] = {}
 
     def of(self, tenant: Tenant) -> Account:

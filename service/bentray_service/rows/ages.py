@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from sqlalchemy import delete, select
 
-from .database import Database
+from .database import Database, Repository
+from .ids import Tenant
 from .tables import About, ExpiredRow
-from .tenants import Tenant
 
 
 class ExpiredItem(NamedTuple):
@@ -21,15 +21,12 @@ class ExpiredItem(NamedTuple):
     id: str
 
 
-class ExpiryMarks:
+class ExpiryMarks(Repository):
     """Marks expired items with the observed time, see :class:`ObservedTime`.
 
     Ages are computed from the system clock, which may be wrong for a while. Therefore an item is deleted only
     if it was found expired repeatedly over a period of observed time.
     """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
 
     def mark(self, expired: Collection[ExpiredItem], observed_s: float) -> dict[ExpiredItem, float]:
         """Mark all items that are expired now, and remove the marks of items that are not.
@@ -54,11 +51,10 @@ class ExpiryMarks:
 
     def clear(self) -> None:
         """Remove all marks, after the system clock was found to be wrong."""
-        with self._database.write() as session:
-            session.execute(delete(ExpiredRow))
+        self._database.change(delete(ExpiredRow))
 
 
-class ObservedTime:
+class ObservedTime(Repository):
     """Counts the running time of services in the database, in seconds of the monotonic clock.
 
     With several services the count does not run faster than real time: each adds its own elapsed time to the
@@ -70,7 +66,7 @@ class ObservedTime:
         database: stores the count.
         clock: monotonic seconds.
         """
-        self._database = database
+        super().__init__(database)
         self._clock = clock
         self._last: tuple[float, float] | None = None
 

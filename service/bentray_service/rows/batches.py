@@ -9,20 +9,16 @@ from sqlalchemy import select
 from sqlalchemy.orm import selectinload
 
 from ..errors import JobFinished, UnknownId
-from .database import Database
-from .idempotency import RequestKey
-from .ids import checked, new_id
+from .database import Repository
+from .ids import Tenant, checked, new_id
 from .job_states import change
 from .jobs import NewJob, Submission, insert_jobs
+from .stored_tables import RequestKey
 from .tables import UNFINISHED, BatchRow, JobRow, Plain
-from .tenants import Tenant
 
 
-class Batches:
+class Batches(Repository):
     """Batches of a tenant. Their jobs are ordinary jobs, so that a batch survives whatever they survive."""
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
 
     def add(
         self, tenant: Tenant, name: str, settings: Plain, new: Sequence[NewJob], how: Submission
@@ -45,10 +41,9 @@ class Batches:
             before = request.earlier(session, BatchRow, tenant)
             if before is None:
                 batch_id = new_id("batch")
-                row = BatchRow(id=batch_id, tenant=tenant, name=name, settings=settings, size=len(new))
-                row.created, row.started_by = time.time(), how.started_by[:200]
-                row.idempotency_key, row.request_sha256 = request.key, request.digest
-                session.add(row)
+                row = {"id": batch_id, "tenant": tenant, "name": name, "settings": settings, "size": len(new)}
+                made = {"created": time.time(), "started_by": how.started_by[:200], **request.columns()}
+                session.add(BatchRow(**row, **made))
                 insert_jobs(session, tenant, new, how, batch_id)
             else:
                 batch_id = before.id

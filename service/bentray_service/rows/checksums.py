@@ -6,24 +6,12 @@ import time
 from collections.abc import Collection
 from typing import NamedTuple
 
-from sqlalchemy import delete, func, select, update
+from sqlalchemy import Delete, delete, func, select, update
 from sqlalchemy.orm import Session
 
-from .database import Database
-from .tables import (
-    ChecksumRow,
-    DatasetRow,
-    FieldRow,
-    JobRow,
-    MeshRow,
-    Plain,
-    ResultVolumeRow,
-    UploadedVolumeRow,
-)
-from .tenants import Tenant
-
-# Tables whose rows have stored files; the file of a turntable belongs to its job.
-STORED = (DatasetRow, UploadedVolumeRow, ResultVolumeRow, MeshRow, FieldRow, JobRow)
+from .database import Repository
+from .ids import Tenant
+from .tables import WITH_FILES, ChecksumRow, Plain
 
 
 class Digest(NamedTuple):
@@ -38,11 +26,8 @@ class Digest(NamedTuple):
     sha256: str
 
 
-class Checksums:
+class Checksums(Repository):
     """Checksums by tenant and id."""
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
 
     def record(self, tenant: Tenant, name: str, path: str, digest: Digest, *, as_written: bool) -> None:
         """Insert or replace the checksum of an item.
@@ -67,7 +52,7 @@ class Checksums:
             known = any(
                 # A concurrent deletion finishes first.
                 session.scalar(select(table.id).filter_by(tenant=tenant, id=name).with_for_update())
-                for table in STORED
+                for table in WITH_FILES
             )
             if known:
                 _record(session, tenant, name, path, digest, as_written=False)
@@ -84,19 +69,15 @@ class Checksums:
 
     def count_damaged(self) -> int:
         """The number of items of all tenants that are known to be damaged."""
-        query = select(func.count()).where(ChecksumRow.damaged.is_not(None))
-        with self._database.read() as session:
-            return session.scalars(query).one()
+        return self._database.row(select(func.count()).where(ChecksumRow.damaged.is_not(None))) or 0
 
     def damaged(self, tenant: Tenant, name: str, since: float | None) -> None:
         """Store since when an item is damaged, s since 1970; None: it is not damaged."""
-        with self._database.write() as session:
-            session.execute(update(ChecksumRow).filter_by(tenant=tenant, id=name).values(damaged=since))
+        self._database.change(update(ChecksumRow).filter_by(tenant=tenant, id=name).values(damaged=since))
 
     def delete(self, tenant: Tenant, names: Collection[str]) -> None:
         """Delete the checksums of items by id."""
-        with self._database.write() as session:
-            delete_checksums(session, tenant, names)
+        self._database.change(deletion_of(tenant, names))
 
 
 def _record(session: Session, tenant: Tenant, name: str, path: str, digest: Digest, as_written: bool) -> None:
@@ -105,6 +86,6 @@ def _record(session: Session, tenant: Tenant, name: str, path: str, digest: Dige
     session.merge(ChecksumRow(tenant=tenant, id=name, **now, as_written=as_written, damaged=None))
 
 
-def delete_checksums(session: Session, tenant: Tenant, names: Collection[str]) -> None:
-    """Delete checksums within the transaction of the caller."""
-    session.execute(delete(ChecksumRow).where(ChecksumRow.tenant == tenant, ChecksumRow.id.in_(names)))
+def deletion_of(tenant: Tenant, names: Collection[str]) -> Delete:
+    """The statement that deletes the checksums of items by id."""
+    return delete(ChecksumRow).where(ChecksumRow.tenant == tenant, ChecksumRow.id.in_(names))

@@ -7,32 +7,32 @@ import json
 import logging
 from collections.abc import Collection
 
-from sqlalchemy import delete, select, update
+from sqlalchemy import Delete, delete, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
-from .database import Database, rows_changed
+from .database import Database, Repository, rows_changed
+from .ids import GIVEN, LOCAL, TENANT_PATTERN, Tenant
 from .tables import ClaimedTenantRow
-from .tenants import GIVEN, LOCAL, PATTERN, Tenant
 
 log = logging.getLogger("bentray.access")
 
 
 def former_tenant(user: str) -> Tenant:
     """The tenant of a user before version 13 of the database: the name itself, or its digest if not valid."""
-    if PATTERN.fullmatch(user) and user != LOCAL and not GIVEN.fullmatch(user):
+    if TENANT_PATTERN.fullmatch(user) and user != LOCAL and not GIVEN.fullmatch(user):
         return Tenant(user)
     return Tenant(f"user-{hashlib.sha256(user.encode()).hexdigest()[:40]}")
 
 
-class ClaimedTenants:
+class ClaimedTenants(Repository):
     """Gives each name of a user or group that a provider or a proxy reports a tenant of its own.
 
     No key and no other name has it, and the name has the same one at all times.
     """
 
     def __init__(self, database: Database) -> None:
-        self._database = database
+        super().__init__(database)
         self._known: dict[tuple[str, str, str], Tenant] = {}
 
     def tenant(self, issuer: str, claim: str, value: str, before: str) -> Tenant:
@@ -55,13 +55,11 @@ class ClaimedTenants:
 
     def keep_from_claims(self, tenants: Collection[Tenant]) -> None:
         """Tenants that the operator has named are never given to a claimed name of before."""
-        with self._database.write() as session:
-            keep_from_claims(session, tenants)
+        self._database.change(unclaiming(tenants))
 
     def _find(self, name: tuple[str, str, str]) -> Tenant | None:
-        query = select(ClaimedTenantRow.tenant).filter_by(issuer=name[0], claim=name[1], value=name[2])
-        with self._database.read() as session:
-            return session.scalar(query)
+        named = {"issuer": name[0], "claim": name[1], "value": name[2]}
+        return self._database.row(select(ClaimedTenantRow.tenant).filter_by(**named))
 
     def _add(self, name: tuple[str, str, str], former: Tenant) -> Tenant:
         row = dict(zip(("issuer", "claim", "value"), name, strict=True))
@@ -81,7 +79,6 @@ def is_claimed(session: Session, tenant: Tenant) -> bool:
     return session.scalar(select(ClaimedTenantRow.number).where(*claimed)) is not None
 
 
-def keep_from_claims(session: Session, tenants: Collection[Tenant]) -> None:
-    """See ``ClaimedTenants.keep_from_claims``."""
-    named = ClaimedTenantRow.issuer == "", ClaimedTenantRow.tenant.in_(tenants)
-    session.execute(delete(ClaimedTenantRow).where(*named))
+def unclaiming(tenants: Collection[Tenant]) -> Delete:
+    """The statement of ``ClaimedTenants.keep_from_claims``."""
+    return delete(ClaimedTenantRow).where(ClaimedTenantRow.issuer == "", ClaimedTenantRow.tenant.in_(tenants))

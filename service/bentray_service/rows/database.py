@@ -1,13 +1,16 @@
-"""The database connection: opening, schema update, read and write transactions."""
+"""The database connection: opening, schema update, transactions, and how many threads may have one."""
 
 from __future__ import annotations
 
+import hashlib
+import itertools
 import json
 import logging
 import math
 import secrets
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -27,18 +30,24 @@ from sqlalchemy import (
     text,
     update,
 )
-from sqlalchemy.engine import URL, make_url
+from sqlalchemy.engine import make_url
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import QueuePool
 
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import DatabaseFull, DatabaseUnavailable
-from .admission import MAX_CONCURRENT, Admission
 from .tables import VERSION, About, Base, SchemaVersion
 
 log = logging.getLogger("bentray.storage")
 
+# The service answers requests with 40 threads; the rest stays free for requests without the database.
+MAX_CONCURRENT = 32
+# Longest wait for a place, s.
+PLACE_SECONDS = 2.0
+# A transaction that takes longer than this marks the database as slow; then fewer threads may wait, s.
+SLOW_SECONDS = 2.0
+MAX_CONCURRENT_WHEN_SLOW = 8
 # Longest wait for another transaction, or for a connection, s.
 BUSY_SECONDS = 5.0
 # Connections to PostgreSQL kept open, and additional ones under load.
@@ -58,8 +67,43 @@ UPGRADE_LOCK = 0x62656E747261
 # Error messages of SQLite and PostgreSQL for a full disk.
 FULL = ("database or disk is full", "No space left on device")
 
-
 Row = TypeVar("Row")
+
+
+class Admission:
+    """Limits the number of threads in database transactions."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._changed = threading.Condition()
+        self._numbers = itertools.count()
+        # Start time of each running transaction, oldest first.
+        self._inside: dict[int, float] = {}
+
+    @contextmanager
+    def __call__(self) -> Iterator[None]:
+        """Take a place for the duration of the block.
+
+        Raises:
+            DatabaseUnavailable: when too many threads hold or wait for a place.
+        """
+        with self._changed:
+            if self._slow() and len(self._inside) >= MAX_CONCURRENT_WHEN_SLOW:
+                raise DatabaseUnavailable(f"{len(self._inside)} requests waiting for a slow database")
+            if not self._changed.wait_for(lambda: len(self._inside) < MAX_CONCURRENT, PLACE_SECONDS):
+                raise DatabaseUnavailable(f"{len(self._inside)} requests waiting for the database")
+            number = next(self._numbers)
+            self._inside[number] = self._clock()
+        try:
+            yield
+        finally:
+            with self._changed:
+                del self._inside[number]
+                self._changed.notify()
+
+    def _slow(self) -> bool:
+        oldest = next(iter(self._inside.values()), None)
+        return oldest is not None and self._clock() - oldest > SLOW_SECONDS
 
 
 class Database:
@@ -109,6 +153,16 @@ class Database:
         with self.read() as session:
             return list(session.scalars(query))
 
+    def row(self, query: Select[Row]) -> Row | None:
+        """The first row of such a query; None without any."""
+        with self.read() as session:
+            return session.scalar(query)
+
+    def change(self, statement: UpdateBase) -> int:
+        """Execute an UPDATE or DELETE in a transaction of its own; returns the number of its rows."""
+        with self.write() as session:
+            return rows_changed(session, statement)
+
     def connections(self) -> tuple[int, int]:
         """Connections in use now, and their maximum."""
         pool = self._writer.pool
@@ -120,11 +174,17 @@ class Database:
 
     def probe(self) -> None:
         """Write one number to verify that writing works; any error is raised."""
-        with self.write() as session:
-            session.execute(update(About).values(probed=time.time()))
+        self.change(update(About).values(probed=time.time()))
 
     def close(self) -> None:
         self._writer.dispose()
+
+
+class Repository:
+    """Queries of some tables of a database."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
 
 
 def open_database(address: str, way_back: str | None = None) -> Database:
@@ -138,24 +198,32 @@ def open_database(address: str, way_back: str | None = None) -> Database:
         InvalidInput: when it cannot be opened, belongs to another program, or was created by a later version
             of Bentray.
     """
-    shown = address
-    try:
-        shown = make_url(address).render_as_string(hide_password=True)
+    accepted = way_back or "the SQLAlchemy address of a database that can be written"
+    with named_database(address, accepted) as shown:
         if way_back is not None:
-            _check_file(make_url(address), way_back)
+            check_file(address, way_back, "missing", "without content")
         engine = engine_of(address, ("foreign_keys=ON",))
         with engine.begin() as connection:
             current = _make_or_check(connection, shown, way_back)
         if not current:
             _upgrade(address, shown)
+    return Database(engine)
+
+
+@contextmanager
+def named_database(address: str, accepted: str) -> Iterator[str]:
+    """Yield the address of a database without its password; its errors in the block name it.
+
+    Raises:
+        InvalidInput: naming ``database_url`` and what is ``accepted``.
+    """
+    shown = address
+    try:
+        shown = make_url(address).render_as_string(hide_password=True)
+        yield shown
     except (exc.SQLAlchemyError, ImportError) as error:
         reason = str(getattr(error, "orig", None) or error).splitlines()[0]
-        raise InvalidInput(
-            "database_url",
-            f"{shown} ({reason})",
-            way_back or "the SQLAlchemy address of a database that can be written",
-        ) from error
-    return Database(engine)
+        raise InvalidInput("database_url", f"{shown} ({reason})", accepted) from error
 
 
 def _options(address: str) -> dict[str, Any]:
@@ -208,6 +276,16 @@ def engine_of(address: str, pragmas: tuple[str, ...], *, patient: bool = True) -
     return engine
 
 
+@contextmanager
+def opened(address: str, pragmas: tuple[str, ...] = (), *, patient: bool = True) -> Iterator[Engine]:
+    """An engine as of ``engine_of``; its connections are closed at the end of the block."""
+    engine = engine_of(address, pragmas, patient=patient)
+    try:
+        yield engine
+    finally:
+        engine.dispose()
+
+
 def _json(value: Any) -> str:
     """Serialise to JSON; NaN and infinity become null."""
     try:
@@ -240,12 +318,13 @@ def _begin_sqlite(connection: Connection) -> None:
     connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")
 
 
-def _check_file(url: URL, way_back: str) -> None:
-    """Reject a file of SQLite that is missing or empty, which opening would create."""
+def check_file(address: str, accepted: str, absent: str = "which does not exist", empty: str = "") -> None:
+    """Reject a file of SQLite that opening would create, in words; an empty one too if there are words."""
+    url = make_url(address)
     path = Path(url.database or "")
-    if url.get_backend_name() == "sqlite" and not (path.is_file() and path.stat().st_size):
+    if url.get_backend_name() == "sqlite" and not (path.is_file() and (path.stat().st_size or not empty)):
         raise InvalidInput(
-            "database_url", f"{path}, {'without content' if path.exists() else 'missing'}", way_back
+            "database_url", f"{path}, {empty if path.exists() and empty else absent}", accepted
         )
 
 
@@ -279,22 +358,18 @@ def _upgrade(address: str, shown: str) -> None:
     from alembic.config import Config
 
     # Migration of a large table may take long.
-    engine = engine_of(address, SQLITE_PRAGMAS, patient=False)
-    try:
-        with engine.begin() as connection:
-            if connection.dialect.name != "sqlite":
-                # Another service may start on it. Write transactions of SQLite are serialised.
-                connection.execute(select(func.pg_advisory_xact_lock(UPGRADE_LOCK)))
-            log.warning("migrating %s from schema version %s to %d", shown, version_of(connection), VERSION)
-            config = Config(attributes={"connection": connection})
-            config.set_main_option("script_location", "bentray_service.rows:alembic")
-            command.upgrade(config, "head")
-            if connection.dialect.name == "sqlite":
-                lost = connection.execute(text("PRAGMA foreign_key_check")).all()
-                if lost:
-                    raise RuntimeError(f"{len(lost)} rows with invalid references")
-    finally:
-        engine.dispose()
+    with opened(address, SQLITE_PRAGMAS, patient=False) as engine, engine.begin() as connection:
+        if connection.dialect.name != "sqlite":
+            # Another service may start on it. Write transactions of SQLite are serialised.
+            connection.execute(select(func.pg_advisory_xact_lock(UPGRADE_LOCK)))
+        log.warning("migrating %s from schema version %s to %d", shown, version_of(connection), VERSION)
+        config = Config(attributes={"connection": connection})
+        config.set_main_option("script_location", "bentray_service.rows:alembic")
+        command.upgrade(config, "head")
+        if connection.dialect.name == "sqlite":
+            lost = connection.execute(text("PRAGMA foreign_key_check")).all()
+            if lost:
+                raise RuntimeError(f"{len(lost)} rows with invalid references")
 
 
 def version_of(connection: Connection) -> str:
@@ -309,6 +384,13 @@ def rows_changed(session: Session, statement: UpdateBase) -> int:
     result = session.execute(statement)
     assert isinstance(result, CursorResult)
     return int(result.rowcount)
+
+
+def take_lock(session: Session, words: str) -> None:
+    """Serialise write transactions with the same words until they end; those of SQLite are anyway."""
+    if session.get_bind().dialect.name != "sqlite":
+        digest = hashlib.sha256(words.encode()).digest()
+        session.execute(select(func.pg_advisory_xact_lock(int.from_bytes(digest[:8], signed=True))))
 
 
 def new_mark() -> str:

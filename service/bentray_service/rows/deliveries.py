@@ -13,9 +13,9 @@ from sqlalchemy import delete, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from .accounts import account_in
-from .database import Database, rows_changed
+from .database import Repository
+from .ids import Tenant
 from .tables import DeliveryRow, JobRow, Plain, WebhookSecretRow
-from .tenants import Tenant
 
 # Time after which an attempt whose service died is repeated, s.
 LEASE_S = 60.0
@@ -44,16 +44,12 @@ def announce(session: Session, job_id: str, state: str) -> None:
     session.add(message)
 
 
-class Deliveries:
+class Deliveries(Repository):
     """Messages of all tenants, in the order in which they are due."""
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
 
     def of_job(self, tenant: Tenant, job_id: str) -> DeliveryRow | None:
         """The message of a job of this tenant; None before its end, or without a webhook."""
-        with self._database.read() as session:
-            return session.scalar(select(DeliveryRow).filter_by(tenant=tenant, job_id=job_id))
+        return self._database.row(select(DeliveryRow).filter_by(tenant=tenant, job_id=job_id))
 
     def newest(self, tenant: Tenant | None, state: str | None, limit: int) -> list[DeliveryRow]:
         """Messages of one tenant or all, in one state or any, newest first."""
@@ -72,8 +68,7 @@ class Deliveries:
 
     def take_over(self) -> None:
         """Repeat the attempts of a dead service at once, if no other service uses the database."""
-        with self._database.write() as session:
-            session.execute(update(DeliveryRow).values(lease_until=None))
+        self._database.change(update(DeliveryRow).values(lease_until=None))
 
     def claim(self) -> DeliveryRow | None:
         """Begin an attempt of a message that is due; None if there is none."""
@@ -106,22 +101,17 @@ class Deliveries:
             due: time of the next attempt of a waiting message.
         """
         now: Plain = {"state": state, "log": [*delivery.log, entry], "due": due, "lease_until": None}
-        with self._database.write() as session:
-            session.execute(update(DeliveryRow).where(DeliveryRow.id == delivery.id).values(**now))
+        self._database.change(update(DeliveryRow).where(DeliveryRow.id == delivery.id).values(**now))
 
     def retry(self, ids: Collection[str]) -> int:
         """Send failed messages again, with all attempts; returns their number."""
         again: Plain = {"state": "waiting", "attempts": 0, "due": time.time()}
         failed = DeliveryRow.id.in_(ids), DeliveryRow.state == "failed"
-        with self._database.write() as session:
-            return rows_changed(session, update(DeliveryRow).where(*failed).values(**again))
+        return self._database.change(update(DeliveryRow).where(*failed).values(**again))
 
 
-class WebhookSecrets:
+class WebhookSecrets(Repository):
     """Secrets of tenants, in the form of Standard Webhooks: ``whsec_`` and base64."""
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
 
     def create(self, tenant: Tenant) -> str:
         """A new secret of a tenant; those before it still sign for ``OVERLAP_S``."""

@@ -1,12 +1,26 @@
-"""Ids of stored items: creation, and validation before an id becomes part of a path."""
+"""Ids of stored items and names of tenants: creation, and validation before either becomes part of a path."""
 
 from __future__ import annotations
 
 import re
 import secrets
+from typing import NewType
+
+from bentray_kernels.errors import InvalidInput
 
 from ..errors import UnknownId
 
+# A folder has this name, so it must not contain path separators.
+TENANT_PATTERN = re.compile(r"[a-z0-9][a-z0-9._@+-]{0,63}")
+ACCEPTED_TENANTS = "1 to 64 of a-z, 0-9 and . _ @ + -, beginning with a letter or digit"
+
+# Names that nobody chooses: of claimed names, and of projects, whose id is the tenant of their items.
+GIVEN = re.compile(r"user-[0-9a-f]{40}|project-[0-9a-f]{20}")
+
+Tenant = NewType("Tenant", str)
+
+# The owner of all data when authentication is not required.
+LOCAL = Tenant("local")
 PREFIXES = {
     "dataset": "ds",
     "job": "job",
@@ -18,6 +32,17 @@ PREFIXES = {
     "upload": "up",
 }
 _RANDOM = re.compile(r"[0-9a-f]{20}")
+
+
+def checked_tenant(text: str) -> Tenant:
+    """Return ``text`` if it is a valid tenant name.
+
+    Raises:
+        InvalidInput: otherwise.
+    """
+    if not TENANT_PATTERN.fullmatch(text):
+        raise InvalidInput("tenant", repr(text[:80]), ACCEPTED_TENANTS)
+    return Tenant(text)
 
 
 def new_id(what: str) -> str:

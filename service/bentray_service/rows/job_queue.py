@@ -13,11 +13,10 @@ from sqlalchemy.orm import Session
 
 from . import usage
 from .accounts import Account, account_in
-from .database import Database
-from .job_states import RUNNING, change
+from .database import Database, Repository
+from .ids import Tenant
+from .job_states import RUNNING, change, turns_of
 from .tables import ENDED, JobRow, Plain, ResultRow, ResultVolumeRow
-from .tenants import Tenant
-from .turns import turns_of
 
 MAX_ATTEMPTS = 3
 
@@ -25,7 +24,7 @@ MAX_ATTEMPTS = 3
 LEASE_S = 30.0
 
 
-class Queue:
+class Queue(Repository):
     """Job states from ``queued`` through ``running`` (and ``cancelling``) to the end.
 
     A service that claims a job holds a lease, which it renews while it is alive. A service that has lost its
@@ -38,7 +37,7 @@ class Queue:
         installation: the id of the data folder that this process has locked (``installation_of``). Leases of
             the same id belong to dead processes and are taken over at once. None: leases must expire.
         """
-        self._database = database
+        super().__init__(database)
         self._prefix = f"{installation or secrets.token_hex(8)}-"
         self._owner = self._prefix + secrets.token_hex(4)
 
@@ -49,8 +48,7 @@ class Queue:
 
     def held_state(self, job_id: str) -> str | None:
         """The state of a job that this service holds; None if another service holds it."""
-        with self._database.read() as session:
-            return session.scalar(select(JobRow.state).where(self._held(job_id)))
+        return self._database.row(select(JobRow.state).where(self._held(job_id)))
 
     def load(self) -> tuple[dict[str, int], float | None]:
         """The number of jobs in each state, and the creation time of the oldest queued job."""
@@ -86,8 +84,7 @@ class Queue:
 
     def unfinished(self) -> set[str]:
         """The ids of all jobs that have not ended."""
-        with self._database.read() as session:
-            return set(session.scalars(select(JobRow.id).where(JobRow.state.not_in(ENDED))))
+        return set(self._database.rows(select(JobRow.id).where(JobRow.state.not_in(ENDED))))
 
     def claim(self, *, idle_only: bool = False) -> JobRow | None:
         """Claim the next queued job and return it; None when no job is queued.
@@ -111,14 +108,13 @@ class Queue:
 
     def renew(self, held: Collection[str]) -> None:
         """Renew the leases of running jobs."""
-        with self._database.write() as session:
-            mine = JobRow.id.in_(held), JobRow.lease_owner == self._owner, JobRow.state.in_(RUNNING)
-            session.execute(update(JobRow).where(*mine).values(lease_until=time.time() + LEASE_S))
+        mine = JobRow.id.in_(held), JobRow.lease_owner == self._owner, JobRow.state.in_(RUNNING)
+        self._database.change(update(JobRow).where(*mine).values(lease_until=time.time() + LEASE_S))
 
     def reset_attempts(self, job_id: str) -> None:
         """Reset the number of attempts of a job that has saved a checkpoint."""
-        with self._database.write() as session:
-            session.execute(update(JobRow).where(self._held(job_id), JobRow.attempts > 1).values(attempts=1))
+        mine = self._held(job_id), JobRow.attempts > 1
+        self._database.change(update(JobRow).where(*mine).values(attempts=1))
 
     def record_size(self, job_id: str, size: int) -> None:
         """Store the disk usage of a running job, if it exceeds the reserved size, bytes."""
@@ -133,8 +129,7 @@ class Queue:
     def progress(self, job_id: str, done: int, total: int, history: list[Plain], phase: str = "") -> None:
         """Store the progress of a running job."""
         now: Plain = {"done": done, "total": total, "history": history, "phase": phase}
-        with self._database.write() as session:
-            session.execute(update(JobRow).where(self._held(job_id)).values(**now))
+        self._database.change(update(JobRow).where(self._held(job_id)).values(**now))
 
     def succeed(
         self, job_id: str, result: Plain | None, into: type[ResultRow] = ResultVolumeRow, size: int = 0

@@ -1,19 +1,32 @@
-"""Changes of the state of a job: an update and an appended event in the transaction of the caller.
-
-When a job ends, its reserved storage is released, and a message to its webhook is stored.
-"""
+"""States of jobs: changes with their events, and the order in which accounts take turns."""
 
 from __future__ import annotations
 
+import math
 import time
-from typing import Any
+from functools import cache
+from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, delete, select, update
-from sqlalchemy.orm import Session
+from sqlalchemy import (
+    ColumnElement,
+    Select,
+    String,
+    bindparam,
+    case,
+    delete,
+    func,
+    or_,
+    select,
+    union,
+    update,
+)
+from sqlalchemy.orm import Session, aliased
 
+from .accounts import Account, account_in
 from .database import rows_changed
 from .deliveries import announce
-from .tables import ENDED, EventRow, JobRow, StorageRow
+from .ids import Tenant
+from .tables import ENDED, EventRow, JobRow, ProjectRow, StorageRow
 
 RUNNING = ("running", "cancelling")
 
@@ -45,3 +58,57 @@ def change(
 def append_event(session: Session, job_id: str, state: str, note: str = "") -> None:
     """Append an event."""
     session.add(EventRow(job_id=job_id, time=time.time(), state=state, note=note))
+
+
+class Turn(NamedTuple):
+    """Turn of an account; smaller ones go first. An account without any job goes before those with one.
+
+    Attributes:
+        running: number of running jobs.
+        served: start of the job that started last, s since 1970.
+        oldest: number of the oldest queued job.
+        queued: number of queued jobs.
+        tenants: owners of the queued jobs, the account itself and its projects.
+    """
+
+    running: int = 0
+    served: float = 0.0
+    oldest: float = math.inf
+    queued: int = 0
+    tenants: tuple[Tenant, ...] = ()
+
+
+def turns_of(session: Session, further: Account | None = None) -> dict[Account, Turn]:
+    """Turns of all accounts with queued jobs, and of a ``further`` one."""
+    turns: dict[Account, Turn] = {} if further is None else {further: Turn()}
+    rows = session.execute(_query(further=further is not None), {"further": further})
+    for account, tenant, waits, busy, last, first in rows:
+        before = turns.get(Account(account), Turn())
+        turns[Account(account)] = Turn(
+            before.running + int(busy),
+            max(before.served, float(last)),
+            min(before.oldest, math.inf if first is None else first),
+            before.queued + int(waits),
+            (*before.tenants, Tenant(tenant)) if waits else before.tenants,
+        )
+    return turns
+
+
+@cache
+def _query(*, further: bool) -> Select[str, Tenant, int, int, float, int | None]:
+    """Counts of each tenant; composed once, since every claim of a job needs it."""
+    there = aliased(JobRow)
+    waiting = select(account_in(there.tenant)).where(there.state == "queued")
+    accounts = union(waiting, select(bindparam("further", type_=String))) if further else waiting
+    of_them = or_(
+        JobRow.tenant.in_(accounts),
+        JobRow.tenant.in_(select(ProjectRow.id).where(ProjectRow.tenant.in_(accounts))),
+    )
+    queued, running = (
+        func.coalesce(func.sum(case((JobRow.state.in_(states), 1), else_=0)), 0)
+        for states in (("queued",), RUNNING)
+    )
+    served = func.coalesce(func.max(JobRow.started), 0.0)
+    oldest = func.min(case((JobRow.state == "queued", JobRow.number)))
+    each = select(account_in(JobRow.tenant), JobRow.tenant, queued, running, served, oldest)
+    return each.where(of_them).group_by(JobRow.tenant)

@@ -13,17 +13,59 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from ..errors import JobFinished, QueueFull, UnknownId
-from . import job_search, usage
+from . import usage
 from .accounts import account_of, family_of
-from .idempotency import RequestKey
-from .ids import checked, new_id
-from .job_states import append_event, change
-from .stored_tables import NamedTable
+from .ids import Tenant, checked, new_id
+from .job_states import append_event, change, turns_of
+from .stored_tables import NamedTable, RequestKey, matches
 from .tables import ENDED, UNFINISHED, EventRow, JobRow, Plain
-from .tenants import Tenant
-from .turns import turns_of
 
 BATCH = 500
+
+
+@dataclass(frozen=True)
+class NewJob:
+    """A job to insert.
+
+    Attributes:
+        kind: a key of ``jobs.kinds.KINDS``.
+        settings: of the job, as JSON.
+        dataset_id, volume_id, mesh_id: inputs.
+        field_id: output, if its id is known in advance.
+        plan: decomposition into tasks.
+        reserved: maximum bytes that it stores while it runs.
+    """
+
+    kind: str
+    settings: Plain
+    dataset_id: str | None = None
+    volume_id: str | None = None
+    mesh_id: str | None = None
+    field_id: str | None = None
+    plan: Plain | None = None
+    reserved: int = 0
+
+
+@dataclass(frozen=True)
+class Submission:
+    """Properties common to all jobs of a request.
+
+    Attributes:
+        most_bytes: quota of the tenant; None: nothing is reserved.
+        most_queued: maximum number of queued jobs.
+        key: idempotency key.
+        started_by: id of the key, or the user.
+        webhook: address to call when each job ends.
+    """
+
+    most_bytes: int | None = None
+    most_queued: int | None = None
+    key: str | None = None
+    started_by: str = ""
+    webhook: str | None = None
+
+
+NO_LIMITS = Submission()
 
 
 class JobProgress(NamedTuple):
@@ -44,53 +86,25 @@ class Jobs(NamedTable[JobRow]):
 
     table, what = JobRow, "job"
 
-    def add(
-        self,
-        tenant: Tenant,
-        kind: str,
-        settings: Plain,
-        dataset_id: str | None = None,
-        volume_id: str | None = None,
-        mesh_id: str | None = None,
-        field_id: str | None = None,
-        *,
-        plan: Plain | None = None,
-        reserve: tuple[int, int] | None = None,
-        most_queued: int | None = None,
-        key: str | None = None,
-        started_by: str = "",
-        webhook: str | None = None,
-    ) -> JobRow:
+    def add(self, tenant: Tenant, new: NewJob, how: Submission = NO_LIMITS) -> JobRow:
         """Insert a queued job; it survives a crash once this method returns.
 
-        A ``key`` that this tenant has used before returns the job of that request.
+        A key that this tenant has used before returns the job of that request.
 
         Args:
             tenant: owner.
-            kind: a key of ``jobs.kinds.KINDS``.
-            settings: of the job, as JSON.
-            dataset_id, volume_id, mesh_id: inputs.
-            field_id: output, if its id is known in advance.
-            plan: decomposition into tasks.
-            reserve: maximum bytes that the job stores while it runs, and the quota of the tenant.
-            most_queued: maximum number of queued jobs.
-            key: idempotency key of the request.
-            started_by: id of the key, or user of the proxy.
-            webhook: address to call when it ends.
+            new: the job.
+            how: limits, key and user of the request.
 
         Raises:
             KeyReused: when the key was used with another request.
             QuotaExceeded: when less than the reserved size is available.
-            QueueFull: when ``most_queued`` jobs of this tenant are queued.
+            QueueFull: when too many jobs of this tenant are queued.
             UnknownId: when the dataset has been deleted in the meantime.
         """
-        references = {"dataset_id": dataset_id, "volume_id": volume_id, "mesh_id": mesh_id}
-        new = NewJob(
-            kind, settings, **references, field_id=field_id, plan=plan, reserved=(reserve or (0, 0))[0]
-        )
-        how = Submission(None if reserve is None else reserve[1], most_queued, key, started_by, webhook)
-        called = [] if webhook is None else [webhook]
-        request = RequestKey.from_header(key, [kind, settings, dataset_id, volume_id, mesh_id, *called])
+        called = [] if how.webhook is None else [how.webhook]
+        content = [new.kind, new.settings, new.dataset_id, new.volume_id, new.mesh_id, *called]
+        request = RequestKey.from_header(how.key, content)
         with self._database.write() as session:
             before = request.earlier(session, JobRow, tenant)
             if before is None:
@@ -99,41 +113,25 @@ class Jobs(NamedTable[JobRow]):
                 job_id = before.id
         return self.get(tenant, job_id)
 
-    def newest(
+    def search(
         self,
         tenant: Tenant,
         limit: int,
-        state: str | None = None,
-        kind: str | None = None,
         before: str | None = None,
         text: str | None = None,
-        batch: str | None = None,
+        **equal: str | None,
     ) -> list[JobRow]:
-        """Up to ``limit`` jobs of this tenant, newest first.
+        """Newest jobs with a text and values of columns.
 
         Args:
-            tenant: owner.
-            limit: maximum number.
-            state, kind: only jobs with these values.
-            before: only jobs older than the job with this id.
-            text: only jobs that ``job_search.matches``.
-            batch: only jobs of this batch.
-
-        Raises:
-            UnknownId: when the tenant has no such job.
+            tenant, limit, before: as of ``newest``.
+            text: only jobs that ``matches``.
+            equal: only jobs with these values, None for any: ``state``, ``kind`` or ``batch_id``.
         """
-        query = select(JobRow).where(JobRow.tenant == tenant).order_by(JobRow.number.desc()).limit(limit)
-        if state is not None:
-            query = query.where(JobRow.state == state)
-        if kind is not None:
-            query = query.where(JobRow.kind == kind)
-        if batch is not None:
-            query = query.where(JobRow.batch_id == checked("batch", batch))
+        only = [getattr(JobRow, name) == value for name, value in equal.items() if value is not None]
         if text:
-            query = query.where(job_search.matches(tenant, text))
-        if before is not None:
-            query = query.where(JobRow.number < self.get(tenant, before).number)
-        return self._database.rows(query)
+            only.append(matches(tenant, text))
+        return self.newest(tenant, limit, *only, before=before)
 
     def place(self, job: JobRow) -> int | None:
         """How many queued jobs of all tenants start before this one if jobs run one at a time.
@@ -256,48 +254,6 @@ class Jobs(NamedTable[JobRow]):
         return self.get(tenant, job_id)
 
 
-@dataclass(frozen=True)
-class NewJob:
-    """A job to insert.
-
-    Attributes:
-        kind: a key of ``jobs.kinds.KINDS``.
-        settings: of the job, as JSON.
-        dataset_id, volume_id, mesh_id: inputs.
-        field_id: output, if its id is known in advance.
-        plan: decomposition into tasks.
-        reserved: maximum bytes that it stores while it runs.
-    """
-
-    kind: str
-    settings: Plain
-    dataset_id: str | None = None
-    volume_id: str | None = None
-    mesh_id: str | None = None
-    field_id: str | None = None
-    plan: Plain | None = None
-    reserved: int = 0
-
-
-@dataclass(frozen=True)
-class Submission:
-    """Properties common to all jobs of a request.
-
-    Attributes:
-        most_bytes: quota of the tenant; None: nothing is reserved.
-        most_queued: maximum number of queued jobs.
-        key: idempotency key.
-        started_by: id of the key, or the user.
-        webhook: address to call when each job ends.
-    """
-
-    most_bytes: int | None = None
-    most_queued: int | None = None
-    key: str | None = None
-    started_by: str = ""
-    webhook: str | None = None
-
-
 def insert_jobs(
     session: Session,
     tenant: Tenant,
@@ -334,11 +290,9 @@ def insert_jobs(
             usage.reserve(session, tenant, job_id, job.reserved, how.most_bytes)
         columns = asdict(job)
         del columns["reserved"]
-        row = JobRow(id=job_id, tenant=tenant, batch_id=batch_id, **columns)
-        row.started_by, row.webhook = how.started_by[:200], how.webhook
-        row.state, row.created = "queued", time.time()
-        if request is not None:
-            row.idempotency_key, row.request_sha256 = request.key, request.digest
+        columns |= {"state": "queued", "created": time.time(), "webhook": how.webhook}
+        columns |= {} if request is None else request.columns()
+        row = JobRow(id=job_id, tenant=tenant, batch_id=batch_id, started_by=how.started_by[:200], **columns)
         with _dataset_exists(job.dataset_id):
             session.add(row)
             session.flush()

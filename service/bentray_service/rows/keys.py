@@ -1,34 +1,90 @@
-"""The table of API keys."""
+"""API keys: their format, and their table; secrets are never stored."""
 
 from __future__ import annotations
 
+import hashlib
 import hmac
 import logging
+import re
+import secrets
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from sqlalchemy import func, or_, select, update
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
 
-from .api_key import ApiKey
-from .claims import is_claimed, keep_from_claims
-from .database import Database
+from .claims import is_claimed, unclaiming
+from .database import Repository
+from .ids import GIVEN, Tenant
 from .tables import KeyRow
-from .tenants import GIVEN, Tenant
 
-log = logging.getLogger("bentray.access")
+PREFIX = "bentray_"
+ACCEPTED = "bentray_, 12 hexadecimal digits, _ and 40 more"
 
+# Also used to remove keys from logs.
+PATTERN = re.compile(r"bentray_([0-9a-f]{12})_([0-9a-f]{40})")
 # Resolution of the stored time of last use, s; it avoids one write per request.
 USED_S = 60.0
 
 
-class Keys:
-    """The keys of all tenants, for the command line and authentication."""
+@dataclass(frozen=True, repr=False)
+class ApiKey:
+    """An API key with its secret; ``repr`` does not show the secret.
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    Attributes:
+        id: public identifier of the key.
+    """
+
+    id: str
+    _secret: str
+
+    @classmethod
+    def new(cls) -> ApiKey:
+        """A new random key."""
+        return cls(secrets.token_hex(6), secrets.token_hex(20))
+
+    @classmethod
+    def from_text(cls, text: str) -> ApiKey | None:
+        """Parse ``text``; None if it does not have the format of a key."""
+        match = PATTERN.fullmatch(text)
+        return None if match is None else cls(match[1], match[2])
+
+    @classmethod
+    def given(cls, field: str, text: str) -> ApiKey:
+        """Parse ``text``.
+
+        Raises:
+            InvalidInput: naming ``field``; the text itself is not shown, since it may contain a secret.
+        """
+        key = cls.from_text(text)
+        if key is None:
+            raise InvalidInput(field, f"{len(text)} characters that are not a key", ACCEPTED)
+        return key
+
+    def digest(self) -> str:
+        """Digest to store, hexadecimal.
+
+        One round of SHA-256 is sufficient: the secret is 160 random bits, so it cannot be guessed from the
+        digest as a password could. A slow hash would only slow down every request.
+        """
+        return hashlib.sha256(self._secret.encode()).hexdigest()
+
+    def shown(self) -> str:
+        """The complete key including the secret, for its owner."""
+        return f"{PREFIX}{self.id}_{self._secret}"
+
+    def __repr__(self) -> str:
+        return f"Token({self.id})"
+
+
+log = logging.getLogger("bentray.access")
+
+
+class Keys(Repository):
+    """The keys of all tenants, for the command line and authentication."""
 
     def add(
         self, token: ApiKey, tenant: Tenant, name: str, scopes: Sequence[str], expires: float | None = None
@@ -45,7 +101,7 @@ class Keys:
                 if GIVEN.fullmatch(tenant) or is_claimed(session, tenant):
                     accepted = "another name; for users and programs together, BENTRAY_OIDC_TENANTS"
                     raise InvalidInput("tenant", f"{tenant}, of a user who signs in or a project", accepted)
-                keep_from_claims(session, [tenant])
+                session.execute(unclaiming([tenant]))
                 session.add(KeyRow(**row, **made))
         except IntegrityError:
             raise InvalidInput("key", f"{token.id}, which exists", "a key with a new id") from None
@@ -53,8 +109,7 @@ class Keys:
 
     def any(self) -> bool:
         """Whether a key exists or existed; authentication is required from then on."""
-        with self._database.read() as session:
-            return session.scalar(select(KeyRow.number).limit(1)) is not None
+        return self._database.row(select(KeyRow.number).limit(1)) is not None
 
     def owner(self, token: ApiKey) -> KeyRow | None:
         """The row of a valid key; None if it is unknown, revoked or expired."""
@@ -72,17 +127,13 @@ class Keys:
 
     def ended(self, key_ids: Sequence[str]) -> list[str]:
         """The keys among ``key_ids`` that are revoked or expired."""
-        query = select(KeyRow.id).where(
-            KeyRow.id.in_(key_ids), or_(KeyRow.revoked.is_not(None), KeyRow.expires <= time.time())
-        )
-        with self._database.read() as session:
-            return list(session.scalars(query))
+        ended = or_(KeyRow.revoked.is_not(None), KeyRow.expires <= time.time())
+        return self._database.rows(select(KeyRow.id).where(KeyRow.id.in_(key_ids), ended))
 
     def next_expiry(self) -> float | None:
         """When the next valid key expires, s since 1970; None if none does."""
         valid = KeyRow.revoked.is_(None), KeyRow.expires > time.time()
-        with self._database.read() as session:
-            return session.scalar(select(func.min(KeyRow.expires)).where(*valid))
+        return self._database.row(select(func.min(KeyRow.expires)).where(*valid))
 
     def all(self, tenant: Tenant | None = None) -> list[KeyRow]:
         """All keys, or those of one tenant, oldest first."""
@@ -97,9 +148,8 @@ class Keys:
         Raises:
             InvalidInput: when the id is unknown.
         """
-        with self._database.write() as session:
-            mine = update(KeyRow).where(KeyRow.id == key_id, KeyRow.revoked.is_(None))
-            session.execute(mine.values(revoked=time.time()))
+        mine = update(KeyRow).where(KeyRow.id == key_id, KeyRow.revoked.is_(None))
+        self._database.change(mine.values(revoked=time.time()))
         return self._row(key_id)
 
     def _row(self, key_id: str) -> KeyRow:
@@ -109,12 +159,10 @@ class Keys:
         return row
 
     def _find(self, key_id: str) -> KeyRow | None:
-        with self._database.read() as session:
-            return session.scalar(select(KeyRow).where(KeyRow.id == key_id))
+        return self._database.row(select(KeyRow).where(KeyRow.id == key_id))
 
     def _note(self, key_id: str, now: float) -> None:
         try:
-            with self._database.write() as session:
-                session.execute(update(KeyRow).where(KeyRow.id == key_id).values(used=now))
+            self._database.change(update(KeyRow).where(KeyRow.id == key_id).values(used=now))
         except SQLAlchemyError as error:
             log.warning("the last use of key %s could not be stored: %s", key_id, error)

@@ -16,21 +16,9 @@ from sqlalchemy.orm import Session, with_expression
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import InUse, UnknownId
-from .database import Database, rows_changed
-from .ids import checked, new_id
-from .tables import (
-    DatasetRow,
-    FieldRow,
-    JobRow,
-    MemberRow,
-    MeshRow,
-    ProjectRow,
-    ResultVolumeRow,
-    StorageRow,
-    UploadedVolumeRow,
-    UploadRow,
-)
-from .tenants import Tenant
+from .database import Repository, rows_changed
+from .ids import Tenant, checked, new_id
+from .tables import WITH_FILES, MemberRow, ProjectRow, StorageRow, UploadRow
 
 # Permissions of each role; owners also change the project and its members.
 ROLES = {"reader": ("read",), "contributor": ("read", "write"), "owner": ("read", "write")}
@@ -43,20 +31,14 @@ MOST_PROJECTS = 1000
 MOST_MEMBERS = 1000
 
 # Tables that have items of a project.
-HOLDING = (
-    *(DatasetRow, JobRow, ResultVolumeRow, UploadedVolumeRow, MeshRow, FieldRow, UploadRow),
-    StorageRow,
-)
+HOLDING = (*WITH_FILES, UploadRow, StorageRow)
 
 
-class Projects:
+class Projects(Repository):
     """Projects of tenants; several may have the same name.
 
     ``member`` None stands for a caller who may do everything in the tenant.
     """
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
 
     def add(self, tenant: Tenant, name: str, member: str | None) -> ProjectRow:
         """Insert a project; ``member`` becomes its owner.
@@ -98,8 +80,7 @@ class Projects:
 
     def rename(self, project: ProjectRow, name: str) -> None:
         """Rename a project."""
-        with self._database.write() as session:
-            session.execute(update(ProjectRow).where(ProjectRow.id == project.id).values(name=name))
+        self._database.change(update(ProjectRow).where(ProjectRow.id == project.id).values(name=name))
 
     def put_member(self, project: ProjectRow, member: str, role: str) -> None:
         """Add a member, or change their role.
@@ -152,9 +133,8 @@ class Projects:
         """Those of some ``membership`` that have ended."""
         asked = [one for one in memberships if "/" in one]
         ids = {one.partition("/")[0] for one in asked}
-        query = select(MemberRow).where(MemberRow.project_id.in_(ids))
-        with self._database.read() as session:
-            left = {membership(row.project_id, row.member) for row in session.scalars(query)}
+        rows = self._database.rows(select(MemberRow).where(MemberRow.project_id.in_(ids)))
+        left = {membership(row.project_id, row.member) for row in rows}
         return [one for one in asked if one not in left]
 
     def _read(self, tenant: Tenant, member: str | None, name: str | None = None) -> list[ProjectRow]:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from sqlalchemy import delete, select
 
-from .database import Database, rows_changed
+from .database import Repository, rows_changed
+from .ids import Tenant
 from .tables import PendingSignInRow, SessionRow
-from .tenants import Tenant
 
 # Time for the user to sign in at the provider, s.
 PENDING_S = 600.0
@@ -45,11 +45,8 @@ class PendingSignIn:
         return cls(*(secrets.token_urlsafe(32) for _ in range(4)))
 
 
-class Sessions:
+class Sessions(Repository):
     """Sessions of all tenants. The secret of a session is in a cookie; its digest is stored."""
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
 
     def begin(self, pending: PendingSignIn, address: str) -> None:
         """Store a sign-in under way.
@@ -97,19 +94,16 @@ class Sessions:
     def owner(self, secret: str) -> SessionRow | None:
         """The row of a valid session; None if it is unknown, ended or expired."""
         valid = SessionRow.sha256 == digest(secret), SessionRow.expires > time.time()
-        with self._database.read() as session:
-            return session.scalar(select(SessionRow).where(*valid))
+        return self._database.row(select(SessionRow).where(*valid))
 
     def end(self, secret: str) -> None:
         """End a session."""
-        with self._database.write() as session:
-            session.execute(delete(SessionRow).where(SessionRow.sha256 == digest(secret)))
+        self._database.change(delete(SessionRow).where(SessionRow.sha256 == digest(secret)))
 
     def ended(self, ids: Sequence[str]) -> list[str]:
         """The sessions among ``ids`` that have ended or expired."""
         valid = select(SessionRow.id).where(SessionRow.id.in_(ids), SessionRow.expires > time.time())
-        with self._database.read() as session:
-            left = set(session.scalars(valid))
+        left = set(self._database.rows(valid))
         return [one for one in ids if one.startswith(ID_PREFIX) and one not in left]
 
 

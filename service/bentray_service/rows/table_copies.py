@@ -6,12 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sqlalchemy import Connection, exc, func, insert, inspect, select
-from sqlalchemy.engine import make_url
+from sqlalchemy import Connection, func, insert, inspect, select
 
 from bentray_kernels.errors import InvalidInput
 
-from .database import engine_of, version_of
+from .database import check_file, named_database, opened, version_of
 from .tables import VERSION, About, Base
 
 # Rows in memory at once.
@@ -27,28 +26,20 @@ def snapshot(address: str) -> Iterator[Connection]:
     Raises:
         InvalidInput: when it cannot be read, is empty, or has another schema version.
     """
-    shown = make_url(address).render_as_string(hide_password=True)
-    try:
-        _check_file(address)
-        engine = engine_of(address, (), patient=False)
+    check_file(address, ACCEPTED)
+    with named_database(address, ACCEPTED) as shown, opened(address, patient=False) as engine:
         reading = engine.execution_options(bentray_read_only=True)
         if engine.dialect.name != "sqlite":
             # A read transaction of SQLite is of one moment anyway.
             reading = reading.execution_options(isolation_level="REPEATABLE READ")
-        try:
-            with reading.begin() as connection:
-                if not inspect(connection).has_table(About.__tablename__):
-                    raise InvalidInput("database_url", f"{shown}, without tables", ACCEPTED)
-                version = version_of(connection)
-                if version != str(VERSION):
-                    accepted = f"schema version {VERSION}; use the Bentray version of the service"
-                    raise InvalidInput("database_url", f"{shown} with schema version {version}", accepted)
-                yield connection
-        finally:
-            engine.dispose()
-    except (exc.SQLAlchemyError, ImportError) as error:
-        reason = str(getattr(error, "orig", None) or error).splitlines()[0]
-        raise InvalidInput("database_url", f"{shown} ({reason})", ACCEPTED) from error
+        with reading.begin() as connection:
+            if not inspect(connection).has_table(About.__tablename__):
+                raise InvalidInput("database_url", f"{shown}, without tables", ACCEPTED)
+            version = version_of(connection)
+            if version != str(VERSION):
+                accepted = f"schema version {VERSION}; use the Bentray version of the service"
+                raise InvalidInput("database_url", f"{shown} with schema version {version}", accepted)
+            yield connection
 
 
 def copy_to_file(source: Connection, path: Path) -> None:
@@ -64,13 +55,9 @@ def copy_to(source: Connection, address: str) -> None:
         source: of the present schema version.
         address: of the other database.
     """
-    engine = engine_of(address, ("foreign_keys=ON",), patient=False)
-    try:
-        with engine.begin() as target:
-            Base.metadata.create_all(target)
-            _copy_rows(source, target)
-    finally:
-        engine.dispose()
+    with opened(address, ("foreign_keys=ON",), patient=False) as engine, engine.begin() as target:
+        Base.metadata.create_all(target)
+        _copy_rows(source, target)
 
 
 def _copy_rows(source: Connection, target: Connection) -> None:
@@ -86,31 +73,20 @@ def _copy_rows(source: Connection, target: Connection) -> None:
             target.execute(select(func.setval(sequence, *last)))
 
 
-def _check_file(address: str) -> None:
-    """Reject an SQLite database that does not exist, which opening would create."""
-    url = make_url(address)
-    if url.get_backend_name() == "sqlite" and not Path(url.database or "").is_file():
-        raise InvalidInput("database_url", f"{url.database}, which does not exist", ACCEPTED)
-
-
 def has_tables(address: str, besides: str = "") -> bool:
     """Whether a database has tables of a service; one with the id ``besides`` does not count.
 
     Raises:
         InvalidInput: when it does not answer.
     """
-    shown = make_url(address).render_as_string(hide_password=True)
-    engine = engine_of(address, ())
-    try:
-        with engine.begin() as connection:
-            if not inspect(connection).has_table(About.__tablename__):
-                return False
-            return connection.execute(select(About.database)).scalar_one_or_none() != besides
-    except exc.SQLAlchemyError as error:
-        reason = str(getattr(error, "orig", None) or error).splitlines()[0]
-        raise InvalidInput("database_url", f"{shown} ({reason})", "a database that answers") from error
-    finally:
-        engine.dispose()
+    with (
+        named_database(address, "a database that answers"),
+        opened(address) as engine,
+        engine.begin() as connection,
+    ):
+        if not inspect(connection).has_table(About.__tablename__):
+            return False
+        return connection.execute(select(About.database)).scalar_one_or_none() != besides
 
 
 def remove_database(path: Path) -> None:

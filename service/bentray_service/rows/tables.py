@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from sqlalchemy import (
     JSON,
@@ -28,7 +28,7 @@ from sqlalchemy.orm import (
     relationship,
 )
 
-from .tenants import Tenant
+from .ids import Tenant
 
 # The newest revision of Alembic, in ``alembic/versions``.
 VERSION = 14
@@ -460,6 +460,8 @@ class FieldRow(Base):
 
 # The tables of stored items.
 StoredRow = DatasetRow | ResultVolumeRow | UploadedVolumeRow | MeshRow | FieldRow
+# Those whose rows have stored files; the file of a turntable belongs to its job.
+WITH_FILES = (*get_args(StoredRow), JobRow)
 # The tables of results of jobs, whose rows have the id of the job.
 ResultRow = ResultVolumeRow | DatasetRow | FieldRow
 

@@ -12,10 +12,9 @@ from sqlalchemy.orm import Session
 from ..errors import RateLimited
 from . import usage
 from .accounts import family_of
-from .ids import new_id
+from .ids import Tenant, new_id
 from .stored_tables import TenantTable
 from .tables import Plain, UploadRow
-from .tenants import Tenant
 
 # Incomplete uploads of one tenant; they are deleted by the client or expire.
 MAX_INCOMPLETE = 100
@@ -93,8 +92,7 @@ class Uploads(TenantTable[UploadRow]):
 
     def ids(self) -> set[str]:
         """The ids of the uploads of all tenants."""
-        with self._database.read() as session:
-            return set(session.scalars(select(UploadRow.id)))
+        return set(self._database.rows(select(UploadRow.id)))
 
     def receiving(self) -> list[UploadRow]:
         """Incomplete uploads of all tenants."""

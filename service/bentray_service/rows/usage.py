@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -13,10 +12,9 @@ from sqlalchemy.orm import Session
 
 from ..errors import QuotaExceeded
 from .accounts import Account, account_in, account_of, family_of
-from .database import Database, rows_changed
-from .ids import PREFIXES
+from .database import Database, rows_changed, take_lock
+from .ids import PREFIXES, Tenant
 from .tables import ResultVolumeRow, StorageRow
-from .tenants import Tenant
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ def reserve(
     Raises:
         QuotaExceeded: when less is available; nothing is changed.
     """
-    _take_turn(session, tenant)
+    take_lock(session, f"storage/{account_of(session, tenant)}")
     used = usage_of(session, tenant, name)
     if used.stored + used.reserved + size > most:
         raise QuotaExceeded(
@@ -106,7 +104,7 @@ def keep(session: Session, tenant: Tenant, name: str, otherwise: int) -> None:
 
 def store(session: Session, tenant: Tenant, name: str, size: int) -> None:
     """Store the size of an item, bytes."""
-    _take_turn(session, tenant)
+    take_lock(session, f"storage/{account_of(session, tenant)}")
     if not _settle(session, tenant, name, bytes=size):
         session.add(StorageRow(tenant=tenant, name=name, bytes=size, reserved=False))
 
@@ -164,13 +162,6 @@ def _counted() -> ColumnElement[bool]:
     return or_(StorageRow.lease_until.is_(None), StorageRow.lease_until >= time.time())
 
 
-def _take_turn(session: Session, tenant: Tenant) -> None:
-    """Serialise write transactions of one tenant; those of SQLite are serialised anyway."""
-    if session.get_bind().dialect.name != "sqlite":
-        digest = hashlib.sha256(f"storage/{account_of(session, tenant)}".encode()).digest()
-        session.execute(select(func.pg_advisory_xact_lock(int.from_bytes(digest[:8], signed=True))))
-
-
 StoredKind = Literal["scans", "results", "volumes", "meshes", "geometry-fields", "exports", "jobs", "uploads"]
 
 _BY_PREFIX: dict[str, StoredKind] = {
@@ -202,10 +193,8 @@ class KindUsage:
 
 def usage_by_kind(database: Database, tenant: Tenant) -> list[KindUsage]:
     """Storage of a tenant by kind, without reservations of dead processes; kinds without any are left out."""
-    alive = or_(StorageRow.lease_until.is_(None), StorageRow.lease_until >= time.time())
-    mine = select(StorageRow.name, StorageRow.bytes, StorageRow.reserved).where(
-        StorageRow.tenant == tenant, alive
-    )
+    columns = StorageRow.name, StorageRow.bytes, StorageRow.reserved
+    mine = select(*columns).where(StorageRow.tenant == tenant, _counted())
     made = select(ResultVolumeRow.id).where(ResultVolumeRow.tenant == tenant)
     with database.read() as session:
         results = set(session.execute(made).scalars())

@@ -1,9 +1,16 @@
-"""HTML of pages that are generated as a whole: head, title and navigation; tables with escaped cells."""
+"""HTML of pages that are generated as a whole, and the built documentation at /documentation."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from html import escape
+from pathlib import Path
+
+from starlette.staticfiles import StaticFiles
+
+PACKAGED = Path(__file__).parent / "built_documentation"
+CHECKOUT = Path(__file__).resolve().parents[3]
 
 
 def document(title: str, version: str, content: str) -> str:
@@ -45,3 +52,26 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
         "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows
     )
     return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+@cache
+def documentation_files() -> StaticFiles | None:
+    """The built pages, or None where there are none."""
+    places = [PACKAGED]
+    if (CHECKOUT / "docs" / "conf.py").is_file():
+        places.append(CHECKOUT / "build" / "docs")
+    found = next((place for place in places if (place / "index.html").is_file()), None)
+    return StaticFiles(directory=found, html=True) if found else None
+
+
+def missing_page(version: str) -> str:
+    """Instructions for where the documentation is not built."""
+    return document(
+        "documentation",
+        version,
+        "<p>This installation has no built documentation. The packages of a release contain it. In a clone "
+        "of the repository, run <code>make docs</code> and restart the service; the same texts are in the "
+        "folder <code>docs</code>.</p>"
+        '<p>The <a href="/docs">REST reference</a> and the <a href="/docs/formats">file formats</a> are '
+        "always served.</p>",
+    )

@@ -22,9 +22,8 @@ from starlette.routing import Match, Mount
 from bentray_kernels.errors import InvalidInput
 
 from .. import errors
-from .headers import HEADERS as SECURITY
+from .middleware import REQUEST_ID, SECURITY_HEADERS
 from .problem import Fault, Problem
-from .request_id import REQUEST_ID
 
 log = logging.getLogger("bentray.errors")
 
@@ -274,7 +273,7 @@ def _unexpected(request: Request, error: Exception) -> Response:
     log.error(words, request.method, request.url.path, number, exc_info=error, extra={"figures": figures})
     detail = f"internal error of the service; see the log entry {number}"
     # This response bypasses the middleware.
-    headers = {**SECURITY, REQUEST_ID: number}
+    headers = {**SECURITY_HEADERS, REQUEST_ID: number}
     return _respond(make_problem(INTERNAL, detail, instance=request.url.path, correlation_id=number), headers)
 
 

@@ -1,4 +1,4 @@
-"""The page /docs: a REST reference generated from the OpenAPI description."""
+"""The OpenAPI description, and the page /docs: a REST reference generated from it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,39 @@ from collections.abc import Iterator
 from html import escape
 from typing import Any
 
+from fastapi import FastAPI
+
 from .documents import document, table
 from .errors import EDGE, FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
+
+
+class OpenApiApp(FastAPI):
+    """A FastAPI application whose description has no null parameters.
+
+    FastAPI describes an optional parameter with the default None as null, but queries and headers cannot be
+    null.
+    """
+
+    def openapi(self) -> dict[str, Any]:
+        """The description, generated once."""
+        made = self.openapi_schema is None
+        document = super().openapi()
+        if made:
+            _drop_null(document)
+        return document
+
+
+def _drop_null(document: dict[str, Any]) -> None:
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            for parameter in operation.get("parameters", ()):
+                schema = parameter["schema"]
+                kinds = [one for one in schema.pop("anyOf", ()) if one != {"type": "null"}]
+                if len(kinds) == 1:
+                    parameter["schema"] = {**kinds[0], **schema}
+                elif kinds:
+                    schema["anyOf"] = kinds
+
 
 Node = dict[str, Any]
 

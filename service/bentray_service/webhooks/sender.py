@@ -16,8 +16,8 @@ from .. import __version__
 from ..errors import DatabaseUnavailable
 from ..rows.database import Database
 from ..rows.deliveries import Deliveries, WebhookSecrets
+from ..rows.ids import Tenant
 from ..rows.tables import DeliveryRow
-from ..rows.tenants import Tenant
 from ..settings import ServiceSettings
 from ..web.addresses import networks
 from .receiver import Outcome, check_url, post

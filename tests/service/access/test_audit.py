@@ -7,9 +7,8 @@ from datetime import UTC, datetime
 import pytest
 
 from bentray_service.access.audit import Audit, entries
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 
 ENTRY = {"method": "GET", "route": "/v1/datasets/{dataset_id}", "ids": ["ds-1"], "tenant": "acme"}
 

@@ -27,12 +27,10 @@ from bentray_kernels.tomography.result import Reconstruction
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.app import create_app
 from bentray_service.routes.models.surface_records import FieldErrors, FieldSeconds, FieldSizes, Repairs
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.ids import new_id, volume_of
+from bentray_service.rows.ids import Tenant, new_id, volume_of
 from bentray_service.rows.jobs import NewJob, Submission
-from bentray_service.rows.keys import Keys
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.rows.tables import Base, FieldRow, ResultVolumeRow
-from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
 from bentray_service.web import errors
 from bentray_workers.files.reconstruction import write_reconstruction
@@ -98,7 +96,7 @@ def one_of_each(app: FastAPI, http: TestClient, owner: Tenant, auth: dict[str, s
     surface["repairs"] = dict.fromkeys(Repairs.model_fields, 0)
     surface |= {"title": "", "format": "ply", "content": "0" * 64}
     state.stores.meshes.add(owner, mesh, size=1, sha256="0" * 64, summary=surface)
-    job = state.stores.jobs.add(owner, "reconstruction", {}, dataset).id
+    job = state.stores.jobs.add(owner, NewJob("reconstruction", {}, dataset)).id
     cube = {"axes": "x,y,z", "shape": [4, 4, 4], "spacing_m": [1.0] * 3, "origin_m": [0.0] * 3}
     cube |= {"speed_range_mps": [1.0, 2.0], "water_speed_mps": 1.0, "provenance": {}, "bytes": 1}
     # At its end, so that its events have one too.

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from bentray_service.access import key_watch
-from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
-from bentray_service.rows.keys import Keys
+from bentray_service.rows.ids import LOCAL
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.sessions import Sessions
-from bentray_service.rows.tenants import LOCAL
 
 PATIENCE_S = 60.0
 

@@ -16,6 +16,7 @@ import pytest
 from bentray_service.access.caller import Caller
 from bentray_service.access.sign_in import SignIn
 from bentray_service.errors import QueueFull, QuotaExceeded, RateLimited, TooManyStreams
+from bentray_service.files.data_folder import Files
 from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.upload_limits import UploadLimits
 from bentray_service.jobs.feed import OF_ACCOUNT, EventFeed
@@ -27,12 +28,13 @@ from bentray_service.rows.accounts import Accounts
 from bentray_service.rows.claims import ClaimedTenants
 from bentray_service.rows.database import Database, open_database
 from bentray_service.rows.deliveries import Deliveries
+from bentray_service.rows.ids import Tenant, new_id
 from bentray_service.rows.job_queue import Queue
-from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.jobs import Jobs, NewJob, Submission
 from bentray_service.rows.keys import Keys
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.sessions import Sessions
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.tables import DatasetRow
 from bentray_service.rows.uploads import MAX_INCOMPLETE, Uploads
 from bentray_service.rows.usage import reserve
 from bentray_service.settings import ServiceSettings
@@ -134,7 +136,7 @@ def stored_bytes(world: World) -> tuple[int, Use]:
 
 def queued_jobs(world: World) -> tuple[int, Use]:
     rows = Jobs(world.database)
-    return 5, lambda tenant: rows.add(tenant, "simulation", {}, most_queued=5)
+    return 5, lambda tenant: rows.add(tenant, NewJob("simulation", {}), Submission(most_queued=5))
 
 
 def running_jobs(world: World, at_once: int = 2) -> tuple[int, Use]:
@@ -143,7 +145,7 @@ def running_jobs(world: World, at_once: int = 2) -> tuple[int, Use]:
     rows, running = Jobs(world.database), []
 
     def run(tenant: Tenant) -> None:
-        job = rows.add(tenant, "simulation", {})
+        job = rows.add(tenant, NewJob("simulation", {}))
         count = len(running)
         if count >= runner._most or runner.queue.claim(idle_only=count >= runner._at_once) is None:
             rows.request_cancel(tenant, job.id)
@@ -159,7 +161,7 @@ def last_running_job(world: World) -> tuple[int, Use]:
 
 
 def pictures(world: World) -> tuple[int, Use]:
-    made, loop = Pictures(FakeCluster(), world.accounts, lambda path: path), asyncio.new_event_loop()
+    made, loop = Pictures(FakeCluster(), world.accounts, Files(Path("unused"))), asyncio.new_event_loop()
     # The list of workers is fresh, so that nothing is waited for before the admission.
     made._queue._asked = math.inf
     held: list[asyncio.Task[Any]] = []
@@ -168,10 +170,8 @@ def pictures(world: World) -> tuple[int, Use]:
         await asyncio.sleep(60.0)
 
     async def run(tenant: Tenant) -> None:
-        what = "dataset", "ds-0", Cost(0.0, 0)
-        task = asyncio.ensure_future(
-            made._made(tenant, what, Path("scan.h5"), lambda path: PictureTasks([], None))
-        )
+        scan = DatasetRow(id=new_id("dataset"), tenant=tenant)
+        task = asyncio.ensure_future(made._made(scan, Cost(0.0, 0), lambda path: PictureTasks([], None)))
         await asyncio.sleep(0.0)
         if task.done():
             await task
@@ -182,7 +182,7 @@ def pictures(world: World) -> tuple[int, Use]:
             task.cancel()
         await asyncio.gather(*held, return_exceptions=True)
 
-    made._in_thread = file_that_never_comes  # type: ignore[method-assign,assignment]
+    made._fetched = file_that_never_comes  # type: ignore[method-assign,assignment]
     world.stack.callback(made.stop)
     world.stack.callback(loop.close)
     world.stack.callback(lambda: loop.run_until_complete(end()))
@@ -208,7 +208,7 @@ def messages_under_way(world: World) -> tuple[int, Use]:
     rows, queue, sent = Jobs(world.database), Queue(world.database), Deliveries(world.database)
 
     def send(tenant: Tenant) -> None:
-        job = rows.add(tenant, "simulation", {}, webhook="https://example.org/")
+        job = rows.add(tenant, NewJob("simulation", {}), Submission(webhook="https://example.org/"))
         queue.claim()
         queue.fail(job.id, {"detail": "why"})
         if sent.claim() is None:

@@ -14,9 +14,8 @@ from bentray_service.access import key_watch
 from bentray_service.access.audit import entries
 from bentray_service.app import create_app
 from bentray_service.client import Client
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.settings import ServiceSettings
 
 from ..conftest import FakeCluster

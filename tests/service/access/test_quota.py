@@ -11,8 +11,7 @@ import pytest
 
 from bentray_service.errors import DatabaseUnavailable
 from bentray_service.files.disk import bytes_in
-from bentray_service.rows.ids import new_id
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL, new_id
 
 from ..tus_records import settled
 

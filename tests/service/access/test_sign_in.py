@@ -7,13 +7,12 @@ from bentray_kernels.errors import InvalidInput
 from bentray_service.access.sign_in import SignIn
 from bentray_service.errors import Forbidden, NotAuthenticated, RateLimited
 from bentray_service.rows.accounts import Accounts
-from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.claims import ClaimedTenants
 from bentray_service.rows.database import open_database
-from bentray_service.rows.keys import Keys
+from bentray_service.rows.ids import LOCAL, Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.sessions import Sessions
-from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.settings import ServiceSettings
 
 NEAR, FAR = "127.0.0.1", "192.0.2.7"

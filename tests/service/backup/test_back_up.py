@@ -19,14 +19,12 @@ from bentray_service.backup.restore import restore
 from bentray_service.files.checked_store import CheckedStore
 from bentray_service.files.data_folder import Files
 from bentray_service.files.store import Store
-from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.database import open_database
-from bentray_service.rows.ids import new_id
-from bentray_service.rows.keys import Keys
+from bentray_service.rows.ids import Tenant, new_id
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.rows.stored_tables import Datasets
 from bentray_service.rows.tables import DatasetRow
-from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
 
 from ..rows.conftest import SUMMARY

@@ -18,7 +18,7 @@ from bentray_kernels.opencl import (
     SelfTestResult,
 )
 from bentray_kernels.opencl.device_benchmark import Timing
-from bentray_service.cli import opencl_help
+from bentray_service.cli import devices
 from bentray_service.cli.output.terminal import show_warnings_on_one_line
 
 GPU = Device(0, "Fast Platform", "GPU 9000", "gpu", "OpenCL 3.0", "1.2.3", True, "/usr/lib/libfast.so.1")
@@ -90,7 +90,7 @@ def test_without_devices_a_remedy_is_shown(
     monkeypatch.setattr(opencl, "find_devices", tuple)
     monkeypatch.setattr(opencl, "select_device", lambda: DeviceSelection(None, ()))
     monkeypatch.delenv("BENTRAY_OPENCL_DEVICE", raising=False)
-    monkeypatch.setattr(opencl_help.shutil, "which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr(devices.shutil, "which", lambda name: f"/usr/bin/{name}")
     first, second = bentray("devices").stdout.splitlines()
     assert first == "this machine has no OpenCL device; compiled code computes everything"
     assert second.startswith("suggestion: ")
@@ -116,8 +116,8 @@ def test_where_all_are_rejected_one_command_helps(
     monkeypatch.setattr(
         opencl, "select_device", lambda: DeviceSelection(None, ("Slow Platform:Processor was refused",))
     )
-    monkeypatch.setattr(opencl_help.shutil, "which", lambda name: None)
-    monkeypatch.setattr(opencl_help.platform, "machine", lambda: machine)
+    monkeypatch.setattr(devices.shutil, "which", lambda name: None)
+    monkeypatch.setattr(devices.platform, "machine", lambda: machine)
     lines = bentray("devices").stdout.splitlines()
     assert lines[-2] == "no device passed; compiled code computes everything"
     assert command in lines[-1]

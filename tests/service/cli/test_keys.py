@@ -11,7 +11,7 @@ import pytest
 from typer.testing import Result
 
 from bentray_service.files.folder_database import GUARDED
-from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import ApiKey
 
 Run = Callable[..., Result]
 

@@ -15,9 +15,8 @@ from bentray_service.files.data_folder import Files
 from bentray_service.files.store import Store
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.database import open_database
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.stored_tables import Datasets
-from bentray_service.rows.tenants import LOCAL
 
 Run = Callable[..., Result]
 SUMMARY = {"title": "", "source": "", "license": "", "dimension": 2, "elements": 3, "ntx": 3, "nrx": 3}

@@ -6,7 +6,7 @@ import pytest
 from bentray_kernels.eikonal import methods
 from bentray_kernels.errors import InvalidInput
 from bentray_service.client import Client, ClientError
-from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import ApiKey
 from bentray_workers.files.dataset import read_dataset
 
 

@@ -17,10 +17,9 @@ import uvicorn
 from tenacity import Retrying
 
 from bentray_service.app import create_app
-from bentray_service.client import AsyncClient, Client, ClientError, flows, retries, uploading
-from bentray_service.client.connection import Connection
+from bentray_service.client import AsyncClient, Client, ClientError, connection, flows, uploading
+from bentray_service.client.connection import Connection, Retries
 from bentray_service.client.errors import NoAnswer
-from bentray_service.client.retries import Retries
 from bentray_service.client.steps import DownloadStep, RequestStep
 from bentray_service.settings import ServiceSettings
 
@@ -92,7 +91,7 @@ def test_it_ends(walk: Walk) -> None:
         walk.ask(LOOK)
     assert 280.0 < sum(walk.pauses) <= 300.0
     with pytest.raises(ClientError, match="500"):
-        walk.ask(LOOK, *[answered(500)] * retries.MAX_ERRORS)
+        walk.ask(LOOK, *[answered(500)] * connection.MAX_ERRORS)
 
 
 def test_wait_timeout_is_honoured(walk: Walk) -> None:
@@ -139,7 +138,7 @@ def test_a_job_has_one_key_however_often_it_is_sent() -> None:
 
 @pytest.fixture
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(retries, "FIRST_PAUSE_S", 0.05)
+    monkeypatch.setattr(connection, "FIRST_PAUSE_S", 0.05)
 
 
 def test_a_job_whose_answer_was_lost_is_started_once(

@@ -3,8 +3,7 @@
 import pytest
 
 from bentray_service.files.data_folder import Files
-from bentray_service.rows.ids import new_id
-from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.ids import LOCAL, Tenant, new_id
 
 OTHER = Tenant("other.one+2@clinic")
 

@@ -15,8 +15,7 @@ from bentray_service.files.bucket import Bucket
 from bentray_service.files.bucket_store import FORGOTTEN_S, LEFT_S, MARK, BucketStore
 from bentray_service.files.cache import RECENT_S
 from bentray_service.files.data_folder import Files
-from bentray_service.rows.ids import new_id
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL, new_id
 
 from ... import s3
 from .store_suite import StoreSuite

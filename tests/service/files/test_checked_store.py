@@ -6,15 +6,14 @@ import pytest
 from sqlalchemy import insert
 
 from bentray_service.errors import Damaged, Deleted
+from bentray_service.files.bucket_store import open_store
 from bentray_service.files.checked_store import CheckedStore
 from bentray_service.files.data_folder import Files
-from bentray_service.files.open_store import open_store
 from bentray_service.files.store import Store
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.database import open_database
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.tables import UploadedVolumeRow
-from bentray_service.rows.tenants import LOCAL
 
 from .store_suite import StoreSuite
 

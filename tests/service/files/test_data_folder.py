@@ -5,8 +5,7 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_service.errors import UnknownId
 from bentray_service.files.data_folder import Files, lock
-from bentray_service.rows.ids import new_id
-from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.ids import LOCAL, Tenant, new_id
 
 
 def test_half_done_work_is_dropped(tmp_path):
@@ -94,20 +93,3 @@ def test_tenants_are_isolated_on_disk(tmp_path):
     (mine.field(field) / "a").write_bytes(bytes(1000))
     assert not theirs.field(field).exists()
     assert (mine.sizes(), theirs.sizes()) == ({field: 1000}, {})
-
-
-def test_the_folder_of_an_older_version_goes_to_the_local_tenant(tmp_path):
-    """Also when that was cut off before: what has arrived stays, what has not comes."""
-    for name in ("datasets", "volumes", "work"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "x").write_text(name)
-    files = Files(tmp_path)
-    files.prepare()
-    local = files.of(LOCAL)
-    (tmp_path / "datasets").replace(local.root / "datasets")
-    for _ in range(2):
-        files.give_to_local()
-        found = {path.parent.name: path.read_text() for path in local.root.glob("*/x")}
-        assert found == {name: name for name in ("datasets", "volumes", "work")}
-        assert {path.name for path in tmp_path.iterdir()} == {"tenants", "scratch", "audit"}
-        assert local.mesh(new_id("mesh")).parent.is_dir()

@@ -16,8 +16,8 @@ from bentray_service.housekeeping import DAY_S, Housekeeper
 from bentray_service.ingest.append import UploadLocks
 from bentray_service.rows.ages import ExpiryMarks, ObservedTime
 from bentray_service.rows.database import open_database
-from bentray_service.rows.ids import new_id, volume_of
-from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.ids import LOCAL, Tenant, new_id, volume_of
+from bentray_service.rows.jobs import Jobs, NewJob
 from bentray_service.rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
 from bentray_service.rows.tables import (
     Base,
@@ -28,7 +28,6 @@ from bentray_service.rows.tables import (
     ResultVolumeRow,
     UploadedVolumeRow,
 )
-from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
 
 OTHER = Tenant("other")
@@ -67,7 +66,7 @@ class Shelf:
 
     def reconstruction(self, dataset, tenant=LOCAL):
         """A job that has succeeded, its volume, and the exports of that."""
-        job = self.ended(self.jobs.add(tenant, "reconstruction", {}, dataset))
+        job = self.ended(self.jobs.add(tenant, NewJob("reconstruction", {}, dataset)))
         name, files = volume_of(job), self.files.of(tenant)
         row = {
             **GRID,
@@ -85,7 +84,7 @@ class Shelf:
 
     def simulation(self, state, days=31.0):
         """A job that reads nothing, and ended so many days ago."""
-        job = self.ended(self.jobs.add(LOCAL, "simulation", {}), state=state)
+        job = self.ended(self.jobs.add(LOCAL, NewJob("simulation", {})), state=state)
         if days is not None:
             with self.database.write() as connection:
                 mine = update(JobRow).where(JobRow.id == job)
@@ -93,7 +92,7 @@ class Shelf:
         return job
 
     def turntable(self, volume, tenant=LOCAL):
-        job = self.ended(self.jobs.add(tenant, "refraction", {}, volume_id=volume))
+        job = self.ended(self.jobs.add(tenant, NewJob("refraction", {}, volume_id=volume)))
         self.files.of(tenant).animation(job, "zip").write_bytes(b"x")
         return job
 
@@ -113,7 +112,7 @@ class Shelf:
         return name
 
     def field(self, mesh, field):
-        job = self.ended(self.jobs.add(LOCAL, "geometry-field", {}, mesh_id=mesh, field_id=field))
+        job = self.ended(self.jobs.add(LOCAL, NewJob("geometry-field", {}, mesh_id=mesh, field_id=field)))
         folder = self.files.of(LOCAL).field(field)
         if not folder.exists():
             folder.mkdir()
@@ -152,7 +151,7 @@ def test_deleting_a_scan_deletes_its_results(shelf):
     for _ in range(2):
         _, volume = shelf.reconstruction(dataset)
         shelf.turntable(volume)
-    shelf.ended(shelf.jobs.add(LOCAL, "reconstruction", {}, dataset), state="failed")
+    shelf.ended(shelf.jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)), state="failed")
     shelf.delete("dataset", dataset)
     assert (shelf.left(), shelf.rows()) == ([], {})
     with pytest.raises(UnknownId):
@@ -181,7 +180,7 @@ def test_deletion_affects_nothing_else(shelf):
 def test_inputs_of_a_running_job_are_kept(shelf, state):
     dataset = shelf.dataset()
     _, volume = shelf.reconstruction(dataset)
-    busy = shelf.ended(shelf.jobs.add(LOCAL, "refraction", {}, volume_id=volume), state=state)
+    busy = shelf.ended(shelf.jobs.add(LOCAL, NewJob("refraction", {}, volume_id=volume)), state=state)
     before = shelf.left(), shelf.rows()
     for what, name in (("dataset", dataset), ("volume", volume)):
         with pytest.raises(InUse, match=busy):
@@ -235,7 +234,7 @@ def test_old_data_go_and_young_data_stay(shelf):
     old, young, needed = shelf.dataset(), shelf.dataset(), shelf.dataset(OTHER)
     shelf.reconstruction(old)
     volume, mesh = shelf.upload(), shelf.mesh()
-    shelf.jobs.add(OTHER, "reconstruction", {}, needed)
+    shelf.jobs.add(OTHER, NewJob("reconstruction", {}, needed))
     with shelf.database.write() as connection:
         for table in (DatasetRow, UploadedVolumeRow, MeshRow):
             aged = update(table).where(table.id != young)

@@ -10,9 +10,8 @@ from bentray_kernels.errors import InvalidInput
 from bentray_service.app import create_app
 from bentray_service.files.data_folder import Files
 from bentray_service.files.folder_database import GUARDED, STAMP, open_folder_database
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.settings import ServiceSettings
 
 from ..conftest import TestClient

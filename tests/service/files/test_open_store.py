@@ -4,8 +4,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.files.bucket import Bucket
-from bentray_service.files.bucket_store import BucketStore
-from bentray_service.files.open_store import open_store
+from bentray_service.files.bucket_store import BucketStore, open_store
 from bentray_service.files.store import Store
 from bentray_service.rows.database import open_database
 

@@ -8,9 +8,8 @@ from bentray_service.files.data_folder import Files
 from bentray_service.files.folder_database import STAMP
 from bentray_service.files.orphans import SAFE_S, Orphans
 from bentray_service.rows.database import open_database
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.stored_tables import Datasets
-from bentray_service.rows.tenants import LOCAL
 from bentray_service.rows.uploads import Uploads
 
 from ..rows.conftest import SUMMARY

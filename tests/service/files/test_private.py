@@ -13,7 +13,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.files.data_folder import Files
-from bentray_service.files.private import close_to_others, private_files
+from bentray_service.files.disk import close_to_others, private_files
 
 
 @pytest.fixture(autouse=True)

@@ -6,7 +6,7 @@ import pytest
 
 from bentray_service.ingest import fair_queue
 from bentray_service.ingest.fair_queue import FairQueue, readers_at_once
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
 
 from ..conftest import NoProjects
 

@@ -15,7 +15,7 @@ from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.upload_ingest import UploadIngest
 from bentray_service.rows.accounts import Accounts
 from bentray_service.rows.database import open_database
-from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.ids import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
 
 PATIENCE_S = 60.0

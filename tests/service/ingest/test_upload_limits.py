@@ -6,7 +6,7 @@ import pytest
 
 from bentray_service.errors import Busy, RateLimited
 from bentray_service.ingest.upload_limits import UploadLimits
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
 
 from ..conftest import NoProjects
 

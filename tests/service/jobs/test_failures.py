@@ -7,7 +7,7 @@ import pytest
 from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.jobs.failures import explain
+from bentray_service.jobs.reporter import explain
 
 
 def test_bad_input_keeps_its_fields():

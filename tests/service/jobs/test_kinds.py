@@ -18,9 +18,8 @@ from bentray_kernels.tomography import Progress
 from bentray_service.app import create_app
 from bentray_service.jobs import kinds
 from bentray_service.rows.checksums import Checksums
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.tables import JobRow
-from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh

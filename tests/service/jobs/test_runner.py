@@ -13,8 +13,9 @@ from sqlalchemy.exc import DataError, OperationalError
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.settings import Settings
+from bentray_service.rows.ids import LOCAL, Tenant
 from bentray_service.rows.job_queue import Queue
-from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.jobs import NewJob
 
 
 def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
@@ -55,7 +56,7 @@ def test_job_of_another_tenant_starts_during_long_jobs(start, uploaded, work):
         state.stores.files.store.publish(its)
 
     def add(tenant):
-        job = state.stores.jobs.add(Tenant(tenant), "reconstruction", settings, dataset).id
+        job = state.stores.jobs.add(Tenant(tenant), NewJob("reconstruction", settings, dataset)).id
         state.background.runner.notify()
         return job
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from bentray_service.app import create_app
 from bentray_service.cli import app as command_line
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.simulation import parts

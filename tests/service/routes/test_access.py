@@ -4,9 +4,8 @@ import time
 
 import pytest
 
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 
 HDF5 = {"Content-Type": "application/x-hdf5"}
 

@@ -10,8 +10,8 @@ import pytest
 
 from bentray_service.access.audit import entries
 from bentray_service.routes.models.name_changes import LengthUnit, TimeUnit
+from bentray_service.rows.ids import Tenant
 from bentray_service.rows.stored_tables import Datasets
-from bentray_service.rows.tenants import Tenant
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.files.dataset.units import POSITION_UNITS, TIME_UNITS
 

@@ -9,9 +9,8 @@ import pytest
 
 from bentray_service.access import sign_in
 from bentray_service.rows import database
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL
+from bentray_service.rows.keys import ApiKey, Keys
 
 from ..held_database import held
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from sqlalchemy import insert
 
+from bentray_service.rows.ids import LOCAL
 from bentray_service.rows.tables import DatasetRow
-from bentray_service.rows.tenants import LOCAL
 from bentray_workers.files.dataset import read_dataset
 
 HDF5 = {"Content-Type": "application/x-hdf5"}

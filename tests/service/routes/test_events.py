@@ -11,7 +11,7 @@ from sqlalchemy.exc import OperationalError
 
 from bentray_service.jobs import feed
 from bentray_service.routes import events
-from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.ids import LOCAL, Tenant
 
 
 @pytest.fixture(autouse=True)

@@ -12,9 +12,9 @@ from sqlalchemy import insert
 
 from bentray_kernels.meshes.example_surfaces import torus
 from bentray_service.app import create_app
-from bentray_service.rows.ids import field_of, new_id
+from bentray_service.rows.ids import LOCAL, field_of, new_id
+from bentray_service.rows.jobs import NewJob
 from bentray_service.rows.tables import FieldRow
-from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.mesh import StoredMesh, write_mesh
@@ -52,7 +52,7 @@ def here(http, made):
     target.mkdir()
     for file in source.iterdir():
         (target / file.name).write_bytes(file.read_bytes())
-    job = state.stores.jobs.add(LOCAL, "reconstruction", {}).id
+    job = state.stores.jobs.add(LOCAL, NewJob("reconstruction", {})).id
     row = {"mesh_id": mesh, "bytes": bytes_of(target), "settings": COARSE, "figures": figures}
     with state.stores.database.write() as connection:
         connection.execute(insert(FieldRow).values(id=field, job_id=job, created=1.0, **row))

@@ -8,7 +8,7 @@ import pytest
 from bentray_kernels.eikonal import methods
 from bentray_kernels.tomography.result import Candidate
 from bentray_kernels.tomography.settings import Settings
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL
 
 
 @pytest.fixture

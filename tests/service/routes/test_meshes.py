@@ -10,8 +10,7 @@ import trimesh
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
 from bentray_kernels.meshes.mesh import TriangleMesh
 from bentray_kernels.phantoms import ONE_HOLE, sampled
-from bentray_service.rows.ids import new_id
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_workers.files.mesh import load_mesh
 from bentray_workers.rendering import isosurface_mesh
 

@@ -4,7 +4,7 @@ from itertools import product
 
 import pytest
 
-from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import ApiKey
 
 
 @pytest.fixture

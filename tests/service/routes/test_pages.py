@@ -5,7 +5,7 @@ import re
 import pytest
 
 from bentray_service.routes.pages import WEB
-from bentray_service.web import documentation
+from bentray_service.web import documents
 
 PAGES = ("/", "/docs", "/docs/formats")
 ASSETS = [
@@ -50,10 +50,10 @@ def built(tmp_path, monkeypatch):
     (folder / "index.html").write_text("<title>start</title>")
     (folder / "how-to" / "deploy.html").write_text("<title>deploy</title>")
     (tmp_path / "secret.html").write_text("secret")
-    monkeypatch.setattr(documentation, "PACKAGED", folder)
-    documentation.documentation_files.cache_clear()
+    monkeypatch.setattr(documents, "PACKAGED", folder)
+    documents.documentation_files.cache_clear()
     yield folder
-    documentation.documentation_files.cache_clear()
+    documents.documentation_files.cache_clear()
 
 
 def test_the_documentation_is_served_under_the_same_policy(start, built):
@@ -68,11 +68,11 @@ def test_the_documentation_is_served_under_the_same_policy(start, built):
 
 
 def test_a_documentation_that_is_not_built_says_how_to_get_it(start, monkeypatch, tmp_path):
-    monkeypatch.setattr(documentation, "PACKAGED", tmp_path)
-    monkeypatch.setattr(documentation, "CHECKOUT", tmp_path)
-    documentation.documentation_files.cache_clear()
+    monkeypatch.setattr(documents, "PACKAGED", tmp_path)
+    monkeypatch.setattr(documents, "CHECKOUT", tmp_path)
+    documents.documentation_files.cache_clear()
     answer = start().get("/documentation/")
-    documentation.documentation_files.cache_clear()
+    documents.documentation_files.cache_clear()
     assert answer.status_code == 404
     assert "make docs" in answer.text
     assert not re.search(r"<script(?![^>]*\bsrc=)|<style|\bstyle=|\bon\w+=", answer.text)

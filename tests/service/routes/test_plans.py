@@ -7,9 +7,8 @@ import pytest
 from sqlalchemy import text
 
 from bentray_service.jobs import kinds
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 
 from ..conftest import HDF5
 

@@ -9,9 +9,8 @@ import numpy as np
 from bentray_kernels.tomography.reconstruction_graph import ReconstructionCheckpoint
 from bentray_kernels.tomography.sart import sart_step
 from bentray_service.files.tenant_files import CHECKPOINTS
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_workers.cluster.checkpoints import Checkpoints
 from bentray_workers.reconstruction import reconstruction_run
 

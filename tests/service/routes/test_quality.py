@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import PICKERS
-from bentray_service.routes.quality import Picker
+from bentray_service.routes.datasets import Picker
 from bentray_workers.files.dataset import write_dataset
 
 from ...kernels.acquisition.traces import blob_delay, scan

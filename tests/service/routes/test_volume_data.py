@@ -11,8 +11,7 @@ import pytest
 from scipy.io import loadmat
 
 from bentray_service.files.deletion import StoredItem
-from bentray_service.rows.ids import new_id
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_workers.files.export.registry import FORMATS
 from bentray_workers.files.volume import Volume, write_volume
 
@@ -119,9 +118,9 @@ def test_export_of_a_volume_deleted_meanwhile(http, upload, monkeypatch):
     state = http.app.state
     export = state.background.pictures.export
 
-    async def delete_then(tenant, volume, *given):
-        await export(tenant, volume, *given)
-        state.stores.deletion.delete(StoredItem(tenant, "volume", volume.id))
+    async def delete_then(volume, *given):
+        await export(volume, *given)
+        state.stores.deletion.delete(StoredItem(volume.tenant, "volume", volume.id))
 
     monkeypatch.setattr(state.background.pictures, "export", delete_then)
     answer = http.get(f"{upload}?format=npy")

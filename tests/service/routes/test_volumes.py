@@ -9,7 +9,7 @@ import nibabel
 import numpy as np
 import pytest
 
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL
 
 
 @pytest.fixture

@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 from bentray_service.rows.database import Database, open_database
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs
 from bentray_service.rows.stored_tables import Datasets
-from bentray_service.rows.tenants import LOCAL
 
 from ... import postgresql
 

@@ -6,8 +6,8 @@ from contextlib import ExitStack
 import pytest
 
 from bentray_service.errors import DatabaseUnavailable
-from bentray_service.rows import admission
-from bentray_service.rows.admission import MAX_CONCURRENT, MAX_CONCURRENT_WHEN_SLOW, Admission
+from bentray_service.rows import database as admission
+from bentray_service.rows.database import MAX_CONCURRENT, MAX_CONCURRENT_WHEN_SLOW, Admission
 
 
 class Clock:

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import ApiKey
 
 
 def test_there_and_back():

@@ -5,10 +5,9 @@ from sqlalchemy import update
 
 from bentray_service.errors import JobFinished, KeyReused, QueueFull, QuotaExceeded, UnknownId
 from bentray_service.rows.batches import Batches
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, Tenant, new_id
 from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.tables import JobRow
-from bentray_service.rows.tenants import LOCAL, Tenant
 
 
 @pytest.fixture
@@ -30,11 +29,11 @@ def test_its_jobs_are_ordinary_jobs_in_order(batches, jobs, queue, dataset):
     batch = start(batches, dataset, started_by="key-7")
     ids = [job.id for job in batch.jobs]
     assert [row.settings["nodes"] for row in (jobs.get(LOCAL, one) for one in ids)] == [0, 1, 2]
-    assert {row.id for row in jobs.newest(LOCAL, 9, batch=batch.id)} == set(ids)
+    assert {row.id for row in jobs.search(LOCAL, 9, batch_id=batch.id)} == set(ids)
     assert [queue.claim().id for _ in ids] == ids
     assert (batch.state, batch.fraction, batch.size, batch.name) == ("queued", 0.0, 3, "Ward 3")
     assert jobs.get(LOCAL, ids[0]).started_by == "key-7"
-    assert jobs.get(LOCAL, jobs.add(LOCAL, "reconstruction", {}, dataset).id).batch_id is None
+    assert jobs.get(LOCAL, jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id).batch_id is None
 
 
 def test_state_and_progress_are_those_of_its_jobs(batches, database, dataset):

@@ -12,11 +12,11 @@ import pytest
 from sqlalchemy import select, text, update
 
 from bentray_service.errors import DatabaseFull, DatabaseUnavailable
-from bentray_service.rows import admission, database, postgresql_timeouts
+from bentray_service.rows import database, postgresql_timeouts
 from bentray_service.rows.database import open_database
-from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.ids import LOCAL
+from bentray_service.rows.jobs import Jobs, NewJob
 from bentray_service.rows.tables import VERSION, About, SchemaVersion
-from bentray_service.rows.tenants import LOCAL
 
 from ..held_database import held
 
@@ -50,9 +50,9 @@ def test_held_by_another_program(tmp_path, monkeypatch, caplog):
         with held(tmp_path / "db.sqlite"):
             for _ in range(3):
                 with pytest.raises(DatabaseUnavailable, match="locked by another program"):
-                    jobs.add(LOCAL, "simulation", {})
+                    jobs.add(LOCAL, NewJob("simulation", {}))
             assert jobs.newest(LOCAL, 9) == [], "reading goes on"
-        assert jobs.add(LOCAL, "simulation", {}).state == "queued"
+        assert jobs.add(LOCAL, NewJob("simulation", {})).state == "queued"
     assert [record.message for record in caplog.records] == [
         "the database is unavailable: database is locked"
     ], "once a minute, not once a request"
@@ -60,13 +60,13 @@ def test_held_by_another_program(tmp_path, monkeypatch, caplog):
 
 def test_few_threads_wait_while_it_is_held(tmp_path, monkeypatch):
     monkeypatch.setattr(database, "BUSY_SECONDS", 2.0)
-    monkeypatch.setattr(admission, "SLOW_SECONDS", 0.1)
+    monkeypatch.setattr(database, "SLOW_SECONDS", 0.1)
     with closing(open_database(f"sqlite:///{tmp_path / 'db.sqlite'}")) as opened:
         jobs = Jobs(opened)
 
         def submit(_):
             with pytest.raises(DatabaseUnavailable) as refused:
-                jobs.add(LOCAL, "simulation", {})
+                jobs.add(LOCAL, NewJob("simulation", {}))
             return refused.value.value
 
         with held(tmp_path / "db.sqlite"), ThreadPoolExecutor(40) as pool:
@@ -74,7 +74,7 @@ def test_few_threads_wait_while_it_is_held(tmp_path, monkeypatch):
             time.sleep(0.3)
             found = list(pool.map(submit, range(39)))
     # Beside the first.
-    assert sum("locked by another program" in one for one in found) < admission.MAX_CONCURRENT_WHEN_SLOW
+    assert sum("locked by another program" in one for one in found) < database.MAX_CONCURRENT_WHEN_SLOW
     assert any("waiting for a slow database" in one for one in found)
 
 
@@ -83,7 +83,7 @@ def test_a_full_disk(tmp_path):
         with opened.read() as connection:
             connection.execute(text("PRAGMA max_page_count = 1"))
         with pytest.raises(DatabaseFull):
-            Jobs(opened).add(LOCAL, "simulation", {"much": "x" * 100_000})
+            Jobs(opened).add(LOCAL, NewJob("simulation", {"much": "x" * 100_000}))
 
 
 def test_postgresql_that_is_killed(postgresql_server):

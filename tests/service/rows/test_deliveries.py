@@ -7,8 +7,9 @@ from sqlalchemy import update
 
 from bentray_service.rows import deliveries as module
 from bentray_service.rows.deliveries import Deliveries, WebhookSecrets
+from bentray_service.rows.ids import LOCAL, Tenant
+from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.tables import DeliveryRow
-from bentray_service.rows.tenants import LOCAL, Tenant
 
 LAB = Tenant("lab")
 URL = "https://example.org/hook"
@@ -19,7 +20,7 @@ def ended(jobs):
     """Insert a job with a webhook and end it; returns its id."""
 
     def add(tenant=LOCAL, webhook=URL):
-        job = jobs.add(tenant, "simulation", {}, webhook=webhook).id
+        job = jobs.add(tenant, NewJob("simulation", {}), Submission(webhook=webhook)).id
         jobs.request_cancel(tenant, job)
         return job
 
@@ -29,7 +30,7 @@ def ended(jobs):
 def test_one_message_for_each_job_with_a_webhook(database, jobs, ended):
     found = Deliveries(database)
     assert found.claim() is None
-    waiting = jobs.add(LOCAL, "simulation", {}, webhook=URL).id
+    waiting = jobs.add(LOCAL, NewJob("simulation", {}), Submission(webhook=URL)).id
     job, silent = ended(), ended(webhook=None)
     assert found.of_job(LOCAL, job).state == "waiting"
     assert found.of_job(LAB, job) is None

@@ -4,12 +4,11 @@ import pytest
 
 from bentray_service.errors import UnknownId
 from bentray_service.rows.database import open_database
-from bentray_service.rows.ids import field_of, new_id
+from bentray_service.rows.ids import LOCAL, Tenant, field_of, new_id
 from bentray_service.rows.job_queue import Queue
-from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.jobs import Jobs, NewJob
 from bentray_service.rows.stored_tables import GeometryFields
 from bentray_service.rows.tables import FieldRow
-from bentray_service.rows.tenants import LOCAL, Tenant
 
 
 @pytest.fixture
@@ -23,7 +22,7 @@ def finished(database, mesh, content, size, tenant=LOCAL):
     """A job that succeeds with a field of that content; its id."""
     field = field_of(content)
     jobs, queue = Jobs(database), Queue(database)
-    jobs.add(tenant, "geometry-field", {"samples": 8}, mesh_id=mesh, field_id=field)
+    jobs.add(tenant, NewJob("geometry-field", {"samples": 8}, mesh_id=mesh, field_id=field))
     job = queue.claim()
     assert (job.mesh_id, job.field_id) == (mesh, field)
     row = {"id": field, "mesh_id": mesh, "bytes": size, "settings": {"samples": 8}, "figures": {"faces": 1}}

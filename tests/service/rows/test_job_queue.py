@@ -8,11 +8,11 @@ import pytest
 
 from bentray_service.errors import UnknownId
 from bentray_service.rows import usage
-from bentray_service.rows.ids import volume_of
+from bentray_service.rows.ids import LOCAL, Tenant, volume_of
 from bentray_service.rows.job_queue import LEASE_S, Queue
+from bentray_service.rows.jobs import NewJob
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.stored_tables import Volumes
-from bentray_service.rows.tenants import LOCAL, Tenant
 
 PROBLEM = {"type": "/problems/x", "title": "t", "status": 500, "detail": "why"}
 
@@ -32,13 +32,13 @@ def volume(job_id):
 
 
 def test_claimed_in_order(jobs, queue, dataset):
-    made = [jobs.add(LOCAL, "reconstruction", {}, dataset).id for _ in range(3)]
+    made = [jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id for _ in range(3)]
     assert [queue.claim().id for _ in range(3)] == made
     assert queue.claim() is None
 
 
 def test_no_job_is_claimed_twice(jobs, queue, dataset):
-    made = {jobs.add(LOCAL, "reconstruction", {}, dataset).id for _ in range(12)}
+    made = {jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id for _ in range(12)}
     claimed = []
 
     def take():
@@ -55,7 +55,7 @@ def test_no_job_is_claimed_twice(jobs, queue, dataset):
 
 
 def test_success_comes_with_its_volume(database, jobs, queue, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset)
+    job = jobs.add(LOCAL, NewJob("reconstruction", {"nodes": 16}, dataset))
     queue.claim()
     queue.progress(job.id, 4, 4, [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 4}])
     assert queue.succeed(job.id, volume(job.id))
@@ -67,7 +67,7 @@ def test_success_comes_with_its_volume(database, jobs, queue, dataset):
 
 
 def test_a_cancelled_job_cannot_succeed(database, jobs, queue, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
     queue.claim()
     assert jobs.request_cancel(LOCAL, job.id).state == "cancelling"
     assert not queue.succeed(job.id, volume(job.id))
@@ -78,7 +78,7 @@ def test_a_cancelled_job_cannot_succeed(database, jobs, queue, dataset):
 
 
 def test_failure_keeps_the_reason(jobs, queue, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
     queue.claim()
     queue.fail(job.id, PROBLEM)
     assert jobs.get(LOCAL, job.id).error == PROBLEM
@@ -86,7 +86,7 @@ def test_failure_keeps_the_reason(jobs, queue, dataset):
 
 
 def test_release_is_no_attempt(jobs, queue, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
     queue.claim()
     queue.progress(job.id, 3, 9, [])
     queue.release(job.id, "a reason")
@@ -97,7 +97,7 @@ def test_release_is_no_attempt(jobs, queue, dataset):
 
 
 def test_a_job_that_kills_the_service_is_given_up(database, jobs, queue, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
     ends = []
     for _ in range(3):
         Queue(database, "folder").claim()
@@ -107,7 +107,7 @@ def test_a_job_that_kills_the_service_is_given_up(database, jobs, queue, dataset
 
 
 def test_job_with_progress_is_retried(database, jobs, queue, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
     for _ in range(8):
         dying = Queue(database, "folder")
         assert dying.claim().id == job.id
@@ -121,7 +121,9 @@ def test_job_with_progress_is_retried(database, jobs, queue, dataset):
 
 
 def test_a_service_takes_over_the_jobs_of_its_data_folder_at_once_and_no_others(database, jobs, dataset):
-    made = {name: jobs.add(LOCAL, "reconstruction", {}, dataset).id for name in ("one", "one_", "other")}
+    made = {
+        name: jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id for name in ("one", "one_", "other")
+    }
     for name in made:
         Queue(database, name).claim()
     again = Queue(database, "one")
@@ -135,7 +137,7 @@ def test_the_longest_queues_are_those_of_accounts_with_their_projects(database, 
     project = Projects(database).add(LOCAL, "Trial", None).id
     for tenant, number in ((LOCAL, 2), (project, 2), ("b", 3), ("c", 1)):
         for _ in range(number):
-            jobs.add(tenant, "reconstruction", {}, dataset)
+            jobs.add(tenant, NewJob("reconstruction", {}, dataset))
     queue.claim()
     found = queue.longest(2)
     assert {account for account, _ in found} == {LOCAL, "b"}
@@ -147,7 +149,7 @@ def test_the_longest_queues_are_those_of_accounts_with_their_projects(database, 
 
 
 def test_second_service_claims_only_expired_jobs(database, jobs, queue, dataset, monkeypatch):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
     other = Queue(database)
     other.claim()
     assert queue.recover(PROBLEM) == 0
@@ -171,7 +173,7 @@ def test_second_service_claims_only_expired_jobs(database, jobs, queue, dataset,
 
 
 def test_lost_claim_is_reclaimed(jobs, queue, dataset, monkeypatch):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset)
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
     queue.claim()
     queue.renew([])
     assert queue.recover(PROBLEM) == 0, "it may be on its way"
@@ -184,7 +186,7 @@ def test_lost_claim_is_reclaimed(jobs, queue, dataset, monkeypatch):
 def test_tenants_take_turns(jobs, queue, dataset):
     for tenant, count in (("a", 5), ("b", 2), ("c", 1)):
         for _ in range(count):
-            jobs.add(tenant, "reconstruction", {}, dataset)
+            jobs.add(tenant, NewJob("reconstruction", {}, dataset))
     order = []
     for _ in range(8):
         job = queue.claim()
@@ -194,14 +196,14 @@ def test_tenants_take_turns(jobs, queue, dataset):
         time.sleep(0.002)
     assert order == ["a", "b", "c", "a", "b", "a", "a", "a"]
     for _ in range(3):
-        jobs.add(Tenant("a"), "reconstruction", {}, dataset)
-    jobs.add(Tenant("b"), "reconstruction", {}, dataset)
+        jobs.add(Tenant("a"), NewJob("reconstruction", {}, dataset))
+    jobs.add(Tenant("b"), NewJob("reconstruction", {}, dataset))
     assert [queue.claim().tenant for _ in range(3)] == ["b", "a", "a"]
 
 
 def test_claim_can_be_limited_to_idle_tenants(jobs, queue, dataset):
     for tenant in ("a", "a", "b"):
-        jobs.add(Tenant(tenant), "reconstruction", {}, dataset)
+        jobs.add(Tenant(tenant), NewJob("reconstruction", {}, dataset))
     assert queue.claim(idle_only=True).tenant == "a"
     job = queue.claim(idle_only=True)
     assert job.tenant == "b"
@@ -212,7 +214,7 @@ def test_claim_can_be_limited_to_idle_tenants(jobs, queue, dataset):
 
 
 def test_a_job_on_a_volume_ends_without_one(jobs, queue, database):
-    job = jobs.add(LOCAL, "refraction", {"frames": 3}, volume_id="vol-" + "0" * 20)
+    job = jobs.add(LOCAL, NewJob("refraction", {"frames": 3}, volume_id="vol-" + "0" * 20))
     assert (job.dataset_id, job.volume_id) == (None, "vol-" + "0" * 20)
     queue.claim()
     assert queue.succeed(job.id, None)
@@ -222,7 +224,7 @@ def test_a_job_on_a_volume_ends_without_one(jobs, queue, database):
 
 
 def test_a_result_with_numbers_that_json_has_not_is_null_there(jobs, queue, dataset, database):
-    job = jobs.add(LOCAL, "reconstruction", {"weight": math.inf}, dataset)
+    job = jobs.add(LOCAL, NewJob("reconstruction", {"weight": math.inf}, dataset))
     queue.claim()
     result = volume(job.id)
     result |= {"speed_range_mps": [math.nan, 1500.0], "provenance": {"fit": {"rms": -math.inf, "n": 3}}}

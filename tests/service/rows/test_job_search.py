@@ -2,10 +2,10 @@
 
 import pytest
 
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, Tenant, new_id
+from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.stored_tables import Datasets
 from bentray_service.rows.tables import DatasetRow
-from bentray_service.rows.tenants import LOCAL, Tenant
 
 from .conftest import SUMMARY
 
@@ -19,7 +19,7 @@ def titled(database, jobs):
     def make(tenant, title, name="", started_by=""):
         summary = {**SUMMARY, "title": title}
         row = Datasets(database).add(tenant, new_id("dataset"), size=1, sha256="0" * 64, summary=summary)
-        job = jobs.add(tenant, "reconstruction", {}, row.id, started_by=started_by)
+        job = jobs.add(tenant, NewJob("reconstruction", {}, row.id), Submission(started_by=started_by))
         jobs.describe(tenant, job.id, name=name)
         return job.id
 
@@ -27,7 +27,7 @@ def titled(database, jobs):
 
 
 def found(jobs, tenant, text):
-    return [job.id for job in jobs.newest(tenant, 10, text=text)]
+    return [job.id for job in jobs.search(tenant, 10, text=text)]
 
 
 def test_names_titles_and_owners_of_one_tenant(jobs, titled):
@@ -48,7 +48,7 @@ def test_no_character_is_a_pattern(jobs, titled):
 
 
 def test_a_simulation_by_the_title_of_the_scan_that_it_made(database, jobs, queue):
-    jobs.add(LOCAL, "simulation", {})
+    jobs.add(LOCAL, NewJob("simulation", {}))
     job = queue.claim()
     result = {
         **SUMMARY,

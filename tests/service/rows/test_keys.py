@@ -6,10 +6,9 @@ import pytest
 from sqlalchemy import select
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.rows.api_key import ApiKey
-from bentray_service.rows.keys import USED_S, Keys
+from bentray_service.rows.ids import LOCAL, Tenant
+from bentray_service.rows.keys import USED_S, ApiKey, Keys
 from bentray_service.rows.tables import KeyRow
-from bentray_service.rows.tenants import LOCAL, Tenant
 
 ACME = Tenant("acme")
 

@@ -4,9 +4,8 @@ import pytest
 
 from bentray_service.errors import UnknownId
 from bentray_service.rows.database import open_database
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.stored_tables import Meshes
-from bentray_service.rows.tenants import LOCAL
 
 SUMMARY = {
     "title": "a ball",

@@ -3,14 +3,15 @@
 import pytest
 
 from bentray_service.errors import UnknownId
+from bentray_service.rows.ids import LOCAL, Tenant
+from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.stored_tables import Datasets
-from bentray_service.rows.tenants import LOCAL, Tenant
 
 OTHER = Tenant("other")
 
 
 def test_what_is_not_given_stays(database, jobs, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset, started_by="key-7")
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset), Submission(started_by="key-7"))
     assert (job.name, job.notes, job.started_by) == ("", "", "key-7")
     jobs.describe(LOCAL, job.id, name="First", notes="Cold water")
     assert jobs.describe(LOCAL, job.id).values() == jobs.get(LOCAL, job.id).values()
@@ -22,7 +23,7 @@ def test_what_is_not_given_stays(database, jobs, dataset):
 
 
 def test_only_the_item_of_the_tenant_is_changed(database, jobs, dataset):
-    mine, second = (jobs.add(LOCAL, "reconstruction", {}, dataset) for _ in range(2))
+    mine, second = (jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)) for _ in range(2))
     for table, item in ((jobs, mine.id), (Datasets(database), dataset)):
         with pytest.raises(UnknownId):
             table.describe(OTHER, item, name="theirs")
@@ -34,7 +35,7 @@ def test_only_the_item_of_the_tenant_is_changed(database, jobs, dataset):
 def test_the_place_in_the_queue_is_the_order_of_claims(jobs, queue, dataset):
     """Tenants take turns; every place that is told is the number of claims before the job's own."""
     owners = [LOCAL, LOCAL, LOCAL, OTHER, Tenant("third"), OTHER, LOCAL]
-    waiting = [jobs.add(owner, "reconstruction", {}, dataset) for owner in owners]
+    waiting = [jobs.add(owner, NewJob("reconstruction", {}, dataset)) for owner in owners]
     # So that the tenants differ in when their last job started.
     for _ in range(2):
         claimed = queue.claim()

@@ -7,9 +7,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_service.errors import InUse, QuotaExceeded, UnknownId
 from bentray_service.rows import usage
 from bentray_service.rows.accounts import family_of
+from bentray_service.rows.ids import Tenant
 from bentray_service.rows.projects import Projects, membership
 from bentray_service.rows.tables import StorageRow
-from bentray_service.rows.tenants import Tenant
 
 LAB, OTHER = Tenant("lab"), Tenant("other")
 ALICE, BOB = "user:alice", "user:bob"

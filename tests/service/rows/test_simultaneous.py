@@ -9,9 +9,10 @@ import pytest
 from bentray_service.errors import InUse, JobFinished, KeyReused, UnknownId
 from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion, StoredItem
-from bentray_service.rows import admission
+from bentray_service.rows import database as admission
+from bentray_service.rows.ids import LOCAL
+from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.tables import JobRow
-from bentray_service.rows.tenants import LOCAL
 
 AT_ONCE = 50
 
@@ -43,21 +44,27 @@ def states(jobs, job_id):
 
 
 def test_one_key_makes_one_job(jobs, dataset):
-    made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {"nodes": 16}, dataset, key="once"))
+    made = at_once(
+        lambda _: jobs.add(LOCAL, NewJob("reconstruction", {"nodes": 16}, dataset), Submission(key="once"))
+    )
     assert len({job.id for job in made}) == 1
     assert len(jobs.newest(LOCAL, 2 * AT_ONCE)) == 1
     assert states(jobs, made[0].id) == ["queued"]
 
 
 def test_a_key_for_several_requests_is_the_firsts(jobs, dataset):
-    made = at_once(lambda n: jobs.add(LOCAL, "reconstruction", {"nodes": 16 + n % 2}, dataset, key="once"))
+    made = at_once(
+        lambda n: jobs.add(
+            LOCAL, NewJob("reconstruction", {"nodes": 16 + n % 2}, dataset), Submission(key="once")
+        )
+    )
     refused = [one for one in made if isinstance(one, KeyReused)]
     assert len(refused) == AT_ONCE // 2
     assert len(jobs.newest(LOCAL, 2 * AT_ONCE)) == 1
 
 
 def test_without_keys_each_makes_its_own(jobs, dataset):
-    made = at_once(lambda _: jobs.add(LOCAL, "reconstruction", {}, dataset))
+    made = at_once(lambda _: jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)))
     assert len({job.id for job in made}) == AT_ONCE
 
 
@@ -69,7 +76,7 @@ def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
     def ask(number):
         if number == AT_ONCE // 2:
             return deletion.delete(StoredItem(LOCAL, "dataset", dataset))
-        return jobs.add(LOCAL, "reconstruction", {}, dataset)
+        return jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
 
     told = at_once(ask)
     deleted = told.pop(AT_ONCE // 2) is None
@@ -78,14 +85,14 @@ def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
 
 
 def test_a_queued_job_is_cancelled_once(jobs, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset).id
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id
     told = Counter(type(one) for one in at_once(lambda _: jobs.request_cancel(LOCAL, job)))
     assert told == {JobRow: 1, JobFinished: AT_ONCE - 1}
     assert states(jobs, job) == ["queued", "cancelled"]
 
 
 def test_running_job_is_cancelled_once(jobs, queue, dataset):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset).id
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id
     assert queue.claim().id == job
     told = at_once(lambda _: jobs.request_cancel(LOCAL, job).state)
     assert told == ["cancelling"] * AT_ONCE
@@ -94,7 +101,7 @@ def test_running_job_is_cancelled_once(jobs, queue, dataset):
 
 @pytest.mark.parametrize("end", ["succeed", "cancelled"])
 def test_a_job_that_ends_while_it_is_cancelled_has_one_end(jobs, queue, dataset, end):
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset).id
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id
     queue.claim()
 
     def ask(number):

@@ -4,9 +4,9 @@ from sqlalchemy import insert
 
 from bentray_service.access.quota import Quota
 from bentray_service.rows import usage
-from bentray_service.rows.ids import new_id, volume_of
+from bentray_service.rows.ids import LOCAL, Tenant, new_id, volume_of
+from bentray_service.rows.jobs import NewJob
 from bentray_service.rows.tables import ResultVolumeRow, StorageRow
-from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.usage import usage_by_kind
 
 OTHER = Tenant("other")
@@ -18,7 +18,7 @@ def kinds(database, tenant=LOCAL):
 
 def test_every_kind_is_counted_once(database, jobs):
     scan = new_id("dataset")
-    job = jobs.add(LOCAL, "refraction", {}).id
+    job = jobs.add(LOCAL, NewJob("refraction", {})).id
     result = volume_of(job)
     cube = {"axes": "x", "shape": [1], "spacing_m": [1.0], "origin_m": [0.0], "speed_range_mps": [1.0, 1.0]}
     row = {"id": result, "job_id": job, "created": 1.0, "bytes": 20, "water_speed_mps": 1.0, "provenance": {}}

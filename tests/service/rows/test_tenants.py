@@ -6,12 +6,11 @@ from hypothesis import strategies as st
 from sqlalchemy import insert
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.claims import ClaimedTenants, former_tenant
 from bentray_service.rows.database import open_database
-from bentray_service.rows.keys import Keys
+from bentray_service.rows.ids import LOCAL, TENANT_PATTERN, Tenant, checked_tenant
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.rows.tables import ClaimedTenantRow
-from bentray_service.rows.tenants import LOCAL, PATTERN, Tenant, checked_tenant
 
 HERE, THERE = "https://id.example", "https://id.example.org"
 # Names that look like another, that a key may have as tenant, and that are no names of folders.
@@ -23,7 +22,7 @@ ALIKE += ["local", "project-0123456789abcdef0123", "user-" + "0" * 40, "../clini
 def test_every_user_is_a_tenant_and_no_two_the_same(one, other):
     for user in (one, other):
         tenant = former_tenant(user)
-        assert PATTERN.fullmatch(tenant)
+        assert TENANT_PATTERN.fullmatch(tenant)
         assert checked_tenant(tenant) == tenant != LOCAL
     assert (former_tenant(one) == former_tenant(other)) == (one == other)
 

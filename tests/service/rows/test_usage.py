@@ -13,9 +13,9 @@ from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion, StoredItem
 from bentray_service.rows import uploads as uploading
 from bentray_service.rows.database import open_database
-from bentray_service.rows.ids import new_id
+from bentray_service.rows.ids import LOCAL, Tenant, new_id
+from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.stored_tables import Datasets
-from bentray_service.rows.tenants import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
 from bentray_service.rows.usage import Usage
 
@@ -76,7 +76,11 @@ def test_simultaneous_uploads_stay_within_the_limit(database, monkeypatch):
 
 def test_of_many_jobs_at_once_as_many_are_allowed_as_fit(database, jobs, dataset, queue):
     Quota(database, 100).stored(LOCAL, dataset, 10)
-    allowed = at_once(lambda n: jobs.add(LOCAL, "reconstruction", {}, dataset, reserve=(15, 100)))
+    allowed = at_once(
+        lambda n: jobs.add(
+            LOCAL, NewJob("reconstruction", {}, dataset, reserved=15), Submission(most_bytes=100)
+        )
+    )
     assert allowed.count(True) == 6
     assert len(jobs.newest(LOCAL, 99)) == 6
     assert Quota(database, 100).of(LOCAL) == Usage(10, 90)
@@ -150,7 +154,7 @@ def test_an_upload_has_its_room_until_it_is_forgotten_refused_or_stored(database
 def test_a_job_has_its_room_until_its_end(database, jobs, queue, dataset, end):
     quota = Quota(database, 100)
     before = quota.of(LOCAL).stored
-    job = jobs.add(LOCAL, "reconstruction", {}, dataset, reserve=(60, 100)).id
+    job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset, reserved=60), Submission(most_bytes=100)).id
     assert queue.claim().id == job
     queue.record_size(job, 50)
     assert quota.of(LOCAL) == Usage(before, 60)
@@ -183,7 +187,7 @@ def test_deletion_releases_quota_of_derived_objects(database, jobs, queue, tmp_p
     quota, files, dataset = Quota(database, 1000), Files(tmp_path / "data"), new_id("dataset")
     files.prepare()
     Datasets(database).add(LOCAL, dataset, size=60, sha256="0" * 64, summary=SUMMARY)
-    job = jobs.add(LOCAL, "simulation", {}, dataset, reserve=(60, 1000)).id
+    job = jobs.add(LOCAL, NewJob("simulation", {}, dataset, reserved=60), Submission(most_bytes=1000)).id
     queue.claim()
     queue.succeed(job, None, size=9)
     quota.stored(LOCAL, f"{dataset}.nii", 5)

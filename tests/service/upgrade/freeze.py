@@ -28,8 +28,8 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeSca
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import WebhookSecrets
+from bentray_service.rows.ids import Tenant
 from bentray_service.rows.tables import VERSION
-from bentray_service.rows.tenants import Tenant
 from bentray_workers.files.dataset import write_dataset
 
 from ...faults.live_service import LiveService

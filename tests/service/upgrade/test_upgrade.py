@@ -12,13 +12,12 @@ from bentray_kernels.tomography import reconstruct
 from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_service.backup.archive import Description, digest_of_file, write_sums
 from bentray_service.backup.restore import restore
-from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import Deliveries
-from bentray_service.rows.keys import Keys
+from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.tables import VERSION
-from bentray_service.rows.tenants import Tenant
 from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import read_dataset

@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import WebhookSecrets
-from bentray_service.rows.tenants import LOCAL
+from bentray_service.rows.ids import LOCAL
 
 pytestmark = pytest.mark.browser
 

@@ -4,10 +4,9 @@ import httpx
 import pytest
 from playwright.sync_api import expect
 
-from bentray_service.rows.api_key import ApiKey
 from bentray_service.rows.database import open_database
-from bentray_service.rows.keys import Keys
-from bentray_service.rows.tenants import Tenant
+from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 
 pytestmark = pytest.mark.browser
 

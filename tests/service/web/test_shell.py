@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from bentray_service.rows.api_key import ApiKey
+from bentray_service.rows.keys import ApiKey
 
 pytestmark = pytest.mark.browser
 

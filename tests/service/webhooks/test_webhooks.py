@@ -13,8 +13,8 @@ from sqlalchemy import update
 import bentray
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import Deliveries, WebhookSecrets
+from bentray_service.rows.ids import LOCAL
 from bentray_service.rows.tables import DeliveryRow
-from bentray_service.rows.tenants import LOCAL
 from bentray_service.settings import ServiceSettings
 from bentray_service.webhooks import sender
 

@@ -1,4 +1,4 @@
-"""Exit codes: 0 success, 1 failure, 2 invalid input, 3 doubtful result, 130 after Ctrl-C."""
+"""Groups of commands, and exit codes: 0 success, 1 failure, 2 invalid input, 3 doubtful, 130 after Ctrl-C."""
 
 from __future__ import annotations
 
@@ -8,13 +8,35 @@ from contextlib import contextmanager
 from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
-from .command_list import CommandList
-
+# Longer than every summary: it is never cut.
+WHOLE = 1_000
 WORK_FAILED = 1
 BAD_INPUT = 2
 DOUBTFUL = 3
 INTERRUPTED = 130
+
+
+class CommandList(TyperGroup):
+    """A group of commands; its help and theirs can be read and copied on a terminal of 80 columns."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        for command in self.commands.values():
+            if command.help is not None:
+                # After \b lines stay as they are; else they are broken at hyphens, within options too.
+                command.help = command.help.replace("\n\nExample:", "\n\n\b\nExample:")
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands with their whole summaries, below the names of their panels."""
+        panels: dict[str, list[tuple[str, str]]] = {}
+        for name, command in self.commands.items():
+            rows = panels.setdefault(getattr(command, "rich_help_panel", None) or "Commands", [])
+            rows.append((name, command.get_short_help_str(WHOLE)))
+        for panel, rows in panels.items():
+            with formatter.section(panel):
+                formatter.write_dl(rows)
 
 
 class WorkFailed(Exception):  # noqa: N818 - the command's ending, not a fault of the program

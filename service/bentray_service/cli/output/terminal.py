@@ -48,6 +48,14 @@ def print_json(figures: object) -> None:
     sys.stdout.flush()
 
 
+def print_result(figures: object, lines: Iterable[str], *, as_json: bool) -> None:
+    """Print the figures as JSON, or else the lines."""
+    if as_json:
+        print_json(figures)
+    else:
+        print_lines(lines)
+
+
 def without_nan(value: object) -> object:
     """Replace non-finite numbers by None, in lists and dicts at any depth."""
     if isinstance(value, dict):

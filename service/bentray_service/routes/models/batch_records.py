@@ -11,8 +11,7 @@ from bentray_kernels.request_fields import check_used
 from bentray_kernels.tomography.settings import Settings
 
 from ...html_tables import ShownRecord
-from ...jobs.request_words import DEFAULTS
-from ...settings_request import check_setting_names
+from ...settings_request import DEFAULTS, check_setting_names
 from .job_records import State
 
 # Scans of one batch.

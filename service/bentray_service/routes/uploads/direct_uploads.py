@@ -12,8 +12,8 @@ from bentray_kernels.errors import InvalidInput
 
 from ...errors import NoBucket, TooLarge, WrongOffset
 from ...files.direct_uploads import DirectUploads, part_sizes
+from ...rows.ids import Tenant
 from ...rows.tables import UploadRow
-from ...rows.tenants import Tenant
 from ...web.errors import problems
 from ...wiring import Access, Background, CallerTenant, Stores
 from ..bodies import SmallBody, accept_media_types

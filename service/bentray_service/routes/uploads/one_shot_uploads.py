@@ -16,10 +16,9 @@ from ...ingest.canonical import IngestLimits, make_canonical
 from ...ingest.fair_queue import FairQueue
 from ...ingest.ingest_process import ACCEPTED
 from ...ingest.receive import Received, check_announced, receive
-from ...rows.ids import new_id
+from ...rows.ids import Tenant, new_id
 from ...rows.stored_tables import UploadedTable
 from ...rows.tables import DatasetRow, MeshRow, UploadedVolumeRow
-from ...rows.tenants import Tenant
 from ...wiring import Access, Background, Stores
 
 # Longest wait of a request in the ingest queue, s; proxies rarely wait longer.

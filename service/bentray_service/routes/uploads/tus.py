@@ -16,10 +16,10 @@ from starlette.concurrency import run_in_threadpool
 
 from ...errors import StorageFull, TooLarge, WrongOffset, WrongProtocol
 from ...ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, received_bytes
+from ...rows.ids import Tenant
 from ...rows.tables import UploadRow
-from ...rows.tenants import Tenant
 from ...web.errors import problems
-from ...web.tus_headers import PLACE, VERSION
+from ...web.middleware import TUS_PLACE, TUS_VERSION
 from ...wiring import Access, Background, CallerTenant, Stores
 from ..bodies import accept_media_types
 from ..models.upload_records import UploadRecord
@@ -35,17 +35,17 @@ Offset = Annotated[int, Header(ge=0, le=2**63 - 1, description="Offset of the bo
 # tus requires 412 for another version and 400 for an unknown checksum algorithm. FastAPI would answer 422,
 # so both values are validated here and only described to FastAPI.
 Version = Annotated[
-    str, Header(max_length=20, description="Version of tus.", json_schema_extra={"const": VERSION})
+    str, Header(max_length=20, description="Version of tus.", json_schema_extra={"const": TUS_VERSION})
 ]
 
 
 def check_tus_version(tus_resumable: Version) -> None:
     """A dependency that rejects other versions of tus."""
-    if tus_resumable != VERSION:
-        raise WrongProtocol("Tus-Resumable", repr(tus_resumable), VERSION)
+    if tus_resumable != TUS_VERSION:
+        raise WrongProtocol("Tus-Resumable", repr(tus_resumable), TUS_VERSION)
 
 
-router = APIRouter(prefix=PLACE, tags=["uploads"])
+router = APIRouter(prefix=TUS_PLACE, tags=["uploads"])
 TusVersion = Depends(check_tus_version)
 BYTES = {"schema": {"type": "string", "format": "binary"}}
 BODY = {"requestBody": {"required": True, "content": {MEDIA_TYPE: BYTES}}}

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_service.cli.options.repeated_words import repeat_option
+from bentray_service.cli.options.view_options import repeat_option
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.upload_limits import MAX_PER_ACCOUNT
 from bentray_service.routes.uploads import one_shot_uploads
 from bentray_service.routes.uploads.one_shot_uploads import run_in_turn
-from bentray_service.rows.tenants import LOCAL, Tenant
+from bentray_service.rows.ids import LOCAL, Tenant
 
 from ...conftest import NoProjects
 
