@@ -24,11 +24,18 @@ PIXELS = 24
 # Functions that follow a ray, and those among them whose calls are counted.
 FOLLOWING = {
     RENDER: ("cast",),
-    caster: ("_trace_ray", "leave_interval", "field_at", "gradient_at", "value_and_gradient_at", "layer_at"),
+    caster: (
+        "_trace_ray",
+        "leave_interval",
+        "field_at",
+        "gradient_at",
+        "sampled_value_and_gradient",
+        "layer_at",
+    ),
     crossing: ("leave_interval", "_scan", "_way_out", "_within", "_turned", "brent", "newton", "field_at"),
-    roots: ("field_at", "_polished", "value_and_gradient_at"),
+    roots: ("field_at", "_polished", "sampled_value_and_gradient"),
 }
-EVALUATIONS = ("field_at", "value_and_gradient_at")
+EVALUATIONS = ("field_at", "sampled_value_and_gradient")
 
 
 @contextmanager
@@ -48,7 +55,7 @@ def counted() -> Iterator[Counter[str]]:
             for name in names:
                 function = getattr(module, name)
                 # The spline is evaluated by compiled code.
-                plain = function if name == "value_and_gradient_at" else function.py_func
+                plain = function if name == "sampled_value_and_gradient" else function.py_func
                 replaced.enter_context(patch.object(module, name, counting(name, plain)))
         yield counts
 

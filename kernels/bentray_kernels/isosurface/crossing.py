@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 from ..arrays import Vector
 from ..compiled import kernel
+from ..splines.sampler import Sampler
 from .octree import Octree
-from .roots import Field, Ray, brent, field_at, first_root_of_cubic, newton
+from .roots import Ray, brent, field_at, first_root_of_cubic, newton
 
 # Root finders within a cell.
 CERTAIN, CERTAIN_BRENT, BRENT, ANALYTIC = 0, 1, 2, 3
@@ -49,7 +50,7 @@ class Search(NamedTuple):
 
 @kernel(inline="always")
 def leave_interval(
-    field: Field,
+    field: Sampler,
     octree: Octree,
     search: Search,
     ray: Ray,
@@ -191,7 +192,7 @@ def _within(place: float, node: int, level: int, cells: int) -> int:
 
 @kernel(inline="always")
 def _scan(
-    field: Field,
+    field: Sampler,
     ray: Ray,
     smooth: bool,
     speed: float,
@@ -255,7 +256,7 @@ def _scan(
 
 @kernel(inline="always")
 def _solve(
-    field: Field, ray: Ray, start: float, stop: float, below: float, above: float
+    field: Sampler, ray: Ray, start: float, stop: float, below: float, above: float
 ) -> tuple[float, int, Vector]:
     """Root in a trilinear cell, whose field along the ray is the cubic through four values."""
     third = (stop - start) / 3.0

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Vector
 from ..compiled import kernel
-from ..splines.sampling import Stencil, value_and_gradient_at, value_at
+from ..splines.sampler import Sampler, sampled_value, sampled_value_and_gradient
 
 # Steps of either method; both halve what is left at worst every third.
 STEPS = 200
-
-
-class Field(NamedTuple):
-    """A filtered volume as the compiled functions read it: ``Spline.coefficients`` and ``Spline.stencil``."""
-
-    coefficients: Any
-    stencil: Stencil
 
 
 class Ray(NamedTuple):
@@ -56,14 +49,14 @@ def point_at(ray: Ray, s: float) -> tuple[float, float, float]:
 
 
 @kernel(inline="always")
-def field_at(field: Field, ray: Ray, s: float) -> Any:
+def field_at(field: Sampler, ray: Ray, s: float) -> float:
     """The field at s."""
-    return value_at(field.coefficients, field.stencil, point_at(ray, s))
+    return sampled_value(field, point_at(ray, s))
 
 
 @kernel(inline="always")
 def brent(
-    field: Field,
+    field: Sampler,
     ray: Ray,
     target: float,
     a: float,
@@ -122,7 +115,7 @@ def brent(
 
 @kernel(inline="always")
 def newton(
-    field: Field,
+    field: Sampler,
     ray: Ray,
     target: float,
     a: float,
@@ -149,7 +142,7 @@ def newton(
     gradient, last = (0.0, 0.0, 0.0), 0.0
     for count in range(STEPS):
         before = gradient
-        value, gradient = value_and_gradient_at(field.coefficients, field.stencil, point_at(ray, s))
+        value, gradient = sampled_value_and_gradient(field, point_at(ray, s))
         slope = gradient[0] * ray.along_x + gradient[1] * ray.along_y + gradient[2] * ray.along_z
         if (value > target) == (value_b > value_a):
             b = s

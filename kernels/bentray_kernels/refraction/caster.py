@@ -12,8 +12,8 @@ from ..arrays import Floats, Vector
 from ..compiled import kernel
 from ..isosurface.crossing import MAX_HALVINGS, Search, leave_interval
 from ..isosurface.octree import Octree
-from ..isosurface.roots import Field, Ray, field_at, point_at, ray_of
-from ..splines.sampling import value_and_gradient_at
+from ..isosurface.roots import Ray, field_at, point_at, ray_of
+from ..splines.sampler import Sampler, sampled_value_and_gradient, sampler_of
 from .camera import affine
 from .optics import refracted
 from .scene import Scene
@@ -27,7 +27,8 @@ class RefractiveMedium(NamedTuple):
     """A scene for compiled functions.
 
     Attributes:
-        field, octree: as in ``Scene``.
+        field: the sampler of ``Scene.field``.
+        octree: as in ``Scene``.
         levels: (isos + 2,) −∞, the iso-values, +∞: layer m lies between m and m + 1.
         indices: (isos + 1,) refractive indices of the layers.
         around: the layer around the grid.
@@ -37,7 +38,7 @@ class RefractiveMedium(NamedTuple):
         open: whether the box is the grid itself, whose faces then cut the object.
     """
 
-    field: Field
+    field: Sampler
     octree: Octree
     levels: Floats
     indices: Floats
@@ -55,7 +56,7 @@ def medium_of(scene: Scene, structure: str) -> RefractiveMedium:
     low, high = scene.box if boxed else scene.grid
     levels = np.array([-np.inf, *scene.layers.isos, np.inf])
     return RefractiveMedium(
-        scene.field,
+        sampler_of(scene.field),
         scene.octree,
         levels,
         np.array(scene.layers.indices),
@@ -274,7 +275,7 @@ def gradient_at(medium: RefractiveMedium, ray: Ray, s: float, known: Vector) -> 
     """Gradient of the field at s, per m; read there unless it is known per node, not NaN."""
     slopes = known
     if math.isnan(known[0]):
-        _, slopes = value_and_gradient_at(medium.field.coefficients, medium.field.stencil, point_at(ray, s))
+        _, slopes = sampled_value_and_gradient(medium.field, point_at(ray, s))
     x, y, z = medium.density
     return slopes[0] * x, slopes[1] * y, slopes[2] * z
 

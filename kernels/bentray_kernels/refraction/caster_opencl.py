@@ -104,7 +104,7 @@ class OpenCLCaster:
             OpenCLFallbackWarning: once for each root finder for which the device fails its self-test and
                 ``caster.cast`` traces the rays.
         """
-        if medium.field is not self.scene.field:
+        if medium.octree is not self.scene.octree:
             raise InvalidInput("medium", "that of another scene", "a medium of the scene on the device")
         way = _way(search)
         if way not in self._faults:
@@ -154,7 +154,7 @@ class OpenCLCaster:
         """Like ``cast``, on the device, without self-test."""
         # Place, point, direction, weight and the two whole numbers of a ray; its path.
         at_once = max(1, self.session.doubles_at_once() // (10 + 3 * traced.vertices.shape[1]))
-        program = _program(self.precision, self._sum.name, medium.field.stencil, _way(search))
+        program = _program(self.precision, self._sum.name, self.scene.field.stencil, _way(search))
         kernel = self.session.kernel(program, "follow")
         for start in range(0, len(pixels), at_once):
             rays = slice(start, start + at_once)
@@ -185,8 +185,8 @@ class OpenCLCaster:
             there[-1] = session.upload(traced.vertices.astype(real))
         arguments = (
             *self._volume,
-            real(medium.field.stencil.shift),
-            *(np.int32(count) for count in medium.field.coefficients.shape),
+            real(self.scene.field.stencil.shift),
+            *(np.int32(count) for count in self.scene.field.coefficients.shape),
             *self._octree,
             np.int32(search.top),
             levels,

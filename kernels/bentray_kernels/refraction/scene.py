@@ -13,7 +13,6 @@ from ..errors import InvalidInput
 from ..isosurface.cell_bounds import cell_ranges
 from ..isosurface.crossing import ANALYTIC, BRENT, CERTAIN, CERTAIN_BRENT, Search
 from ..isosurface.octree import Octree, octree_of
-from ..isosurface.roots import Field
 from ..splines.spline import Spline
 
 ROOTS = {"certain": CERTAIN, "brent": BRENT, "analytic": ANALYTIC}
@@ -70,7 +69,7 @@ class Scene:
         linear: whether the field is trilinear in each cell.
     """
 
-    field: Field
+    field: Spline
     octree: Octree
     layers: Layers
     origin: Floats
@@ -126,8 +125,7 @@ class Scene:
         grid = np.array([[0.0] * 3, cells.low.shape])
         box = grid if cut else octree.occupied()
         linear = spline.filter.name in ("trilinear", "central")
-        field = Field(spline.coefficients, spline.stencil)
-        return cls(field, octree, layers, origin, spacing, grid, box, cut, octree.highest_empty(), linear)
+        return cls(spline, octree, layers, origin, spacing, grid, box, cut, octree.highest_empty(), linear)
 
     def search(self, structure: str = "octree", roots: str = "certain", step: float = 0.1) -> Search:
         """Settings of the search for surfaces.

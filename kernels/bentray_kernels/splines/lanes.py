@@ -113,35 +113,6 @@ def within(builder: Any, point: Sequence[Any], last: Sequence[Any]) -> Any:
     return builder.icmp_unsigned("==", bits, ir.Constant(bits.type, -1))
 
 
-def cells(lanes: Lanes, point: Sequence[Any], shift: Any, counts: Sequence[Any]) -> tuple[list[Any], Any]:
-    """The filter's cell of a point along every axis, and the position within it.
-
-    Args:
-        lanes: of the filter.
-        point: nodes, doubles.
-        shift: of the filter, a double.
-        counts: nodes of each axis, border included.
-
-    Returns:
-        The cells, and a vector of the rests t.
-    """
-    builder = lanes.builder
-    places = point_vector(builder, point)
-    places = builder.fadd(places, point_vector(builder, [shift] * len(point)))
-    taps = INDEX(lanes.taps)
-    last = [builder.sitofp(builder.sub(count, taps), DOUBLE) for count in counts]
-    ends = point_vector(builder, last)
-    starts = ir.Constant(places.type, [DOUBLE(0.0)] * places.type.count)
-    # Both comparisons are false for NaN, so that its index is inside the grid.
-    inside = builder.select(builder.fcmp_ordered(">", places, starts), places, starts)
-    inside = builder.select(builder.fcmp_ordered("<", inside, ends), inside, ends)
-    floors = builder.fptosi(inside, ir.VectorType(INDEX, places.type.count))
-    rests = builder.fsub(places, builder.sitofp(floors, places.type))
-    if lanes.real == FLOAT:
-        rests = builder.fptrunc(rests, ir.VectorType(FLOAT, places.type.count))
-    return [builder.extract_element(floors, SHORT(k)) for k in range(len(point))], rests
-
-
 class Axis:
     """One axis of a grid: nodes and weights of a point.
 
@@ -184,6 +155,35 @@ class Axis:
             row = lanes.load(row, rest.type.count)
             weights = row if weights is None else lanes.multiply_add(weights, rest, row)
         return weights
+
+
+def axes_at(
+    lanes: Lanes, places: Any, ends: Any, strides: Sequence[Any], tables: Any, *, slopes: bool
+) -> list[Axis]:
+    """The axes of a grid at a point.
+
+    Args:
+        lanes: of the filter.
+        places: the point, nodes plus the filter's shift, as ``point_vector``.
+        ends: the last cell along every axis, as ``point_vector``.
+        strides: from one node to the next along every axis, in numbers.
+        tables: start of ``Stencil.weights``.
+        slopes: whether weights of the slope are needed.
+    """
+    builder = lanes.builder
+    starts = ir.Constant(places.type, [DOUBLE(0.0)] * places.type.count)
+    # Both comparisons are false for NaN, so that its index is inside the grid.
+    inside = builder.select(builder.fcmp_ordered(">", places, starts), places, starts)
+    inside = builder.select(builder.fcmp_ordered("<", inside, ends), inside, ends)
+    cells = builder.fptosi(inside, ir.VectorType(INDEX, places.type.count))
+    rests = builder.fsub(places, builder.sitofp(cells, places.type))
+    if lanes.real == FLOAT:
+        rests = builder.fptrunc(rests, ir.VectorType(FLOAT, places.type.count))
+    width = 2 * lanes.width if slopes else lanes.width
+    return [
+        Axis(lanes, stride, builder.extract_element(cells, SHORT(k)), lanes.pick(rests, [k] * width), tables)
+        for k, stride in enumerate(strides)
+    ]
 
 
 def value(lanes: Lanes, axes: Sequence[Axis], start: Any) -> Any:

@@ -13,7 +13,19 @@ from numpy.typing import DTypeLike
 
 from ..compiled import kernel
 from .filters import Filter
-from .lanes import DOUBLE, FLOAT, INDEX, Axis, Lanes, cells, value, value_and_gradient, width_of, within
+from .lanes import (
+    DOUBLE,
+    FLOAT,
+    INDEX,
+    Axis,
+    Lanes,
+    axes_at,
+    point_vector,
+    value,
+    value_and_gradient,
+    width_of,
+    within,
+)
 
 
 class Stencil(NamedTuple):
@@ -126,17 +138,16 @@ def _stage(
     context: Any, builder: Any, taken: Any, arguments: Any, *, slopes: bool
 ) -> tuple[Lanes, list[Axis], Any]:
     """Common start of both intrinsics: the filter's lanes, the axes and the start of the grid."""
-    coefficients, places, _, weights, _ = taken
-    lanes = Lanes(builder, len(places), DOUBLE if coefficients.dtype == types.float64 else FLOAT)
+    coefficients, length, _, weights, _ = taken
+    lanes = Lanes(builder, len(length), DOUBLE if coefficients.dtype == types.float64 else FLOAT)
     grid = context.make_array(coefficients)(context, builder, arguments[0])
     tables = context.make_array(weights)(context, builder, arguments[3]).data
     counts = cgutils.unpack_tuple(builder, grid.shape, coefficients.ndim)
     point = [builder.extract_value(arguments[4], axis) for axis in range(coefficients.ndim)]
-    first, rests = cells(lanes, point, arguments[2], counts)
-    axes: list[Axis] = []
-    stride = INDEX(1)
-    for axis in reversed(range(coefficients.ndim)):
-        rest = lanes.pick(rests, [axis] * (2 * lanes.width if slopes else lanes.width))
-        axes.insert(0, Axis(lanes, stride, first[axis], rest, tables))
-        stride = builder.mul(stride, counts[axis])
-    return lanes, axes, grid.data
+    places = builder.fadd(point_vector(builder, point), point_vector(builder, [arguments[2]] * len(point)))
+    taps = INDEX(lanes.taps)
+    ends = point_vector(builder, [builder.sitofp(builder.sub(count, taps), DOUBLE) for count in counts])
+    strides = [INDEX(1)]
+    for count in reversed(counts[1:]):
+        strides.insert(0, builder.mul(strides[0], count))
+    return lanes, axes_at(lanes, places, ends, strides, tables, slopes=slopes), grid.data

@@ -19,8 +19,9 @@ from bentray_kernels.isosurface.crossing import (
     leave_interval,
 )
 from bentray_kernels.isosurface.octree import Octree, octree_of
-from bentray_kernels.isosurface.roots import Field, ray_of
+from bentray_kernels.isosurface.roots import ray_of
 from bentray_kernels.splines import Spline
+from bentray_kernels.splines.sampler import Sampler, sampler_of
 
 from ...effort import effort
 
@@ -30,7 +31,7 @@ FILTERS = ("trilinear", "catmull-rom", "bspline2", "bspline3", "bspline6")
 
 @kernel
 def leave(
-    field: Field,
+    field: Sampler,
     octree: Octree,
     search: Search,
     origin: tuple[float, float, float],
@@ -74,7 +75,7 @@ class Case:
         return float(levels[layer]), float(levels[layer + 1])
 
     def leave(self, search: Search, start: float, interval: tuple[float, float], slope: float = 0.0):
-        field = Field(self.spline.coefficients, self.spline.stencil)
+        field = sampler_of(self.spline)
         s, side, left = leave(
             field,
             self.octree,
@@ -271,10 +272,7 @@ def test_a_ray_on_a_plateau_is_given_up_after_so_many_readings(monkeypatch, halv
     monkeypatch.setattr(crossing, "_scan", crossing._scan.py_func)
     for seed in range(20):
         case = plateau(seed)
-        field, ray = (
-            Field(case.spline.coefficients, case.spline.stencil),
-            ray_of(tuple(case.origin), tuple(case.along)),
-        )
+        field, ray = sampler_of(case.spline), ray_of(tuple(case.origin), tuple(case.along))
         search, s, side, left = Search(CERTAIN, 5, 0.0), 0.0, 1, halvings
         interval = (-np.inf, 0.0) if float(case.field([0.0])[0]) <= 0.0 else (0.0, np.inf)
         readings.clear()

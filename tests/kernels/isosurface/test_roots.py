@@ -8,14 +8,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.compiled import kernel
-from bentray_kernels.isosurface.roots import Field, Ray, brent, field_at, first_root_of_cubic, ray_of
+from bentray_kernels.isosurface.roots import Ray, brent, field_at, first_root_of_cubic, ray_of
 from bentray_kernels.splines import Spline
+from bentray_kernels.splines.sampler import Sampler, sampler_of
 
 from ...effort import effort
 
 
 @kernel
-def root(field: Field, ray: Ray, target: float, a: float, b: float, tolerance: float) -> float:
+def root(field: Sampler, ray: Ray, target: float, a: float, b: float, tolerance: float) -> float:
     ends = field_at(field, ray, a), field_at(field, ray, b)
     return brent(field, ray, target, a, ends[0], b, ends[1], tolerance)
 
@@ -31,7 +32,7 @@ def test_brent_finds_the_place_of_a_value(target):
     nodes = ((np.arange(80.0) - 38.0) ** 3)[:, None, None] + np.zeros((1, 4, 4))
     spline = Spline(nodes)
     ray = ray_of((38.0, 1.5, 1.5), (2.0, 0.0, 0.0))
-    found = root(Field(spline.coefficients, spline.stencil), ray, target, 0.0, 1.5, 1e-12)
+    found = root(sampler_of(spline), ray, target, 0.0, 1.5, 1e-12)
     assert 2.0 * found == pytest.approx(np.cbrt(target), abs=1e-8)
 
 

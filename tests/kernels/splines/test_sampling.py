@@ -6,6 +6,7 @@ from numba.core.errors import TypingError
 
 from bentray_kernels.compiled import kernel
 from bentray_kernels.splines import FILTERS, Spline
+from bentray_kernels.splines.sampler import sampled_value, sampled_value_and_gradient, sampler_of
 from bentray_kernels.splines.sampling import (
     border_of,
     lies_within,
@@ -20,6 +21,12 @@ def read(coefficients, stencil, x, y, z):
     value = value_at(coefficients, stencil, (x, y, z))
     same, slopes = value_and_gradient_at(coefficients, stencil, (x, y, z))
     return value, same, slopes[0], slopes[1], slopes[2]
+
+
+@kernel
+def read_by_address(sampler, x, y, z):
+    same, slopes = sampled_value_and_gradient(sampler, (x, y, z))
+    return sampled_value(sampler, (x, y, z)), same, slopes[0], slopes[1], slopes[2]
 
 
 def volume(seed=0, shape=(5, 7, 6)):
@@ -122,3 +129,13 @@ def test_the_outer_nodes_belong_to_the_grid(axis, position, found):
     point = [1.0, 2.0, 3.0]
     point[axis] = position
     assert inside(*point, 4.0, 4.0, 4.0) == (found, found or axis == 2)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_a_sampler_reads_the_same_to_the_bit(name, dtype):
+    spline = Spline.from_volume(volume(), name, dtype=dtype)
+    sampler = sampler_of(spline)
+    for place in ((1.3, 4.0, 2.81), (0.0, 6.0, 5.0), (-0.9, 6.6, 5.4), (1.0, 1e300, 2.0), (1.0, np.nan, 2.0)):
+        expected = read(spline.coefficients, spline.stencil, *place)
+        np.testing.assert_array_equal(read_by_address(sampler, *place), expected)
