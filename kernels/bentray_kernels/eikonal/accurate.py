@@ -154,7 +154,8 @@ def _pass(
         settled[seeds[k]] = seed_times[k]
         if squares[seeds[k]] > 0.0:
             tau[seeds[k]] = seed_times[k] / math.sqrt(squares[seeds[k]])
-    for node in order:
+    for listed in order:
+        node = np.int64(listed)
         if settled[node] < math.inf or (numbers[WAIT] > 0 and place[node] > DONE):
             continue
         time = factored_update(node, front)

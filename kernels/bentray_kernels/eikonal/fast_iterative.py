@@ -81,7 +81,7 @@ def _iterate(
     while length > 0:
         following_length = 0
         for k in range(length):
-            node = active[k]
+            node = np.int64(active[k])
             crossing = spacing * slowness[node]
             old = time[node]
             own = min(old, _updated(node, steps, crossing, time))

@@ -67,7 +67,7 @@ def take(heap: Nodes, keys: Floats, place: Nodes, length: int) -> int:
     length -= 1
     if length > 0:
         # The last entry nearly always belongs among the leaves: sink all the way, then rise a little.
-        node = heap[length]
+        node = np.int64(heap[length])
         time = keys[length]
         rise(heap, keys, place, sink(heap, keys, place, length, 0), node, time)
     return length
@@ -76,7 +76,7 @@ def take(heap: Nodes, keys: Floats, place: Nodes, length: int) -> int:
 @kernel(inline="always")
 def change(heap: Nodes, keys: Floats, place: Nodes, length: int, node: int, time: float) -> int:
     """Enter a node, or change the time of one that is there."""
-    hole = place[node]
+    hole = np.int64(place[node])
     if hole == FAR:
         hole = length
         length += 1

@@ -7,11 +7,12 @@ import math
 from ..arrays import Floats
 from ..compiled import kernel
 
-# A tuple of which only the length is used: it is part of the type, so that loops over it are unrolled.
-Length = tuple[int, ...]
+# Only its length is used. That of a tuple is part of the type: loops over it are unrolled, in a kernel for
+# each length. That of an array is not.
+Length = tuple[int, ...] | Floats
 
 
-def length(count: int) -> Length:
+def length(count: int) -> tuple[int, ...]:
     """A tuple of that length."""
     return (0,) * count
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..compiled import kernel
-from .bernstein import Length, contract, hull
+from .bernstein import contract, hull
 
 # Halvings along each axis: the hull approaches a critical value as the square of the width.
 HALVINGS = 18
@@ -19,9 +19,7 @@ ROUNDING = 1e-13
 
 
 @kernel
-def exact_range(
-    nodes: Floats, value: Floats, pieces: int, across: Length, rows: Length
-) -> tuple[float, float]:
+def exact_range(nodes: Floats, value: Floats, pieces: int) -> tuple[float, float]:
     """Least and greatest value of a cell to 1e-8 of its hull, never short of them.
 
     The dissertation solves for the stationary points of the cell, its faces and its edges. Here the Bernstein
@@ -32,10 +30,8 @@ def exact_range(
         nodes: (n³,) coefficients, C order.
         value: (pieces·(degree + 1), n) Bernstein coefficients of the weights.
         pieces: polynomial pieces along each axis.
-        across: n.
-        rows: degree + 1.
     """
-    n, m = len(across), len(rows)
+    n, m = value.shape[1], len(value) // pieces
     size = m * m * m
     first, second = np.empty(m * n * n), np.empty(m * m * n)
     stack = np.empty((3 * HALVINGS + 2, size))
@@ -46,7 +42,7 @@ def exact_range(
     for piece in range(pieces**3):
         p, q, r = piece // pieces**2, (piece // pieces) % pieces, piece % pieces
         x, y, z = value[p * m : p * m + m], value[q * m : q * m + m], value[r * m : r * m + m]
-        contract(nodes, x, y, z, across, rows, first, second, stack[0])
+        contract(nodes, x, y, z, x[0], x[:, 0], first, second, stack[0])
         depths[0] = 0
         top = 1
         while top > 0:

@@ -88,7 +88,6 @@ def cell_ranges(
             len(weights.powers),
             length(weights.nodes),
             length(len(weights.powers) * (weights.degree + 1)),
-            length(weights.degree + 1),
             weights.total(),
             CellRanges(*(part[x : x + LAYERS] for part in ranges)),
         )
@@ -110,7 +109,6 @@ def _refine(
     pieces: int,
     across: Length,
     rows: Length,
-    piece_rows: Length,
     total: float,
     ranges: CellRanges,
 ) -> None:
@@ -134,7 +132,7 @@ def _refine(
             contract(nodes, value, value, value, across, rows, one_axis, two_axes, form)
             low, high = hull(form)
         elif bound == 4:
-            low, high = exact_range(nodes, value, pieces, across, piece_rows)
+            low, high = exact_range(nodes, value, pieces)
         elif bound > 0:
             low, high = weighted_range(nodes, least, most)
         margin = OUTWARD * max(abs(low), abs(high))

@@ -177,6 +177,8 @@ def intersect(
     for k in range(len(origins)):
         origin = (origins[k, 0], origins[k, 1], origins[k, 2])
         direction = (directions[k, 0], directions[k, 1], directions[k, 2])
-        face, s, u, v, front = closest(surface, waiting, 0, origin, direction, 0.0, np.inf, ignored[k])
+        face, s, u, v, front = closest(
+            surface, waiting, 0, origin, direction, 0.0, np.inf, np.int64(ignored[k])
+        )
         faces[k], distances[k], outside[k] = face, s, front
         weights[k, 0], weights[k, 1] = u, v

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from .program import Program
-from .session import Session, set_arguments
+from .session import Session
 
 # Points along a side of a block, by dimensions of the grid; 64 points either way.
 EDGES = {2: 8, 3: 4}
@@ -127,15 +127,14 @@ def _advance_until_settled(
         flags, lengths = session.upload(queued), session.upload(counts)
         queues = [session.upload(row) for row in waiting]
         step = 0
-        set_arguments(kernel, times, fields, flags, queues[0], queues[1], lengths, np.uint32(0))
-        for position, value in enumerate((*sides, len(crossings) == 1), start=7):
-            kernel.set_arg(position, np.uint32(value))
-        kernel.set_arg(11, np.float64(tolerance))
+        kernel.set(
+            times=times, crossings=fields, queued=flags, counts=lengths, tolerance=np.float64(tolerance)
+        )
+        blocks_x, blocks_y, blocks_z, shared = map(np.uint32, (*sides, len(crossings) == 1))
+        kernel.set(blocks_x=blocks_x, blocks_y=blocks_y, blocks_z=blocks_z, shared=shared)
         length = counts[:1]
         while length[0] > 0:
-            kernel.set_arg(3, queues[step % 2])
-            kernel.set_arg(4, queues[(step + 1) % 2])
-            kernel.set_arg(6, np.uint32(step))
+            kernel.set(active=queues[step % 2], following=queues[(step + 1) % 2], step=np.uint32(step))
             session.launch(kernel, (int(length[0]) * blocks.edge, *group[1:]), group)
             step += 1
             session.download(length, lengths, 4 * (step % 3))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from functools import cache
 from importlib import resources
 from typing import NamedTuple
 
@@ -21,6 +23,17 @@ class Program(NamedTuple):
     def text(self) -> str:
         """The files, each with its name for messages of the compiler."""
         return "".join(map(_named, self.sources))
+
+    def positions(self, kernel: str) -> dict[str, int]:
+        """Positions of a kernel's arguments by name, as its source declares them."""
+        return _positions(self.text, kernel)
+
+
+@cache
+def _positions(text: str, kernel: str) -> dict[str, int]:
+    signature = re.search(rf"\bkernel void {kernel}\(([^)]*)\)", text)
+    assert signature is not None, kernel
+    return {re.findall(r"\w+", one)[-1]: k for k, one in enumerate(signature[1].split(","))}
 
 
 def _named(source: str) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,17 +37,17 @@ class Session:
         self.handle = handle_of(device)
         self.context = cl.Context([self.handle])
         self.queue = cl.CommandQueue(self.context)
-        self._kernels: dict[tuple[Program, str], Any] = {}
+        self._kernels: dict[tuple[Program, str], DeviceKernel] = {}
         self._programs: dict[Program, Any] = {}
 
-    def kernel(self, program: Program, name: str) -> Any:
+    def kernel(self, program: Program, name: str) -> DeviceKernel:
         """A kernel of a program, which is built on first use."""
         key = (program, name)
         if key not in self._kernels:
             self._kernels[key] = self.own_kernel(program, name)
         return self._kernels[key]
 
-    def own_kernel(self, program: Program, name: str) -> Any:
+    def own_kernel(self, program: Program, name: str) -> DeviceKernel:
         """Like ``kernel``, but a new one of the caller's own, whose arguments nobody else sets."""
         import pyopencl as cl
 
@@ -59,7 +59,7 @@ class Session:
                 self._programs[program] = cl.Program(self.context, program.text).build(
                     [f"-D{define}" for define in program.defines], cache_dir=False
                 )
-        return cl.Kernel(self._programs[program], name)
+        return DeviceKernel(cl.Kernel(self._programs[program], name), program.positions(name))
 
     def upload(self, array: Any) -> Any:
         """A buffer on the device with a copy of a C-ordered array."""
@@ -105,21 +105,42 @@ class Session:
 
         cl.enqueue_copy(self.queue, array, buffer, src_offset=offset_bytes, is_blocking=True)
 
-    def launch(self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None) -> None:
+    def launch(self, kernel: DeviceKernel, size: tuple[int, ...], group: tuple[int, ...] | None) -> None:
         """Enqueue a kernel whose arguments are set."""
         import pyopencl as cl
 
-        cl.enqueue_nd_range_kernel(self.queue, kernel, size, group)
+        cl.enqueue_nd_range_kernel(self.queue, kernel.handle, size, group)
 
     def doubles_at_once(self) -> int:
         """How many doubles a pair of buffers may hold together without filling the device."""
         return int(min(self.handle.max_mem_alloc_size, self.handle.global_mem_size // 4)) // 8
 
 
-def set_arguments(kernel: Any, *arguments: Any) -> None:
-    """Set buffers and numpy scalars in order, without the launcher that pyopencl generates and caches."""
-    for place, argument in enumerate(arguments):
-        kernel.set_arg(place, argument)
+class DeviceKernel(NamedTuple):
+    """A kernel of a program on a device. It does not keep the buffers alive that are its arguments.
+
+    Attributes:
+        handle: the ``pyopencl.Kernel``.
+        positions: of its arguments, by name.
+    """
+
+    handle: Any
+    positions: dict[str, int]
+
+    def set(self, **arguments: Any) -> DeviceKernel:
+        """Set buffers and numpy scalars, without the launcher that pyopencl generates and caches.
+
+        Raises:
+            KeyError: for a name that the kernel's signature lacks.
+        """
+        for name, argument in arguments.items():
+            position = self.positions[name]
+            self.handle.set_arg(position, argument)
+        return self
+
+    def set_from(self, arguments: Mapping[str, Any]) -> DeviceKernel:
+        """Set those of the engine's arguments that this kernel has."""
+        return self.set(**{name: arguments[name] for name in self.positions if name in arguments})
 
 
 def programs() -> Iterator[Program]:
@@ -142,7 +163,7 @@ def probe(session: Session, width: int, a: Floats, b: Floats) -> tuple[Floats, F
     root, lower = np.empty_like(a), np.empty_like(a)
     with session.lock:
         buffers = [session.upload(array) for array in (a, b, root, lower)]
-        set_arguments(kernel, *buffers)
+        kernel.set(**dict(zip(("a", "b", "root", "lower"), buffers, strict=True)))
         session.launch(kernel, (a.size // width,), None)
         session.download(root, buffers[2])
         session.download(lower, buffers[3])

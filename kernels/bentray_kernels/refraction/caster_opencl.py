@@ -16,7 +16,6 @@ from ..isosurface.crossing import Search
 from ..isosurface.roots import STEPS
 from ..opencl import OpenCLFallbackWarning, Session, Work, computing_on, scene_or_warning
 from ..opencl.program import Program
-from ..opencl.session import set_arguments
 from ..splines.filters import FILTERS
 from ..splines.sampling import Stencil, stencil_of
 from .camera import perspective
@@ -49,6 +48,10 @@ TRIED, TRIED_DEPTH = 256, 4
 TOLERANCES = {"float64": (1e-6, 0.02), "float32": (1e-2, 0.05)}
 
 
+# Arguments of the kernel that are ``Traced``.
+RESULTS = ("points", "directions", "fates", "crossings", "weights", "vertices")
+
+
 class OpenCLCaster:
     """A scene on a device; ``caster.cast`` replaces root finders that fail their self-test.
 
@@ -75,15 +78,16 @@ class OpenCLCaster:
         self._sum: Any = min(self._real, scene.field.coefficients.dtype, key=lambda kind: kind.itemsize)
         self._faults: dict[str, str] = {}
         with session.lock:
-            self._volume = (
-                session.upload(scene.field.coefficients.astype(self._sum, copy=False)),
-                session.upload(scene.field.stencil.weights.astype(self._sum)),
-            )
-            self._octree = (
-                session.upload(scene.octree.masks),
-                session.upload(scene.octree.bend),
-                session.upload(scene.octree.levels.astype(np.int64)),
-            )
+            counts = map(np.int32, scene.field.coefficients.shape)
+            self._arguments: dict[str, Any] = {
+                "coefficients": session.upload(scene.field.coefficients.astype(self._sum, copy=False)),
+                "tables": session.upload(scene.field.stencil.weights.astype(self._sum)),
+                "shift": self._real.type(scene.field.stencil.shift),
+                **dict(zip(("counts_x", "counts_y", "counts_z"), counts, strict=True)),
+                "masks": session.upload(scene.octree.masks),
+                "bend": session.upload(scene.octree.bend),
+                "shapes": session.upload(scene.octree.levels.astype(np.int64)),
+            }
 
     def cast(
         self,
@@ -183,27 +187,23 @@ class OpenCLCaster:
         # Vertices that no ray reaches stay as they are.
         if traced.vertices.size:
             there[-1] = session.upload(traced.vertices.astype(real))
-        arguments = (
-            *self._volume,
-            real(self.scene.field.stencil.shift),
-            *(np.int32(count) for count in self.scene.field.coefficients.shape),
-            *self._octree,
-            np.int32(search.top),
-            levels,
-            indices,
-            np.int32(len(medium.indices)),
-            np.int32(medium.around),
-            frames,
-            np.int32(medium.open),
-            real(search.step),
-            views,
-            np.int32(depth),
-            np.int32(traced.vertices.shape[1]),
-            np.uint32(len(pixels)),
-            at,
-            *there,
+        kernel.set(
+            **self._arguments,
+            top=np.int32(search.top),
+            levels=levels,
+            indices=indices,
+            layers=np.int32(len(medium.indices)),
+            around=np.int32(medium.around),
+            frame=frames,
+            open=np.int32(medium.open),
+            step=real(search.step),
+            camera=views,
+            depth=np.int32(depth),
+            kept=np.int32(traced.vertices.shape[1]),
+            count=np.uint32(len(pixels)),
+            places=at,
+            **dict(zip(RESULTS, there, strict=True)),
         )
-        set_arguments(kernel, *arguments)
         session.launch(kernel, (-(-len(pixels) // GROUP) * GROUP,), (GROUP,))
         for array, buffer in zip(filled, there, strict=True):
             if array.size:

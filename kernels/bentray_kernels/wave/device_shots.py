@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from .adjoint import LIGHT_EVERY
-from .device_waves import NOTHING, DeviceWaves, Launch, filled, uints
+from .device_waves import NOTHING, DeviceWaves, Launch, filled
 from .points import REACH, Points
 from .time_blocks import Poll
 
@@ -48,7 +48,9 @@ class ShotBatch:
         self._shape = (self._emitters, scan.steps, len(scan.receivers.first))
         self._samples = session.reserve(max(math.prod(self._shape) * kind.itemsize, 1))
         self._stored = session.reserve(max(self._emitters * self._held * size.image * kind.itemsize, 1))
-        self._points = (*waves.uploaded(sources), session.upload(pulse.astype(kind)))
+        emitter, sending = waves.uploaded(sources)
+        wavelet = session.upload(pulse.astype(kind))
+        self._points = {"emitter": emitter, "sending": sending, "wavelet": wavelet}
         self._stepping = waves.grid.work_items(self._emitters), (*waves.grid.group, 1)
         self._over_the_image = waves.over_the_image(self._emitters)
         self._checkpoints: dict[int, list[Any]] = {}
@@ -87,8 +89,14 @@ class ShotBatch:
         sums = np.empty((emitters, receivers, 2))
         with session.lock:
             buffers = [session.upload(array) for array in (recorded, weight, sums)]
-            sizes = (*uints(steps, receivers), np.float64(scale))
-            kernel = self._waves.misfit(program, self._samples, *buffers, *sizes)
+            kernel = self._waves.misfit(
+                program,
+                traces=self._samples,
+                **dict(zip(("recorded", "weight", "sums"), buffers, strict=True)),
+                steps=np.uint32(steps),
+                receivers=np.uint32(receivers),
+                scale=np.float64(scale),
+            )
             session.launch(kernel, (receivers, emitters), None)
             session.download(sums, buffers[2])
         values, divisors = sums.sum(axis=1).T
@@ -130,13 +138,13 @@ class ShotBatch:
         # A kernel for each role of the two fields, so that only numbers change from step to step.
         scattering: list[Any] = []
         stepping, ending = [], []
-        points = (self._samples, *self._points)
+        points = {"traces": self._samples, **self._points}
         for now, new in (fields, fields[::-1]):
             if store:
                 scattering.append(waves.scatter(now, new, self._stored))
             stepping.append(waves.advance(now, new))
             ending.append(
-                {use: waves.exchange(use, now, new, self._stored, *points, reading=reading) for use in uses}
+                {use: waves.exchange(use, now, new, self._stored, points, reading=reading) for use in uses}
             )
         ends = self._of_points((self._shape[2] if reading else 0) + (2 * REACH) ** len(waves.grid.shape))
         for n in self._steps(segment):
@@ -144,11 +152,11 @@ class ShotBatch:
             end = ending[n % 2][use]
             if use:
                 slot = np.uint32(n // every % self._held)
-                scattering[n % 2].set_arg(13, slot)
+                scattering[n % 2].set(slot=slot)
                 self._session.launch(scattering[n % 2], *self._over_the_image)
-                end.set_arg(17, slot)
+                end.set(slot=slot)
             self._session.launch(stepping[n % 2], *self._stepping)
-            end.set_arg(18, np.uint32(n))
+            end.set(step=np.uint32(n))
             self._session.launch(end, *ends)
 
     def _backward(self, adjoint: list[Any], segment: int, sums: list[Any]) -> None:
@@ -163,11 +171,11 @@ class ShotBatch:
         for n in self._steps(segment, backwards=True):
             if n % every == 0:
                 slot = n // every
-                correlating[n % 2].set_arg(9, np.uint32(slot % self._held))
-                correlating[n % 2].set_arg(10, np.uint32(slot % LIGHT_EVERY == 0))
+                lit = np.uint32(slot % LIGHT_EVERY == 0)
+                correlating[n % 2].set(slot=np.uint32(slot % self._held), lit=lit)
                 self._session.launch(correlating[n % 2], *self._over_the_image)
             self._session.launch(stepping[n % 2], *self._stepping)
-            ending[n % 2].set_arg(11, np.uint32(n))
+            ending[n % 2].set(step=np.uint32(n))
             self._session.launch(ending[n % 2], *ends)
 
     def _of_points(self, number: int) -> Launch:

@@ -19,7 +19,7 @@ from .stencil import HALO, weights
 from .time_step import FLUSH
 
 if TYPE_CHECKING:
-    from ..opencl.session import Session
+    from ..opencl.session import DeviceKernel, Session
 
 # Work-items of a group. A processor runs a group in one thread, which turns rows into vectors; of these
 # widths the one is taken that fills up least.
@@ -80,22 +80,33 @@ class DeviceWaves:
         session, scan: the arguments.
         grid: of the medium.
         kind: type of all numbers.
-        drive: buffer of that factor of the medium.
-        gather: buffers of the receivers' taps by node; None where nothing is stored.
-        gathered: nodes with a tap.
+        gathered: nodes with a tap of a receiver, where fields are stored; else 0.
     """
 
     def __init__(self, session: Session, medium: Medium, scan: Scan, group: Group | None = None) -> None:
         self.session, self.scan, self.kind = session, scan, medium.keep.dtype
         self.grid = DeviceGrid.from_medium(medium, group or _group(session, medium))
         self._fills = self.grid.group[1] > 1
-        self._factors = [session.upload(self.grid.packed(factor)) for factor in medium.factors]
-        self._taps = session.upload(weights(medium.order).astype(self.kind))
-        self._receivers = self.uploaded(scan.receivers)
-        self.drive, self.gather, self.gathered = self._factors[2], None, 0
+        factors = (session.upload(self.grid.packed(factor)) for factor in medium.factors)
+        # By their names in the kernels.
+        self._arguments: dict[str, Any] = {
+            **dict(zip(("keep", "fade", "drive"), factors, strict=True)),
+            "weights": session.upload(weights(medium.order).astype(self.kind)),
+            "flush": self.kind.type(FLUSH),
+            "steps": np.uint32(scan.steps),
+            "receivers": np.uint32(len(scan.receivers.first)),
+            "plane": np.uint64(self.grid.plane),
+            "nodes": self.grid.nodes,
+            **{
+                name: np.uint32(getattr(self.grid, name))
+                for name in ("first", "pitch", "slab", "blocks", "shift")
+            },
+        }
+        self._receivers = dict(zip(("receiver", "reading"), self.uploaded(scan.receivers), strict=True))
+        self._gather, self.gathered = {}, 0
         if scan.every:
             gather = Gather.from_receivers(self.grid, scan.receivers)
-            self.gather = [session.upload(array) for array in vars(gather).values()]
+            self._gather = {name: session.upload(part) for name, part in vars(gather).items()}
             self.gathered = len(gather.node)
 
     @property
@@ -134,67 +145,46 @@ class DeviceWaves:
         along = np.ascontiguousarray(elements.weights, self.kind)
         return self.session.upload(elements.first.astype(np.uint32)), self.session.upload(along)
 
-    def advance(self, now: Any, new: Any) -> Any:
+    def advance(self, now: Any, new: Any) -> DeviceKernel:
         """The kernel of a step from ``now``: the field before it, in ``new``, becomes the one after it."""
-        layout = (np.uint32(self.grid.first), *self._strides, np.uint32(self.grid.blocks))
-        return self._kernel("advance", NOTHING, *self._stepping(now, new), *layout)
+        return self._kernel("advance", NOTHING, now=now, old=new)
 
-    def scatter(self, now: Any, before: Any, stored: Any) -> Any:
+    def scatter(self, now: Any, before: Any, stored: Any) -> DeviceKernel:
         """The kernel that stores what a change of the medium would scatter in the step from ``now``."""
-        layout = (np.uint32(self.grid.shift), *self._strides, self.grid.nodes, stored, np.uint32(0))
-        return self._kernel("scatter", self.scan.store, *self._stepping(now, before), *layout)
+        return self._kernel("scatter", self.scan.store, now=now, old=before, stored=stored)
 
-    def _stepping(self, now: Any, before: Any) -> tuple[Any, ...]:
-        return now, before, *self._factors, self._taps, self.kind.type(FLUSH)
-
-    def exchange(self, store: int, now: Any, new: Any, stored: Any, *points: Any, reading: bool) -> Any:
+    def exchange(
+        self, store: int, now: Any, new: Any, stored: Any, points: dict[str, Any], *, reading: bool
+    ) -> DeviceKernel:
         """The kernel that ends a step forwards.
 
         Args:
             store: what a step stores.
             now, new: fields before and after the step.
             stored: buffer.
-            points: buffers of traces, emitters and wavelet.
+            points: "traces", "emitter", "sending" and "wavelet", buffers.
             reading: whether receivers read, too.
         """
-        traces, *emitters = points
-        receivers = len(self.scan.receivers.first) if reading else 0
-        sizes = uints(self.scan.steps, receivers, self.grid.shift)
-        layout = (*self._strides, self.grid.nodes, stored, *uints(0, 0))
-        return self._kernel(
-            "exchange", store, now, new, self.drive, *self._receivers, traces, *emitters, *sizes, *layout
-        )
+        receivers = self._arguments["receivers"] if reading else np.uint32(0)
+        own = {**self._receivers, **points, "receivers": receivers}
+        return self._kernel("exchange", store, now=now, next=new, stored=stored, slot=np.uint32(0), **own)
 
-    def correlate(self, now: Any, stored: Any, image: Any, light: Any) -> Any:
+    def correlate(self, now: Any, stored: Any, image: Any, light: Any) -> DeviceKernel:
         """The kernel that correlates the adjoint field ``now`` with a stored one."""
-        layout = (np.uint32(self.grid.shift), *self._strides, self.grid.nodes, *uints(0, 0))
-        return self._kernel("correlate", NOTHING, now, stored, image, light, *layout)
+        return self._kernel("correlate", NOTHING, adjoint=now, stored=stored, image=image, light=light)
 
-    def inject(self, new: Any, residual: Any) -> Any:
+    def inject(self, new: Any, residual: Any) -> DeviceKernel:
         """The kernel that ends a step backwards."""
-        assert self.gather is not None
-        sizes = uints(self.scan.steps, len(self.scan.receivers.first))
-        numbers = (np.uint64(self.grid.plane), *uints(self.gathered, 0))
-        return self._kernel("inject", NOTHING, new, self.drive, *self.gather, residual, *sizes, *numbers)
+        count = np.uint32(self.gathered)
+        return self._kernel("inject", NOTHING, next=new, residual=residual, count=count, **self._gather)
 
-    @property
-    def _strides(self) -> tuple[Any, ...]:
-        return *uints(self.grid.pitch, self.grid.slab), np.uint64(self.grid.plane)
-
-    def misfit(self, name: str, *arguments: Any) -> Any:
+    def misfit(self, name: str, **arguments: Any) -> DeviceKernel:
         """A kernel of ``misfits.cl`` with its arguments."""
-        return self._own_kernel(_misfits(self.kind), name, arguments)
+        return self.session.own_kernel(_misfits(self.kind), name).set(**arguments)
 
-    def _kernel(self, name: str, store: int, *arguments: Any) -> Any:
+    def _kernel(self, name: str, store: int, **own: Any) -> DeviceKernel:
         program = _waves(self.kind, len(self.grid.shape), store, self._fills)
-        return self._own_kernel(program, name, arguments)
-
-    def _own_kernel(self, program: Program, name: str, arguments: tuple[Any, ...]) -> Any:
-        from ..opencl.session import set_arguments
-
-        kernel = self.session.own_kernel(program, name)
-        set_arguments(kernel, *arguments)
-        return kernel
+        return self.session.own_kernel(program, name).set_from(self._arguments | own)
 
 
 def programs() -> Iterator[Program]:
@@ -235,11 +225,6 @@ def tiles(emitters: int, most: int) -> Iterator[slice]:
 def filled(number: int, group: int) -> int:
     """Work-items filled up to whole groups."""
     return -(-number // group) * group
-
-
-def uints(*values: int) -> tuple[np.uint32, ...]:
-    """Numbers as kernels take them."""
-    return tuple(np.uint32(value) for value in values)
 
 
 def _group(session: Session, medium: Medium) -> Group:

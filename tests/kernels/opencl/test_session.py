@@ -7,7 +7,7 @@ import pyopencl as cl
 import pytest
 
 from bentray_kernels.opencl.program import Program
-from bentray_kernels.opencl.session import probe
+from bentray_kernels.opencl.session import DeviceKernel, probe
 
 PROBE = Program(("probe",), ("REAL=double",))
 
@@ -32,7 +32,13 @@ def test_a_program_of_several_files_names_the_one_that_does_not_compile(session)
 
 def test_later_files_see_earlier_definitions(session):
     both = Program(("refraction/rays", "probe"), ("REAL=double",))
-    assert session.kernel(both, "probe").function_name == "probe"
+    assert session.kernel(both, "probe").handle.function_name == "probe"
+
+
+def test_arguments_have_the_names_of_the_source():
+    assert PROBE.positions("probe") == {"a": 0, "b": 1, "root": 2, "lower": 3}
+    with pytest.raises(KeyError, match="roof"):
+        DeviceKernel(None, PROBE.positions("probe")).set(roof=1.0)
 
 
 def test_buffers_round_trip(session):

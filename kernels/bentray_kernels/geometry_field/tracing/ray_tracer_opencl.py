@@ -12,7 +12,6 @@ from ...errors import InvalidInput
 from ...meshes.intersector import WAITING
 from ...opencl import OpenCLFallbackWarning, Session, Work, computing_on, scene_or_warning
 from ...opencl.program import Program
-from ...opencl.session import set_arguments
 from ...refraction.backdrop import Colours
 from ...refraction.camera import Camera
 from ..tables import accurate_lookup, cube
@@ -40,6 +39,23 @@ TRIED = 48
 ODD = {"float64": 0.01, "float32": 0.05}
 
 
+# Arrays of the world's surface and of the world, which the kernel calls the same; the last in its precision.
+OF_SURFACE = ("triangles", "links", "nodes", "children", "normals", "uv")
+OF_WORLD = (
+    "shapes",
+    "faces",
+    "fractions",
+    "known",
+    "inner_faces",
+    "starts",
+    "instances",
+    "pictures",
+    "textures",
+    "sky",
+)
+OF_WORLD_REAL = ("to_local", "looks", "ground", "light")
+
+
 class OpenCLTracer:
     """A world on a device; ``ray_tracer.trace`` replaces a device that fails its self-test.
 
@@ -63,17 +79,12 @@ class OpenCLTracer:
         self._fault: str | None = None
         surface = world.surface
         with session.lock:
-            self._arguments = [
-                *self._there(surface.triangles, surface.links, surface.nodes, surface.children),
-                *self._there(surface.normals, surface.uv),
-                *self._there(world.shapes, world.faces, world.fractions, world.known),
-                *self._there(world.inner_faces, world.starts),
-                *self._there(world.to_local.astype(self._real), world.instances),
-                np.int32(len(world.instances)),
-                *self._there(world.looks.astype(self._real), world.pictures, world.textures, world.sky),
-                *(np.int32(size) for size in world.sky.shape[:2]),
-                *self._there(world.ground.astype(self._real), world.light.astype(self._real)),
-            ]
+            arrays = {name: getattr(surface, name) for name in OF_SURFACE}
+            arrays |= {name: getattr(world, name) for name in OF_WORLD}
+            arrays |= {name: getattr(world, name).astype(self._real) for name in OF_WORLD_REAL}
+            self._arguments = dict(zip(arrays, self._there(*arrays.values()), strict=True))
+            self._arguments["count"] = np.int32(len(world.instances))
+            self._arguments["sky_rows"], self._arguments["sky_columns"] = map(np.int32, world.sky.shape[:2])
 
     def trace(self, camera: Camera, settings: TraceSettings) -> Colours:
         """Like ``tracing.ray_tracer.trace``; ``settings.threads`` counts only where the CPU takes over.
@@ -137,8 +148,10 @@ class OpenCLTracer:
             views = self.session.upload(np.stack([camera.origin, camera.direction]).astype(self._real))
             there = self.session.reserve(image.nbytes)
             ways = (lookup_scene.WAYS[settings.eye], lookup_scene.WAYS[settings.way])
-            numbers = (*ways, settings.depth, settings.rows, settings.columns)
-            set_arguments(kernel, *self._arguments, views, *map(np.int32, numbers), there)
+            numbers = dict(zip(("eye", "way"), ways, strict=True))
+            numbers |= {name: getattr(settings, name) for name in ("depth", "rows", "columns")}
+            kernel.set(**self._arguments, camera=views, image=there)
+            kernel.set(**{name: np.int32(number) for name, number in numbers.items()})
             pixels = settings.rows * settings.columns
             self.session.launch(kernel, (-(-pixels // GROUP) * GROUP,), (GROUP,))
             self.session.download(image, there)

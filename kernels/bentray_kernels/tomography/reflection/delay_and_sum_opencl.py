@@ -12,7 +12,6 @@ from ...arrays import Flags, Floats, Ints
 from ...opencl import Session, session_or_warning
 from ...opencl.lost_device import computing_on
 from ...opencl.program import Program
-from ...opencl.session import set_arguments
 from .delay_and_sum import Pixels, Signals, Sums, empty_sums, sum_echoes
 from .element_times import ElementTimes
 
@@ -78,6 +77,25 @@ def _summed(
     least = math.cos(math.radians(pair_angle_deg))
     views = session.reserve(VIEW_BYTES * elements * at_once)
     found, total = session.reserve(SUM_BYTES * emissions * at_once), session.reserve(SUM_BYTES * at_once)
+    of_elements = {
+        "places": places,
+        "slowness": slowness,
+        "stored_x": np.int32(times.slowness.shape[1]),
+        "stored_y": np.int32(times.slowness.shape[2]),
+        "spacing": np.float64(spacing),
+    }
+    of_signals = {
+        "signals": parts,
+        "used": used,
+        "emitters": sent,
+        "receivers": back,
+        "count": np.int32(len(pairs[1])),
+        "samples": np.int32(samples),
+        "rate": np.float32(signals.rate_hz),
+        "first": np.float32(signals.first_s * signals.rate_hz),
+        "least": np.float32(least),
+        "scale": np.float32(1.0 / (1.0 - least)),
+    }
     kernels = [session.kernel(PROGRAM, name) for name in ("view_pixels", "sum_receivers", "sum_emissions")]
     for start in range(0, len(column), at_once):
         where = slice(start, start + at_once)
@@ -86,37 +104,11 @@ def _summed(
         count, wide = np.int32(len(m)), -(-len(m) // GROUP) * GROUP
         # Setting an argument does not keep its buffer alive: the names do.
         there = session.upload(px), session.upload(py)
-        stored = (np.int32(n) for n in times.slowness.shape[1:])
-        set_arguments(
-            kernels[0],
-            places,
-            slowness,
-            *stored,
-            np.float64(spacing),
-            *there,
-            count,
-            views,
-        )
+        kernels[0].set(**of_elements, px=there[0], py=there[1], pixels=count, views=views)
         session.launch(kernels[0], (wide, elements), (GROUP, 1))
-        rate, first = np.float32(signals.rate_hz), np.float32(signals.first_s * signals.rate_hz)
-        set_arguments(
-            kernels[1],
-            parts,
-            used,
-            sent,
-            back,
-            np.int32(len(pairs[1])),
-            np.int32(samples),
-            views,
-            count,
-            rate,
-            first,
-            np.float32(least),
-            np.float32(1.0 / (1.0 - least)),
-            found,
-        )
+        kernels[1].set(**of_signals, pixels=count, views=views, found=found)
         session.launch(kernels[1], (wide, emissions), (GROUP, 1))
-        set_arguments(kernels[2], found, np.int32(emissions), count, total)
+        kernels[2].set(found=found, emissions=np.int32(emissions), pixels=count, sums=total)
         session.launch(kernels[2], (wide,), (GROUP,))
         result = np.empty((len(m), 4), np.float32)
         session.download(result, total)

@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Float32s, Floats, Ints
 from ...errors import InvalidInput
 from ...opencl.program import Program
-from ...opencl.session import Session, set_arguments
+from ...opencl.session import DeviceKernel, Session
 from ...rays.vectorised import LONGEST
 from ..result import RESIDUAL_EDGES_S
 
@@ -149,6 +149,10 @@ def ring_bytes(nodes: int) -> int:
     return 4 * (SLOTS * (nodes + BESIDE) + CROSSINGS * nodes)
 
 
+# A kernel, its work-items, and those of a group; None: the driver's choice.
+Launch = tuple[DeviceKernel, tuple[int, ...], tuple[int, ...] | None]
+
+
 class DeviceSlices:
     """Slices on the device, and the work arrays of one update of each.
 
@@ -183,54 +187,59 @@ class DeviceSlices:
         self._group = next(group for group in GROUPS if group <= session.handle.max_work_group_size)
         self._numbers = np.array([len(emission.emitters) for emission in emissions], np.uint32)
         up, reserve = session.upload, session.reserve
-        self._slowness = up(np.ascontiguousarray(slowness))
-        self._coverage = up(np.ascontiguousarray(coverage))
-        self._region = up(np.ascontiguousarray(region, np.uint8))
-        self._count_of = up(self._numbers)
-        self._sources = up(self._padded([emission.emitters for emission in emissions], 0.0))
-        self._times = up(self._padded([emission.delta_tof for emission in emissions], np.nan))
-        self._ring = up(self._padded([emission.ring for emission in emissions], 0).astype(np.int32))
-        self._places = up(np.stack([emission.receivers for emission in emissions]))
-        self._scales, self._weights = up(scales / update.spacing), up(update.weights)
-        self._edges = up(RESIDUAL_EDGES_S)
         grids, rays = self._passes * self._nodes, self._passes * self._receivers
-        self._crossings, self._deviation = reserve(8 * grids), reserve(8 * grids)
-        self._fields, self._sums = reserve(16 * grids), session.zeros(2 * grids, np.int64)
-        self._tracks = reserve(12 * rays * self._most)
-        self._taken, self._residuals, self._correction = (
-            reserve(4 * rays),
-            reserve(8 * rays),
-            reserve(4 * rays),
-        )
-        self._exponents = reserve(4 * self._passes)
-        self._changes, self._blurred = reserve(4 * slices * self._nodes), reserve(4 * slices * self._nodes)
-        rows = slices * self._emitters
-        self._squares = session.zeros(rows, np.float64)
-        self._bins = session.zeros(slices * (RESIDUAL_EDGES_S.size - 1), np.uint32)
+        fields = reserve(16 * grids)
+        # By their names in the kernels.
+        self._buffers = {
+            "slowness": up(np.ascontiguousarray(slowness)),
+            "coverage": up(np.ascontiguousarray(coverage)),
+            "region": up(np.ascontiguousarray(region, np.uint8)),
+            "numbers": up(self._numbers),
+            "sources": up(self._padded([emission.emitters for emission in emissions], 0.0)),
+            "times": up(self._padded([emission.delta_tof for emission in emissions], np.nan)),
+            "ring": up(self._padded([emission.ring for emission in emissions], 0).astype(np.int32)),
+            "receivers": up(np.stack([emission.receivers for emission in emissions])),
+            "scales": up(scales / update.spacing),
+            "weights": up(update.weights),
+            "edges": up(RESIDUAL_EDGES_S),
+            "crossings": reserve(8 * grids),
+            "deviation": reserve(8 * grids),
+            "fields": fields,
+            "all_fields": fields,
+            "sums": session.zeros(2 * grids, np.int64),
+            "tracks": reserve(12 * rays * self._most),
+            "taken": reserve(4 * rays),
+            "residuals": reserve(8 * rays),
+            "correction": reserve(4 * rays),
+            "exponents": reserve(4 * self._passes),
+            "changes": reserve(4 * slices * self._nodes),
+            "blurred": reserve(4 * slices * self._nodes),
+            "squares": session.zeros(slices * self._emitters, np.float64),
+            "bins": session.zeros(slices * (RESIDUAL_EDGES_S.size - 1), np.uint32),
+        }
 
     def run(self) -> None:
         """Enqueue the updates by all emitters."""
         kernels = self._kernels()
         for step in range(-(-self._emitters // self._update.members)):
-            for kernel, index, size, group in kernels:
-                if index is not None:
-                    kernel.set_arg(index, np.uint32(step))
+            for kernel, size, group in kernels:
+                kernel.set_from({"step": np.uint32(step)})
                 self._session.launch(kernel, size, group)
 
     def images(self) -> tuple[Floats, Floats]:
         """Slowness and coverage of all slices."""
         slowness = np.empty((len(self._numbers), *self._shape))
         coverage = np.empty_like(slowness)
-        self._session.download(slowness, self._slowness)
-        self._session.download(coverage, self._coverage)
+        self._session.download(slowness, self._buffers["slowness"])
+        self._session.download(coverage, self._buffers["coverage"])
         return slowness, coverage
 
     def residuals(self) -> list[Residuals]:
         """Residuals of each slice, before the updates."""
         squares = np.empty((len(self._numbers), self._emitters))
         bins = np.empty((len(self._numbers), RESIDUAL_EDGES_S.size - 1), np.uint32)
-        self._session.download(squares, self._squares)
-        self._session.download(bins, self._bins)
+        self._session.download(squares, self._buffers["squares"])
+        self._session.download(bins, self._buffers["bins"])
         return [
             Residuals(squares[k, :number], bins[k].astype(np.int64)) for k, number in enumerate(self._numbers)
         ]
@@ -242,74 +251,48 @@ class DeviceSlices:
             into[: len(row)] = row
         return out
 
-    def _kernels(self) -> list[tuple[Any, int | None, tuple[int, ...], tuple[int, ...] | None]]:
-        """The launches of one update, in order, each with the place of the number of the update."""
+    def _kernels(self) -> list[Launch]:
+        """The launches of one update, in order; their argument ``step`` is the number of the update."""
         (nx, ny), update, session = self._shape, self._update, self._session
         passes, nodes, slices, group = self._passes, self._nodes, len(self._numbers), self._group
-        uint, at, members = np.uint32, np.uint32(0), np.uint32(update.members)
-        sides, indices = (np.int32(nx), np.int32(ny)), (self._count_of, members, at)
-        emitters, count = uint(self._emitters), uint(self._receivers)
         over_nodes, over_images = (_filled(nodes), passes), (_filled(nodes), slices)
         over_rays, rays_group = (_filled(self._receivers, RAYS_GROUP), passes), (RAYS_GROUP, 1)
-        reach, spacing = np.int32(update.weights.size - 1), np.float64(update.spacing)
-        traced = self._taken, self._residuals, self._correction
+        numbers = {
+            "nx": np.int32(nx),
+            "ny": np.int32(ny),
+            "nj": np.int32(nx),
+            "nk": np.int32(ny),
+            "nodes": np.int32(nodes),
+            "reach": np.int32(update.weights.size - 1),
+            "members": np.uint32(update.members),
+            "emitters": np.uint32(self._emitters),
+            "count": np.uint32(self._receivers),
+            "rings": np.uint32(self._rings),
+            "most": np.uint32(self._most),
+            "edge_count": np.uint32(RESIDUAL_EDGES_S.size),
+            "spacing": np.float64(update.spacing),
+            "water": np.float64(update.crossing_s),
+            "curved": np.int32(update.curved),
+            "step": np.uint32(0),
+            **dict(zip(("lowest", "highest"), map(np.float64, update.bounds), strict=True)),
+        }
 
-        def kernel(name: str, *arguments: Any) -> Any:
-            made = session.own_kernel(_program(group), name)
-            set_arguments(made, *arguments)
-            return made
+        def kernel(name: str, **own: Any) -> DeviceKernel:
+            return session.own_kernel(_program(group), name).set_from(self._buffers | numbers | own)
 
-        begin = kernel(
-            "begin",
-            *(self._slowness, self._sources, *indices, emitters, self._crossings, self._deviation),
-            *(*sides, np.int32(update.curved)),
-        )
-        interleave = kernel("interleave", *indices, self._crossings, self._deviation, *sides, self._fields)
-        trace = kernel(
-            "trace",
-            *(self._slowness, self._sources, *indices, emitters, self._places, self._ring, self._times),
-            *(uint(self._rings), count, *sides, spacing, np.float64(update.crossing_s)),
-            *(self._fields, uint(self._most), self._tracks, *traced),
-        )
-        summarise = kernel(
-            "summarise",
-            *(*indices, emitters, count, *traced, self._exponents, self._squares),
-            *(self._edges, uint(RESIDUAL_EDGES_S.size), self._bins),
-        )
-        project = kernel(
-            "project",
-            *(count, *sides, uint(self._most), self._tracks, self._taken, self._correction),
-            *(self._exponents, self._sums),
-        )
-        change = kernel(
-            "change",
-            *(*indices, np.int32(nodes), spacing, self._region, self._exponents, self._sums),
-            *(self._coverage, self._changes),
-        )
-        blur = kernel("blur", self._changes, self._blurred, self._weights, reach, *sides)
-        bounds = (np.float64(bound) for bound in update.bounds)
-        apply = kernel(
-            "apply",
-            *(*indices, self._blurred, self._weights, reach, *sides, self._scales, *bounds),
-            *(self._region, self._slowness),
-        )
-        launches: list[tuple[Any, int | None, tuple[int, ...], tuple[int, ...] | None]] = [
-            (begin, 4, over_nodes, None),
-            (interleave, 2, over_nodes, None),
-            (trace, 4, over_rays, rays_group),
-            (summarise, 2, (passes * group,), (group,)),
-            (project, None, over_rays, rays_group),
-            (change, 2, over_images, None),
-            (blur, None, over_images, None),
-            (apply, 2, over_images, None),
+        launches: list[Launch] = [
+            (kernel("begin"), over_nodes, None),
+            (kernel("interleave"), over_nodes, None),
+            (kernel("trace"), over_rays, rays_group),
+            (kernel("summarise"), (passes * group,), (group,)),
+            (kernel("project"), over_rays, rays_group),
+            (kernel("change"), over_images, None),
+            (kernel("blur"), over_images, None),
+            (kernel("apply"), over_images, None),
         ]
         if update.curved:
-            front = kernel(
-                "front",
-                *(self._sources, *indices, emitters, self._crossings, self._deviation, *sides),
-                local_memory(ring_bytes(ny)),
-            )
-            launches.insert(1, (front, 3, (passes * group,), (group,)))
+            front = kernel("front", ring=local_memory(ring_bytes(ny)))
+            launches.insert(1, (front, (passes * group,), (group,)))
         return launches
 
 
