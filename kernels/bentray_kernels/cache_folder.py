@@ -32,7 +32,7 @@ def cache_folder() -> Path | None:
     # Without a home the path is relative.
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111
     wanted = Path(home, "bentray")
-    reason = _fault_of(wanted)
+    reason = fault_of(wanted)
     if not reason:
         return wanted
     temporary = _temporary_folder()
@@ -62,7 +62,7 @@ def use_writable_folder(variable: str, name: str, usual: Path | None = None) -> 
     named = os.environ.get(variable, "")
     found = cache_folder()
     wanted = Path(named).absolute() if named else usual or found
-    reason = _fault_of(wanted) if wanted else ""
+    reason = fault_of(wanted) if wanted else ""
     if not reason:
         return None
     if named:
@@ -104,7 +104,7 @@ def _links_beside(sources: Path) -> Iterator[tuple[Path, Path]]:
     """Files of a cache beside the sources, with their paths in one folder, named as numba names them."""
     for compiled in sources.rglob("__pycache__"):
         folder = compiled.parent
-        name = f"{folder.name}_{hashlib.sha1(str(folder).encode(), usedforsecurity=False).hexdigest()}"
+        name = name_in_cache(folder)
         for file in compiled.glob("*.nb[ic]"):
             yield Path(name, file.name), file
 
@@ -119,11 +119,11 @@ def _temporary_folder() -> Path | None:
         return None
     # Compiled code of another user must not run.
     own = stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and not state.st_mode & 0o022
-    return folder if own and not _fault_of(folder / "bentray") else None
+    return folder if own and not fault_of(folder / "bentray") else None
 
 
 @cache
-def _fault_of(folder: Path) -> str:
+def fault_of(folder: Path) -> str:
     """Why a folder cannot be made or written; empty if it can."""
     if not folder.is_absolute():
         return "no home folder"
@@ -133,6 +133,11 @@ def _fault_of(folder: Path) -> str:
     except OSError as error:
         return error.strerror or type(error).__name__
     return ""
+
+
+def name_in_cache(sources: Path) -> str:
+    """Of the folder in ``NUMBA_CACHE_DIR`` for kernels of one folder of sources, as numba names it."""
+    return f"{sources.name}_{hashlib.sha1(str(sources).encode(), usedforsecurity=False).hexdigest()}"
 
 
 @cache

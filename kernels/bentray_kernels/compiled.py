@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import gc
+import sys
 from collections.abc import Callable
-from contextlib import suppress
+from functools import cached_property, wraps
+from pathlib import Path
 from typing import Any, TypeVar, overload
 
-from .cache_folder import use_writable_kernel_cache
+from .cache_folder import fault_of, name_in_cache, use_writable_kernel_cache
 from .sources import ROOT, digest
 
 # Before numba reads its variables.
 use_writable_kernel_cache(ROOT)
 
-from numba import config, njit  # noqa: E402
+from numba import config, njit, types  # noqa: E402
+from numba.core import event  # noqa: E402
+from numba.extending import models, register_model, typeof_impl  # noqa: E402
 
 # Another package may have imported numba earlier.
 config.reload_config()
@@ -36,44 +41,146 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: str = "never")
         inline: ``always`` for functions inside innermost loops; they must not allocate arrays.
     """
     if function is None:
-        return lambda wrapped: _compiled(wrapped, inline == "always")
-    return _compiled(function, inline == "always")
+        return lambda wrapped: Kernel(wrapped, inline == "always")
+    return Kernel(function, inline == "always")
 
 
-def _compiled(function: Callable[..., Any], inner: bool) -> Any:
-    # LLVM inlines inner functions, which are built without reference counts. If numba inlined them, each
-    # would count references to its array arguments atomically: factored marching took four times as long.
-    dispatcher = njit(nogil=True, error_model="numpy", forceinline=inner, _nrt=not inner)(function)
-    try:
-        dispatcher.enable_caching()
-    except RuntimeError:  # numba finds no folder that it can write to
-        return dispatcher
-    # Numba's own stamp is the time and size of the function's file: after an edit of an imported module, or
-    # an upgrade, the old inner function would still run. So the stamp is the content of all imported modules.
-    index = dispatcher._cache._cache_file
-    index._source_stamp = digest(function.__module__)
-    index._load_index = _without_unknown_types(index._load_index)
-    dispatcher._cache.save_overload = _where_possible(dispatcher._cache.save_overload)
-    return dispatcher
+class Kernel:
+    """A function that numba compiles once for each type of its arguments.
 
+    Args:
+        function: in Python.
+        inner: whether it is inlined. Numba then compiles no wrapper for calls from Python, which takes a
+            third of the time; such a call, as of a test, compiles a kernel around it.
 
-def _where_possible(save: Callable[..., None]) -> Callable[..., None]:
-    """A full disk, or a folder that has become read-only, stores nothing; the compiled function runs."""
+    Attributes:
+        py_func: the function.
+        dispatcher: numba's.
+    """
 
-    def saved(*arguments: Any) -> None:
-        with suppress(OSError):
-            save(*arguments)
-
-    return saved
-
-
-def _without_unknown_types(load: Callable[[], dict[Any, Any]]) -> Callable[[], dict[Any, Any]]:
-    """An index of another version may name types that this one does not have: it counts as empty."""
-
-    def loaded() -> dict[Any, Any]:
+    def __init__(self, function: Callable[..., Any], inner: bool) -> None:
+        wraps(function)(self)
+        self.py_func = function
+        # LLVM inlines inner functions, which are built without reference counts. If numba inlined them, each
+        # would count references to its array arguments atomically: factored marching took four times as long.
+        self.dispatcher = njit(
+            nogil=True,
+            error_model="numpy",
+            no_cfunc_wrapper=True,
+            no_cpython_wrapper=inner,
+            forceinline=inner,
+            _nrt=not inner,
+        )(function)
+        self._inner = inner
+        usual, config.CACHE_LOCATOR_CLASSES = config.CACHE_LOCATOR_CLASSES, f"{__name__}.CacheLocator"
         try:
-            return load()
-        except (AttributeError, ImportError):
-            return {}
+            self.dispatcher.enable_caching()
+        except RuntimeError:  # the locator finds no folder
+            pass
+        finally:
+            config.CACHE_LOCATOR_CLASSES = usual
 
-    return loaded
+    def __call__(self, *arguments: Any) -> Any:
+        try:
+            return self._called(*arguments)
+        except OSError:
+            # A full disk, or a folder that has become read-only, stores nothing; the function is compiled.
+            return self._called(*arguments)
+
+    def __reduce__(self) -> str:
+        return self.py_func.__qualname__
+
+    @cached_property
+    def _called(self) -> Callable[..., Any]:
+        if not self._inner:
+            return self.dispatcher  # type: ignore[no-any-return]
+        return njit(nogil=True, error_model="numpy")(lambda *arguments: self(*arguments))  # type: ignore[no-any-return]
+
+
+class KernelType(types.Dispatcher):  # type: ignore[misc]
+    """The type of a kernel that another one calls."""
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        """Compile for the types of a call: literal numbers as any others, which LLVM inlines as constants."""
+        args = tuple(types.unliteral(argument) for argument in args)
+        try:
+            return super().get_call_type(context, args, kws)
+        except OSError:  # as in ``Kernel.__call__``
+            return super().get_call_type(context, args, kws)
+
+
+register_model(KernelType)(models.OpaqueModel)
+
+
+@typeof_impl.register(Kernel)
+def _type_of_kernel(value: Kernel, _context: Any) -> KernelType:
+    return KernelType(value.dispatcher)
+
+
+class _CollectorPause(event.Listener):  # type: ignore[misc]
+    """Pauses the search for cyclic garbage while numba compiles, of whose time it takes a tenth."""
+
+    def __init__(self) -> None:
+        # Of calls that compile; numba lets one thread compile at a time.
+        self._depth = 0
+        self._enabled = False
+
+    def on_start(self, event: Any) -> None:
+        if self._depth == 0:
+            self._enabled = gc.isenabled()
+            gc.disable()
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self._depth -= 1
+        if self._depth == 0 and self._enabled:
+            gc.enable()
+
+
+event.register("numba:compile", _CollectorPause())
+
+
+class CacheLocator:
+    """Where numba caches a kernel, in the form that ``NUMBA_CACHE_LOCATOR_CLASSES`` documents.
+
+    Numba's own locators stamp a kernel by its own file: after an edit of an imported module, or an upgrade,
+    the old inner function would still run. Here the names of its files contain the digest of all modules that
+    its own imports.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._folder = folder
+        self._digest = digest(function.__module__)[:16]
+        self._function = function.__qualname__.replace("<", "").replace(">", "")
+        self._line = function.__code__.co_firstlineno
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> CacheLocator | None:
+        """The locator of a kernel; None if it is of no file, or no folder can be written."""
+        sources = Path(file).resolve().parent
+        folder = (
+            Path(config.CACHE_DIR, name_in_cache(sources)) if config.CACHE_DIR else sources / "__pycache__"
+        )
+        if not Path(file).is_file() or fault_of(folder):
+            return None
+        return cls(function, folder)
+
+    def get_cache_path(self) -> str:
+        """The folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """The digest of the sources."""
+        return self._digest
+
+    def get_disambiguator(self) -> str:
+        """What names of files contain beside that of the function."""
+        return f"{self._line}-{self._digest}"
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder before a kernel is stored, and remove what was compiled from other sources."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        version = f"py{sys.version_info.major}{sys.version_info.minor}"
+        for file in self._folder.glob(f"*.{self._function}-*.{version}*.nb[ic]"):
+            if self._digest not in file.name:
+                file.unlink(missing_ok=True)

@@ -90,7 +90,7 @@ def _first_order(problem: PointSource, nodes: Ints, times: Floats) -> Floats:
     """First-order times from given ones, flat and padded, s."""
     sweeper = Sweeper(problem.slowness.shape)
     sweeper.start(nodes, times)
-    sweeper.settle(problem.slowness, problem.spacing, ORDER_TOLERANCE)
+    sweeper.sweep_until_converged(problem.slowness, problem.spacing, ORDER_TOLERANCE)
     time = np.empty(problem.padded_slowness.size)
     sweeper.load(time, border=True)
     return time

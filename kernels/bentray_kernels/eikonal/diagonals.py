@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
-from ..crew import ALONE, Crew
+from ..thread_team import SINGLE_THREAD, ThreadTeam
 
 AnyFloats = NDArray[np.floating[Any]]
 
@@ -101,16 +101,22 @@ class Diagonals:
         *,
         scale: float = 1.0,
         border: bool = True,
-        crew: Crew = ALONE,
+        team: ThreadTeam = SINGLE_THREAD,
     ) -> None:
         """Copy a flat grid into its diagonals, times ``scale``; with its border, or without one."""
-        self._move(plain, into, flipped, scale, border, False, crew)
+        self._move(plain, into, flipped, scale, border, False, team)
 
     def load(
-        self, plain: Floats, source: Floats, flipped: bool, *, border: bool = True, crew: Crew = ALONE
+        self,
+        plain: Floats,
+        source: Floats,
+        flipped: bool,
+        *,
+        border: bool = True,
+        team: ThreadTeam = SINGLE_THREAD,
     ) -> None:
         """Copy the diagonals into a flat grid with or without its border."""
-        self._move(plain, source, flipped, 1.0, border, True, crew)
+        self._move(plain, source, flipped, 1.0, border, True, team)
 
     def _move(
         self,
@@ -120,7 +126,7 @@ class Diagonals:
         scale: float,
         border: bool,
         back: bool,
-        crew: Crew,
+        team: ThreadTeam,
     ) -> None:
         planes, nj, nk = self.shape
         rim = 2 if border else 0
@@ -130,7 +136,7 @@ class Diagonals:
             part, shape = self._group(diagonals, first, end - rim)
             move(plain[first * layer :], part, shape, self.stored, flipped, scale, border, back)
 
-        crew.share(some, planes + rim if planes else 1, 3)
+        team.map_blocks(some, planes + rim if planes else 1, 3)
 
     def _group(self, diagonals: Floats, first: int, end: int) -> tuple[Floats, tuple[int, int, int]]:
         """The planes ``first`` to ``end`` as a smaller grid.
@@ -152,19 +158,21 @@ class Diagonals:
         _exchange(nodes, values, self.shape, self.stored, source, flipped, True)
         return values
 
-    def turn(self, source: Floats, into: Floats, crew: Crew = ALONE) -> None:
+    def mirror(self, source: Floats, into: Floats, team: ThreadTeam = SINGLE_THREAD) -> None:
         """Copy the diagonals of a grid into those of the grid whose j is flipped."""
-        crew.share(lambda first, end: self._turn(source, into, first, end), self._padded_planes, 3)
+        team.map_blocks(lambda first, end: self._mirror(source, into, first, end), self._padded_planes, 3)
 
-    def turn_changed(self, source: Floats, into: Floats, changed: Columns, crew: Crew = ALONE) -> None:
-        """Like ``turn`` where no other nodes than ``changed`` differ."""
+    def mirror_changed(
+        self, source: Floats, into: Floats, changed: Columns, team: ThreadTeam = SINGLE_THREAD
+    ) -> None:
+        """Like ``mirror`` where no other nodes than ``changed`` differ."""
         plane = self.rows * self.width
 
         def some(first: int, end: int) -> None:
             # Copying single nodes costs more per node than copying tiles.
             stored = slice(first + 1, end + 1) if self.shape[0] else slice(None)
             begin = stored.start or 0
-            few = _turn_some(
+            few = _mirror_nodes(
                 source[begin * plane :],
                 into[begin * plane :],
                 changed.low[stored],
@@ -174,19 +182,19 @@ class Diagonals:
                 (end - first) * plane // FEW,
             )
             if not few:
-                self._turn(source, into, first, end)
+                self._mirror(source, into, first, end)
 
-        crew.share(some, self._padded_planes, 3)
+        team.map_blocks(some, self._padded_planes, 3)
 
-    def _turn(self, source: Floats, into: Floats, first: int, end: int) -> None:
+    def _mirror(self, source: Floats, into: Floats, first: int, end: int) -> None:
         part, shape = self._group(source, first, end - 2)
-        turn(part, self._group(into, first, end - 2)[0], shape, self.stored)
+        mirror(part, self._group(into, first, end - 2)[0], shape, self.stored)
 
     @property
     def _padded_planes(self) -> int:
         return self.shape[0] + 2 if self.shape[0] else 1
 
-    def no_columns(self) -> Columns:
+    def empty_ranges(self) -> Columns:
         """An empty set of nodes."""
         _, nj, nk = self.shape
         return Columns(np.full((self.planes, nj + nk + 4), NONE), np.full((self.planes, nj + nk + 4), -1))
@@ -195,15 +203,15 @@ class Diagonals:
         """Add the neighbours of flat padded ``nodes``."""
         _surround(nodes, self.shape, into.low, into.high)
 
-    def flip(self, columns: Columns, into: Columns, crew: Crew = ALONE) -> None:
+    def mirror_mask(self, columns: Columns, into: Columns, team: ThreadTeam = SINGLE_THREAD) -> None:
         """Write these nodes, or more, in the grid whose j is flipped."""
         into.clear()
 
         def some(first: int, end: int) -> None:
             part = slice(first, end)
-            _flip(columns.low[part], columns.high[part], self.shape, into.low[part], into.high[part])
+            _mirror_ranges(columns.low[part], columns.high[part], self.shape, into.low[part], into.high[part])
 
-        crew.share(some, self.planes, 1)
+        team.map_blocks(some, self.planes, 1)
 
 
 @kernel
@@ -249,8 +257,8 @@ def move(
 
 
 @kernel
-def turn(source: AnyFloats, into: AnyFloats, shape: tuple[int, int, int], stored: tuple[int, int]) -> None:
-    """Like ``Diagonals.turn``, for numbers of any width."""
+def mirror(source: AnyFloats, into: AnyFloats, shape: tuple[int, int, int], stored: tuple[int, int]) -> None:
+    """Like ``Diagonals.mirror``, for numbers of any width."""
     planes, nj, nk = shape
     rows, width = stored
     step = np.uint64(width + 1)
@@ -273,7 +281,7 @@ def turn(source: AnyFloats, into: AnyFloats, shape: tuple[int, int, int], stored
 
 
 @kernel
-def _turn_some(
+def _mirror_nodes(
     source: Floats,
     into: Floats,
     low: Ints,
@@ -354,7 +362,7 @@ def _surround(nodes: Ints, shape: tuple[int, int, int], low: Ints, high: Ints) -
 
 
 @kernel
-def _flip(low: Ints, high: Ints, shape: tuple[int, int, int], lower: Ints, higher: Ints) -> None:
+def _mirror_ranges(low: Ints, high: Ints, shape: tuple[int, int, int], lower: Ints, higher: Ints) -> None:
     _, nj, nk = shape
     for plane in range(low.shape[0]):
         for s in range(2, nj + nk + 1):

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..compiled import kernel
 from ..errors import InvalidInput
-from .heap import DONE, FAR, Nodes, change, take
+from .heap import DONE, FAR, Nodes, pop_min, push_or_update
 from .problem import PointSource
 from .updates import TIE, Front, factored_update, plain_update
 
@@ -101,7 +101,7 @@ def _march(
     group = np.empty(slowness.size, np.int32)
     length = 0
     for k in range(seeds.size):
-        length = change(heap, keys, place, length, seeds[k], seed_times[k])
+        length = push_or_update(heap, keys, place, length, seeds[k], seed_times[k])
     while length > 0:
         # Nodes that tie are accepted together, or the second differences would depend on their order.
         latest = keys[0] * (1.0 + TIE)
@@ -110,7 +110,7 @@ def _march(
             group[members] = heap[0]
             members += 1
             settled[heap[0]] = keys[0]
-            length = take(heap, keys, place, length)
+            length = pop_min(heap, keys, place, length)
         for k in range(members):
             node = group[k]
             for axis in range(3):
@@ -123,7 +123,7 @@ def _march(
                         neighbour, steps, spacing * slowness[neighbour], settled, second_order
                     )
                     if here == FAR or trial < keys[here]:
-                        length = change(heap, keys, place, length, neighbour, trial)
+                        length = push_or_update(heap, keys, place, length, neighbour, trial)
     return settled
 
 
@@ -166,7 +166,7 @@ def _march_factored(
                         continue
                     # A neighbour more can make the time later: it replaces what fewer neighbours gave.
                     trial = factored_update(neighbour, front)
-                    length = change(heap, keys, place, length, neighbour, trial)
+                    length = push_or_update(heap, keys, place, length, neighbour, trial)
         # Nodes that tie are accepted together, or the second differences would depend on their order.
         latest = keys[0] * (1.0 + TIE)
         members = 0
@@ -176,5 +176,5 @@ def _march_factored(
             members += 1
             settled[node] = keys[0]
             tau[node] = keys[0] / math.sqrt(squares[node])
-            length = take(heap, keys, place, length)
+            length = pop_min(heap, keys, place, length)
     return settled

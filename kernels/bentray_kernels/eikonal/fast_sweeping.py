@@ -19,9 +19,9 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..atomics import add, wait_for
 from ..compiled import kernel
-from ..crew import ALONE, Crew, crew_of
 from ..errors import InvalidInput
 from ..float32 import higher, lower
+from ..thread_team import SINGLE_THREAD, ThreadTeam, thread_team
 from .diagonals import FIRST, NONE, RUN, Columns, Diagonals, include
 from .problem import PointSource
 
@@ -47,16 +47,16 @@ class Grid(NamedTuple):
     Attributes:
         time: s; changed in place.
         crossing: slowness times spacing of each node, s.
-        waiting: nodes to update because of a neighbour in their plane.
-        across: nodes to update because of a neighbour in another plane.
+        active_in_plane: nodes to update because of a neighbour in their plane.
+        active_across_planes: nodes to update because of a neighbour in another plane.
         changed: nodes that a sweep has changed.
         shape, stored: as in ``Diagonals``.
     """
 
     time: Floats
     crossing: Floats
-    waiting: Columns
-    across: Columns
+    active_in_plane: Columns
+    active_across_planes: Columns
     changed: Columns
     shape: tuple[int, int, int]
     stored: tuple[int, int]
@@ -99,8 +99,8 @@ def fast_sweeping_many(
     """
     check_options(tolerance, threads)
     shape = times.shape[1:]
-    with crew_of(threads if len(shape) == 3 else 1) as crew:
-        sweeper = Sweeper(shape, crew)
+    with thread_team(threads if len(shape) == 3 else 1) as team:
+        sweeper = Sweeper(shape, team)
         for problem, into in zip(problems, times, strict=True):
             sweeper.solve(problem, tolerance, into)
 
@@ -116,26 +116,27 @@ def check_options(tolerance: float, threads: int) -> None:
 class Sweeper:
     """The arrays of sweeps over grids of one shape, used again for every solve.
 
-    A solve is ``start``, ``settle``, and as often as earlier times arrive ``lower`` and ``settle``.
+    A solve is ``start``, ``sweep_until_converged``, and for each arrival of earlier times ``lower_times`` and
+    ``sweep_until_converged``.
     """
 
-    def __init__(self, shape: tuple[int, ...], crew: Crew = ALONE) -> None:
+    def __init__(self, shape: tuple[int, ...], team: ThreadTeam = SINGLE_THREAD) -> None:
         self._grid = Diagonals.of(shape)
-        self._crew = crew
+        self._team = team
         # One block: the allocator keeps freed blocks of this size, and returns smaller ones to the system.
         arrays = np.empty((5, self._grid.size))
         for number, array in enumerate(arrays):
-            crew.fill(array, -math.inf if number < 3 else math.inf)
+            team.fill(array, -math.inf if number < 3 else math.inf)
         self._times = arrays[0], arrays[1]
         self._unknown = arrays[2]
         unknown = np.empty(math.prod(n + 2 for n in shape))
-        crew.fill(unknown, math.inf)
-        self._grid.store(unknown, self._unknown, False, crew=crew)
+        team.fill(unknown, math.inf)
+        self._grid.store(unknown, self._unknown, False, team=team)
         self._crossings = arrays[3], arrays[4]
-        # Nodes waiting for an update, in either grid, and nodes changed by the last sweeps.
-        self._waiting = self._grid.no_columns(), self._grid.no_columns()
-        self._across = self._grid.no_columns(), self._grid.no_columns()
-        self._changed = self._grid.no_columns()
+        # Nodes to update, in either grid, and nodes changed by the last sweeps.
+        self._active_in_plane = self._grid.empty_ranges(), self._grid.empty_ranges()
+        self._active_across_planes = self._grid.empty_ranges(), self._grid.empty_ranges()
+        self._changed = self._grid.empty_ranges()
         # Which grid holds the times, and whether the other one differs by the changed nodes alone.
         self._side, self._equal = 0, False
         # Slowness and spacing of the stored crossing times, in the original and in the flipped grid.
@@ -149,7 +150,7 @@ class Sweeper:
     def solve(self, problem: PointSource, tolerance: float, into: Floats) -> None:
         """Travel time of a problem of this shape, s, written into (nx, ny[, nz]) in C order."""
         self.start(*problem.seeds())
-        self.settle(problem.slowness, problem.spacing, tolerance)
+        self.sweep_until_converged(problem.slowness, problem.spacing, tolerance)
         self.load(into)
 
     def start(self, nodes: Ints, times: Floats) -> None:
@@ -160,68 +161,68 @@ class Sweeper:
                 updated.
             times: of these nodes, s.
         """
-        self._crew.copy(self._unknown, self._times[0])
+        self._team.copy(self._unknown, self._times[0])
         self._side, self._equal = 0, False
-        for columns in (self._waiting[0], self._across[0]):
+        for columns in (self._active_in_plane[0], self._active_across_planes[0]):
             columns.clear()
         self._put(nodes, times)
 
-    def resume(self, times: Floats) -> None:
+    def restart_from(self, times: Floats) -> None:
         """Begin with the times of all nodes, (nx, ny[, nz]), s, after sweeps that have ended."""
         padded = np.full(tuple(n + 2 for n in times.shape), math.inf)
         padded[(slice(1, -1),) * times.ndim] = times
-        self._grid.store(padded.ravel(), self._times[0], False, crew=self._crew)
+        self._grid.store(padded.ravel(), self._times[0], False, team=self._team)
         self._side, self._equal = 0, False
-        for columns in (self._waiting[0], self._across[0]):
+        for columns in (self._active_in_plane[0], self._active_across_planes[0]):
             columns.clear()
 
-    def lower(self, nodes: Ints, times: Floats) -> None:
+    def lower_times(self, nodes: Ints, times: Floats) -> None:
         """Go on from the present times with earlier ones of some nodes; as ``start``."""
         grid, side = self._grid, self._side
         if self._equal:
-            grid.turn_changed(self._times[side], self._times[1 - side], self._changed, self._crew)
+            grid.mirror_changed(self._times[side], self._times[1 - side], self._changed, self._team)
         if side == 1:
-            grid.flip(self._waiting[1], self._waiting[0], self._crew)
-            grid.flip(self._across[1], self._across[0], self._crew)
+            grid.mirror_mask(self._active_in_plane[1], self._active_in_plane[0], self._team)
+            grid.mirror_mask(self._active_across_planes[1], self._active_across_planes[0], self._team)
         self._changed.clear()
         self._side = 0
         self._put(nodes, times)
 
-    def settle(self, slowness: Floats, spacing: float, tolerance: float) -> None:
-        """Sweep until no node is waiting.
+    def sweep_until_converged(self, slowness: Floats, spacing: float, tolerance: float) -> None:
+        """Sweep until no node is active.
 
         Args:
             slowness: (nx, ny[, nz]), s/m, C order.
             spacing: node spacing, m.
             tolerance: as for ``fast_sweeping``.
         """
-        grid, crew = self._grid, self._crew
+        grid, team = self._grid, self._team
         quiet = 0
         while True:
             side = self._side
             here, there = self._times[side], self._times[1 - side]
-            waiting, across = self._waiting[side], self._across[side]
+            active_in_plane, across = self._active_in_plane[side], self._active_across_planes[side]
             self._changed.clear()
             crossing = self._crossing(side, slowness, spacing)
-            swept = Grid(here, crossing, waiting, across, self._changed, grid.shape, grid.stored)
+            swept = Grid(here, crossing, active_in_plane, across, self._changed, grid.shape, grid.stored)
             quiet = 0 if self._sweep(swept, tolerance) else quiet + 1
-            if quiet == 2 or not (waiting.any() or across.any()):
+            if quiet == 2 or not (active_in_plane.any() or across.any()):
                 return
             if self._equal:
-                grid.turn_changed(here, there, self._changed, crew)
+                grid.mirror_changed(here, there, self._changed, team)
             else:
-                grid.turn(here, there, crew)
+                grid.mirror(here, there, team)
             self._equal = True
-            grid.flip(waiting, self._waiting[1 - side], crew)
-            grid.flip(across, self._across[1 - side], crew)
+            grid.mirror_mask(active_in_plane, self._active_in_plane[1 - side], team)
+            grid.mirror_mask(across, self._active_across_planes[1 - side], team)
             self._side = 1 - side
 
     def load(self, into: Floats, *, border: bool = False) -> None:
         """Write the times, s, into a C-ordered array (nx, ny[, nz]), or into a padded one with ``border``."""
         times, flipped = self._times[self._side], self._side == 1
-        self._grid.load(into.reshape(-1), times, flipped, border=border, crew=self._crew)
+        self._grid.load(into.reshape(-1), times, flipped, border=border, team=self._team)
 
-    def take(self, nodes: Ints) -> Floats:
+    def times_at(self, nodes: Ints) -> Floats:
         """Times of flat padded ``nodes``, s."""
         return self._grid.take(nodes, self._times[self._side], self._side == 1)
 
@@ -229,11 +230,11 @@ class Sweeper:
         self._grid.put(nodes, times, self._times[0])
         if self._equal:
             self._grid.put(nodes, times, self._times[1], True)
-        self._grid.include_neighbours(nodes, self._waiting[0])
+        self._grid.include_neighbours(nodes, self._active_in_plane[0])
 
     def _sweep(self, grid: Grid, tolerance: float) -> int:
         """Whether a sweep in all orders of one of the two grids lowered a time by more than the tolerance."""
-        threads, at_once = self._crew.threads, self._crew.at_once
+        threads, at_once = self._team.threads, self._team.at_once
         if not grid.shape[0]:
             return int(_sweep_2d(grid, tolerance))
         if threads == 1:
@@ -251,7 +252,7 @@ class Sweeper:
             or not (stored[0] is slowness or np.array_equal(stored[0], slowness))
         ):
             plain, into = slowness.reshape(-1), self._crossings[side]
-            self._grid.store(plain, into, side == 1, scale=spacing, border=False, crew=self._crew)
+            self._grid.store(plain, into, side == 1, scale=spacing, border=False, team=self._team)
         self._stored[side] = slowness, spacing
         crossing: Floats = self._crossings[side]
         return crossing
@@ -313,19 +314,19 @@ def _share_sweeps(grid: Grid, tolerance: float, counters: Ints) -> int:
 
 @kernel(inline="always")
 def update_diagonal(grid: Grid, tolerance: float, layer: int, step: int, up: int, way: int) -> int:
-    """Update the waiting nodes of a diagonal of a plane, both counted in the order of the sweep.
+    """Update the active nodes of a diagonal of a plane, both counted in the order of the sweep.
 
-    Nodes that change are added to ``grid.changed``, their later neighbours to ``grid.waiting`` and
-    ``grid.across``. Those of other planes are kept apart, so that threads at adjacent planes never write to
-    the same place.
+    Nodes that change are added to ``grid.changed``, their later neighbours to ``grid.active_in_plane`` and
+    ``grid.active_across_planes``. Those of other planes are kept apart, so that threads at adjacent planes
+    never write to the same place.
 
     Args:
         up: 1 for planes in rising, -1 in falling order, 0 for a grid of two axes.
         way: 1 for diagonals in rising, -1 in falling order.
     """
     time, crossing, shape = grid.time, grid.crossing, grid.shape
-    low, high = grid.waiting
-    low_across, high_across = grid.across
+    low, high = grid.active_in_plane
+    low_across, high_across = grid.active_across_planes
     lowest, highest = grid.changed
     planes, nj, nk = shape
     plane = 0 if up == 0 else (2 + layer if up > 0 else planes + 1 - layer)

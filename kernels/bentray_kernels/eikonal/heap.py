@@ -20,67 +20,67 @@ DONE = -2
 
 
 @kernel(inline="always")
-def rise(heap: Nodes, keys: Floats, place: Nodes, hole: int, node: int, time: float) -> None:
-    """Put ``node`` into a hole, moving it up past all later entries."""
-    while hole > 0:
-        parent = (hole - 1) >> 1
+def sift_up(heap: Nodes, keys: Floats, place: Nodes, slot: int, node: int, time: float) -> None:
+    """Put ``node`` into a slot, and move it up past all later entries."""
+    while slot > 0:
+        parent = (slot - 1) >> 1
         if keys[parent] <= time:
             break
         above = heap[parent]
-        heap[hole] = above
-        keys[hole] = keys[parent]
-        place[above] = hole
-        hole = parent
-    heap[hole] = node
-    keys[hole] = time
-    place[node] = hole
+        heap[slot] = above
+        keys[slot] = keys[parent]
+        place[above] = slot
+        slot = parent
+    heap[slot] = node
+    keys[slot] = time
+    place[node] = slot
 
 
 @kernel(inline="always")
-def sink(heap: Nodes, keys: Floats, place: Nodes, length: int, hole: int) -> int:
-    """Move a hole down to a leaf along the earlier children; returns where it ends."""
-    child = 2 * hole + 2
+def sift_down(heap: Nodes, keys: Floats, place: Nodes, length: int, slot: int) -> int:
+    """Move an empty slot down to a leaf along the earlier children; returns where it ends."""
+    child = 2 * slot + 2
     while child < length:
         # Arithmetic instead of a branch: the processor cannot predict which child is earlier, and wrong
         # predictions at every level double the time of the whole march.
         child -= keys[child - 1] <= keys[child]
         below = heap[child]
-        heap[hole] = below
-        keys[hole] = keys[child]
-        place[below] = hole
-        hole = child
-        child = 2 * hole + 2
+        heap[slot] = below
+        keys[slot] = keys[child]
+        place[below] = slot
+        slot = child
+        child = 2 * slot + 2
     if child == length:
         child -= 1
         below = heap[child]
-        heap[hole] = below
-        keys[hole] = keys[child]
-        place[below] = hole
-        hole = child
-    return hole
+        heap[slot] = below
+        keys[slot] = keys[child]
+        place[below] = slot
+        slot = child
+    return slot
 
 
 @kernel(inline="always")
-def take(heap: Nodes, keys: Floats, place: Nodes, length: int) -> int:
+def pop_min(heap: Nodes, keys: Floats, place: Nodes, length: int) -> int:
     """Remove the earliest entry, which the caller has read from ``heap[0]`` and ``keys[0]``."""
     place[heap[0]] = DONE
     length -= 1
     if length > 0:
-        # The last entry nearly always belongs among the leaves: sink all the way, then rise a little.
+        # The last entry nearly always belongs among the leaves: sift down all the way, then up a little.
         node = np.int64(heap[length])
         time = keys[length]
-        rise(heap, keys, place, sink(heap, keys, place, length, 0), node, time)
+        sift_up(heap, keys, place, sift_down(heap, keys, place, length, 0), node, time)
     return length
 
 
 @kernel(inline="always")
-def change(heap: Nodes, keys: Floats, place: Nodes, length: int, node: int, time: float) -> int:
+def push_or_update(heap: Nodes, keys: Floats, place: Nodes, length: int, node: int, time: float) -> int:
     """Enter a node, or change the time of one that is there."""
-    hole = np.int64(place[node])
-    if hole == FAR:
-        hole = length
+    slot = np.int64(place[node])
+    if slot == FAR:
+        slot = length
         length += 1
-    elif time > keys[hole]:
-        hole = sink(heap, keys, place, length, hole)
-    rise(heap, keys, place, hole, node, time)
+    elif time > keys[slot]:
+        slot = sift_down(heap, keys, place, length, slot)
+    sift_up(heap, keys, place, slot, node, time)
     return length

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..compiled import kernel
-from .heap import DONE, FAR, Nodes, change, take
+from .heap import DONE, FAR, Nodes, pop_min, push_or_update
 from .updates import TIE, Front, factored_update
 
 # The place of nodes of the source's cell, whose times are final.
@@ -74,7 +74,7 @@ def accept_earlier(node: int, time: float, front: Front, waiting: Waiting) -> fl
         first = np.int64(heap[0])
         front.settled[first] = keys[0]
         front.tau[first] = keys[0] / math.sqrt(front.squares[first])
-        numbers[LENGTH] = take(heap, keys, place, numbers[LENGTH])
+        numbers[LENGTH] = pop_min(heap, keys, place, numbers[LENGTH])
         numbers[WAIT] -= 1
         correct(first, front, waiting)
         if node >= 0:
@@ -147,4 +147,4 @@ def _enter(node: int, front: Front, waiting: Waiting) -> None:
     time = factored_update(node, front)
     if time < math.inf or waiting.place[node] != FAR:
         heap, keys, place, _, numbers = waiting
-        numbers[LENGTH] = change(heap, keys, place, numbers[LENGTH], node, time)
+        numbers[LENGTH] = push_or_update(heap, keys, place, numbers[LENGTH], node, time)

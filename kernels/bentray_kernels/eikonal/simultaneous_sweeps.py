@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..compiled import kernel
-from ..crew import crew_of
+from ..thread_team import thread_team
 from .diagonals import Columns, Diagonals
 from .fast_sweeping import Grid, check_options, update_diagonal
 from .problem import PointSource
@@ -55,20 +55,26 @@ def simultaneous_sweeps(problem: PointSource, *, tolerance: float = 1e-12, threa
         side, up, way = orders[number]
         copy = copies[number]
         np.copyto(copy, time[side])
-        waiting = Columns(every.low.copy(), every.high.copy())
+        active_in_plane = Columns(every.low.copy(), every.high.copy())
         swept = Grid(
-            copy, crossing[side], waiting, grid.no_columns(), grid.no_columns(), grid.shape, grid.stored
+            copy,
+            crossing[side],
+            active_in_plane,
+            grid.empty_ranges(),
+            grid.empty_ranges(),
+            grid.shape,
+            grid.stored,
         )
         return int(_sweep_once(swept, tolerance, up, way))
 
     half = len(orders) // 2
-    with crew_of(threads) as crew:
-        while any(list(crew.at_once(sweep, range(len(orders))))):
+    with thread_team(threads) as team:
+        while any(list(team.at_once(sweep, range(len(orders))))):
             for side in (0, 1):
                 np.minimum.reduce(copies[side * half : (side + 1) * half], out=time[side])
-            grid.turn(time[1], copies[0], crew)
+            grid.mirror(time[1], copies[0], team)
             np.minimum(time[0], copies[0], out=time[0])
-            grid.turn(time[0], time[1], crew)
+            grid.mirror(time[0], time[1], team)
     times = np.empty(shape)
     grid.load(times.reshape(-1), time[0], False, border=False)
     return times
@@ -77,7 +83,7 @@ def simultaneous_sweeps(problem: PointSource, *, tolerance: float = 1e-12, threa
 def _all_columns(grid: Diagonals) -> Columns:
     """All nodes of a grid."""
     _, nj, nk = grid.shape
-    every = grid.no_columns()
+    every = grid.empty_ranges()
     s = np.arange(2, nj + nk + 1)
     planes = slice(2, -2) if grid.shape[0] else slice(None)
     every.low[planes, 2 : nj + nk + 1] = np.maximum(1, s - nj)

@@ -62,7 +62,7 @@ class Block:
         if times is None:
             self._sweeper.start(np.array(nodes, np.int64), np.array(list(seeds.values()), np.float64))
         else:
-            self._sweeper.resume(times)
+            self._sweeper.restart_from(times)
 
     @property
     def nbytes(self) -> int:
@@ -90,13 +90,13 @@ class Block:
             if face.shape != shape:
                 raise InvalidInput(f"faces[{number}]", f"shape {face.shape}", f"{shape}")
             finite = np.isfinite(face.ravel())
-            self._sweeper.lower(nodes[finite], face.ravel()[finite])
-        self._sweeper.settle(self._slowness, self._spacing, tolerance)
+            self._sweeper.lower_times(nodes[finite], face.ravel()[finite])
+        self._sweeper.sweep_until_converged(self._slowness, self._spacing, tolerance)
         own, changed = [], []
         for number, (side, (nodes, shape)) in enumerate(
             zip(sides(self._slowness.ndim), self._beyond, strict=True)
         ):
-            after = self._sweeper.take(_inwards(nodes, self._padded, side)).reshape(shape)
+            after = self._sweeper.times_at(_inwards(nodes, self._padded, side)).reshape(shape)
             before = sent_halo.faces[number] if sent_halo else np.full(shape, math.inf)
             earlier = after < before
             drop = before[earlier] - after[earlier]

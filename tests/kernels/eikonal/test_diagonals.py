@@ -30,7 +30,7 @@ def test_a_grid_comes_back_whole(shape, flipped):
     assert np.array_equal(back, plain)
     assert np.count_nonzero(stored >= 0.0) == plain.size
     turned = np.full(grid.size, -1.0)
-    grid.turn(stored, turned)
+    grid.mirror(stored, turned)
     other = np.full(grid.size, -1.0)
     grid.store(plain, other, not flipped)
     assert np.array_equal(turned, other)
@@ -88,18 +88,18 @@ def test_turning_what_changed_turns_the_whole(shape, seed, many):
     rng = np.random.default_rng(seed)
     stored, turned, expected = np.full((3, grid.size), -1.0)
     grid.store(numbered(shape), stored, False)
-    grid.turn(stored, turned)
+    grid.mirror(stored, turned)
     inside = np.flatnonzero(np.pad(np.ones(shape), 1).ravel())
     nodes = rng.choice(inside, inside.size if many else 1, replace=False)
     grid.put(nodes, rng.uniform(0.0, 1.0, nodes.size), stored)
-    changed = grid.no_columns()
+    changed = grid.empty_ranges()
     _, nj, nk = grid.shape
     for node in nodes:
         row, k = divmod(int(node), nk + 2)
         plane, j = divmod(row, nj + 2)
         include(*changed, plane + 1 if grid.shape[0] else 0, j + k, k, k, grid.shape)
-    grid.turn_changed(stored, turned, changed)
-    grid.turn(stored, expected)
+    grid.mirror_changed(stored, turned, changed)
+    grid.mirror(stored, expected)
     assert np.array_equal(turned, expected)
 
 
@@ -117,7 +117,7 @@ def members(grid, low, high):
 def test_neighbours_of_a_node_are_those_of_the_grid(shape):
     grid = Diagonals.of(shape)
     padded = tuple(n + 2 for n in shape)
-    computed = grid.no_columns()
+    computed = grid.empty_ranges()
     for node in np.ndindex(padded):
         expected = set()
         for axis in range(len(shape)):
@@ -137,9 +137,9 @@ def test_flipping_keeps_every_node(shape, seed):
     grid = Diagonals.of(shape)
     rng = np.random.default_rng(seed)
     nodes = rng.integers(0, numbered(shape).size, 5)
-    near, flipped = grid.no_columns(), grid.no_columns()
+    near, flipped = grid.empty_ranges(), grid.empty_ranges()
     grid.include_neighbours(nodes, near)
-    grid.flip(near, flipped)
+    grid.mirror_mask(near, flipped)
     _, nj, nk = grid.shape
     turned = members(grid, *flipped)
     for node in members(grid, *near):

@@ -96,8 +96,8 @@ def test_the_square_root_is_taken_of_vectors():
     fresh = njit(nogil=True, error_model="numpy")(fast_sweeping._sweep_3d.py_func)
     grid = Diagonals.of((4, 4, 4))
     time, crossing = np.full((2, grid.size), np.inf)
-    waiting, across, changed = (grid.no_columns() for _ in range(3))
-    fresh(fast_sweeping.Grid(time, crossing, waiting, across, changed, grid.shape, grid.stored), 0.0)
+    active_in_plane, across, changed = (grid.empty_ranges() for _ in range(3))
+    fresh(fast_sweeping.Grid(time, crossing, active_in_plane, across, changed, grid.shape, grid.stored), 0.0)
     (assembly,) = fresh.inspect_asm().values()
     if "vsqrt" not in assembly:
         pytest.skip("not a processor with AVX")

@@ -110,7 +110,7 @@ def _compiled_methods():
     """Which solvers have run in this process: their compiled inner functions have signatures."""
     from bentray_kernels.eikonal.accurate import _pass
 
-    return ["accurate"] if _pass.signatures else []
+    return ["accurate"] if _pass.dispatcher.signatures else []
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "tcp://"])

@@ -1,4 +1,4 @@
-"""A minimal linker for one object file, for PoCL on systems without `ld`.
+"""A minimal linker for one object file: the only PoCL of the Python index runs `ld`, which many systems lack.
 
 ``ld … -o LIBRARY … OBJECT …`` makes a shared library for x86-64 Linux of one relocatable object as LLVM makes
 it of a kernel: code, constants, data, and calls of functions that the process has. Options and libraries are

@@ -14,35 +14,35 @@ from .arrays import Floats
 
 
 @dataclass(frozen=True)
-class Crew:
+class ThreadTeam:
     """Threads, and the ``map`` that runs one call on each of them at the same time."""
 
     threads: int = 1
     at_once: Callable[..., Iterable[Any]] = map
 
-    def share(self, work: Callable[[int, int], None], planes: int, least: int) -> None:
-        """Call ``work(first, end)`` for adjacent groups of at least ``least`` planes, one for each thread."""
-        parts = max(1, min(self.threads, planes // least))
+    def map_blocks(self, function: Callable[[int, int], None], planes: int, min_planes: int) -> None:
+        """Call ``function(first, end)`` for adjacent blocks of ``min_planes`` or more, one a thread."""
+        parts = max(1, min(self.threads, planes // min_planes))
         cuts = [planes * part // parts for part in range(parts + 1)]
-        list(self.at_once(work, cuts[:-1], cuts[1:]))
+        list(self.at_once(function, cuts[:-1], cuts[1:]))
 
     def fill(self, array: Floats, value: float) -> None:
         """Fill a flat array; the first writing of memory, for which the system clears it, is shared too."""
-        self.share(lambda first, end: array[first:end].fill(value), array.size, 1)
+        self.map_blocks(lambda first, end: array[first:end].fill(value), array.size, 1)
 
     def copy(self, source: Floats, into: Floats) -> None:
         """Copy a flat array."""
-        self.share(lambda first, end: np.copyto(into[first:end], source[first:end]), into.size, 1)
+        self.map_blocks(lambda first, end: np.copyto(into[first:end], source[first:end]), into.size, 1)
 
 
-ALONE = Crew()
+SINGLE_THREAD = ThreadTeam()
 
 
 @contextmanager
-def crew_of(threads: int) -> Iterator[Crew]:
+def thread_team(threads: int) -> Iterator[ThreadTeam]:
     """That many threads, which end with the block."""
     if threads == 1:
-        yield ALONE
+        yield SINGLE_THREAD
         return
     with ThreadPoolExecutor(threads, "sweep") as pool:
-        yield Crew(threads, pool.map)
+        yield ThreadTeam(threads, pool.map)

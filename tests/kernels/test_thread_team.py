@@ -5,15 +5,15 @@ import threading
 import numpy as np
 import pytest
 
-from bentray_kernels.crew import ALONE, crew_of
 from bentray_kernels.eikonal.diagonals import Diagonals
+from bentray_kernels.thread_team import SINGLE_THREAD, thread_team
 
 
 @pytest.mark.parametrize(("planes", "least", "groups"), [(9, 3, 3), (8, 3, 2), (2, 3, 1), (40, 1, 4)])
 def test_each_plane_is_in_one_group(planes, least, groups):
     results = []
-    with crew_of(4) as crew:
-        crew.share(lambda first, end: results.append((first, end)), planes, least)
+    with thread_team(4) as team:
+        team.map_blocks(lambda first, end: results.append((first, end)), planes, least)
     results.sort()
     assert len(results) == groups
     assert [plane for first, end in results for plane in range(first, end)] == list(range(planes))
@@ -23,8 +23,8 @@ def test_each_plane_is_in_one_group(planes, least, groups):
 def test_threads_work_at_the_same_time_and_end():
     meeting = threading.Barrier(3, timeout=120.0)
     before = threading.active_count()
-    with crew_of(3) as crew:
-        crew.share(lambda _first, _end: meeting.wait(), 3, 1)
+    with thread_team(3) as team:
+        team.map_blocks(lambda _first, _end: meeting.wait(), 3, 1)
     assert threading.active_count() == before
 
 
@@ -33,28 +33,28 @@ def test_grids_are_copied_as_by_one_thread(shape):
     random = np.random.default_rng(1)
     grid = Diagonals.of(shape)
     inner, padded = random.random(np.prod(shape)), random.random(np.prod([n + 2 for n in shape]))
-    changed = grid.no_columns()
+    changed = grid.empty_ranges()
     grid.include_neighbours(np.flatnonzero(random.random(padded.size) < 0.05), changed)
 
-    def copies(crew):
+    def copies(team):
         arrays = np.empty((6, grid.size))
         for array in arrays:
-            crew.fill(array, -1.0)
-        grid.store(inner, arrays[0], True, scale=2.0, border=False, crew=crew)
-        grid.store(padded, arrays[1], False, crew=crew)
-        grid.turn(arrays[1], arrays[2], crew)
-        grid.turn_changed(arrays[1], arrays[3], changed, crew)
-        grid.turn_changed(arrays[1], arrays[4], grid.no_columns(), crew)
-        crew.copy(arrays[1], arrays[5])
-        back, inside, flipped = np.zeros(padded.size), np.zeros(inner.size), grid.no_columns()
-        grid.load(back, arrays[2], True, crew=crew)
-        grid.load(inside, arrays[0], True, border=False, crew=crew)
-        grid.flip(changed, flipped, crew)
+            team.fill(array, -1.0)
+        grid.store(inner, arrays[0], True, scale=2.0, border=False, team=team)
+        grid.store(padded, arrays[1], False, team=team)
+        grid.mirror(arrays[1], arrays[2], team)
+        grid.mirror_changed(arrays[1], arrays[3], changed, team)
+        grid.mirror_changed(arrays[1], arrays[4], grid.empty_ranges(), team)
+        team.copy(arrays[1], arrays[5])
+        back, inside, flipped = np.zeros(padded.size), np.zeros(inner.size), grid.empty_ranges()
+        grid.load(back, arrays[2], True, team=team)
+        grid.load(inside, arrays[0], True, border=False, team=team)
+        grid.mirror_mask(changed, flipped, team)
         return [*arrays, back, inside, *flipped]
 
-    alone = copies(ALONE)
-    with crew_of(3) as crew:
-        for first, several in zip(alone, copies(crew), strict=True):
+    alone = copies(SINGLE_THREAD)
+    with thread_team(3) as team:
+        for first, several in zip(alone, copies(team), strict=True):
             assert np.array_equal(first, several)
     # Some were copied, not all.
     assert 0 < np.count_nonzero(alone[3] >= 0.0) < padded.size
