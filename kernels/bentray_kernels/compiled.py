@@ -9,6 +9,8 @@ from functools import cached_property, wraps
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
+import numpy as np
+
 from .cache_folder import fault_of, name_in_cache, use_writable_kernel_cache
 from .sources import ROOT, digest
 
@@ -21,6 +23,10 @@ from numba.extending import models, register_model, typeof_impl  # noqa: E402
 
 # Another package may have imported numba earlier.
 config.reload_config()
+
+# Kernels take whole numbers in this width, so that one compilation serves all callers. To the type checker it
+# is any number.
+int64: Any = np.int64
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

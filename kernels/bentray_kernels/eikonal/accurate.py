@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
+from ..compiled import int64, kernel
 from ..errors import InvalidInput
 from ..splines import refined
 from .fast_marching import high_accuracy_fast_marching
@@ -155,7 +155,7 @@ def _pass(
         if squares[seeds[k]] > 0.0:
             tau[seeds[k]] = seed_times[k] / math.sqrt(squares[seeds[k]])
     for listed in order:
-        node = np.int64(listed)
+        node = int64(listed)
         if settled[node] < math.inf or (numbers[WAIT] > 0 and place[node] > DONE):
             continue
         time = factored_update(node, front)

@@ -20,7 +20,7 @@ import numpy as np
 from ..arrays import Float32s
 from ..compiled import kernel
 from ..float32 import lower
-from .diagonals import FIRST, Diagonals, move, turn
+from .diagonals import FIRST, Diagonals, mirror, move
 
 # First and last j, first and last k, counted from 1.
 Box = tuple[int, int, int, int]
@@ -112,7 +112,7 @@ def deviate(slowness: Float32s, j: float, k: float, at: SweepArrays, out: Float3
                 else:
                     moved |= _sweep_second_order(box, way, side, at)
             if side == 0 or sweeps < ROUNDS:
-                turn(at.deviation[side], at.deviation[1 - side], at.shape, at.stored)
+                mirror(at.deviation[side], at.deviation[1 - side], at.shape, at.stored)
     move(out, at.deviation[0], at.shape, at.stored, False, np.float32(1.0), False, True)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
+from ..compiled import int64, kernel
 from ..errors import InvalidInput
 from .problem import PointSource
 from .updates import first_order_2d, first_order_3d
@@ -81,7 +81,7 @@ def _iterate(
     while length > 0:
         following_length = 0
         for k in range(length):
-            node = np.int64(active[k])
+            node = int64(active[k])
             crossing = spacing * slowness[node]
             old = time[node]
             own = min(old, _updated(node, steps, crossing, time))

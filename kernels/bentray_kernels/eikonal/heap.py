@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compiled import int64, kernel
 
 Nodes = NDArray[np.int32]
 
@@ -67,7 +67,7 @@ def pop_min(heap: Nodes, keys: Floats, place: Nodes, length: int) -> int:
     length -= 1
     if length > 0:
         # The last entry nearly always belongs among the leaves: sift down all the way, then up a little.
-        node = np.int64(heap[length])
+        node = int64(heap[length])
         time = keys[length]
         sift_up(heap, keys, place, sift_down(heap, keys, place, length, 0), node, time)
     return length
@@ -76,7 +76,7 @@ def pop_min(heap: Nodes, keys: Floats, place: Nodes, length: int) -> int:
 @kernel(inline="always")
 def push_or_update(heap: Nodes, keys: Floats, place: Nodes, length: int, node: int, time: float) -> int:
     """Enter a node, or change the time of one that is there."""
-    slot = np.int64(place[node])
+    slot = int64(place[node])
     if slot == FAR:
         slot = length
         length += 1

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
+from ..compiled import int64, kernel
 from .heap import DONE, FAR, Nodes, pop_min, push_or_update
 from .updates import TIE, Front, factored_update
 
@@ -71,7 +71,7 @@ def accept_earlier(node: int, time: float, front: Front, waiting: Waiting) -> fl
     """
     heap, keys, place, _, numbers = waiting
     while numbers[LENGTH] > 0 and keys[0] <= time and keys[0] < math.inf and numbers[RESETS] <= heap.size:
-        first = np.int64(heap[0])
+        first = int64(heap[0])
         front.settled[first] = keys[0]
         front.tau[first] = keys[0] / math.sqrt(front.squares[first])
         numbers[LENGTH] = pop_min(heap, keys, place, numbers[LENGTH])
@@ -95,9 +95,9 @@ def correct(node: int, front: Front, waiting: Waiting) -> None:
     numbers[WAIT] += number
     numbers[RESETS] += number
     for k in range(number):
-        _enter(np.int64(taken[k]), front, waiting)
+        _enter(int64(taken[k]), front, waiting)
         # Their times depend on this node too.
-        _enter_neighbours(np.int64(taken[k]), front, waiting)
+        _enter_neighbours(int64(taken[k]), front, waiting)
     _enter_neighbours(node, front, waiting)
 
 
@@ -110,7 +110,7 @@ def _reset(start: int, number: int, spared: int, front: Front, waiting: Waiting)
     number = _reset_one(start, number, front, waiting)
     done = number - 1
     while done < number:
-        node = np.int64(waiting.taken[done])
+        node = int64(waiting.taken[done])
         done += 1
         since = front.tau[node] * (1.0 - TIE)
         for axis in range(3):

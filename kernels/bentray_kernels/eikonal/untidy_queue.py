@@ -9,9 +9,7 @@ list.
 
 from __future__ import annotations
 
-import numpy as np
-
-from ..compiled import kernel
+from ..compiled import int64, kernel
 from .heap import DONE, FAR, Nodes
 
 
@@ -19,7 +17,7 @@ from .heap import DONE, FAR, Nodes
 def enter(heads: Nodes, links: Nodes, place: Nodes, width: float, node: int, time: float) -> int:
     """Enter a node, or move one to the bucket of its earlier time; returns the number of nodes entered."""
     bucket = int(time / width) % heads.size
-    old = np.int64(place[node])
+    old = int64(place[node])
     if old == bucket:
         return 0
     if old != FAR:
@@ -47,7 +45,7 @@ def unlink(heads: Nodes, links: Nodes, node: int, bucket: int) -> None:
 @kernel(inline="always")
 def take(heads: Nodes, links: Nodes, place: Nodes, bucket: int) -> int:
     """Take out the last entered node of a bucket that has one."""
-    node = np.int64(heads[bucket])
+    node = int64(heads[bucket])
     unlink(heads, links, node, bucket)
     place[node] = DONE
-    return node
+    return int(node)

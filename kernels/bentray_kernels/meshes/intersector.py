@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float32s, Floats, Int32s, Vector
-from ..compiled import kernel
+from ..compiled import int64, kernel
 from .surface import Surface
 
 # Size of the traversal stack: more than a hierarchy has levels.
@@ -177,8 +177,6 @@ def intersect(
     for k in range(len(origins)):
         origin = (origins[k, 0], origins[k, 1], origins[k, 2])
         direction = (directions[k, 0], directions[k, 1], directions[k, 2])
-        face, s, u, v, front = closest(
-            surface, waiting, 0, origin, direction, 0.0, np.inf, np.int64(ignored[k])
-        )
+        face, s, u, v, front = closest(surface, waiting, 0, origin, direction, 0.0, np.inf, int64(ignored[k]))
         faces[k], distances[k], outside[k] = face, s, front
         weights[k, 0], weights[k, 1] = u, v

@@ -102,7 +102,7 @@ def empty_path(fan: Fan) -> tuple[Floats, Floats]:
     return np.empty((longest(fan.shape), axes)), np.empty((3, axes))
 
 
-@kernel(inline="always")
+@kernel
 def longest(shape: tuple[int, ...]) -> int:
     """Points of a path at most, in a grid of this shape."""
     return int(LONGEST * sum(shape) / STEP) + 16

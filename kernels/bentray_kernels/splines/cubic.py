@@ -43,7 +43,8 @@ def refined(values: ArrayLike, times: int) -> Floats:
         read = np.empty((times * (n - 1) + 1, *lines.shape[1:]))
         for part in range(times):
             places = n if part == 0 else n - 1
-            weights = _weights(part / times)
+            # The function itself: Python cannot call what is inlined without compiling it once more.
+            weights = _weights.py_func(part / times)  # type: ignore[attr-defined]
             read[part::times] = sum(weights[q] * lines[q : q + places] for q in range(4))
         fine = np.moveaxis(read, 0, axis)
     return np.ascontiguousarray(fine)

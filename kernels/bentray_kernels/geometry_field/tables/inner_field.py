@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Int32s
-from ...compiled import kernel
+from ...compiled import int64, kernel
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING, closest
 from ...meshes.surface import Surface
@@ -117,4 +117,4 @@ def _fill_rows(surface: Surface, points: Int32s, places: Floats, faces: Int32s) 
         )
         for exit_ in range(len(places)):
             along = (places[exit_, 0] - s[0], places[exit_, 1] - s[1], places[exit_, 2] - s[2])
-            faces[row, exit_] = closest(surface, waiting, 0, s, along, 0.0, 1.0, np.int64(points[row]))[0]
+            faces[row, exit_] = closest(surface, waiting, 0, s, along, 0.0, 1.0, int64(points[row]))[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Int32s, Vector
-from ...compiled import kernel
+from ...compiled import int64, kernel
 from ...meshes.face_plane import meet_plane
 from ...meshes.intersector import closest
 from ..tables.accurate_lookup import STEPS, settle
@@ -149,7 +149,7 @@ def _next_face(
     _, _, _, _, _, t, tx, ty = line_of(
         origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]
     )
-    face = np.int64(world.inner_faces[start + world.starts[left] * (6 * n * n) + number_at(t, tx, ty, n)])
+    face = int64(world.inner_faces[start + world.starts[left] * (6 * n * n) + number_at(t, tx, ty, n)])
     if face >= 0:
         face, distance, first, second = settle(world.surface, face, side, STEPS, *origin, *direction)
         length = (direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2) ** 0.5
