@@ -57,6 +57,7 @@ def test_file_and_exports_hold_the_image_on_its_own_grid(result, path, tmp_path)
     assert b"speed_mps" not in text
     summary = result_summary(volume, scan=path)
     assert "reflection" in summary["quantities"]
+    assert summary["automatic"] == result.provenance["automatic"] != ""
     assert summary["grids"]["reflection"]["shape"] == list(image.db.shape)
     assert summary["grids"]["reflection"]["spacing_m"] == [2e-3, 2e-3]
 
