@@ -1,6 +1,8 @@
 """The committed openapi.json equals the schema of the service."""
 
 import json
+import re
+import shlex
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -97,6 +99,28 @@ def test_every_json_body_has_examples_that_are_taken():
                 taken.validate_python(example["value"])
                 result += 1
     assert result >= 5
+
+
+def test_every_operation_has_an_example_by_curl():
+    server = json.loads(description())["servers"][0]
+    address = server["url"].format(address=server["variables"]["address"]["default"])
+    for name, operation in operations():
+        method, path = name.split()
+        (sample,) = operation["x-codeSamples"]
+        words = shlex.split(sample["source"])
+        assert words[0] == "curl"
+        assert re.fullmatch(re.sub(r"\{\w+\}", r"[a-z]+-…", address + path), words[-1]), name
+        sends = {"-d", "--data-binary"} & set(words)
+        assert bool(sends) == ("requestBody" in operation), name
+        assert method == (words[words.index("-X") + 1] if "-X" in words else "POST" if sends else "GET")
+        headers = [words[at + 1] for at, word in enumerate(words) if word == "-H"]
+        needed = {
+            parameter["name"]
+            for parameter in operation.get("parameters", ())
+            if parameter.get("required") and parameter["in"] != "path"
+        }
+        assert needed <= {header.partition(":")[0].lower() for header in headers}, name
+        assert "None" not in " ".join(headers), name
 
 
 def test_settings_of_a_job_are_described():

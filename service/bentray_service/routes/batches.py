@@ -17,7 +17,7 @@ from ..rows.jobs import Submission
 from ..rows.tables import ENDED
 from ..web.errors import problems
 from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
-from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types
+from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types, answer_made
 from .models.batch_records import BatchList, BatchRecord, BatchRequest
 from .record_conversion import batch_record
 
@@ -70,7 +70,7 @@ def start_batch(
     log.info("%s queued, %d jobs", row.id, row.size, extra={"figures": {"batch": row.id}})
     background.runner.notify(row.id)
     batch = batch_record(row)
-    response.headers["Location"] = batch.links["self"]
+    answer_made(response, batch.links["self"], replayed=row.replayed)
     return batch
 
 

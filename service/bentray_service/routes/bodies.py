@@ -19,11 +19,13 @@ IdempotencyKey = Annotated[
     Header(
         min_length=1,
         max_length=200,
-        description="Idempotency key: a repeated request with the same key starts nothing a second time.",
+        description="Idempotency key: a repeated request with the same key starts nothing a second time; its "
+        "answer is that of the first, with Idempotency-Replayed: true.",
     ),
 ]
 # Jobs are a few hundred bytes.
 LONGEST_JSON = 64 * 1024
+FORM = "application/x-www-form-urlencoded"
 
 
 def accept_media_types(*accepted: str) -> Callable[[Request], None]:
@@ -39,6 +41,29 @@ def accept_media_types(*accepted: str) -> Callable[[Request], None]:
             raise WrongMediaType(found, accepted)
 
     return check
+
+
+def accept_upload(*accepted: str) -> Callable[[Request], None]:
+    """As ``accept_media_types``, for bodies that are files, which tell their format themselves.
+
+    Without a Content-Type, or with that of a form, which ``curl --data-binary`` sends unless told otherwise,
+    the body is taken as a file too, but from no browser: any web page may send both without being asked for.
+    """
+    check = accept_media_types(*accepted)
+
+    def check_upload(request: Request) -> None:
+        stated = request.headers.get("content-type", "")
+        if stated not in ("", FORM) or "origin" in request.headers:
+            check(request)
+
+    return check_upload
+
+
+def answer_made(response: Response, address: str, *, replayed: bool) -> None:
+    """State in the headers where the thing is that a request made, and whether an earlier one made it."""
+    response.headers["Location"] = address
+    if replayed:
+        response.headers["Idempotency-Replayed"] = "true"
 
 
 class SmallBody(APIRoute):

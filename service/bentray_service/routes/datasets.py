@@ -15,7 +15,7 @@ from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
 from ..files.deletion import StoredItem
 from ..web.errors import problems
 from ..wiring import Access, Background, CallerTenant, FindDataset, Stores
-from .bodies import Limit, accept_media_types
+from .bodies import Limit, accept_upload
 from .downloads import download, download_of
 from .models.job_records import DatasetList, DatasetRecord
 from .models.name_changes import TEXT
@@ -38,7 +38,7 @@ router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 @router.post(
     "",
     status_code=status.HTTP_201_CREATED,
-    dependencies=[Depends(accept_media_types(*MEDIA_TYPES))],
+    dependencies=[Depends(accept_upload(*MEDIA_TYPES))],
     openapi_extra=body_of("dataset", MEDIA_TYPES),
     responses=problems(413, 415, 422, 503, 507),
 )

@@ -19,7 +19,7 @@ from ..rows.jobs import Submission
 from ..rows.tables import ENDED, JobRow
 from ..web.errors import problems
 from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
-from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types
+from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types, answer_made
 from .downloads import download, download_of
 from .models.job_records import EstimateRecord, JobList, JobRecord, PlanRecord, PreviewRecord, State
 from .models.name_changes import TEXT
@@ -69,10 +69,11 @@ def start_job(
     new = KINDS[kind].plan(job_request, tenant, stores, background.runner.compute)
     limits = stores.quota.most_bytes, access.settings.max_queued_jobs
     how = Submission(*limits, idempotency_key, caller.who, job_request.webhook)
-    job = _shown(stores, background, stores.jobs.add(tenant, new, how))
+    row = stores.jobs.add(tenant, new, how)
+    job = _shown(stores, background, row)
     log.info("%s queued, kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
     background.runner.notify(job.id)
-    response.headers["Location"] = job.links["self"]
+    answer_made(response, job.links["self"], replayed=row.replayed)
     return job
 
 

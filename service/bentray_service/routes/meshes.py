@@ -19,7 +19,7 @@ from ..rows.ids import new_id
 from ..rows.tables import MeshRow
 from ..web.errors import problems
 from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
-from .bodies import Limit, accept_media_types
+from .bodies import Limit, accept_upload
 from .models.surface_records import MeshList, MeshRecord
 from .pictures import while_connected
 from .record_conversion import mesh_record
@@ -39,7 +39,7 @@ router = APIRouter(prefix="/v1", tags=["meshes"])
 @router.post(
     "/meshes",
     status_code=status.HTTP_201_CREATED,
-    dependencies=[Depends(accept_media_types(*MEDIA_TYPES))],
+    dependencies=[Depends(accept_upload(*MEDIA_TYPES))],
     openapi_extra=body_of("mesh", MEDIA_TYPES),
     responses=problems(413, 415, 422, 503, 507),
 )

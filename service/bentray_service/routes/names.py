@@ -17,7 +17,7 @@ from ..rows.stored_tables import RequestKey
 from ..rows.tables import DatasetRow
 from ..web.errors import problems
 from ..wiring import Access, Background, CallerTenant, Stores
-from .bodies import IdempotencyKey, SmallBody, accept_media_types
+from .bodies import IdempotencyKey, SmallBody, accept_media_types, answer_made
 from .models.job_records import DatasetRecord, JobRecord
 from .models.name_changes import DatasetChanges, JobChanges, ScanCorrection
 from .record_conversion import dataset_record, job_record
@@ -94,7 +94,7 @@ async def correct_dataset(
     if made is None:
         made = await _corrected(dataset_id, given, key, request, stores, background, access, tenant)
     record = dataset_record(made)
-    response.headers["Location"] = record.links["self"]
+    answer_made(response, record.links["self"], replayed=made.replayed)
     return record
 
 

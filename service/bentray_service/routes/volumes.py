@@ -23,7 +23,7 @@ from ..view_parameters import ViewParameters
 from ..web.errors import problems
 from ..wiring import Access, Background, CallerTenant, FindVolume, Stores, access_of, caller_of
 from . import slices, volume_data, volume_summaries
-from .bodies import Limit, accept_media_types
+from .bodies import Limit, accept_upload
 from .downloads import headers_of, unchanged
 from .models.job_records import HistogramRecord, VolumeList, VolumeRecord
 from .pictures import PICTURE, check_render_rate, picture, while_connected
@@ -45,7 +45,7 @@ SMOOTHING = Range(0.0, MAX_SMOOTHING)
 @router.post(
     "",
     status_code=status.HTTP_201_CREATED,
-    dependencies=[Depends(accept_media_types(*MEDIA_TYPES))],
+    dependencies=[Depends(accept_upload(*MEDIA_TYPES))],
     openapi_extra=body_of("volume", MEDIA_TYPES),
     responses=problems(413, 415, 422, 503, 507),
 )

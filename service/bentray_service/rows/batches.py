@@ -47,7 +47,9 @@ class Batches(Repository):
                 insert_jobs(session, tenant, new, how, batch_id)
             else:
                 batch_id = before.id
-        return self.get(tenant, batch_id)
+        batch = self.get(tenant, batch_id)
+        batch.replayed = before is not None
+        return batch
 
     def get(self, tenant: Tenant, name: str) -> BatchRow:
         """One batch of this tenant with the state of its jobs.

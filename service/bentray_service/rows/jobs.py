@@ -111,7 +111,9 @@ class Jobs(NamedTable[JobRow]):
                 job_id = insert_jobs(session, tenant, [new], how, request=request)[0]
             else:
                 job_id = before.id
-        return self.get(tenant, job_id)
+        row = self.get(tenant, job_id)
+        row.replayed = before is not None
+        return row
 
     def search(
         self,

@@ -75,6 +75,8 @@ class RequestKey:
         if row is not None and row.request_sha256 != self.digest:
             accepted = "a unique key for every request; this key was used with another request"
             raise KeyReused("Idempotency-Key", repr(self.key), accepted)
+        if row is not None:
+            row.replayed = True
         return row
 
 

@@ -115,7 +115,14 @@ class Uploaded:
     tenant: Mapped[Owner]
 
 
-class DatasetRow(Uploaded, Base):
+class MadeOnce:
+    """What a request with an idempotency key makes."""
+
+    # Of a row in an answer: whether an earlier request made it.
+    replayed = False
+
+
+class DatasetRow(MadeOnce, Uploaded, Base):
     """A scan."""
 
     __tablename__ = "datasets"
@@ -148,7 +155,7 @@ class DatasetRow(Uploaded, Base):
     request_sha256: Mapped[RequestSha256]
 
 
-class JobRow(Base):
+class JobRow(MadeOnce, Base):
     """A job."""
 
     __tablename__ = "jobs"
@@ -209,7 +216,7 @@ class JobRow(Base):
         return min(1.0, self.done / self.total)
 
 
-class BatchRow(Base):
+class BatchRow(MadeOnce, Base):
     """Reconstructions of many scans that were started together; state and progress are those of the jobs."""
 
     __tablename__ = "batches"

@@ -8,12 +8,13 @@ from typing import Any
 
 from fastapi import FastAPI
 
+from .curl_examples import add_examples
 from .documents import document, table
 from .errors import EDGE, FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
 
 
 class OpenApiApp(FastAPI):
-    """A FastAPI application whose description has no null parameters.
+    """A FastAPI application whose description has no null parameters, and an example of each operation.
 
     FastAPI describes an optional parameter with the default None as null, but queries and headers cannot be
     null.
@@ -25,6 +26,7 @@ class OpenApiApp(FastAPI):
         document = super().openapi()
         if made:
             _drop_null(document)
+            add_examples(document)
         return document
 
 
@@ -42,7 +44,7 @@ def _drop_null(document: dict[str, Any]) -> None:
 
 Node = dict[str, Any]
 
-EXAMPLE = """curl -H 'Content-Type: application/x-hdf5' --data-binary @scan.h5 http://127.0.0.1:8000/v1/datasets
+EXAMPLE = """curl --data-binary @scan.h5 http://127.0.0.1:8000/v1/datasets
 
 curl -H 'Content-Type: application/json' http://127.0.0.1:8000/v1/jobs \\
      -d '{"kind": "reconstruction", "dataset": "ds-…", "settings": {"rays": "curved"}}'
@@ -95,6 +97,7 @@ def _operation(operation: tuple[str, str, Node]) -> str:
         f'<span class="method {method}">{method.upper()}</span> <code>{escape(path)}</code></h3>',
         f"<p>{escape(what.get('description', ''))}</p>",
     ]
+    parts += [f'<pre tabindex="0">{escape(sample["source"])}</pre>' for sample in what["x-codeSamples"]]
     if parameters := what.get("parameters"):
         known = [(p["name"], p["in"], type_words(p["schema"]), p.get("description", "")) for p in parameters]
         parts.append(table(("Parameter", "In", "Type", "Meaning"), known))

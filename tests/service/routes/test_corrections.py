@@ -121,6 +121,7 @@ def test_a_repeated_request_makes_no_second_copy(http, here, scan):
     assert (first.status_code, again.status_code) == (201, 201)
     assert again.json() == first.json()
     assert again.headers["location"] == first.headers["location"]
+    assert [one.headers.get("idempotency-replayed") for one in (first, again)] == [None, "true"]
     assert [one["id"] for one in copies_of(http, here)] == [first.json()["id"]]
     other = http.post(f"{here}/corrections", json={**WRONG, "frequency_hz": 5e5}, headers=key)
     assert (other.status_code, other.json()["field"]) == (409, "Idempotency-Key")

@@ -123,7 +123,24 @@ def test_empty_body(start):
         assert (body["status"], body["type"], body["field"]) == (422, "/problems/empty-body", "body")
 
 
-@pytest.mark.parametrize("headers", [{"Content-Type": "image/png"}, {}])
+FORM = {"Content-Type": "application/x-www-form-urlencoded"}
+
+
+@pytest.mark.parametrize("headers", [{}, FORM], ids=["nothing", "as curl"])
+def test_a_file_needs_no_media_type(start, scan, headers):
+    answer = upload(start(), scan().read_bytes(), headers)
+    assert answer.status_code == 201, answer.text
+
+
+# A page of another site can send a form, or a body without a type, and its browser does not ask before.
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Content-Type": "image/png"},
+        {"Origin": "http://localhost:3000"},
+        {"Origin": "http://localhost:3000", **FORM},
+    ],
+)
 def test_wrong_media_type_says_which_is_right(start, scan, headers):
     body = problem(upload(start(), scan().read_bytes(), headers))
     assert (body["status"], body["field"]) == (415, "Content-Type")

@@ -188,6 +188,7 @@ def test_the_same_request_twice_makes_one_job(http, dataset, work):
     first, again = (http.post("/v1/jobs", json=asked, headers=key) for _ in range(2))
     assert (first.status_code, again.status_code) == (202, 202)
     assert first.json()["id"] == again.json()["id"]
+    assert [one.headers.get("idempotency-replayed") for one in (first, again)] == [None, "true"]
     other = http.post("/v1/jobs", json={**asked, "settings": {"method": "sart", "nodes": 17}}, headers=key)
     assert (other.status_code, problem(other)["field"]) == (409, "Idempotency-Key")
     assert http.post("/v1/jobs", json=asked).json()["id"] != first.json()["id"]

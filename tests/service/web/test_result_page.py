@@ -463,7 +463,7 @@ def test_the_copied_code_reads_the_values(page, result):
     copied(page, "Copy as Python")
     names = {}
     exec(page.evaluate("navigator.clipboard.readText()"), names)
-    np.testing.assert_array_equal(names["values"], SPEED - 1300.0)
+    np.testing.assert_array_equal(names["coverage"], SPEED - 1300.0)
     np.testing.assert_allclose(names["x"], X0 + DX * np.arange(24))
     copied(page, "Copy as curl")
     words = shlex.split(page.evaluate("navigator.clipboard.readText()"))

@@ -18,11 +18,11 @@ import { Viewer } from "../viewer/viewer.js";
 function pythonOf({ job, volume }, stored) {
   const name = stored === "truth" ? "speed" : stored;
   return [
-    "from bentray_service.client import Client",
+    "import bentray",
     "",
-    `with Client("${location.origin}") as client:`,
+    `with bentray.Client("${location.origin}") as client:`,
     `    result = client.result("${volume.id}")  # of ${job.id}`,
-    `values = result.values["${name}"]  # ${volume.shape.join(" × ")} nodes, ${name === "speed" ? "m/s" : "SI units"}`,
+    `${name} = result.${name}  # ${volume.shape.join(" × ")} nodes, ${name === "speed" ? "m/s" : "SI units"}`,
     'x, y = (1e3 * result.coordinates[axis] for axis in ("x", "y"))  # mm',
     "",
   ].join("\n");
