@@ -6,7 +6,6 @@ import ast
 import re
 import subprocess
 import tomllib
-from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -58,13 +57,6 @@ def test_every_source_file_starts_with_its_purpose() -> None:
 def test_no_file_is_named_for_having_no_job() -> None:
     vague = {"utils", "util", "helpers", "helper", "common", "misc"}
     assert [str(path) for path in committed() if {path.stem, *path.parts} & vague] == []
-
-
-def test_folders_are_small_enough_to_search() -> None:
-    """At most 30 files; each recorded benchmark has one, or two with its picture, in one folder."""
-    counts = Counter(str(path.parent.relative_to(ROOT)) for path in committed())
-    del counts["benchmarks/results"]
-    assert {folder: count for folder, count in counts.items() if count > 30} == {}
 
 
 def test_no_file_names_a_folder_of_somebodys_machine() -> None:
