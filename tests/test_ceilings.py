@@ -20,9 +20,9 @@ SOURCES = (".py", ".cl", ".js", ".css", ".html")
 LINES = {
     # folders: (ceiling, goal)
     ("kernels", "workers", "service"): (94_400, 87_000),
-    ("service",): (32_600, 31_000),
-    ("tests",): (69_500, 58_000),
-    ("benchmarks",): (14_700, 13_000),
+    ("service",): (32_700, 31_000),
+    ("tests",): (69_000, 58_000),
+    ("benchmarks",): (15_500, 13_000),
 }
 
 FILES = 28
@@ -45,6 +45,7 @@ LONG_FUNCTIONS = {
     "worker.py worker": "options of a command are its parameters",
     "volume_data.py volume_data": "parameters of a route with their descriptions",
     "result_summary.py result_summary": "fields of one record, in its order",
+    "planning.py plan": "checks and lanes in the order in which a plan is refused",
 }
 
 
