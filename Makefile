@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start hundreds of Python processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint docs bench task-costs bench-device mutants release lock clean
+.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint tables docs bench task-costs bench-device mutants release lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -43,6 +43,9 @@ lint: install-dev ## check style, types and the import rules
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+
+tables: install ## write the tables of docs/ that come from the code: settings, commands, REST, formats
+	@cd docs && ../$(BIN)/python -m from_code
 
 docs: install-docs ## build the documentation into build/docs, with the gallery; warnings are errors
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html -d build/doctrees docs build/docs

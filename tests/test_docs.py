@@ -224,6 +224,18 @@ def test_every_variable_that_the_code_reads_is_in_the_table(monkeypatch: pytest.
     assert read <= set(re.findall(r"`([A-Z_]+)`", settings_table()))
 
 
+def test_the_tables_of_the_pages_are_those_of_the_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS))
+    from from_code import BUILT, MARK, PARTS, filled
+
+    shown: list[str] = []
+    for page in PAGES:
+        text = page.read_text()
+        assert filled(text) == text, f"{page.name}: run `make tables`"
+        shown += [mark[1] for mark in MARK.finditer(text)]
+    assert sorted(shown) == sorted([*PARTS, *BUILT])
+
+
 def test_every_page_is_in_the_contents() -> None:
     listed = re.findall(r"^((?:[\w-]+/)?[\w-]+)$", (DOCS / "index.md").read_text(), re.MULTILINE)
     pages = {str(page.relative_to(DOCS).with_suffix("")) for page in PAGES} - {"index"}

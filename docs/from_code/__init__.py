@@ -1,4 +1,4 @@
-"""Sphinx extension: generates tables of the reference pages from the code."""
+"""Tables of the pages from the code: most stand in the pages (`make tables`), one is made by Sphinx."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .scoreboard import scoreboard
 from .service_settings import settings_table
 from .sizing import measured_sizing, sizing
 
-# A page includes one of these by a comment on its own line: <!-- from the code: commands -->
+# A page holds one of these between comments on lines of their own: <!-- from the code: commands --> and
+# <!-- end: commands -->. `make tables` writes what is between them, and a test compares it.
 PARTS: dict[str, Callable[[], str]] = {
     "commands": commands,
     "routes": routes,
     "records": records,
     "dispersion": dispersion,
-    "dissertation": dissertation,
     "export formats": export_formats,
     "scan limits": scan_limits,
     "scan readers": scan_readers,
@@ -34,25 +34,34 @@ PARTS: dict[str, Callable[[], str]] = {
     "service settings": settings_table,
     "reconstruction settings": reconstruction_settings,
 }
+# Of megabytes, so it is made when the pages are built: <!-- from the code: dissertation -->
+BUILT = {"dissertation": dissertation}
 # Docstrings write absolute values between bars, which reStructuredText reads as substitutions.
 BARS = re.compile(r"``[^`]*``|\|")
-MARK = re.compile(r"^<!-- from the code: ([a-z ]+) -->$", re.MULTILINE)
+MARK = re.compile(r"^<!-- from the code: ([a-z ]+) -->$(?:.*?^<!-- end: \1 -->$)?", re.MULTILINE | re.DOTALL)
 
 
 def filled(text: str) -> str:
-    """The text of a page with every mark replaced by its generated part.
+    """The text of a page with the parts of ``PARTS`` as the code has them now.
 
     Raises:
         KeyError: for an unknown part.
     """
-    return MARK.sub(lambda mark: PARTS[mark[1]](), text)
+
+    def part(mark: re.Match[str]) -> str:
+        name = mark[1]
+        if name in BUILT:
+            return mark[0]
+        return f"<!-- from the code: {name} -->\n{PARTS[name]()}\n<!-- end: {name} -->"
+
+    return MARK.sub(part, text)
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Register the extension: fill pages when they are read, and escape bars in docstrings."""
+    """Register the extension: fill in what is built, and escape bars in docstrings."""
 
     def fill(app: Any, page: str, source: list[str]) -> None:
-        source[0] = filled(source[0])
+        source[0] = MARK.sub(lambda mark: BUILT[mark[1]]() if mark[1] in BUILT else mark[0], source[0])
 
     def keep_bars(app: Any, what: str, name: str, one: Any, options: Any, lines: list[str]) -> None:
         lines[:] = [BARS.sub(lambda found: "\\|" if found[0] == "|" else found[0], line) for line in lines]

@@ -41,7 +41,7 @@ def _prose(text: str) -> str:
         if before.strip():
             paragraphs.append(_plain(before.strip()))
         if example:
-            paragraphs.append(f"```sh\n{line.strip()}\n```")
+            paragraphs.append(f"```text\n{line.strip()}\n```")
     return "\n\n".join(paragraphs)
 
 
