@@ -66,7 +66,7 @@ def fast_iterative_opencl_many(
     seeds = []
     for problem in problems:
         nodes, starts = problem.seeds()
-        places = np.array(np.unravel_index(nodes, problem.padded_shape)) - 1
-        seeds.append((np.ravel_multi_index(tuple(places), problem.slowness.shape), starts))
+        indices = np.array(np.unravel_index(nodes, problem.padded_shape)) - 1
+        seeds.append((np.ravel_multi_index(tuple(indices), problem.slowness.shape), starts))
     with computing_on(session):
         times[...] = travel_times(session, crossings, seeds, tolerance)

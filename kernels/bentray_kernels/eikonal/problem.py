@@ -47,8 +47,8 @@ class SlownessGrid:
             raise InvalidInput("speed", f"shape {speeds.shape}", "a non-empty 2-D or 3-D array")
         # NaN fails the first comparison.
         if not (speeds.min() > 0.0 and speeds.max() < math.inf):
-            place = tuple(int(i) for i in np.argwhere(~(np.isfinite(speeds) & (speeds > 0.0)))[0])
-            raise InvalidInput("speed", f"{speeds[place]:g} at node {place}", "finite speeds > 0 m/s")
+            node = tuple(int(i) for i in np.argwhere(~(np.isfinite(speeds) & (speeds > 0.0)))[0])
+            raise InvalidInput("speed", f"{speeds[node]:g} at node {node}", "finite speeds > 0 m/s")
         step = float(spacing)
         if not (math.isfinite(step) and step > 0.0):
             raise InvalidInput("spacing", spacing, "a finite node spacing > 0 m")
@@ -197,13 +197,13 @@ def cell_of(source: Floats, shape: tuple[int, ...], spacing: float) -> Cell:
     """The nodes around a source with their multilinear weights, those of weight 0 left out."""
     corners: list[tuple[Node, float]] = [((), 1.0)]
     for axis, n in enumerate(shape):
-        place = float(source[axis]) / spacing
-        low = min(int(place), n - 1)
-        part = place - low
-        if part < ON_NODE or part > 1.0 - ON_NODE or low + 1 >= n:
-            ends = [(min(round(place), n - 1), 1.0)]
+        position = float(source[axis]) / spacing
+        low = min(int(position), n - 1)
+        fraction = position - low
+        if fraction < ON_NODE or fraction > 1.0 - ON_NODE or low + 1 >= n:
+            ends = [(min(round(position), n - 1), 1.0)]
         else:
-            ends = [(low, 1.0 - part), (low + 1, part)]
+            ends = [(low, 1.0 - fraction), (low + 1, fraction)]
         corners = [((*node, i), weight * w) for node, weight in corners for i, w in ends]
     return corners
 

@@ -22,8 +22,8 @@ def product_ranges(weights: CellWeights, divisions: int) -> tuple[Floats, Floats
     lows, highs = [], []
     for p in np.ndindex(divisions, divisions, divisions):
         least, most = low[p[0]], high[p[0]]
-        for part in p[1:]:
-            ends = [np.multiply.outer(a, b) for a in (least, most) for b in (low[part], high[part])]
+        for division in p[1:]:
+            ends = [np.multiply.outer(a, b) for a in (least, most) for b in (low[division], high[division])]
             least, most = np.minimum.reduce(ends), np.maximum.reduce(ends)
         lows.append(least.ravel())
         highs.append(most.ravel())

@@ -62,17 +62,15 @@ class CellWeights:
         """Least and greatest weight of each node in each of equal parts of the cell, (divisions, nodes)."""
         low = np.full((divisions, self.nodes), np.inf)
         high = np.full((divisions, self.nodes), -np.inf)
-        for part in range(divisions):
+        for k in range(divisions):
             for number, piece in enumerate(self.powers):
-                start, stop = np.clip(
-                    np.array([part, part + 1]) / divisions * len(self.powers) - number, 0.0, 1.0
-                )
+                start, stop = np.clip(np.array([k, k + 1]) / divisions * len(self.powers) - number, 0.0, 1.0)
                 if start == stop:
                     continue
                 for node, weight in enumerate(piece):
                     values = _extremes(weight, start, stop)
-                    low[part, node] = min(low[part, node], values.min())
-                    high[part, node] = max(high[part, node], values.max())
+                    low[k, node] = min(low[k, node], values.min())
+                    high[k, node] = max(high[k, node], values.max())
         # Rounding leaves ±1e-17 where a B-spline is 0; its sign would turn a lower bound into none.
         low[np.abs(low) < 1e-15] = 0.0
         return low, high
@@ -106,8 +104,8 @@ def _substituted(powers: Floats, start: float, width: float) -> Floats:
 def _extremes(weight: Floats, start: float, stop: float) -> Floats:
     """Values at both ends and where the slope is zero between them."""
     flat = np.real(polynomial.polyroots(polynomial.polytrim(polynomial.polyder(weight), 1e-14)))
-    places = np.concatenate([[start, stop], flat[(flat > start) & (flat < stop)]])
-    return np.asarray(polynomial.polyval(places, weight))
+    points = np.concatenate([[start, stop], flat[(flat > start) & (flat < stop)]])
+    return np.asarray(polynomial.polyval(points, weight))
 
 
 def _bernstein(degree: int) -> Floats:

@@ -81,8 +81,8 @@ def _lines(count: int) -> Float32s:
 def _neighbours(faces: NDArray[np.int32]) -> Ints:
     """(faces, 3) the face across each edge, −1 where there is none or more than one."""
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].astype(np.int64), axis=2).reshape(-1, 2)
-    _, place, count = np.unique(edges[:, 0] << 32 | edges[:, 1], return_inverse=True, return_counts=True)
-    sides = np.argsort(place, kind="stable")
+    _, edge, count = np.unique(edges[:, 0] << 32 | edges[:, 1], return_inverse=True, return_counts=True)
+    sides = np.argsort(edge, kind="stable")
     first = np.concatenate([[0], np.cumsum(count)[:-1]])
     pair = count == 2
     a, b = sides[first[pair]], sides[first[pair] + 1]

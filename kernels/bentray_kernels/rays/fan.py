@@ -59,8 +59,8 @@ class Fan(NamedTuple):
         if times.ndim not in (2, 3) or times.size == 0:
             raise InvalidInput("tof", f"shape {times.shape}", "a non-empty 2-D or 3-D array")
         if not np.isfinite(times).all():
-            place = tuple(int(i) for i in np.argwhere(~np.isfinite(times))[0])
-            raise InvalidInput("tof", f"{times[place]} at node {place}", "finite travel times in seconds")
+            node = tuple(int(i) for i in np.argwhere(~np.isfinite(times))[0])
+            raise InvalidInput("tof", f"{times[node]} at node {node}", "finite travel times in seconds")
         step = float(spacing)
         if not (math.isfinite(step) and step > 0.0):
             raise InvalidInput("spacing", spacing, "a finite node spacing > 0 m")

@@ -61,9 +61,9 @@ def allocate_bundle(rays: int, shape: tuple[int, int]) -> Bundle:
     """Memory for up to ``rays`` rays through a grid; used again for every source."""
     steps = LONGEST * sum(shape)
     x, y, to_x, to_y, length, time = np.empty((6, rays), np.float32)
-    middle_x, middle_y, part = np.empty((3, steps, rays), np.float32)
+    middle_x, middle_y, fraction = np.empty((3, steps, rays), np.float32)
     read, active = np.empty(4 * rays, np.float32), np.empty(steps, np.int64)
-    return Bundle(x, y, to_x, to_y, length, time, read, middle_x, middle_y, part, active)
+    return Bundle(x, y, to_x, to_y, length, time, read, middle_x, middle_y, fraction, active)
 
 
 @kernel

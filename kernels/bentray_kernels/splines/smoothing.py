@@ -101,8 +101,8 @@ def smoothing_for_noise(volume: ArrayLike, order: int, sigma: float | None = Non
 def response(symmetric: Floats, frequencies: Floats) -> Floats:
     """Fourier transform of a symmetric kernel on the nodes, its middle at 0; radians per node."""
     reach = len(symmetric) // 2
-    places = np.arange(-reach, reach + 1)
-    return np.asarray(np.cos(np.multiply.outer(frequencies, places)) @ symmetric)
+    offsets = np.arange(-reach, reach + 1)
+    return np.asarray(np.cos(np.multiply.outer(frequencies, offsets)) @ symmetric)
 
 
 def _passed(order: int, smoothing: float, shape: Sequence[int]) -> Floats:

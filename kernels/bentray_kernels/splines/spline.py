@@ -108,9 +108,9 @@ class Spline:
         Raises:
             InvalidInput: for points of another shape.
         """
-        places = self.places(points)
-        values = np.empty(len(places))
-        _values(self.coefficients, self.stencil, places, self._last, values)
+        positions = self.positions(points)
+        values = np.empty(len(positions))
+        _values(self.coefficients, self.stencil, positions, self._last, values)
         return values
 
     def gradient(self, points: ArrayLike) -> Floats:
@@ -123,17 +123,17 @@ class Spline:
 
     def value_and_gradient(self, points: ArrayLike) -> tuple[Floats, Floats]:
         """Both at once, for little more than the price of one."""
-        places = self.places(points)
-        values, gradients = np.empty(len(places)), np.empty(places.shape)
-        _values_and_gradients(self.coefficients, self.stencil, places, self._last, values, gradients)
+        positions = self.positions(points)
+        values, gradients = np.empty(len(positions)), np.empty(positions.shape)
+        _values_and_gradients(self.coefficients, self.stencil, positions, self._last, values, gradients)
         return values, gradients
 
-    def places(self, points: ArrayLike) -> Floats:
+    def positions(self, points: ArrayLike) -> Floats:
         """The points as (m, ndim), float64, C order; raises InvalidInput for another shape."""
-        places = np.ascontiguousarray(points, dtype=np.float64)
-        if places.ndim != 2 or places.shape[1] != len(self.shape):
-            raise InvalidInput("points", f"shape {places.shape}", f"shape (m, {len(self.shape)}), nodes")
-        return places
+        positions = np.ascontiguousarray(points, dtype=np.float64)
+        if positions.ndim != 2 or positions.shape[1] != len(self.shape):
+            raise InvalidInput("points", f"shape {positions.shape}", f"shape (m, {len(self.shape)}), nodes")
+        return positions
 
 
 def _type_of(dtype: DTypeLike) -> np.dtype[Any]:

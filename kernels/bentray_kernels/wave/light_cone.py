@@ -54,9 +54,9 @@ def light_cone(medium: Medium, source: Points, detectors: Points, until: Ints) -
     end = _last_use(middle, detectors.first + (REACH - 0.5), until, slack, speed)
     blocks = BLOCK_STEPS * np.arange(max(1, -(-int(until.max(initial=0)) // BLOCK_STEPS)))[:, None, None]
     active = (begin <= blocks + BLOCK_STEPS) & (end >= blocks)
-    found = active.any(axis=2)
-    low = np.where(found, HALO + TILE_NODES * active.argmax(axis=2), HALO)
-    high = np.where(found, HALO + TILE_NODES * (count[1] - active[:, :, ::-1].argmax(axis=2)), HALO)
+    reached = active.any(axis=2)
+    low = np.where(reached, HALO + TILE_NODES * active.argmax(axis=2), HALO)
+    high = np.where(reached, HALO + TILE_NODES * (count[1] - active[:, :, ::-1].argmax(axis=2)), HALO)
     return np.stack((low, np.minimum(high, nodes[1] - HALO)), axis=-1).astype(np.int32)
 
 

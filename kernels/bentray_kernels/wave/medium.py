@@ -122,9 +122,9 @@ class Medium:
 
 
 def _converted(values: Floats, dtype: DTypeLike) -> NDArray[np.floating]:
-    found = zeros(values.shape, dtype)
-    found[...] = values
-    return found
+    converted = zeros(values.shape, dtype)
+    converted[...] = values
+    return converted
 
 
 def _padding(shape: tuple[int, ...], margin: int) -> list[tuple[int, int]]:
@@ -142,7 +142,7 @@ def _sponge(shape: tuple[int, ...], edge_nodes: int) -> Floats:
     margin = edge_nodes + HALO
     profiles = []
     for nodes, width in zip(shape, _padding(shape, margin), strict=True):
-        place = np.arange(nodes + sum(width)) - margin
-        depth = np.clip(np.maximum(-place, place - (nodes - 1)) / edge_nodes, 0.0, 1.0)
+        node = np.arange(nodes + sum(width)) - margin
+        depth = np.clip(np.maximum(-node, node - (nodes - 1)) / edge_nodes, 0.0, 1.0)
         profiles.append(strongest * depth**EDGE_POWER)
     return np.asarray(reduce(np.maximum, np.ix_(*profiles)))

@@ -46,5 +46,5 @@ def check_memory(shape: Sequence[int], edge_nodes: int, dtype: DTypeLike, memory
     """
     takes = emission_bytes(shape, edge_nodes, dtype)
     if takes > memory_bytes:
-        nodes = " x ".join(str(one) for one in shape)
+        nodes = " x ".join(str(count) for count in shape)
         raise InvalidInput("speed", f"{nodes} nodes, {takes} bytes", f"at most {memory_bytes:.0f} bytes")

@@ -28,7 +28,7 @@ class Points(NamedTuple):
     weights: Floats
 
 
-def place(positions: Floats, spacing: float, shape: tuple[int, ...], margin: int) -> Points:
+def points_at(positions: Floats, spacing: float, shape: tuple[int, ...], margin: int) -> Points:
     """Elements of an image on the padded grid.
 
     Injecting a source and reading a field with these weights are transposes of each other, so that emitter

@@ -13,7 +13,7 @@ from ..errors import InvalidInput
 from .cache_lines import zeros
 from .light_cone import BLOCK_STEPS, Spans, everywhere, light_cone
 from .medium import Medium
-from .points import Points, place
+from .points import Points, points_at
 from .stencil import OPTIMISED, weights
 from .time_blocks import Poll, no_poll, split_steps
 from .time_step import (
@@ -98,7 +98,7 @@ def place_scan(medium: Medium, emitter: Floats, receivers: Floats, wavelet: Floa
 
 def place_elements(medium: Medium, positions: Floats) -> Points:
     """Elements on the medium's grid, with weights of its type."""
-    points = place(positions, medium.spacing, medium.speed.shape, medium.margin)
+    points = points_at(positions, medium.spacing, medium.speed.shape, medium.margin)
     return Points(points.first, points.weights.astype(medium.keep.dtype))
 
 

@@ -18,7 +18,7 @@ def test_a_plane_wave_is_read_between_nodes(position, points_per_wavelength, ang
     number = 2.0 * np.pi / points_per_wavelength
     x, y = np.meshgrid(np.arange(20.0), np.arange(20.0), indexing="ij")
     kx, ky = number * np.cos(angle), number * np.sin(angle)
-    result = points.place(np.array([[position, 8.3]]), 1.0, (20, 20), 0)
+    result = points.points_at(np.array([[position, 8.3]]), 1.0, (20, 20), 0)
     i, j = result.first[0]
     wx, wy = result.weights[0]
     wave = np.exp(1j * (kx * x + ky * y))
@@ -28,7 +28,7 @@ def test_a_plane_wave_is_read_between_nodes(position, points_per_wavelength, ang
 
 
 def test_an_element_on_a_node_touches_it_alone():
-    computed = points.place(np.array([[7.0, 5.0]]), 1.0, (20, 20), 3)
+    computed = points.points_at(np.array([[7.0, 5.0]]), 1.0, (20, 20), 3)
     expected = np.zeros((2, 2 * points.REACH))
     expected[:, points.REACH - 1] = 1.0
     assert np.allclose(computed.weights[0], expected, atol=1e-12)
@@ -38,4 +38,4 @@ def test_an_element_on_a_node_touches_it_alone():
 @pytest.mark.parametrize("position", [[-0.1, 3.0], [3.0, 19.1], [np.nan, 1.0]])
 def test_elements_outside_are_rejected(position):
     with pytest.raises(InvalidInput, match="element_position_m"):
-        points.place(np.array([position]), 1.0, (20, 20), 4)
+        points.points_at(np.array([position]), 1.0, (20, 20), 4)

@@ -65,9 +65,9 @@ def rasterised(chart: Chart, size: int) -> Raster:
     face = np.full((size, size), -1, np.int32)
     weights = np.zeros((size, size, 3))
     cells = np.zeros((size - 1, size - 1), bool)
-    places = chart.uv * (size - 1)
-    _fill(places, kind, face, weights)
-    _follow(places, seam_sides(chart), kind, face, weights, cells)
+    positions = chart.uv * (size - 1)
+    _fill(positions, kind, face, weights)
+    _follow(positions, seam_sides(chart), kind, face, weights, cells)
     inside = kind == INSIDE
     cells |= inside[:-1, :-1] | inside[1:, :-1] | inside[:-1, 1:] | inside[1:, 1:]
     return Raster(kind, face, weights, cells)

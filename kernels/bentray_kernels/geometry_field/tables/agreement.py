@@ -24,9 +24,9 @@ def agreement(field: OuterField) -> NDArray[np.uint8]:
 
     The last samples of each face of the cube have no following ones; no lookup uses them.
     """
-    known = np.full(field.faces.shape, MIXED, dtype=np.uint8)
-    _compare(field, real(APART / field.samples), known)
-    return known
+    agreeing = np.full(field.faces.shape, MIXED, dtype=np.uint8)
+    _compare(field, real(APART / field.samples), agreeing)
+    return agreeing
 
 
 @kernel

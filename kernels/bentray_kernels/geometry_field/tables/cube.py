@@ -45,14 +45,14 @@ def samples(n: int) -> Floats:
     """
     check_samples(n)
     middle = (np.arange(n) + 0.5) / n
-    places = np.empty((n, 6, n, 3))
+    points = np.empty((n, 6, n, 3))
     for face in range(6):
         axis, side = divmod(face, 2)
         first, second = (other for other in range(3) if other != axis)
-        places[:, face, :, axis] = side
-        places[:, face, :, first] = middle[None, :]
-        places[:, face, :, second] = middle[:, None]
-    return places.reshape(-1, 3)
+        points[:, face, :, axis] = side
+        points[:, face, :, first] = middle[None, :]
+        points[:, face, :, second] = middle[:, None]
+    return points.reshape(-1, 3)
 
 
 @kernel(inline="always")
