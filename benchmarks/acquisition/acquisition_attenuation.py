@@ -42,7 +42,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         images = Images(picked, partial(run, context.progress))
         error_on = object_attenuation_error(dataset)
         ways = {
-            f"{rays} rays, {way}": Settings.of(method="sart", rays=rays, **changes)
+            f"{rays} rays, {way}": Settings.from_values(method="sart", rays=rays, **changes)
             for rays in ("straight", "curved")
             for way, changes in AMPLITUDES.items()
         }

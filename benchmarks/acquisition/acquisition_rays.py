@@ -63,7 +63,7 @@ def scan_rows(name: str, dataset: Dataset) -> Iterable[Row]:
     picked = pick(dataset)
     images = Images(picked, reconstruct)
     error_on = object_error(dataset)
-    plan = Settings.of(method="sart", attenuation=False)
+    plan = Settings.from_values(method="sart", attenuation=False)
     all_at_once = plan.changed(method="gauss-newton")
     width = finite_frequency_candidates(picked, plan)[0]["ray_width_m"]
     bent = {
@@ -125,7 +125,9 @@ def measured(quick: bool) -> Iterable[Row]:
     detail = f"truth shifted by {x:.1f}, {y:.1f} mm; {explain_candidates(result.trials)}"
     yield compared.row(labels[0], truth.rms_mps, 12.0, "<=", "m/s", detail)
     yield compared.row(labels[1], seconds, 20.0, "<=", "s", "one process, trials included")
-    bent = images.compared(images.made(Settings.of(method="sart", attenuation=False)).result, error_on)
+    bent = images.compared(
+        images.made(Settings.from_values(method="sart", attenuation=False)).result, error_on
+    )
     ratio = bent.error / bent.baselines[STRAIGHT_RAYS]
     detail = f"thin rays, m/s: bent {bent.error:.1f}, straight {bent.baselines[STRAIGHT_RAYS]:.1f}"
     yield bent.row(labels[2], ratio, 0.9, "<=", "", detail)

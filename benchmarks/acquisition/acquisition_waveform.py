@@ -76,12 +76,14 @@ class WaveScan:
         wide = {"method": "gauss-newton", "ray_width_m": width}
         changes = {**RAYS, "bent, finite frequency": wide}
         self.made = {
-            way: reconstruct_on_workers(replace(picked, waveform=None), Settings.of(**words), context)
+            way: reconstruct_on_workers(
+                replace(picked, waveform=None), Settings.from_values(**words), context
+            )
             for way, words in changes.items()
         }
         self.made["ideal times"] = reconstruct_on_workers(
             replace(picked, delta_tof_s=ideal(dataset), sigma_s=None, waveform=None),
-            Settings.of(**RAYS["bent, Gauss-Newton"]),
+            Settings.from_values(**RAYS["bent, Gauss-Newton"]),
             context,
         )
         images = Images(dataset, lambda of, settings: self._on_workers(of, settings, context))

@@ -50,14 +50,14 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         )
         dataset = simulate(asked, lambda now: context.progress(now.done, now.total, "simulation"))
         images = {
-            way: reconstruct_on_workers(dataset, Settings.of(attenuation=False, **changes), context)
+            way: reconstruct_on_workers(dataset, Settings.from_values(attenuation=False, **changes), context)
             for way, changes in WAYS.items()
         }
         default, blurred = images["default"], blurred_error(dataset)
         made = Images(
             dataset,
             lambda scan, settings: reconstruct_on_workers(scan, settings, context).result,
-            Settings.of(attenuation=False),
+            Settings.from_values(attenuation=False),
         )
         compared = made.compared(default.result, object_error(dataset))
         detail = f"truth blurred by 1 mm {blurred:.1f}, "

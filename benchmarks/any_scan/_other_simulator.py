@@ -48,7 +48,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         return
     dataset = without_water_shot(planted(simulated(peers["k-Wave"], context.progress), 2))
     images = {
-        way: reconstruct_on_workers(dataset, Settings.of(attenuation=False, **changes), context)
+        way: reconstruct_on_workers(dataset, Settings.from_values(attenuation=False, **changes), context)
         for way, changes in WAYS.items()
     }
     detail = ", ".join(f"{way} {made.rms:.1f} in {made.seconds:.0f} s" for way, made in images.items())
@@ -56,7 +56,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     made = Images(
         dataset,
         lambda scan, settings: reconstruct_on_workers(scan, settings, context).result,
-        Settings.of(attenuation=False),
+        Settings.from_values(attenuation=False),
     )
     for way, goal in GOALS.items():
         ratio = images[way].rms / images["straight"].rms

@@ -44,7 +44,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     for name, dataset in scans(context.quick, context.progress):
         images = {}
         for way, changes in WAYS.items():
-            settings = Settings.of(
+            settings = Settings.from_values(
                 attenuation=False, **({"nodes": 48, "bands": 2} if context.quick else {}), **changes
             )
             for shot, scan in (("with", dataset), ("none", without_water_shot(dataset))):
@@ -53,7 +53,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         made = Images(
             without_water_shot(dataset),
             lambda scan, settings: reconstruct_on_workers(scan, settings, context).result,
-            Settings.of(attenuation=False),
+            Settings.from_values(attenuation=False),
         )
         yield from scan_rows(name, dataset, images, made)
     title = "Images with the water shot, and with one estimated from the scan (none)"

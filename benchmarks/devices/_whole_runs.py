@@ -48,7 +48,7 @@ def whole_runs(context: BenchmarkContext, device: Device) -> Iterable[Row]:
             yield Row(label, None, goal, "<=", "s", ON_PROCESSORS)
             continue
         dataset = volume(nodes, slices, elements)
-        settings = Settings.of(
+        settings = Settings.from_values(
             method="sart", device="opencl", nodes=nodes, side_m=TABLE6_SIDE_M, iterations=ITERATIONS
         )
         tiny = replace(settings, iterations=1)

@@ -68,7 +68,7 @@ def errors(phantom: str, seeds: int = SEEDS) -> dict[str, dict[str, list[float]]
     low, high = scan.phantom.speed_range()
     errors: dict[str, dict[str, list[float]]] = {start: {} for start in STARTS}
     for seed in range(seeds):
-        settings = Settings.of(
+        settings = Settings.from_values(
             method="sart",
             nodes=NODES,
             side_m=scan.side_m,

@@ -115,7 +115,8 @@ class PhantomScan:
         """Reconstruct with some settings of SART on the grid of the phantom, and compare."""
         scan = self.scan
         return self._made(
-            what, Settings.of(**{"method": "sart", "nodes": scan.nodes, "side_m": scan.side_m, **changes})
+            what,
+            Settings.from_values(**{"method": "sart", "nodes": scan.nodes, "side_m": scan.side_m, **changes}),
         )
 
     def run_default(self) -> ReconstructionError:

@@ -20,8 +20,8 @@ from ._unseen_scans import unseen_scans
 
 GOAL = 1.03
 SNRS = (None, 30.0, 10.0)
-SART = Settings.of(method="sart", attenuation=False)
-DEFAULT = Settings.of(attenuation=False)
+SART = Settings.from_values(method="sart", attenuation=False)
+DEFAULT = Settings.from_values(attenuation=False)
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:

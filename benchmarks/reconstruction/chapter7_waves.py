@@ -41,7 +41,10 @@ SNR = 10.0
 
 WAVEFORM = "waveform"
 # No loss is simulated.
-SETTINGS = {DEFAULT_SETTINGS: Settings(), WAVEFORM: Settings.of(method="waveform", attenuation=False)}
+SETTINGS = {
+    DEFAULT_SETTINGS: Settings(),
+    WAVEFORM: Settings.from_values(method="waveform", attenuation=False),
+}
 
 NO_SPACE = (
     "full-waveform inversion works slice by slice. In space its last band at this size has 13 million nodes, "

@@ -27,8 +27,8 @@ COUPLINGS_MPS = (1500.0, 1475.0)
 # Ours, by the name in the rows; the first is compared with the peers. Nothing is tuned.
 OURS = {
     "default": Settings(),
-    "gauss-newton": Settings.of(method="gauss-newton", side_m=SIDE_M, attenuation=False),
-    "sart": Settings.of(method="sart", side_m=SIDE_M, attenuation=False),
+    "gauss-newton": Settings.from_values(method="gauss-newton", side_m=SIDE_M, attenuation=False),
+    "sart": Settings.from_values(method="sart", side_m=SIDE_M, attenuation=False),
 }
 
 RMSE_GOAL_MPS, SECONDS_GOAL = 28.0, 10.0

@@ -75,7 +75,7 @@ def volume(nodes: int, slices: int, elements: int, distinct: int, context: Bench
         seconds, made = {}, {}
         images = Images(few, lambda dataset, settings: run(context, cluster, dataset, settings, "few slices"))
         for rays in ("straight", "curved"):
-            settings = Settings.of(
+            settings = Settings.from_values(
                 method="sart",
                 rays=rays,
                 nodes=nodes,

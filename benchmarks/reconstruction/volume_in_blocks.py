@@ -57,7 +57,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         write_dataset(path, scan(elements, 31 if context.quick else 61))
         # Few iterations in a short time; with the default relaxation of 0.1 the image is still water.
         common = {"method": "sart", "decomposition": "volume", "iterations": 2, "relaxation": 0.5}
-        settings = Settings.of(nodes=nodes, **common)
+        settings = Settings.from_values(nodes=nodes, **common)
         ways = {
             "whole": settings.changed(eikonal="fsm"),
             "accurate": settings,

@@ -55,7 +55,7 @@ def reflections(
 ) -> tuple[dict[str, Reflection], Reconstruction]:
     """Images of the scans, and the reconstruction of the one behind fat, all by the default settings."""
     images, result = {}, None
-    wanted = Settings.of(reflection=True, attenuation=False)
+    wanted = Settings.from_values(reflection=True, attenuation=False)
     # The speed of the image in water is not used.
     plain = wanted.changed(method="sart", iterations=1, delays="water", nodes=64)
     for name, scan, settings in (
@@ -142,7 +142,7 @@ def other_solver(context: BenchmarkContext) -> Iterator[Row]:
     size = FatScan(OTHER_HZ, OTHER_ELEMENTS, OTHER_EMISSIONS, peers["k-Wave"])
     scan = size.simulated(context.progress, ("behind fat",))["behind fat"]
     picked = replace(pick(scan), waveform=scan.waveform)
-    wanted, wave = Settings.of(reflection=True, attenuation=False), size.wavelength_m
+    wanted, wave = Settings.from_values(reflection=True, attenuation=False), size.wavelength_m
     images = {
         delays: reconstruct(picked, wanted.changed(delays=delays)).reflection
         for delays in ("reconstructed", "water")

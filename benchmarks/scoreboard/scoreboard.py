@@ -94,7 +94,7 @@ class _Runs:
                     lambda now: context.progress(now.done, now.total, settings.method),
                 )
 
-            plain = Settings.of(attenuation=False)
+            plain = Settings.from_values(attenuation=False)
             self.images = Images(scan, run, plain)
             error = object_error(scan)
             for way, changes in WAYS.items():

@@ -54,7 +54,7 @@ def ball(folder: Path, nodes: int, *, uploaded: bool) -> tuple[Path, VolumeFile]
     path, row = folder / f"ball {nodes} {uploaded}.h5", {"shape": (nodes,) * 3, "bytes": 4 * nodes**3}
     if uploaded:
         write_volume(path, Volume.from_values(values, (1e-3,) * 3))
-        return path, VolumeFile.of(row)
+        return path, VolumeFile.from_row(row)
     images = dict.fromkeys(("coverage", "attenuation", "recovery"), values.astype(np.float64))
     side = 0.5e-3 * (nodes - 1)
     result = Reconstruction(
@@ -63,11 +63,11 @@ def ball(folder: Path, nodes: int, *, uploaded: bool) -> tuple[Path, VolumeFile]
         spacing_m=(1e-3,) * 3,
         origin_m=(-side,) * 3,
         water_speed_mps=1500.0,
-        settings=Settings.of(method="sart"),
+        settings=Settings.from_values(method="sart"),
         history=(),
     )
     write_reconstruction(path, result)
-    return path, VolumeFile.of({**row, "job_id": 1})
+    return path, VolumeFile.from_row({**row, "job_id": 1})
 
 
 def by_volume(
@@ -166,14 +166,14 @@ def by_truth(
         spacing_m=(side,) * 2,
         origin_m=(-0.1,) * 2,
         water_speed_mps=1500.0,
-        settings=Settings.of(method="sart"),
+        settings=Settings.from_values(method="sart"),
         history=(),
     )
     write_reconstruction(volume, result)
     target = {"target": folder / "truth", "name": "npy"} if task is export_truth else {}
     call(client, task, volume, scan=scan, **target)
     row = {"ntx": elements, "nrx": elements, "slices": 1, "has_traces": False, "bytes": scan.stat().st_size}
-    stored = VolumeFile.of({"shape": (nodes, nodes), "job_id": 1})
+    stored = VolumeFile.from_row({"shape": (nodes, nodes), "job_id": 1})
     cost = picture_cost.truth_cost if task is export_truth else picture_cost.summary_cost
     return {task.__name__: cost(stored, row).size}
 

@@ -121,7 +121,7 @@ def by_times(
     # Few rings, far from each other, where a volume is cut into blocks: a task for each block and emitter.
     pitch_m = 0.05 if "blocks" in asked else 0.003
     path = made_up_scan(folder / "scan.h5", elements, slices, losses=True, pitch_m=pitch_m)
-    settings = Settings.of(
+    settings = Settings.from_values(
         **{"nodes": nodes, "iterations": 2, "decomposition": "slices", "attenuation": False, **asked}
     )
     reconstruct(client, path, settings)
@@ -218,7 +218,7 @@ def by_traces(
     elements, samples = size
     path = made_up_traces(folder / "traces.h5", elements, samples, **scan)
     usual = {"method": "sart", "nodes": 48, "iterations": 2, "decomposition": "slices", "attenuation": False}
-    settings = Settings.of(**{**usual, **asked})
+    settings = Settings.from_values(**{**usual, **asked})
     reconstruct(client, path, settings)
     summary = summary_of(path, settings)
     waves = wave_task_sizes(summary.traces, summary.width_m, settings)

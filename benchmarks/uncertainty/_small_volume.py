@@ -33,7 +33,7 @@ def small_volume(context: BenchmarkContext, goal: float) -> Row:
         )
     truth = scan.truth
     assert truth is not None
-    settings = Settings.of(
+    settings = Settings.from_values(
         method="gauss-newton",
         decomposition="volume",
         nodes=NODES,

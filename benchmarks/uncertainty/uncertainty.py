@@ -152,7 +152,9 @@ def picked_times(context: BenchmarkContext) -> Row:
     """Nodes within two deviations of images from times that were picked from waves; they chose nothing."""
     errors, deviations, details = [], [], []
     for number, scan in enumerate(wave_scans(WAVE_SCANS, context, WAVE_HZ)):
-        result = reconstruct(replace(scan, waveform=None), Settings.of(uncertainty=True, attenuation=False))
+        result = reconstruct(
+            replace(scan, waveform=None), Settings.from_values(uncertainty=True, attenuation=False)
+        )
         error, deviation = beside_truth(scan, result)
         errors.append(error)
         deviations.append(deviation)
@@ -167,7 +169,7 @@ def picked_times(context: BenchmarkContext) -> Row:
 def judge(scan: BreastScan) -> Judged:
     """Reconstruct a scan by the default settings, and compare with the truth."""
     begun = time.process_time()
-    result = reconstruct(scan.dataset, Settings.of(uncertainty=True, attenuation=False))
+    result = reconstruct(scan.dataset, Settings.from_values(uncertainty=True, attenuation=False))
     whole = time.process_time() - begun
     assert result.uncertainty is not None
     spacing, nodes = result.spacing_m[0], result.speed.shape[0]

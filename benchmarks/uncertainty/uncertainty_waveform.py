@@ -25,7 +25,7 @@ from ._breast_scans import detailed
 # Half the size of a breast; the ratio of breast and wavelength is that of 75 kHz at full size.
 SIDE_M, RADIUS_M, CENTRE_HZ, ELEMENTS, EMISSIONS, WATER_MPS = 0.12, 0.054, 1.5e5, 64, 32, 1500.0
 SCANS, QUICK_SCANS, SNRS = 4, 1, (10.0, 30.0)
-PLAN = Settings.of(method="waveform", attenuation=False, uncertainty=True)
+PLAN = Settings.from_values(method="waveform", attenuation=False, uncertainty=True)
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:

@@ -24,7 +24,7 @@ def sizing() -> str:
     rows = []
     for elements, nodes, slices in SIZES:
         for method in METHODS:
-            settings = Settings.of(method=method, nodes=nodes, attenuation={"enabled": False})
+            settings = Settings.from_values(method=method, nodes=nodes, attenuation={"enabled": False})
             planned = plan(_scan(elements, slices).summary(settings), settings, ())
             memory, disk = planned.largest[1] / MIB, planned.stored_bytes / MIB
             size = f"{elements}", f"{nodes}²", f"{slices}", method

@@ -86,25 +86,25 @@ class Pictures:
             volume: its row.
             how: arguments of the functions in ``bentray_workers.images.slice``.
         """
-        cost = picture_cost.slice_cost(VolumeFile.of(volume.values()), how.get("size"))
+        cost = picture_cost.slice_cost(VolumeFile.from_row(volume.values()), how.get("size"))
         draw = drawing_tasks.slice_png if volume.job_id is not None else drawing_tasks.volume_slice_png
         return bytes(await self._one(volume, cost, draw, how, refused=("size", "this slice")))
 
     async def refraction_png(self, volume: VolumeRow, view: RefractionView) -> bytes:
         """Render a volume with refraction."""
-        cost = picture_cost.refraction_cost(VolumeFile.of(volume.values()), view)
+        cost = picture_cost.refraction_cost(VolumeFile.from_row(volume.values()), view)
         return bytes(await self._made(volume, cost, lambda here: refraction.tasks_of(here, view)))
 
     async def coefficients(self, volume: VolumeRow, view: RefractionView) -> bytes:
         """Filter a volume, see ``bentray_workers.rendering.coefficients``."""
-        cost = picture_cost.coefficients_cost(VolumeFile.of(volume.values()))
+        cost = picture_cost.coefficients_cost(VolumeFile.from_row(volume.values()))
         return bytes(await self._one(volume, cost, coefficients_npy, {"view": view}))
 
     async def histogram(self, volume: VolumeRow, quantity: str, bins: int) -> dict[str, Any]:
         """Compute the histogram of a volume, see ``volume_histogram``; recent ones are kept."""
         key = volume.id, volume.created, quantity, bins
         if key not in self._histograms:
-            cost = picture_cost.histogram_cost(VolumeFile.of(volume.values()))
+            cost = picture_cost.histogram_cost(VolumeFile.from_row(volume.values()))
             how = {"quantity": quantity, "bins": bins}
             self._histograms[key] = dict(await self._one(volume, cost, volume_histogram, how))
             while len(self._histograms) > MAX_HISTOGRAMS:
@@ -145,26 +145,26 @@ class Pictures:
         self, volume: VolumeRow, iso: float | None, step: int, target: Path
     ) -> dict[str, Any]:
         """Extract the iso-surface of a volume to a mesh file, see ``isosurface_mesh.mesh_volume``."""
-        cost = picture_cost.mesh_cost(VolumeFile.of(volume.values()))
+        cost = picture_cost.mesh_cost(VolumeFile.from_row(volume.values()))
         return dict(await self._one(volume, cost, mesh_volume, {"iso": iso, "step": step, "target": target}))
 
     async def export(
         self, volume: VolumeRow, target: Path, name: FormatName, selection: volume_export.Selection
     ) -> None:
         """Export a volume to another format, a key of ``EXPORTED``."""
-        cost = picture_cost.export_cost(VolumeFile.of(volume.values()), name)
+        cost = picture_cost.export_cost(VolumeFile.from_row(volume.values()), name)
         how = {"target": target, "name": name, "selection": selection}
         await self._one(volume, cost, volume_export.export_volume, how)
 
     async def export_truth(self, volume: VolumeRow, scan: DatasetRow, target: Path, name: FormatName) -> None:
         """Export the truth of a scan at the nodes of a reconstruction, see ``images.truth_export``."""
-        cost = picture_cost.truth_cost(VolumeFile.of(volume.values()), scan.values())
+        cost = picture_cost.truth_cost(VolumeFile.from_row(volume.values()), scan.values())
         how = {"scan": await self._fetched(scan), "target": target, "name": name}
         await self._one(volume, cost, export_truth, how, refused=("quantity", "truth"))
 
     async def summary(self, volume: VolumeRow, scan: DatasetRow) -> dict[str, Any]:
         """Summarise a reconstruction, see ``images.result_summary``."""
-        cost = picture_cost.summary_cost(VolumeFile.of(volume.values()), scan.values())
+        cost = picture_cost.summary_cost(VolumeFile.from_row(volume.values()), scan.values())
         return dict(await self._one(volume, cost, result_summary, {"scan": await self._fetched(scan)}))
 
     def waiting(self, tenant: Tenant) -> int:

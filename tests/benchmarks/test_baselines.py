@@ -58,7 +58,7 @@ def test_straight_rays_have_the_method_penalty_and_width_of_the_image() -> None:
     spy = Spy()
     images = Images(dataset(), spy)
     bent = images.made(
-        Settings.of(method="gauss-newton", penalty_strength=0.7, ray_width_m=0.002, eikonal="fmm")
+        Settings.from_values(method="gauss-newton", penalty_strength=0.7, ray_width_m=0.002, eikonal="fmm")
     )
     images.straight(bent.result)
     straight = spy.asked[-1]

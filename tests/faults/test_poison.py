@@ -22,7 +22,9 @@ from bentray_workers.reconstruction import reconstruction_run
 # For every change tests/workers/cluster/test_pipelines.py kills a worker under the same limit of deaths.
 pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
-PLAN = Settings.of(nodes=48, attenuation=False, method="gauss-newton", iterations=8, penalty_strength=0.003)
+PLAN = Settings.from_values(
+    nodes=48, attenuation=False, method="gauss-newton", iterations=8, penalty_strength=0.003
+)
 
 
 def test_poison_task_fails_only_its_own_job(scan, scan_file, tmp_path, monkeypatch):

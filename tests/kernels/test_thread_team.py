@@ -31,7 +31,7 @@ def test_threads_work_at_the_same_time_and_end():
 @pytest.mark.parametrize("shape", [(7, 6, 9), (1, 4, 5), (2, 3, 3), (6, 5)])
 def test_grids_are_copied_as_by_one_thread(shape):
     random = np.random.default_rng(1)
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     inner, padded = random.random(np.prod(shape)), random.random(np.prod([n + 2 for n in shape]))
     changed = grid.empty_ranges()
     grid.include_neighbours(np.flatnonzero(random.random(padded.size) < 0.05), changed)

@@ -248,7 +248,7 @@ def sart_scan(nodes: int, slices: int) -> tuple[list[SliceCall], Settings]:
     delta = measured - np.sqrt((offset**2).sum(axis=2)) / WATER_MPS
     delta[sending, senders] = np.nan
     scan = Dataset(positions, senders, np.arange(ring.elements), WATER_MPS, delta_tof_s=delta)
-    settings = Settings.of(method="sart", nodes=nodes, side_m=TABLE6_SIDE_M, iterations=2)
+    settings = Settings.from_values(method="sart", nodes=nodes, side_m=TABLE6_SIDE_M, iterations=2)
     problem = Problem.from_dataset(scan, settings)
     state = begin(initial_slowness(problem, None))
     return [SliceCall(problem, state, TRIAL_EMITTERS, k) for k in range(slices)], settings

@@ -74,7 +74,7 @@ class SweepArrays(NamedTuple):
 
 def allocate_sweep_arrays(shape: tuple[int, ...]) -> SweepArrays:
     """Allocate the arrays for grids of that shape; used again for every solve."""
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     u, slope_j, slope_k, crossing = np.full((4, 2, grid.size), UNKNOWN, np.float32)
     return SweepArrays(u, slope_j, slope_k, crossing, grid.shape, grid.stored)
 

@@ -68,7 +68,7 @@ class Diagonals:
     shape: tuple[int, int, int]
 
     @classmethod
-    def of(cls, shape: tuple[int, ...]) -> Diagonals:
+    def from_shape(cls, shape: tuple[int, ...]) -> Diagonals:
         """For a grid of that shape, border not counted."""
         return cls((shape[0] if len(shape) == 3 else 0, shape[-2], shape[-1]))
 

@@ -121,7 +121,7 @@ class Sweeper:
     """
 
     def __init__(self, shape: tuple[int, ...], team: ThreadTeam = SINGLE_THREAD) -> None:
-        self._grid = Diagonals.of(shape)
+        self._grid = Diagonals.from_shape(shape)
         self._team = team
         # One block: the allocator keeps freed blocks of this size, and returns smaller ones to the system.
         arrays = np.empty((5, self._grid.size))

@@ -39,7 +39,7 @@ def simultaneous_sweeps(problem: PointSource, *, tolerance: float = 1e-12, threa
     """
     check_options(tolerance, threads)
     shape = problem.slowness.shape
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     orders: list[Order] = list(itertools.product((0, 1), (1, -1) if len(shape) == 3 else (0,), (1, -1)))
     crossing, time = np.full((2, grid.size), math.inf), np.full((2, grid.size), -math.inf)
     for side in (0, 1):

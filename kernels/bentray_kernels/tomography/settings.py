@@ -334,7 +334,7 @@ class Settings:
             raise InvalidInput("decomposition", "'volume'", "slices, with reflection")
 
     @classmethod
-    def of(cls, **values: Any) -> Settings:
+    def from_values(cls, **values: Any) -> Settings:
         """The default settings with some values changed, see ``changed``."""
         return Settings().changed(**values)
 

@@ -64,7 +64,7 @@ def from_stored(values: Mapping[str, Any], numerics: Mapping[str, Any] | None = 
     for name, left in FIXED.items():
         if (value := current.pop(name, left)) != left:
             raise InvalidInput(name, value, f"{left}: {WITHDRAWN.get(name, 'it was removed')}")
-    return Settings.of(**current)
+    return Settings.from_values(**current)
 
 
 def _plain(value: Any) -> Any:

@@ -21,7 +21,7 @@ def numbered(shape):
 @given(shape=SHAPES, flipped=st.booleans())
 @settings(deadline=None)
 def test_a_grid_comes_back_whole(shape, flipped):
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     plain = numbered(shape)
     stored = np.full(grid.size, -1.0)
     grid.store(plain, stored, flipped)
@@ -38,7 +38,7 @@ def test_a_grid_comes_back_whole(shape, flipped):
 
 def test_neighbours_lie_in_the_rows_before_and_after():
     shape = (5, 6)
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     stored = np.full(grid.size, np.nan)
     grid.store(numbered(shape), stored, False)
     rows = stored.reshape(grid.stored)
@@ -52,7 +52,7 @@ def test_neighbours_lie_in_the_rows_before_and_after():
 @given(shape=SHAPES, flipped=st.booleans())
 @settings(deadline=None)
 def test_the_border_can_be_left_out_and_values_scaled(shape, flipped):
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     inside = np.arange(np.prod(shape), dtype=float)
     stored = np.full(grid.size, np.inf)
     grid.store(inside, stored, flipped, scale=3.0, border=False)
@@ -70,7 +70,7 @@ def test_the_border_can_be_left_out_and_values_scaled(shape, flipped):
 @given(shape=SHAPES, seed=st.integers(0, 99))
 @settings(deadline=None)
 def test_nodes_are_put_where_storing_puts_them(shape, seed):
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     plain = numbered(shape)
     nodes = np.random.default_rng(seed).integers(0, plain.size, 7)
     stored, put = np.full((2, grid.size), -1.0)
@@ -84,7 +84,7 @@ def test_nodes_are_put_where_storing_puts_them(shape, seed):
 @given(shape=SHAPES, seed=st.integers(0, 99), many=st.booleans())
 @settings(deadline=None)
 def test_turning_what_changed_turns_the_whole(shape, seed, many):
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     rng = np.random.default_rng(seed)
     stored, turned, expected = np.full((3, grid.size), -1.0)
     grid.store(numbered(shape), stored, False)
@@ -115,7 +115,7 @@ def members(grid, low, high):
 
 @pytest.mark.parametrize("shape", [(4, 5), (1, 3), (3, 4, 5)])
 def test_neighbours_of_a_node_are_those_of_the_grid(shape):
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     padded = tuple(n + 2 for n in shape)
     computed = grid.empty_ranges()
     for node in np.ndindex(padded):
@@ -134,7 +134,7 @@ def test_neighbours_of_a_node_are_those_of_the_grid(shape):
 @given(shape=SHAPES, seed=st.integers(0, 99))
 @settings(deadline=None)
 def test_flipping_keeps_every_node(shape, seed):
-    grid = Diagonals.of(shape)
+    grid = Diagonals.from_shape(shape)
     rng = np.random.default_rng(seed)
     nodes = rng.integers(0, numbered(shape).size, 5)
     near, flipped = grid.empty_ranges(), grid.empty_ranges()

@@ -94,7 +94,7 @@ def test_the_square_root_is_taken_of_vectors():
     """Without it a sweep takes four times as long, and nothing else would tell."""
     # Compiled once more, for cached code cannot be read.
     fresh = njit(nogil=True, error_model="numpy")(fast_sweeping._sweep_3d.py_func)
-    grid = Diagonals.of((4, 4, 4))
+    grid = Diagonals.from_shape((4, 4, 4))
     time, crossing = np.full((2, grid.size), np.inf)
     active_in_plane, across, changed = (grid.empty_ranges() for _ in range(3))
     fresh(fast_sweeping.Grid(time, crossing, active_in_plane, across, changed, grid.shape, grid.stored), 0.0)

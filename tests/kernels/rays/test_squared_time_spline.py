@@ -89,7 +89,7 @@ def test_sensitivities_follow_the_same_rays():
 
 
 def test_the_setting_replaces_the_compiled_pass():
-    sart = Settings.of(method="sart")
+    sart = Settings.from_values(method="sart")
     assert solver_of(sart, 2).compiled
     assert solver_of(sart.changed(ray_gradient="bspline"), 2) == (False, "accurate")
     assert solver_of(sart.changed(ray_gradient="bspline", rays="straight"), 2).compiled
@@ -99,4 +99,4 @@ def test_unknown_gradients_are_rejected():
     with pytest.raises(InvalidInput, match="gradient"):
         rays.trace(np.ones((4, 4)), 1.0, [(1.0, 1.0)], (2.0, 2.0), gradient="sobel")
     with pytest.raises(InvalidInput, match="ray_gradient"):
-        Settings.of(ray_gradient="sobel")
+        Settings.from_values(ray_gradient="sobel")

@@ -36,7 +36,7 @@ def scan():
 
 
 def plan(method="gauss-newton", **changes):
-    return Settings.of(method=method, nodes=NODES, side_m=SIDE, **changes)
+    return Settings.from_values(method=method, nodes=NODES, side_m=SIDE, **changes)
 
 
 @pytest.mark.parametrize("method", [pytest.param("sart", marks=pytest.mark.nightly), "gauss-newton"])

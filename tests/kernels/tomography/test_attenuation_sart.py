@@ -21,7 +21,7 @@ def rows_of(matrix, residual, counts):
 
 
 def plan(**changes):
-    return Settings.of(method="sart", smoothing_nodes=0.0, **changes)
+    return Settings.from_values(method="sart", smoothing_nodes=0.0, **changes)
 
 
 def crossing(rays, seed=0):

@@ -41,7 +41,9 @@ def changed(scan: Dataset, change) -> Dataset:
 
 def image(scan: Dataset, method: str, **settings) -> Reconstruction:
     # Not examined: impossible times and orders would be refused before.
-    return reconstruct(scan, Settings.of(method=method, **{"nodes": 32, "examine": False, **settings}))
+    return reconstruct(
+        scan, Settings.from_values(method=method, **{"nodes": 32, "examine": False, **settings})
+    )
 
 
 def codes(result: Reconstruction) -> list[str]:

@@ -28,7 +28,7 @@ from .graph_runs import run, stored
 
 PLANS = {
     "sart": Settings(method="sart", nodes=32, side_m=TABLE6_SIDE_M, iterations=2, resolution_check=True),
-    "gauss-newton": Settings.of(
+    "gauss-newton": Settings.from_values(
         method="gauss-newton",
         nodes=32,
         side_m=TABLE6_SIDE_M,

@@ -23,7 +23,7 @@ from bentray_kernels.tomography.gauss_newton import gauss_newton_step
 WATER = 1500.0
 RING = Ring(32, 0.08)
 WIDTH = 0.009
-PLAN = Settings.of(method="gauss-newton", nodes=40, ray_width_m=WIDTH)
+PLAN = Settings.from_values(method="gauss-newton", nodes=40, ray_width_m=WIDTH)
 
 
 def scan(delta=None):
@@ -80,4 +80,4 @@ def test_wide_times_select_wide_rays():
 @pytest.mark.parametrize("method", ["sart", "auto", "waveform"])
 def test_other_methods_refuse_a_width(method):
     with pytest.raises(InvalidInput, match="ray_width_m"):
-        Settings.of(method=method, ray_width_m=1e-3)
+        Settings.from_values(method=method, ray_width_m=1e-3)

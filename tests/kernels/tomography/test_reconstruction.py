@@ -31,7 +31,7 @@ def method(request):
 
 
 def plan(method, **changes):
-    return Settings.of(method=method, nodes=NODES, side_m=SIDE, **changes)
+    return Settings.from_values(method=method, nodes=NODES, side_m=SIDE, **changes)
 
 
 def test_bent_rays_beat_straight_ones(scan, method):
@@ -161,7 +161,7 @@ def test_progress_rises_to_the_end(scan, method):
 )
 def test_bad_settings_are_named(scan, change, field):
     with pytest.raises(InvalidInput) as refusal:
-        reconstruct(scan, Settings.of(**{"method": "sart", "nodes": NODES, **change}))
+        reconstruct(scan, Settings.from_values(**{"method": "sart", "nodes": NODES, **change}))
     assert refusal.value.field == field
 
 

@@ -9,7 +9,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, reconstruct
 
 RING, WATER = Ring(12, 0.05), 1500.0
-PLAN = Settings.of(method="sart", nodes=24, iterations=2, roi=True, resolution_check=True, edge_mps=5.0)
+PLAN = Settings.from_values(
+    method="sart", nodes=24, iterations=2, roi=True, resolution_check=True, edge_mps=5.0
+)
 WAYS = [
     {},
     {"method": "gauss-newton"},

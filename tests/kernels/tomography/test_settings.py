@@ -22,7 +22,7 @@ from bentray_kernels.tomography.settings import DEVIATION, PLACES, FixedSettings
 
 
 def test_settings_accept_field_names_or_records():
-    by_name = Settings.of(relaxation=0.2, penalty_strength=0.5, examine=False, attenuation=False)
+    by_name = Settings.from_values(relaxation=0.2, penalty_strength=0.5, examine=False, attenuation=False)
     by_record = Settings(
         sart=SartSettings(relaxation=0.2),
         gauss_newton=GaussNewtonSettings(penalty_strength=0.5),
@@ -34,7 +34,7 @@ def test_settings_accept_field_names_or_records():
 
 
 def test_numerical_parameters_are_fixed_and_freed():
-    fixed = Settings.of(nodes=64, subset=4)
+    fixed = Settings.from_values(nodes=64, subset=4)
     assert isinstance(fixed, FixedSettings)
     assert fixed.numerics == Numerics(subset=4)
     assert pickle.loads(pickle.dumps(fixed)) == fixed != Settings(nodes=64)
@@ -44,7 +44,7 @@ def test_numerical_parameters_are_fixed_and_freed():
 
 def test_unknown_names_are_type_errors():
     with pytest.raises(TypeError):
-        Settings.of(swept=1)
+        Settings.from_values(swept=1)
 
 
 def test_every_setting_has_a_description_a_default_and_a_place():
@@ -78,5 +78,5 @@ def test_choices_are_those_of_the_code():
 )
 def test_an_error_names_the_place(values, field):
     with pytest.raises(InvalidInput) as error:
-        check_used(Settings.of(**values))
+        check_used(Settings.from_values(**values))
     assert error.value.field == field

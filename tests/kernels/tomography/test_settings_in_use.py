@@ -79,7 +79,7 @@ def test_every_setting_has_a_case() -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_a_setting_changes_the_result_where_it_has_an_effect(case: str) -> None:
     facts = {"scan_amplitudes": True, "scan_traces": False, "scan_picks": False}
-    base = Settings.of(nodes=24, iterations=4, device="cpu").changed(**CASES[case])
+    base = Settings.from_values(nodes=24, iterations=4, device="cpu").changed(**CASES[case])
     base = base.changed(pixel_m=0.004 if base.reflection.enabled else None)
     usual, idle = arrays(reconstruct(scan(), base)), {}
     for name, place in ((name, declared(Settings)[name].place) for name in SAMPLES):
@@ -109,7 +109,7 @@ def test_a_device_is_refused_where_nothing_is_computed_on_it() -> None:
         {"method": "auto", "minutes": 3.0, "eikonal": "fmm"},
     ]
     for case in cases:
-        settings = Settings.of(nodes=20).changed(**case)
+        settings = Settings.from_values(nodes=20).changed(**case)
         used = device_work(size, settings) is not None
         assert ("device" not in unused(settings.changed(device="opencl"))) == used, case
         assert "device" not in unused(settings.changed(device="cpu"))
@@ -120,7 +120,7 @@ def test_a_result_lists_settings_without_effect_on_it(method: str) -> None:
     """On a scan with times and without amplitudes, and by what ``auto`` chose."""
     bare = replace(scan(), log_ratio_np=None, waveform=None, center_frequency_hz=None)
     asked = {"picker": "threshold", "penalty_strength": 0.02, "iterations": 3}
-    result = reconstruct(bare, check_used(Settings.of(method=method, nodes=20, **asked)))
+    result = reconstruct(bare, check_used(Settings.from_values(method=method, nodes=20, **asked)))
     text = result.caution("settings")
     assert "picking.picker, unless travel times are picked from traces" in text
     if method == "auto":
@@ -130,5 +130,5 @@ def test_a_result_lists_settings_without_effect_on_it(method: str) -> None:
         else:
             assert (replaced in text) == (result.settings.gauss_newton.penalty_strength != 0.02)
     assert not result.doubt
-    plain = reconstruct(bare, Settings.of(method="sart", nodes=20, iterations=3))
+    plain = reconstruct(bare, Settings.from_values(method="sart", nodes=20, iterations=3))
     assert plain.caution("settings") == ""

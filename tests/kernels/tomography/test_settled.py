@@ -86,7 +86,7 @@ def test_machines_decide_device_and_blocks():
     ],
 )
 def test_the_budget_decides_bands_and_emitters(changes, allowed, words):
-    settings = Settings.of(nodes=24, **changes)
+    settings = Settings.from_values(nodes=24, **changes)
     found = settled(MemorySource(wave_scan()), settings)
     assert found.waves.allowed == allowed
     # The rays before a refinement keep what was requested.

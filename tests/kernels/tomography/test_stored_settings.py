@@ -10,19 +10,21 @@ from bentray_kernels.tomography.stored_settings import FIXED, WITHDRAWN, from_st
 
 
 def test_settings_of_today_come_back():
-    settings = Settings.of(
+    settings = Settings.from_values(
         method="sart", nodes=32, speed_bounds_mps=(1400.0, 1600.0), relaxation=0.3, attenuation=False
     )
     assert from_stored(json.loads(json.dumps(settings.to_dict()))) == settings
-    assert from_stored(Settings(method="sart").to_dict(), {"subset": 4, "stop_rms_s": None}) == Settings.of(
-        method="sart", subset=4
-    )
+    assert from_stored(
+        Settings(method="sart").to_dict(), {"subset": 4, "stop_rms_s": None}
+    ) == Settings.from_values(method="sart", subset=4)
 
 
 def test_those_of_earlier_versions_are_computed_to_the_same_bits():
     before = {"seed": 5, "gauss_newton": {"penalty": "laplacian"}, "attenuation": {"focusing": True}}
-    assert from_stored(before) == Settings.of(seed=5, penalty="laplacian", focusing=True)
-    assert from_stored({"reflection": {"enabled": True}}, dict(FIXED)) == Settings.of(reflection=True)
+    assert from_stored(before) == Settings.from_values(seed=5, penalty="laplacian", focusing=True)
+    assert from_stored({"reflection": {"enabled": True}}, dict(FIXED)) == Settings.from_values(
+        reflection=True
+    )
 
 
 @pytest.mark.parametrize("name", FIXED)

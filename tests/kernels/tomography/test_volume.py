@@ -13,7 +13,7 @@ from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
 
 NODES, WATER = 24, 1500.0
 RING, HEIGHTS = Ring(16, 0.04), np.array([-0.012, -0.004, 0.004, 0.012])
-PLAN = Settings.of(method="sart", nodes=NODES, decomposition="volume", iterations=4, relaxation=0.3)
+PLAN = Settings.from_values(method="sart", nodes=NODES, decomposition="volume", iterations=4, relaxation=0.3)
 
 
 def problem_of(dataset, plan=PLAN):

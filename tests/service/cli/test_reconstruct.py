@@ -129,7 +129,7 @@ def test_a_volume_of_one_height_is_rejected_before_any_worker_starts() -> None:
     ("settings", "field"),
     [
         (Settings(method="waveform"), "waveform' for a scan without traces"),
-        (Settings.of(method="sart", amplitudes="ratio"), "waveform/object"),
+        (Settings.from_values(method="sart", amplitudes="ratio"), "waveform/object"),
         (Settings(method="sart", roi=True), "mask/roi"),
         (Settings(method="sart", speed_bounds_mps=(1600.0, 1800.0)), "speed_bounds_mps"),
         (Settings(method="sart", decomposition="volume"), "decomposition"),

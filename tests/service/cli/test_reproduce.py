@@ -28,7 +28,7 @@ WAYS = {
 def made(request: pytest.FixtureRequest, scan_file: Path, tmp_path: Path) -> Path:
     """A result of each way to choose what is done."""
     path = tmp_path / "reconstruction.h5"
-    settings = Settings.of(nodes=24, iterations=2, **{"method": "sart", **request.param})
+    settings = Settings.from_values(nodes=24, iterations=2, **{"method": "sart", **request.param})
     write_reconstruction(path, reconstruct(None, scan_file, settings))
     return path
 

@@ -22,7 +22,7 @@ from bentray_workers.reconstruction import reconstruction_run
 
 def test_it_is_the_pipeline_of_the_service(simulated: bentray.Scan, tmp_path: Path) -> None:
     path = simulated.save(tmp_path / "scan.h5")
-    settings = Settings.of(method="gauss-newton", nodes=24, iterations=2, penalty_strength=0.5)
+    settings = Settings.from_values(method="gauss-newton", nodes=24, iterations=2, penalty_strength=0.5)
     there = reconstruction_run.reconstruct(None, path, settings)
     result = bentray.reconstruct(
         path, "gauss-newton", nodes=np.int64(24), iterations=2, penalty_strength=0.5, threads=2

@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 ELEMENTS = 32
 # So many iterations that the service can be killed between two of them.
-SETTINGS = Settings.of(method="sart", nodes=64, iterations=48)
+SETTINGS = Settings.from_values(method="sart", nodes=64, iterations=48)
 
 # Drops a file on an element, as if from the desktop.
 DROP = """([text, name]) => {

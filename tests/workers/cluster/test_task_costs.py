@@ -80,12 +80,12 @@ def test_every_planned_task_is_in_the_table(decomposition, water, device):
     for method, rays, more in product(("sart", "gauss-newton"), ("curved", "straight"), others):
         names = {"method": method, "rays": rays, "decomposition": decomposition, "nodes": 64}
         try:
-            settings = Settings.of(**names, device=device, **more)
+            settings = Settings.from_values(**names, device=device, **more)
         except InvalidInput:
             continue
         assert all(size.bytes > 0 for size in call_sizes(scan, settings).values())
     for changes in ({"method": "auto"}, {"method": "waveform"}, {"method": "sart", "reflection": True}):
-        settings = Settings.of(**changes, nodes=64, device=device)
+        settings = Settings.from_values(**changes, nodes=64, device=device)
         sizes = wave_task_sizes(shots, 0.16, settings) | reflection_task_sizes(scan, settings)
         assert sizes
         assert all(size.bytes > 0 for size in sizes.values())

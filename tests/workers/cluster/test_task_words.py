@@ -26,16 +26,20 @@ def plans():
     shots = None, TRACES, TRACES.__class__(**{**vars(TRACES), "water_shot": False})
     for traces, method in product(shots, ("sart", "gauss-newton", "auto", "waveform")):
         if traces is not None or method != "waveform":
-            settings = Settings.of(
+            settings = Settings.from_values(
                 method=method, nodes=64, resolution_check=True, uncertainty=True, minutes=10.0
             )
             if method in ("sart", "gauss-newton"):
                 settings = settings.changed(minutes=None)
             yield plan(summary(traces), settings, ())
-    yield plan(summary(None), Settings.of(method="sart", nodes=64, device="opencl"), ())
-    volume = Settings.of(method="sart", nodes=64, decomposition="volume", attenuation=False, blocks=4)
+    yield plan(summary(None), Settings.from_values(method="sart", nodes=64, device="opencl"), ())
+    volume = Settings.from_values(
+        method="sart", nodes=64, decomposition="volume", attenuation=False, blocks=4
+    )
     yield plan(replace(summary(None), slices=8, height_m=0.05), volume, ())
-    yield plan(replace(summary(TRACES), echoes=TRACES), Settings.of(method="sart", reflection=True), ())
+    yield plan(
+        replace(summary(TRACES), echoes=TRACES), Settings.from_values(method="sart", reflection=True), ()
+    )
 
 
 def test_every_task_of_a_plan_has_words():

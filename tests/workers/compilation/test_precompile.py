@@ -34,7 +34,7 @@ with cache_misses.compiled_kernels() as kernels:
     write_dataset(waves, digitised(scan))
     for method in ("sart", "auto", "gauss-newton"):
         reconstruct(None, times, Settings(nodes=32, method=method))
-    reconstruct(None, waves, Settings.of(nodes=32, method="waveform", bands=1, emitters=4))
+    reconstruct(None, waves, Settings.from_values(nodes=32, method="waveform", bands=1, emitters=4))
 print(*kernels, sep="\\n")
 """
 

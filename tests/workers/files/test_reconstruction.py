@@ -68,7 +68,7 @@ def test_bands_of_a_refinement_come_back(tmp_path):
 
 
 def test_numerical_parameters_come_back(tmp_path):
-    settings = Settings.of(method="sart", nodes=24, subset=4, bands=2)
+    settings = Settings.from_values(method="sart", nodes=24, subset=4, bands=2)
     result = replace(made(), settings=settings, provenance=recorded(settings.numerics))
     write_reconstruction(tmp_path / "r.h5", result)
     assert read_reconstruction(tmp_path / "r.h5").settings == settings

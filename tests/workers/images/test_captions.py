@@ -18,8 +18,8 @@ from ..files.reconstructions import made
 @pytest.mark.parametrize(
     "settings",
     [
-        Settings.of(method="sart", nodes=100, coarser_grids=2),
-        Settings.of(method="sart", nodes=99, coarser_grids=2, rays="straight"),
+        Settings.from_values(method="sart", nodes=100, coarser_grids=2),
+        Settings.from_values(method="sart", nodes=99, coarser_grids=2, rays="straight"),
     ],
 )
 def test_captions_name_the_stages(settings):

@@ -18,7 +18,7 @@ from bentray_workers.reconstruction import picking_batches, reconstruction_run
 from ...kernels.acquisition.traces import FREQUENCY_HZ, RATE_HZ, absorbed, blob_delay, scan
 
 ELEMENTS = 16
-PLAN = Settings.of(method="sart", nodes=24, iterations=1, rays="straight", examine=False)
+PLAN = Settings.from_values(method="sart", nodes=24, iterations=1, rays="straight", examine=False)
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +54,6 @@ def test_a_scan_without_traces_and_focusing_of_spectra_are_rejected(lossy, tmp_p
     with pytest.raises(InvalidInput, match="waveform/object"):
         reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN.changed(amplitudes="ratio"))
     with pytest.raises(InvalidInput, match="focusing"):
-        Settings.of(method="sart", amplitudes="spectrum", focusing=True)
+        Settings.from_values(method="sart", amplitudes="spectrum", focusing=True)
     with pytest.raises(InvalidInput, match="amplitudes"):
-        Settings.of(method="sart", amplitudes="height")
+        Settings.from_values(method="sart", amplitudes="height")

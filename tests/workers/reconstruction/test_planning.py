@@ -47,7 +47,7 @@ def test_rejects_grids_larger_than_worker_memory_with_one_that_fits():
 
 @pytest.mark.parametrize(("method", "nodes"), [("gauss-newton", 128), ("sart", 512)])
 def test_refusal_states_what_takes_most_memory(method, nodes):
-    asked = Settings.of(method=method, decomposition="volume", nodes=nodes, attenuation=False)
+    asked = Settings.from_values(method=method, decomposition="volume", nodes=nodes, attenuation=False)
     scan = replace(RING, slices=32, pairs=32 * 256**2, height_m=0.08)
     with pytest.raises(InvalidInput) as refusal:
         plan(scan, asked, [SMALL])
@@ -77,7 +77,7 @@ def test_array_in_space_that_is_no_ring_is_planned_as_a_volume():
     array = bowl(40, 0.1)
     every = np.arange(40)
     scan = Dataset(array.position_m, every, every, 1500.0, delta_tof_s=np.zeros((40, 40)), array_type="free")
-    settings = Settings.of(method="gauss-newton", nodes=48)
+    settings = Settings.from_values(method="gauss-newton", nodes=48)
     counts = DatasetCounts.from_dataset(scan)
     found = plan(counts.summary(settings), settings, [])
     assert found == plan(counts.summary(settings), settings.changed(decomposition="volume"), [])
@@ -100,7 +100,7 @@ def test_array_in_space_that_is_no_ring_is_planned_as_a_volume():
 )
 def test_choice_is_described_in_one_sentence(changes, decomposition, words):
     scan = replace(RING, slices=40, pairs=40 * 256**2, height_m=0.05)
-    found = plan(scan, Settings.of(**{"method": "sart", **changes}), [WorkerCapacity(0, BOTH)])
+    found = plan(scan, Settings.from_values(**{"method": "sart", **changes}), [WorkerCapacity(0, BOTH)])
     assert found.decomposition == decomposition
     assert words in found.why
     assert found.why.endswith(".")
@@ -118,12 +118,14 @@ def test_traces_are_planned_for():
     assert found.tasks > plan(RING, Settings(method="sart", nodes=64), []).tasks + 2 * 64
     # No call holds all traces, which are 3 GiB.
     assert found.largest[1] < scan.traces_bytes / 3
-    unseen = plan(scan, Settings.of(method="sart", nodes=64, examine=False), [])
+    unseen = plan(scan, Settings.from_values(method="sart", nodes=64, examine=False), [])
     assert "measure_traces" not in unseen.call_bytes
     assert "finish_slice" in plan(replace(RING, period=True), Settings(method="sart"), []).call_bytes
     assert (
         "finish_slice"
-        not in plan(replace(RING, period=True), Settings.of(method="sart", examine=False), []).call_bytes
+        not in plan(
+            replace(RING, period=True), Settings.from_values(method="sart", examine=False), []
+        ).call_bytes
     )
 
 
@@ -165,7 +167,7 @@ def test_more_nodes_and_more_slices_never_take_less(nodes, method, volume, check
 
 
 def test_a_device_that_cannot_hold_one_slice_or_emitter_is_refused_by_number():
-    asked = Settings.of(method="sart", nodes=256, device="opencl")
+    asked = Settings.from_values(method="sart", nodes=256, device="opencl")
     needed = SliceSize((256, 256), 256, 256, 1, 1).bytes
 
     def offer(device_bytes):
@@ -191,7 +193,7 @@ def test_a_device_that_cannot_hold_one_slice_or_emitter_is_refused_by_number():
 
 
 def test_result_and_checkpoints_take_no_more_than_the_planned_disk(tmp_path):
-    settings = Settings.of(method="gauss-newton", nodes=24, iterations=2, attenuation=False)
+    settings = Settings.from_values(method="gauss-newton", nodes=24, iterations=2, attenuation=False)
     scan, work, stored = made_up_scan(tmp_path / "scan.h5", 12, 2), tmp_path / "work", [0]
     work.mkdir()
 

@@ -91,7 +91,7 @@ def steps(work):
 
 @pytest.mark.parametrize("way", WAYS, ids=str)
 def test_the_largest_dataset_is_planned_in_as_many_steps_as_a_small_one(way):
-    settings = Settings.of(**{"method": "sart", **way})
+    settings = Settings.from_values(**{"method": "sart", **way})
     few, _ = steps(lambda: planned(SMALL, settings))
     many, taken = steps(lambda: planned(LARGEST, settings))
     assert many <= 1.5 * few
@@ -102,7 +102,7 @@ def test_the_largest_dataset_is_planned_in_as_many_steps_as_a_small_one(way):
 
 @pytest.mark.parametrize("way", WAYS, ids=str)
 def test_rejecting_the_largest_dataset_takes_few_steps(way):
-    settings = Settings.of(**{"method": "sart", **way})
+    settings = Settings.from_values(**{"method": "sart", **way})
     little = [WorkerCapacity(2048 * MIB, ("recon", "render"))]
 
     def refused():
@@ -139,7 +139,7 @@ numbers = {
     way=st.sampled_from(WAYS),
 )
 def test_every_dataset_within_the_limits_has_a_plan(way, **counts):
-    settings, known = Settings.of(**{"method": "sart", **way}), DatasetCounts(**counts)
+    settings, known = Settings.from_values(**{"method": "sart", **way}), DatasetCounts(**counts)
     if settings.method == "waveform" and (known.summary(settings).traces is None or known.in_space):
         with pytest.raises(InvalidInput, match=r"for (a scan without traces|elements in space)"):
             planned(known, settings)
@@ -154,7 +154,7 @@ def test_every_dataset_within_the_limits_has_a_plan(way, **counts):
 def test_an_array_of_no_width_that_was_taken_in_before_has_no_plan(width_m):
     for way in WAYS:
         with pytest.raises(InvalidInput, match="element_position_m"):
-            planned(replace(SMALL, width_m=width_m), Settings.of(**{"method": "sart", **way}))
+            planned(replace(SMALL, width_m=width_m), Settings.from_values(**{"method": "sart", **way}))
 
 
 @given(dataset=datasets())

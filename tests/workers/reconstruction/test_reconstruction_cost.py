@@ -13,7 +13,7 @@ TRACES = Traces(64, 64, 2000, 4, 8e6, 4e5, 1500.0)
 
 
 def seconds(scan=RING, workers=1, **asked):
-    settings = Settings.of(**{"method": "sart", "nodes": 64, "decomposition": "slices", **asked})
+    settings = Settings.from_values(**{"method": "sart", "nodes": 64, "decomposition": "slices", **asked})
     return reconstruction_cost(scan, settings, workers).seconds - OVERHEAD_S
 
 
@@ -62,7 +62,7 @@ def test_waves_and_picking_add_their_time():
 
 def test_classes_keep_apart_what_differs_in_speed():
     def name(scan=RING, **asked):
-        settings = Settings.of(**{"method": "sart", "nodes": 64, "decomposition": "slices", **asked})
+        settings = Settings.from_values(**{"method": "sart", "nodes": 64, "decomposition": "slices", **asked})
         return reconstruction_cost(scan, settings, 1).work_class
 
     traced = replace(RING, traces=TRACES)
@@ -86,6 +86,6 @@ def test_classes_keep_apart_what_differs_in_speed():
 
 @pytest.mark.parametrize("asked", [{"decomposition": "volume"}, {"eikonal": "fim"}])
 def test_speeds_that_nobody_measured_are_not_known(asked):
-    settings = Settings.of(method="sart", nodes=64, decomposition="slices")
+    settings = Settings.from_values(method="sart", nodes=64, decomposition="slices")
     assert reconstruction_cost(RING, settings, 1).speed_known
     assert not reconstruction_cost(RING, settings.changed(**asked), 1).speed_known

@@ -19,7 +19,7 @@ from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.waves import WaveSimulationSettings
 
 WAVES = WaveSimulationSettings(frequency_hz=2e5, side_m=0.06, elements=24, emissions=12, nodes=32)
-SETTINGS = Settings.of(
+SETTINGS = Settings.from_values(
     method="sart", nodes=24, iterations=1, attenuation=False, reflection=True, pixel_m=2e-3
 )
 

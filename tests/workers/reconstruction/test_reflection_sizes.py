@@ -41,7 +41,7 @@ def scan(elements, samples, water=False):
 
 
 def test_buffers_of_a_device_are_planned():
-    settings = Settings.of(method="sart", nodes=48, reflection=True)
+    settings = Settings.from_values(method="sart", nodes=48, reflection=True)
     dataset = scan(24, 500)
     here, there = (
         reflection_task_bytes(DatasetCounts.from_dataset(dataset).summary(one), one)
@@ -52,7 +52,7 @@ def test_buffers_of_a_device_are_planned():
 
 @given(emissions=st.integers(8, 512), samples=st.integers(300, 3000), slices=st.integers(1, 9))
 def test_planned_work_grows_with_the_scan(emissions, samples, slices):
-    settings = Settings.of(method="sart", nodes=64, reflection=True)
+    settings = Settings.from_values(method="sart", nodes=64, reflection=True)
     one = DatasetCounts.from_dataset(scan(8, 8)).summary(settings)
     traces = replace(one.echoes, emissions=emissions, samples=samples)
     summary = replace(one, echoes=traces, slices=slices)
@@ -67,7 +67,7 @@ def test_planned_work_grows_with_the_scan(emissions, samples, slices):
 
 
 def test_a_water_shot_is_planned():
-    settings = Settings.of(method="sart", nodes=48, reflection=True)
+    settings = Settings.from_values(method="sart", nodes=48, reflection=True)
     without, with_it = (
         reflection_task_bytes(DatasetCounts.from_dataset(scan(24, 500, water)).summary(settings), settings)
         for water in (False, True)
@@ -77,7 +77,7 @@ def test_a_water_shot_is_planned():
 
 
 def test_nothing_is_planned_unless_it_is_requested():
-    settings = Settings.of(method="sart", nodes=64)
+    settings = Settings.from_values(method="sart", nodes=64)
     summary = DatasetCounts.from_dataset(scan(8, 8)).summary(settings)
     assert reflection_task_bytes(summary, settings) == {}
     assert reflection_tasks(summary, settings) == reflection_bytes(summary, settings) == 0

@@ -17,7 +17,7 @@ from bentray_workers.reconstruction.reconstruction_run import reconstruct
 pytestmark = pytest.mark.opencl
 
 SLICES, ELEMENTS, WATER = 3, 16, 1375.0
-SETTINGS = Settings.of(method="sart", nodes=32, iterations=2, device="opencl")
+SETTINGS = Settings.from_values(method="sart", nodes=32, iterations=2, device="opencl")
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_the_plan_counts_what_is_in_flight(stack):
 
     def size(slices):
         scan = Summary(512, 512, slices * 512**2, slices, False, 0.0, 0.2, 0, False)
-        settings = Settings.of(method="sart", nodes=256, device="opencl")
+        settings = Settings.from_values(method="sart", nodes=256, device="opencl")
         return ray_task_sizes(scan, settings)["update_sart_slices"].bytes
 
     assert size(1) > 8 * 512**2 + 30 * 256**2

@@ -112,6 +112,6 @@ def test_waves_and_slices_are_computed_on_a_device_that_is_requested(method, dev
     ],
 )
 def test_slices_whose_front_is_that_of_the_compiled_pass_run_on_a_device(changes, able):
-    settings = Settings.of(method="sart", device="opencl", **changes)
+    settings = Settings.from_values(method="sart", device="opencl", **changes)
     assert sart_engine(settings, 2) == ("opencl" if able else "compiled")
     assert sart_engine(settings, 3) == "compiled"

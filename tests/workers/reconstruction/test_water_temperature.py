@@ -19,7 +19,7 @@ from ...kernels.acquisition.reference.object_scans import ELEMENTS, disc_delay_s
 from ...kernels.acquisition.traces import RADIUS_M, scan
 
 STATED_C = 20.4
-SETTINGS = Settings.of(method="sart", nodes=16, iterations=1, water_temperature_c=STATED_C)
+SETTINGS = Settings.from_values(method="sart", nodes=16, iterations=1, water_temperature_c=STATED_C)
 
 
 def times():

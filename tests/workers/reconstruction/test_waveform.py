@@ -23,9 +23,9 @@ from bentray_workers.simulation.waves import WaveSimulationSettings
 from ...kernels.tomography.waveform.scans import error, scan, water
 from ..cluster.tearing import torn_runs
 
-PLAN = Settings.of(method="waveform", nodes=32, iterations=2, bands=3, emitters=5)
+PLAN = Settings.from_values(method="waveform", nodes=32, iterations=2, bands=3, emitters=5)
 # Fewer of everything, where less proves as much.
-SHORT = Settings.of(method="waveform", nodes=32, iterations=1, bands=2, emitters=3)
+SHORT = Settings.from_values(method="waveform", nodes=32, iterations=1, bands=2, emitters=3)
 HEIGHTS = np.array([0.0, 0.002])
 
 
@@ -93,7 +93,9 @@ def test_an_object_that_nearly_fills_the_array_is_made_better_too(tmp_path):
     full = simulate(WaveSimulationSettings(2e5, 0.06, 48, 16, nodes=48, snr=30.0))
     write_dataset(tmp_path / "full.h5", full)
     rays, waves = (
-        reconstruction_run.reconstruct(None, tmp_path / "full.h5", Settings.of(method=method, nodes=48))
+        reconstruction_run.reconstruct(
+            None, tmp_path / "full.h5", Settings.from_values(method=method, nodes=48)
+        )
         for method in ("auto", "waveform")
     )
     by_rays, by_waves = (compare(result, full.truth).rms for result in (rays, waves))
@@ -174,7 +176,7 @@ def test_times_do_not_need_a_water_shot_that_cannot_be_estimated(tmp_path):
     """Chords through water are searched only where they are needed."""
     silent = np.random.default_rng(0).standard_normal(scan().waveform.object.shape).astype(np.float32)
     write_dataset(tmp_path / "times.h5", replace(pick(scan()), waveform=Waveform(silent)))
-    rays = Settings.of(nodes=32, iterations=2, method="auto")
+    rays = Settings.from_values(nodes=32, iterations=2, method="auto")
     result = reconstruction_run.reconstruct(None, tmp_path / "times.h5", rays)
     assert "waveform" not in result.provenance
     with pytest.raises(InvalidInput, match=r"waveform/water: found no traces, and \d+ chords"):
@@ -184,7 +186,7 @@ def test_times_do_not_need_a_water_shot_that_cannot_be_estimated(tmp_path):
 @pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:-900])])
 def test_lost_reference_is_recomputed(tmp_path, damage):
     write_dataset(tmp_path / "bare.h5", replace(scan(), waveform=Waveform(scan().waveform.object)))
-    rays = Settings.of(method="sart", nodes=32, iterations=2, examine=False)
+    rays = Settings.from_values(method="sart", nodes=32, iterations=2, examine=False)
     work = tmp_path / "work"
     work.mkdir()
     first = reconstruction_run.reconstruct(None, tmp_path / "bare.h5", rays, work_dir=work)

@@ -39,7 +39,7 @@ def wave_task_bytes(traces, width_m, settings):
 )
 def test_planned_memory_is_monotonic(bands, emissions, samples, width):
     traces = replace(SCAN, emissions=emissions, samples=samples)
-    settings = Settings.of(method="waveform", bands=bands)
+    settings = Settings.from_values(method="waveform", bands=bands)
     found = wave_task_bytes(traces, width, settings)
     # Beyond those that a band uses emissions do not count, but where they are read in blocks.
     many = wave_task_bytes(replace(traces, emissions=emissions + 64), width, settings)
@@ -57,7 +57,7 @@ def test_planned_memory_is_monotonic(bands, emissions, samples, width):
 
 @pytest.mark.opencl
 def test_the_plan_holds_the_arrays_of_a_device():
-    settings = Settings.of(method="waveform", nodes=32, bands=2, emitters=5, device="opencl")
+    settings = Settings.from_values(method="waveform", nodes=32, bands=2, emitters=5, device="opencl")
     data = scan()
     plan = wave_settings(scale_of(data, settings, data.waveform.object.shape[-1], 1), settings)
     assert plan.engine == "opencl"

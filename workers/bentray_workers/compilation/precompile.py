@@ -164,7 +164,9 @@ def _reconstruct(path: Path, scan: Dataset, candidates: Iterator[dict[str, Any]]
     quality.quality_report(path, "aic")
     for settings in candidates:
         reconstruct(
-            None, path, Settings.of(**{"method": "sart", "nodes": NODES, "iterations": 1, **settings})
+            None,
+            path,
+            Settings.from_values(**{"method": "sart", "nodes": NODES, "iterations": 1, **settings}),
         )
 
 

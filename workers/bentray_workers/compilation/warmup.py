@@ -48,7 +48,7 @@ def warm_up() -> None:
     water = Dataset(Ring(8, 0.01).positions(), elements, elements, 1500.0, delta_tof_s=np.zeros((8, 8)))
     for method in methods():
         if "opencl" not in method:
-            reconstruct(water, Settings.of(method="sart", eikonal=method, nodes=16, iterations=1))
+            reconstruct(water, Settings.from_values(method="sart", eikonal=method, nodes=16, iterations=1))
     reconstruct(water, Settings(method="sart", rays="straight", nodes=16, iterations=1))
 
 

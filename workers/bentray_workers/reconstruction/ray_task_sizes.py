@@ -62,7 +62,7 @@ def rays_of(scan: Summary, settings: Settings) -> int:
 
 def front_size(shape: tuple[int, ...], method: str) -> TaskSize:
     """One travel time with the data for ray tracing; ``method`` is one of ``eikonal.methods()``."""
-    return TaskSize(f"travel time {method}{_space(shape)}", {"nodes": int(Diagonals.of(shape).size)})
+    return TaskSize(f"travel time {method}{_space(shape)}", {"nodes": int(Diagonals.from_shape(shape).size)})
 
 
 def ray_task_sizes(scan: Summary, settings: Settings) -> Sizes:
@@ -188,6 +188,6 @@ def _block_counts(shape: tuple[int, ...], receivers: int, settings: Settings) ->
         "nodes of a block": near * plane,
         "freed nodes": min(near * plane, FREED_NODES),
         "smoothed nodes": min(own + 2 * smoothing_reach(settings), shape[0]) * plane,
-        "swept nodes": int(Diagonals.of((own, *shape[1:])).size),
+        "swept nodes": int(Diagonals.from_shape((own, *shape[1:])).size),
         "points of rays": receivers * max(shape) * len(shape),
     }

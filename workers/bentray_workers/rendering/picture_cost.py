@@ -225,7 +225,7 @@ class VolumeFile:
     node_bytes: int
 
     @classmethod
-    def of(cls, row: Mapping[str, Any]) -> VolumeFile:
+    def from_row(cls, row: Mapping[str, Any]) -> VolumeFile:
         """From a row of ``volumes`` or ``uploaded_volumes``."""
         nodes = math.prod(row["shape"])
         if "job_id" in row:

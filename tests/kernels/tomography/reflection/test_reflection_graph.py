@@ -26,7 +26,7 @@ from .point_echoes import CENTRE_HZ, RADIUS, RATE_HZ, T0, WATER, pulse, ring, tr
 # An eighth of a wavelength.
 PIXEL = 3.75e-4
 POINT, DELAY = np.array([0.006, -0.0045]), 1.3e-6
-SETTINGS = Settings.of(method="sart", nodes=24, iterations=1, reflection=True, pixel_m=PIXEL)
+SETTINGS = Settings.from_values(method="sart", nodes=24, iterations=1, reflection=True, pixel_m=PIXEL)
 
 
 def scan(water=True, **changes):

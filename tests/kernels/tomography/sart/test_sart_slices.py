@@ -39,7 +39,7 @@ def rings():
 
 def plan(**changes):
     values = {"nodes": NODES, "side_m": TABLE6_SIDE_M, "method": "sart", "iterations": 3, "device": "opencl"}
-    return Settings.of(**{**values, **changes})
+    return Settings.from_values(**{**values, **changes})
 
 
 def advanced(rings, settings, emitters=10**6):

@@ -25,7 +25,7 @@ def scan():
 
 
 def plan(**changes):
-    return Settings.of(nodes=NODES, side_m=SIDE, **{"method": "sart", **changes})
+    return Settings.from_values(nodes=NODES, side_m=SIDE, **{"method": "sart", **changes})
 
 
 @given(cuts=st.lists(st.integers(1, 40), min_size=1, max_size=8))

@@ -26,7 +26,7 @@ def scan():
 
 
 def plan(**changes):
-    return Settings.of(
+    return Settings.from_values(
         **{"method": "sart", "nodes": NODES, "side_m": TABLE6_SIDE_M, "iterations": 2, **changes}
     )
 
@@ -49,7 +49,7 @@ def test_data_driven_update_stretches_the_range():
     region = np.ones((4, 4), bool)
     region[0] = False
     slowness = 1.0 / np.linspace(1480.0, 1520.0, 16).reshape(4, 4)
-    wanted = Settings.of(method="sart", speed_range_mps=(1375.0, 1560.0))
+    wanted = Settings.from_values(method="sart", speed_range_mps=(1375.0, 1560.0))
     stretched = propagation_speed(slowness, region, wanted, warm=True)
     assert stretched[region].min() == pytest.approx(1375.0)
     assert stretched[region].max() == pytest.approx(1560.0)

@@ -14,7 +14,7 @@ from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.uncertainty import model_errors
 
 WATER, SIDE, NODES, RING = 1500.0, 0.16, 48, Ring(48, 0.07)
-PLAN = Settings.of(method="gauss-newton", nodes=NODES, side_m=SIDE, iterations=3, uncertainty=True)
+PLAN = Settings.from_values(method="gauss-newton", nodes=NODES, side_m=SIDE, iterations=3, uncertainty=True)
 PHANTOM = EllipsePhantom(
     WATER,
     (

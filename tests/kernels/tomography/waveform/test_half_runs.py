@@ -52,7 +52,7 @@ def test_the_last_bands_of_the_speed_run_again_from_the_image_before_them():
 def test_both_halves_cost_less_than_the_image():
     image = sum(band.evaluations(PLAN.held_out) for band in PLAN.bands)
     assert 0.3 * image < half_runs.passes(PLAN) < image
-    settings = Settings.of(method="waveform", attenuation=False)
+    settings = Settings.from_values(method="waveform", attenuation=False)
     scale = scale_of(recorded(), settings, 120, 1)
     alone, both = scale.minutes(settings), scale.minutes(settings.changed(uncertainty=True))
     assert 1.5 * alone < both < 2.1 * alone
@@ -73,7 +73,7 @@ def test_half_the_difference_of_the_halves_is_the_deviation():
 
 @pytest.fixture(scope="module")
 def refined():
-    plan = Settings.of(
+    plan = Settings.from_values(
         method="waveform", rays="straight", nodes=32, iterations=2, bands=2, emitters=8, attenuation=False
     )
     seen = []

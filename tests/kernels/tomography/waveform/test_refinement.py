@@ -17,7 +17,9 @@ from bentray_kernels.tomography.waveform.waveform_cost import advice
 
 from .scans import error, scan
 
-PLAN = Settings.of(method="auto", rays="straight", nodes=32, iterations=2, bands=3, emitters=6, minutes=60.0)
+PLAN = Settings.from_values(
+    method="auto", rays="straight", nodes=32, iterations=2, bands=3, emitters=6, minutes=60.0
+)
 
 
 def heard(noise=0.0):

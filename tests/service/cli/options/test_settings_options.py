@@ -73,7 +73,7 @@ def test_each_option_sets_its_own_setting_and_no_other(
     bentray("reconstruct", scan, "-o", tmp_path / "out", *words)
     # What else must be set for it to have an effect.
     more = {"method": "sart"} if name == "speed_range_mps" else {"reflection": "--reflection" in words}
-    assert received == [Settings.of(**{**more, name: value})]
+    assert received == [Settings.from_values(**{**more, name: value})]
 
 
 def test_several_are_taken_together(
@@ -82,7 +82,7 @@ def test_several_are_taken_together(
     (tmp_path / "scan.h5").touch()
     words = ("--relaxation", 0.2, "--nodes", 64, "--penalty-strength", 2)
     bentray("reconstruct", tmp_path / "scan.h5", "-o", tmp_path / "out", *words)
-    assert received == [Settings.of(relaxation=0.2, nodes=64, penalty_strength=2.0)]
+    assert received == [Settings.from_values(relaxation=0.2, nodes=64, penalty_strength=2.0)]
 
 
 def test_every_setting_has_its_option() -> None:

@@ -17,7 +17,7 @@ from ..datasets import small
 def test_summary_counts_match_the_problem(tmp_path, reciprocity):
     dataset, path = small(), tmp_path / "scan.h5"
     write_dataset(path, dataset)
-    asked = Settings.of(method="sart", reciprocity=reciprocity)
+    asked = Settings.from_values(method="sart", reciprocity=reciprocity)
     summary, pairs = summary_of(path, asked), from_dataset(dataset, asked, 0)
     assert (summary.emitters, summary.receivers) == pairs.delta_tof.shape
     assert (summary.pairs, summary.slices, summary.in_space, summary.height_m) == (12 * 24, 1, False, 0.0)

@@ -23,7 +23,7 @@ from ....effort import effort
 from ...cluster.tearing import torn_runs
 
 ELEMENTS, HEIGHTS = 5, 2
-PLAN = Settings.of(method="sart", nodes=20, decomposition="volume", iterations=2, relaxation=0.5)
+PLAN = Settings.from_values(method="sart", nodes=20, decomposition="volume", iterations=2, relaxation=0.5)
 WAYS = {
     "curved": ({"iterations": effort(1, 2)}, 3),
     "straight": ({"rays": "straight", "iterations": 1}, 3),
