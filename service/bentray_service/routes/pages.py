@@ -7,13 +7,17 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
+from starlette.concurrency import run_in_threadpool
 
 from bentray_workers.files.export.registry import FORMATS
 
 from ..web.documents import documentation_files, missing_page
 from ..web.reference import reference_page
+from ..web.written_pages import found_pages, page_files, written_page
 
 WEB = Path(__file__).parent.parent / "web"
+# Characters of a search of the documentation.
+LONGEST_SEARCH = 200
 
 router = APIRouter(include_in_schema=False)
 
@@ -31,12 +35,18 @@ def documentation_start() -> RedirectResponse:
 
 
 @router.get("/documentation/{path:path}")
-async def documentation(path: str, request: Request) -> Response:
-    """A file of the built documentation."""
+async def documentation(path: str, request: Request, q: str = "") -> Response:
+    """A file of the built documentation; where it is not built, a page as it is written, or a search."""
     files = documentation_files()
-    if files is None:
-        return HTMLResponse(missing_page(request.app.version), status_code=404)
-    return await files.get_response(path or ".", request.scope)
+    if files is not None:
+        return await files.get_response(path or ".", request.scope)
+    if path in page_files() and path.endswith(".png"):
+        return FileResponse(page_files()[path])
+    version = request.app.version
+    if q:
+        return HTMLResponse(await run_in_threadpool(found_pages, q[:LONGEST_SEARCH], version))
+    page = await run_in_threadpool(written_page, path, version)
+    return HTMLResponse(page or missing_page(version), 200 if page else 404)
 
 
 @router.get("/docs")

@@ -65,13 +65,14 @@ def documentation_files() -> StaticFiles | None:
 
 
 def missing_page(version: str) -> str:
-    """Instructions for where the documentation is not built."""
+    """For an address that is no page, with instructions for where the documentation is not built."""
     return document(
         "documentation",
         version,
-        "<p>This installation has no built documentation. The packages of a release contain it. In a clone "
-        "of the repository, run <code>make docs</code> and restart the service; the same texts are in the "
-        "folder <code>docs</code>.</p>"
+        '<p>The documentation has no such page: <a href="/documentation/">its start</a>. This installation '
+        "shows the pages as they are written; the reference of Python and the pictures of the gallery are in "
+        "the packages of a release. In a clone of the repository, run <code>make docs</code> and restart the "
+        "service.</p>"
         '<p>The <a href="/docs">REST reference</a> and the <a href="/docs/formats">file formats</a> are '
         "always served.</p>",
     )

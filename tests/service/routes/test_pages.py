@@ -67,11 +67,39 @@ def test_the_documentation_is_served_under_the_same_policy(start, built):
         assert app.get(f"/documentation/{path}").status_code == 404
 
 
+def test_a_documentation_that_is_not_built_is_shown_as_it_is_written(start, monkeypatch, tmp_path):
+    monkeypatch.setattr(documents, "PACKAGED", tmp_path)
+    monkeypatch.setattr(documents, "CHECKOUT", tmp_path)
+    documents.documentation_files.cache_clear()
+    app = start()
+    for path, words in {
+        "": "What do you want to do?",
+        "how-to/deploy.html": "<h1",
+        "reference/settings.md": "<td><code>gauss_newton.penalty_strength</code></td>",
+        "mathematics/rays.html": "<pre>",
+        "gallery/02_own_data.html": "import bentray",
+        "gallery/index.html": '<a href="02_own_data.html">',
+        "?q=water+TEMPERATURE": '<a href="/documentation/how-to/use-your-own-data.html">',
+        "?q=%3Cb%3Enothing": "No page has &lt;b&gt;nothing",
+    }.items():
+        answer = app.get(f"/documentation/{path}")
+        assert (answer.status_code, words in answer.text) == (200, True), path
+        assert not re.search(r"<script(?![^>]*\bsrc=)|<style|\bstyle=", answer.text), path
+    start_page = app.get("/documentation/").text
+    pictures = re.findall(r'<img src="(pictures/[^"]+)"', start_page)
+    assert pictures
+    for address in [*pictures, *re.findall(r'<a href="([\w-]+/[\w-]+\.\w+)"', start_page)]:
+        assert app.get(f"/documentation/{address}").status_code == 200, address
+    for path in ("nowhere.html", "..%2fREADME.md", "%2e%2e/pyproject.toml", "conf.py"):
+        assert app.get(f"/documentation/{path}").status_code == 404
+    documents.documentation_files.cache_clear()
+
+
 def test_a_documentation_that_is_not_built_says_how_to_get_it(start, monkeypatch, tmp_path):
     monkeypatch.setattr(documents, "PACKAGED", tmp_path)
     monkeypatch.setattr(documents, "CHECKOUT", tmp_path)
     documents.documentation_files.cache_clear()
-    answer = start().get("/documentation/")
+    answer = start().get("/documentation/nowhere.html")
     documents.documentation_files.cache_clear()
     assert answer.status_code == 404
     assert "make docs" in answer.text
