@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from textwrap import fill
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -26,8 +27,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon
 from PIL import Image, ImageDraw
 
+import bentray
 from bentray_kernels import eikonal, rays
 from bentray_kernels.acquisition import Dataset
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, TWO_HOLES, sampled, table6
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_kernels.tomography.comparison import compare
@@ -118,6 +121,55 @@ def coupling() -> Image.Image:
         row[0].set_ylabel("y (mm)")
     figure.suptitle("2-D breast phantom in water of four speeds")
     figure.colorbar(shown, ax=axes, label="sound speed (m/s)", shrink=0.6)
+    return _drawn(figure)
+
+
+def mistakes() -> Image.Image:
+    """Times of a scan as they should be and with five mistakes; below, the image or the refusal."""
+    scan = simulate(SimulationSettings(nodes=64, elements=64, coupling_mps=1500.0), lambda _: None)
+    assert scan.delta_tof_s is not None
+    right, place = scan.delta_tof_s, scan.element_position_m
+    water = np.linalg.norm(place[:, None] - place[None], axis=2) / scan.water_speed_mps
+    half = len(place) // 2
+    failed = np.random.default_rng(1).random(right.shape) < 0.3
+    order = np.arange(len(place)) ^ 1
+    first, second = np.arange(half), np.arange(half, 2 * half)
+    cases = {
+        "right": {"delta_tof_s": right},
+        "arrival times\nas differences": {"delta_tof_s": water + right},
+        "samples at 20 MHz\nas seconds": {"delta_tof_s": 20e6 * right},
+        "one direction, tx\nand rx exchanged": {
+            "delta_tof_s": right[:half, half:].T,
+            "tx": first,
+            "rx": second,
+            "valid": None,
+        },
+        "neighbouring elements\nexchanged": {"delta_tof_s": right[order][:, order]},
+        "failed picks as\ndifferences of 0": {"delta_tof_s": np.where(failed, 0.0, right)},
+    }
+    figure, axes = plt.subplots(2, 6, figsize=(12.6, 4.7), layout="constrained")
+    side = TABLE6_SIDE_M / 2 * MM
+    for (above, below), (name, changes) in zip(axes.T, cases.items(), strict=True):
+        delta = changes["delta_tof_s"]
+        known = MM**2 * delta[np.isfinite(delta)]
+        above.imshow(delta, cmap="RdBu_r", vmin=-5e-6, vmax=5e-6)
+        above.set_title(name, fontsize="medium")
+        above.set(xlabel=f"{known.min():.2g} to {known.max():.3g} µs", xticks=[], yticks=[])
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "scan.h5"
+            try:
+                write_dataset(path, replace(scan, **changes))
+                result = bentray.reconstruct(bentray.read(path), "sart", nodes=64, progress=False)
+            except InvalidInput as error:
+                below.axis("off")
+                below.text(0, 1, fill(f"rejected: {error}", 27), va="top", fontsize=7)
+                continue
+        speed = result.speed.T
+        shown = below.imshow(speed, origin="lower", extent=(-side, side) * 2, vmin=1350, vmax=1570)
+        below.set_xlabel("x (mm)")
+    axes[0, 0].set_ylabel("emitter over receiver")
+    axes[1, 0].set_ylabel("y (mm)")
+    figure.colorbar(shown, ax=axes, label="sound speed (m/s)")
     return _drawn(figure)
 
 
@@ -443,6 +495,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
         overview,
         fronts,
         coupling,
+        mistakes,
         fresnel,
         axes,
         glass,
