@@ -212,7 +212,7 @@ class Settings:
     )
     eikonal: SolverName = setting(  # noqa: RUF009 - a string, by its alias
         DEVIATION,
-        "Eikonal solver for curved rays. deviation is for SART on slices; elsewhere accurate replaces it.",
+        "Eikonal solver for bent rays. deviation is for SART on slices; elsewhere accurate replaces it.",
         label="Eikonal solver",
         used_when=({"rays": ("curved",)}, {"uncertainty": (True,)}),
     )

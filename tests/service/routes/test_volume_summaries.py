@@ -56,6 +56,7 @@ def test_a_summary_names_quantities_candidates_and_errors(http, result):
         ("bent rays, SART", True),
         ("straight rays, SART", False),
     ]
+    assert (record["criterion"], record["candidates"][0]["outcome"]) == ("held_out_rms_s", "chosen and shown")
     assert record["candidates"][0]["held_out_mean_s"] == 1.5e-7
     assert record["candidates"][1]["held_out_mean_s"] is None
     assert record["reason"].startswith("auto chose bent rays, SART")
@@ -87,6 +88,7 @@ def test_a_scan_without_truth_has_none(http, uploaded, work, submitted, until):
         "cautions": [],
         "grids": {},
         "candidates": [],
+        "criterion": "",
         "reason": "",
         "automatic": "",
         "truth": None,

@@ -48,10 +48,10 @@ def test_the_sweeps_of_all_stages_are_counted():
     ("settings", "words"),
     [
         (Settings(method="sart", rays="straight"), "straight rays  "),
-        (Settings(method="sart"), "curved rays (deviation)"),
-        (Settings(method="sart", eikonal="fsm"), "curved rays (fsm)"),
-        (Settings(method="gauss-newton"), "curved rays (accurate)"),
-        (Settings(method="sart", decomposition="volume"), "curved rays (accurate)"),
+        (Settings(method="sart"), "bent rays (deviation)"),
+        (Settings(method="sart", eikonal="fsm"), "bent rays (fsm)"),
+        (Settings(method="gauss-newton"), "bent rays (accurate)"),
+        (Settings(method="sart", decomposition="volume"), "bent rays (accurate)"),
     ],
 )
 def test_the_wave_front_method_is_the_one_that_was_used(settings, words):

@@ -67,7 +67,7 @@ def _rays(settings: Settings) -> str:
     if settings.rays == "straight":
         return "straight rays"
     front = solver_of(settings, 3 if settings.decomposition == "volume" else 2).eikonal
-    return f"curved rays ({front})"
+    return f"bent rays ({front})"
 
 
 def _iterations(result: Reconstruction) -> str:

@@ -25,20 +25,18 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         ``cautions``: what the reader must know, each with ``code``, ``text`` and whether it makes the image
         ``doubtful``;
         ``grids``: shape, spacing and origin of quantities whose grid is not that of the speed;
-        ``candidates``: the models that were compared, the chosen one first, each with ``label``,
-        ``held_out_rms_s``, ``held_out_mean_s`` (None in files of earlier versions), ``training_rms_s``,
-        ``chosen`` and ``rejection`` (why a lower misfit was not chosen, else empty); ``reason``: of this
-        choice, empty without candidates; ``automatic``: what was decided automatically, and why, empty in
-        files of earlier versions; ``truth``: None without a truth, else ``region``, ``nodes``, errors,
-        similarities (None if they do not exist), mean and spread of image and truth there; or ``region``
-        with the reason why it is not compared, and ``nodes``.
+        ``candidates``: rows of ``choice_table``; ``criterion``: the name of the misfit that decided;
+        ``reason``: of this choice; all empty without candidates; ``automatic``: what was decided
+        automatically, and why, empty in older files; ``truth``: None without a truth, else ``region``,
+        ``nodes``, errors, similarities (None if they do not exist), mean and spread of image and truth there;
+        or ``region`` with the reason why it is not compared, and ``nodes``.
 
     Raises:
         InvalidInput: naming the field of a file.
     """
     # Loaded only where it runs.
     from bentray_kernels.tomography.comparison import NotComparable, compare
-    from bentray_kernels.tomography.model_selection.selection import advice_of, label, rejection
+    from bentray_kernels.tomography.model_selection.selection import advice_of, choice_table, criterion
 
     own, dataset = read_reconstruction(volume), read_dataset(scan, traces=False)
     held = {name: image for name in QUANTITIES if (image := own.image(name)) is not None}
@@ -80,17 +78,8 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         },
         "reason": advice_of(own),
         "automatic": own.provenance.get("automatic", ""),
-        "candidates": [
-            {
-                "label": label(trial.settings),
-                "held_out_rms_s": trial.held_out_rms_s,
-                "held_out_mean_s": trial.held_out_mean_s,
-                "training_rms_s": trial.shown_rms_s,
-                "chosen": k == 0,
-                "rejection": rejection(trial, own.trials),
-            }
-            for k, trial in enumerate(own.trials)
-        ],
+        "candidates": choice_table(own),
+        "criterion": criterion(own.trials),
         "truth": errors,
     }
 

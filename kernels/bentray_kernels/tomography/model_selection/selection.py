@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -201,36 +202,77 @@ def explain_candidates(candidates: Sequence[Candidate]) -> str:
     return f"auto chose {label(chosen.settings)}: {reason}"
 
 
-def candidate_table(candidates: Sequence[Candidate]) -> list[tuple[str, str, str]]:
-    """Rows of a table of candidates: label, misfit of held-out pairs, and ``chosen`` or ``rejection``."""
-    misfit = _misfit_of(candidates)
-    return [
-        (
-            label(candidate.settings),
-            f"{1e9 * misfit(candidate):.0f} ns",
-            "chosen" if k == 0 else rejection(candidate, candidates),
-        )
-        for k, candidate in enumerate(candidates)
-    ]
+def choice_table(result: Reconstruction) -> list[dict[str, Any]]:
+    """Rows of a table of what ``auto`` compared, the chosen candidate first and full waveforms last.
 
-
-def rejection(candidate: Candidate, candidates: Sequence[Candidate]) -> str:
-    """Why a candidate with a lower misfit than the chosen one, the first, was not chosen; else empty.
-
-    It is among finite-frequency rays alone: of thin rays the lowest misfit is chosen.
+    Returns:
+        For each ``label``; ``held_out_rms_s``, ``held_out_mean_s`` and ``training_rms_s``, None for full
+        waveforms; whether it was ``chosen`` among rays, and is the image that is ``shown``; ``outcome``:
+        these in words, or one reason why not. Empty without candidates.
     """
-    chosen, misfit = candidates[0], _misfit_of(candidates)
-    if candidate is chosen or misfit(candidate) >= misfit(chosen) or "ray_width_m" not in chosen.settings:
-        return ""
-    factor, why = STRAIGHT, "straight rays fit smooth times with a wrong image"
+    if not result.trials:
+        return []
+    waves, by_waves = result.provenance.get("waveform", ""), result.settings.method == "waveform"
+    rows = [
+        {
+            "label": label(candidate.settings),
+            "held_out_rms_s": candidate.held_out_rms_s,
+            "held_out_mean_s": candidate.held_out_mean_s,
+            "training_rms_s": candidate.shown_rms_s,
+            "chosen": k == 0,
+            "shown": k == 0 and not by_waves,
+            "outcome": _refusal(candidate, result.trials),
+        }
+        for k, candidate in enumerate(result.trials)
+    ]
+    rows[0]["outcome"] = "chosen: full waveforms began with its image" if by_waves else "chosen and shown"
+    if waves or by_waves:
+        ran = any(record.band_hz for record in result.history)
+        state = "shown" if by_waves else "refused" if ran else "not run"
+        said = waves.removeprefix("full waveform, ").removeprefix("method waveform ")
+        rows.append(
+            {
+                "label": "full waveform",
+                **dict.fromkeys(("held_out_rms_s", "held_out_mean_s", "training_rms_s")),
+                "chosen": False,
+                "shown": by_waves,
+                "outcome": f"{state}: {said}" if said else state,
+            }
+        )
+    return rows
+
+
+def _refusal(candidate: Candidate, candidates: Sequence[Candidate]) -> str:
+    """Why a candidate was not chosen; the chosen one is the first."""
+    misfit = _misfit_of(candidates)
+    its, least = misfit(candidate), misfit(candidates[0])
+    if its >= least:
+        worse = "no better"
+        if 0.0 < least < its < math.inf:
+            excess = 100.0 * (its / least - 1.0)
+            worse = f"{max(excess, 0.1):.{0 if excess >= 10.0 else 1}f} % worse"
+        return f"refused: predicts what was held out {worse}"
+    factor, why = STRAIGHT, "fits smooth times with a wrong image"
+    if "ray_width_m" not in candidates[0].settings:
+        return "refused: predicts what was held out not clearly better"
     if "ray_width_m" not in candidate.settings:
-        factor, why = EXACT, "thin rays fit wrong picks too"
-    return f"must be below {1e9 * factor * misfit(chosen):.0f} ns: {why}"
+        factor, why = EXACT, "fits wrong picks as well as right ones"
+    return f"refused: {why}: {1e9 * its:.0f} ns held out against {1e9 * factor * least:.0f} allowed"
+
+
+def criterion(candidates: Sequence[Candidate]) -> str:
+    """The misfit of ``choice_table`` that decided; empty without candidates.
+
+    It is the mean one where finite-frequency rays were tried, else the root mean square.
+    """
+    if not candidates:
+        return ""
+    wide = any("ray_width_m" in candidate.settings for candidate in candidates)
+    return "held_out_mean_s" if wide else "held_out_rms_s"
 
 
 def _misfit_of(candidates: Sequence[Candidate]) -> Callable[[Candidate], float]:
-    """The misfit that decides: the mean one where finite-frequency rays were tried, else the rms."""
-    wide = any("ray_width_m" in candidate.settings for candidate in candidates)
+    wide = criterion(candidates) == "held_out_mean_s"
     return mean_misfit if wide else lambda candidate: candidate.held_out_rms_s
 
 

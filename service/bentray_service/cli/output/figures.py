@@ -13,7 +13,7 @@ from bentray_kernels.acquisition.dataset import Dataset, Truth
 from bentray_kernels.acquisition.quality.finding import NOTHING_FOUND
 from bentray_kernels.tomography import Reconstruction
 from bentray_kernels.tomography.comparison import NotComparable, compare
-from bentray_kernels.tomography.model_selection.selection import advice_of, candidate_table
+from bentray_kernels.tomography.model_selection.selection import advice_of, choice_table, criterion
 from bentray_kernels.tomography.result import residual_within
 
 # Percentages for the quantiles of the residuals.
@@ -34,8 +34,8 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         check inside the array; ``uncertainty_rms_mps``: root mean square of the standard deviations inside
         the array; ``resolution_width_m``: of each slice, or one; ``doubt``: why the image is doubtful, and
         ``cautions``: all that the reader must know, with codes; ``trials`` and ``reason``: candidate models
-        and choice of ``auto``; ``candidates``: rows of their table. Missing values are None, missing doubts,
-        cautions, widths, trials and reasons are empty.
+        and choice of ``auto``; ``candidates``: rows of their table, with the ``criterion``. Missing values
+        are None, missing doubts, cautions, widths, trials and reasons are empty.
     """
     return {
         "doubt": result.doubt,
@@ -58,7 +58,8 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         "uncertainty_rms_mps": _uncertainty_rms(result),
         "resolution_width_m": list(result.resolution_width_m),
         "reason": advice_of(result),
-        "candidates": candidate_table(result.trials),
+        "candidates": choice_table(result),
+        "criterion": criterion(result.trials),
         "trials": [asdict(trial) for trial in result.trials],
         "truth": None if dataset.truth is None else errors(result, dataset.truth, dataset.roi),
         "settings": result.settings.to_dict(),
@@ -107,7 +108,7 @@ def summary(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """Rows (name, value) of the summary table, from the result of ``figures``."""
     low, high = facts["speed_range_mps"]
     rows = [
-        ("rays", facts["settings"]["rays"]),
+        ("rays", "straight" if facts["settings"]["rays"] == "straight" else "bent"),
         ("method", facts["settings"]["method"]),
         ("image", " by ".join(map(str, facts["shape"])) + f" nodes of {facts['spacing_m'][0] * 1e3:.3g} mm"),
         ("speed", f"{low:.0f} to {high:.0f} m/s, in water of {facts['water_speed_mps']:.1f} m/s"),

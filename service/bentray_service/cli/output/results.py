@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from bentray_kernels.acquisition import Dataset
     from bentray_kernels.tomography import Reconstruction
 
+# The misfits by which ``auto`` chooses.
+CRITERIA = {"held_out_mean_s": "held-out misfit, mean", "held_out_rms_s": "held-out misfit, rms"}
+
 
 def write_results(
     folder: Path,
@@ -62,5 +65,11 @@ def show_results(title: str, facts: dict[str, Any], *, as_json: bool) -> None:
     print_lines(caution["text"] for caution in facts["cautions"] if not caution["doubtful"])
     print_table(title, ("figure", "value"), summary(facts))
     if facts["candidates"]:
-        print_table("", ("candidate", "held-out misfit", "result"), facts["candidates"], {"held-out misfit"})
+        decides, heading = facts["criterion"], CRITERIA[facts["criterion"]]
+        misfits = [row[decides] for row in facts["candidates"]]
+        rows = [
+            (row["label"], "" if misfit is None else f"{1e9 * misfit:.0f} ns", row["outcome"])
+            for row, misfit in zip(facts["candidates"], misfits, strict=True)
+        ]
+        print_table("", ("candidate", heading, "result"), rows, {heading}, bold=heading)
     print_lines([*([facts["reason"]] if facts["reason"] else []), *facts["outputs"].values()])

@@ -7,7 +7,7 @@ import math
 import sys
 import warnings
 from collections.abc import Collection, Iterable, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -68,12 +68,17 @@ def without_nan(value: object) -> object:
 
 
 def print_table(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], numbers: Collection[str] = ()
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    numbers: Collection[str] = (),
+    bold: str = "",
 ) -> None:
-    """Print a table to stdout; ``numbers`` are right-aligned columns."""
+    """Print a table to stdout; ``numbers`` are right-aligned columns, ``bold`` is one in bold type."""
     table = Table(title=title, title_justify="left")
     for name in columns:
-        table.add_column(name, justify="right" if name in numbers else "left", overflow="fold")
+        justify: Literal["left", "right"] = "right" if name in numbers else "left"
+        table.add_column(name, justify=justify, overflow="fold", style="bold" if name == bold else "")
     for row in rows:
         table.add_row(*(Text(str(cell)) for cell in row))
     Console(width=None if sys.stdout.isatty() else WIDTH).print(table)

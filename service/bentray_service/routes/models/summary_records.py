@@ -13,13 +13,19 @@ class CandidateRecord(BaseModel):
     """A model that auto compared, reconstructed from a part of the pairs."""
 
     label: str = Field(description="Rays, method and regularisation.")
-    held_out_rms_s: float = Field(description="Rms misfit of the held-out pairs, s.")
-    held_out_mean_s: float | None = Field(
-        description="Mean absolute misfit of the held-out pairs, s; null for results of earlier versions."
+    held_out_rms_s: float | None = Field(
+        description="Rms misfit of the held-out pairs, s; null for full waveforms."
     )
-    training_rms_s: float = Field(description="Rms misfit of the other pairs, s.")
-    chosen: bool
-    rejection: str = Field(description="Why it was not chosen although its misfit is lower; else empty.")
+    held_out_mean_s: float | None = Field(
+        description="Mean absolute misfit of the held-out pairs, s; null for full waveforms and for older "
+        "results."
+    )
+    training_rms_s: float | None = Field(
+        description="Rms misfit of the other pairs, s; null for full waveforms."
+    )
+    chosen: bool = Field(description="Whether it is the best by rays.")
+    shown: bool = Field(description="Whether it is the image of the result.")
+    outcome: str = Field(description="The same in words, or one reason why it is not the image.")
 
 
 class TruthErrors(BaseModel):
@@ -79,7 +85,12 @@ class SummaryRecord(BaseModel):
     grids: dict[str, GridRecord] = Field(
         description="Grids of quantities that are not on the grid of the volume, such as reflection."
     )
-    candidates: list[CandidateRecord] = Field(description="The chosen one first; empty unless auto chose.")
+    candidates: list[CandidateRecord] = Field(
+        description="The chosen one first, full waveforms last; empty unless auto chose."
+    )
+    criterion: Literal["held_out_rms_s", "held_out_mean_s", ""] = Field(
+        description="The misfit of the candidates that decided; empty without candidates."
+    )
     reason: str = Field(description="Reason of this choice; empty without candidates.")
     automatic: str = Field(
         description="What was decided automatically, and why; empty for results of earlier versions."

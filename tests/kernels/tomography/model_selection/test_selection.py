@@ -10,7 +10,7 @@ from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
-from bentray_kernels.tomography import Candidate, Settings, reconstruct
+from bentray_kernels.tomography import Candidate, Iteration, Reconstruction, Settings, reconstruct
 from bentray_kernels.tomography.gauss_newton.gauss_newton_step import trace_rays
 from bentray_kernels.tomography.held_out import part_of
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import (
@@ -21,10 +21,10 @@ from bentray_kernels.tomography.model_selection.selection import (
     CANDIDATES,
     advice_of,
     candidate_settings,
-    candidate_table,
+    choice_table,
+    criterion,
     explain_candidates,
     final_settings,
-    rejection,
 )
 from bentray_kernels.tomography.scan import MemorySource, Scan
 from bentray_kernels.tomography.stopping import stop_at_noise, travel_time_noise
@@ -74,7 +74,9 @@ def test_eikonal_times_select_bent_rays(scan):
     assert misfits == sorted(misfits)
     assert len(misfits) == len(CANDIDATES)
     assert explain_candidates(result.trials).startswith("auto chose bent rays, ")
-    assert [row[2] for row in candidate_table(result.trials)] == ["chosen"] + [""] * (len(result.trials) - 1)
+    outcomes = [row["outcome"] for row in choice_table(result)]
+    assert outcomes[0] == "chosen and shown"
+    assert {text.split(":")[0] for text in outcomes[1:]} == {"refused"}
     # What was chosen gives the same bits when asked for by itself.
     again = reconstruct(scan, result.settings)
     assert np.array_equal(again.speed, result.speed)
@@ -210,6 +212,14 @@ def trial(rays, held_out):
     return Candidate({"rays": rays}, held_out, held_out)
 
 
+def table_of(*trials, method="sart", waves="", history=()):
+    """Label, outcome and whether it is the image, of each row."""
+    image, axes = np.full((2, 2), WATER), ((1e-3, 1e-3), (0.0, 0.0))
+    settings, said = Settings(method=method), {"waveform": waves} if waves else {}
+    result = Reconstruction(image, image, *axes, WATER, settings, history, trials=trials, provenance=said)
+    return [(row["label"], row["outcome"], row["shown"]) for row in choice_table(result)]
+
+
 @pytest.mark.parametrize(
     ("method", "both_ways", "stop_s"),
     [("gauss-newton", True, 99e-9 / np.sqrt(2)), ("gauss-newton", False, 99e-9), ("sart", True, 99e-9)],
@@ -266,16 +276,17 @@ def test_the_reason_is_one_and_the_table_names_what_differs():
         "auto chose bent rays: 27 % better than straight rays at predicting held-out pairs"
     )
     assert explain_candidates([plain]) == "auto chose straight rays: the only candidate"
-    assert candidate_table([plain, edges]) == [
-        ("straight rays", "100 ns", "chosen"),
-        ("bent rays, sharp edges", "120 ns", ""),
+    assert table_of(plain, edges) == [
+        ("straight rays", "chosen and shown", True),
+        ("bent rays, sharp edges", "refused: predicts what was held out 20 % worse", False),
     ]
+    assert criterion([plain, edges]) == "held_out_rms_s"
     # A result of an earlier version, which asked bent rays for more than the lowest misfit.
     earlier = [plain, replace(more, held_out_rms_s=95e-9)]
     assert explain_candidates(earlier) == (
         "auto chose straight rays: bent rays do not predict held-out pairs clearly better"
     )
-    assert rejection(earlier[1], earlier) == ""
+    assert table_of(*earlier)[1][1] == "refused: predicts what was held out not clearly better"
 
 
 def test_the_table_says_why_a_lower_misfit_of_finite_frequency_rays_was_not_chosen():
@@ -284,10 +295,31 @@ def test_the_table_says_why_a_lower_misfit_of_finite_frequency_rays_was_not_chos
 
     bent = of(100e-9, rays="curved", ray_width_m=0.003)
     straight, thin = of(90e-9, rays="straight", ray_width_m=0.003), of(70e-9, rays="curved")
-    assert [rejection(one, [bent, straight, thin]) for one in (bent, straight, thin)] == [
-        "",
-        "must be below 80 ns: straight rays fit smooth times with a wrong image",
-        "must be below 60 ns: thin rays fit wrong picks too",
+    assert criterion([bent, straight, thin]) == "held_out_mean_s"
+    assert [outcome for _, outcome, _ in table_of(bent, straight, thin)] == [
+        "chosen and shown",
+        "refused: fits smooth times with a wrong image: 90 ns held out against 80 allowed",
+        "refused: fits wrong picks as well as right ones: 70 ns held out against 60 allowed",
+    ]
+
+
+START = "chosen: full waveforms began with its image"
+
+
+@pytest.mark.parametrize(
+    ("method", "said", "outcome", "first", "bands"),
+    [
+        ("sart", "method waveform is advised", "not run: is advised", "chosen and shown", 0),
+        ("sart", "full waveform, no better", "refused: no better", "chosen and shown", 1),
+        ("waveform", "full waveform, 30 % better", "shown: 30 % better", START, 1),
+    ],
+)
+def test_the_last_row_of_the_table_is_of_full_waveforms(method, said, outcome, first, bands):
+    history = bands * (Iteration(0, 1, 1e-7, 4, band_hz=(2e5, 4e5)),)
+    shown = method == "waveform"
+    assert table_of(trial("straight", 1e-7), method=method, waves=said, history=history) == [
+        ("straight rays", first, not shown),
+        ("full waveform", outcome, shown),
     ]
 
 

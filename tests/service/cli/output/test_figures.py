@@ -157,7 +157,11 @@ def test_summary_shows_residuals_resolution_and_candidates() -> None:
     assert record["recovery_mean"] == pytest.approx(0.25)
     assert dict(summary(record))["resolution check"] == "25 % of a checkerboard recovered"
     assert record["reason"].startswith("auto chose straight rays: bent rays do not")
-    assert record["candidates"] == [["straight rays", "40 ns", "chosen"], ["bent rays", "60 ns", ""]]
+    assert [row["outcome"] for row in record["candidates"]] == [
+        "chosen and shown",
+        "refused: predicts what was held out 50 % worse",
+    ]
+    assert record["criterion"] == "held_out_rms_s"
     assert record["trials"][1] == {
         "settings": {"rays": "curved"},
         "held_out_rms_s": 6e-8,

@@ -41,18 +41,19 @@ function Section({ title, className = "", words, children }) {
   return html`<section class=${`panel ${className}`.trim()}><h2>${title}</h2><p>${words}</p>${children}</section>`;
 }
 
-const CANDIDATE_COLUMNS = ["Candidate", "Held-out misfit, mean", "Held-out, rms", "Training, rms", "Result"];
+const MISFITS = { held_out_mean_s: "Held-out misfit, mean", held_out_rms_s: "Held-out misfit, rms", training_rms_s: "Training, rms" };
 
-function candidateCells({ label, held_out_mean_s: mean, held_out_rms_s: rms, training_rms_s: training, chosen, rejection }) {
-  return [label, ...[mean, rms, training].map(inNanoseconds), chosen ? "chosen" : rejection];
-}
-
-// Candidate, held-out misfit, chosen, reason; nothing where nothing was chosen.
-export function ChoiceTable({ candidates, reason, advice }) {
+// Candidate, misfits, outcome, and in bold the misfit that decided; nothing where nothing was chosen.
+export function ChoiceTable({ candidates, criterion, reason, advice }) {
   if (!candidates.length) return advice && html`<${Section} title="Notes" words=${advice} />`;
+  const others = Object.keys(MISFITS).filter((name) => name !== criterion);
+  const columns = ["Candidate", `${MISFITS[criterion]} (decides)`, "Result", ...others.map((name) => MISFITS[name])];
+  const cells = (row) => [
+    row.label, html`<strong>${inNanoseconds(row[criterion])}</strong>`, row.outcome, ...others.map((name) => inNanoseconds(row[name])),
+  ];
   return html`<${Section} title="Automatic choice" className="whole-row" words=${reason}>
-    <${HeadedTable} label="Candidates of the automatic choice" columns=${CANDIDATE_COLUMNS} rows=${candidates.map(candidateCells)}
-      chosen=${candidates.findIndex((candidate) => candidate.chosen)} />
+    <${HeadedTable} label="Candidates of the automatic choice" columns=${columns} rows=${candidates.map(cells)}
+      chosen=${candidates.findIndex((candidate) => candidate.shown)} />
   </${Section}>`;
 }
 
