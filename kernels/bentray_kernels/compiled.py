@@ -157,6 +157,8 @@ class CacheLocator:
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._folder = folder
         self._digest = digest(function.__module__)[:16]
+        # Functions of one name are in several modules of a folder.
+        self._module = Path(function.__code__.co_filename).stem
         self._function = function.__qualname__.replace("<", "").replace(">", "")
         self._line = function.__code__.co_firstlineno
 
@@ -187,6 +189,6 @@ class CacheLocator:
         """Make the folder before a kernel is stored, and remove what was compiled from other sources."""
         self._folder.mkdir(parents=True, exist_ok=True)
         version = f"py{sys.version_info.major}{sys.version_info.minor}"
-        for file in self._folder.glob(f"*.{self._function}-*.{version}*.nb[ic]"):
+        for file in self._folder.glob(f"{self._module}.{self._function}-*.{version}*.nb[ic]"):
             if self._digest not in file.name:
                 file.unlink(missing_ok=True)

@@ -36,17 +36,21 @@ def test_files_of_other_sources_are_removed_when_a_kernel_is_stored():
     locator = CacheLocator.from_function(doubled.py_func, __file__)
     version = "py{}{}".format(*sys.version_info)
     names = (
-        f"doubled-{locator.get_disambiguator()}",
-        "doubled-9-0123456789abcdef",
-        "undoubled-9-0123456789abcdef",
+        f"test_compiled.doubled-{locator.get_disambiguator()}",
+        "test_compiled.doubled-9-0123456789abcdef",
+        "test_compiled.undoubled-9-0123456789abcdef",
+        # A kernel of the same name, of another module beside it.
+        "others.doubled-9-0123456789abcdef",
+        "others.test_compiled.doubled-9-0123456789abcdef",
     )
-    files = [Path(locator.get_cache_path(), f"test_compiled.{name}.{version}.nbi") for name in names]
+    files = [Path(locator.get_cache_path(), f"{name}.{version}.nbi") for name in names]
     for file in files:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.touch()
     locator.ensure_cache_path()
-    assert [file.exists() for file in files] == [True, False, True]
-    files[2].unlink()
+    assert [file.exists() for file in files] == [True, False, True, True, True]
+    for file in files[2:]:
+        file.unlink()
 
 
 @pytest.mark.parametrize("function", [double, doubled])
