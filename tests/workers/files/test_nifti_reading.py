@@ -1,6 +1,7 @@
 """NIfTI: round trip of values, scale and units, compressed or not; damage is rejected."""
 
 import gzip
+import io
 from contextlib import suppress
 from itertools import permutations, product
 
@@ -11,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.nifti_reading import read_nifti
 from bentray_workers.files.volume_formats import import_volume
 
 from ...effort import effort
@@ -161,3 +163,11 @@ def test_a_damaged_header_is_read_or_refused_and_nothing_else(tmp_path, changes)
     (tmp_path / "v").write_bytes(content)
     with suppress(InvalidInput):
         assert import_volume(tmp_path / "v").values.ndim == 3
+
+
+def test_a_stream_is_read_as_a_volume():
+    values = np.arange(24, dtype=np.uint8).reshape(4, 3, 2)
+    image = nibabel.Nifti1Image(values, np.diag((1.0, 2.0, 3.0, 1.0)))
+    volume = read_nifti(io.BytesIO(image.to_bytes()))
+    assert volume.spacing_m == pytest.approx((1e-3, 2e-3, 3e-3))
+    assert np.array_equal(volume.values, values)
