@@ -157,7 +157,7 @@ def _submit(
 
     with client_errors(), Client(url, on_wait=remark) as client:
         with progress_bar("Uploading") as step:
-            dataset = client.upload(scan, step)
+            dataset = client.upload(scan, step, filename=source.name)
         job = client.submit(dataset.id, settings.to_dict(), webhook=webhook)
         if job.plan is not None:
             remark(job.plan.why)

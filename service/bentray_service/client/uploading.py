@@ -43,7 +43,7 @@ def send_file(
     except OSError as error:
         raise _unreadable(path, error) from error
     if resume is None:
-        location = yield from _begin(total, {"filename": path.name, **metadata, "kind": kind})
+        location = yield from _begin(total, {**metadata, "kind": kind})
     else:
         location = f"/v1/uploads/{resume}"
     try:
@@ -62,7 +62,7 @@ def send_direct(
         total = path.stat().st_size
     except OSError as error:
         raise _unreadable(path, error) from error
-    request = {"json": {"kind": kind, "length": total, "metadata": {"filename": path.name, **metadata}}}
+    request = {"json": {"kind": kind, "length": total, "metadata": dict(metadata)}}
     # An unused upload expires.
     response = yield RequestStep("POST", "/v1/direct-uploads", request, repeatable=True)
     upload = DirectUploadRecord.model_validate_json(response.content)

@@ -13,7 +13,7 @@ from ..files.tenant_files import TenantFiles
 from ..rows.ids import Tenant
 from ..rows.stored_tables import Datasets, RequestKey
 from ..rows.tables import DatasetRow
-from .ingest_process import CORRECTION
+from .ingest_process import CORRECTION, FILE_NAME
 from .sandbox import ingest
 
 ENDING = ", corrected"
@@ -51,7 +51,7 @@ def make_canonical(
         result_id: id of the result.
         files: of the tenant.
         limits: of the process.
-        given: metadata.
+        given: metadata; ``FILE_NAME`` is the title of a file that has none.
         reserve: reserves storage, bytes, replacing an earlier reservation.
         started: called with the process id.
 
@@ -64,6 +64,7 @@ def make_canonical(
         StorageUnavailable: when the canonical file cannot be published.
     """
     received = source.stat().st_size
+    stated = {name: value for name, value in given.items() if name != FILE_NAME}
     try:
         candidate = files.candidate(result_id)
         summary = ingest(
@@ -73,7 +74,7 @@ def make_canonical(
             memory_bytes=limits.memory_bytes,
             seconds=limits.seconds,
             scratch=limits.scratch,
-            given=given,
+            given=stated,
             started=started,
             reserve=lambda size: reserve(max(size, received)),
         )
@@ -82,7 +83,7 @@ def make_canonical(
         files.adopt(result_id)
     finally:
         files.discard_candidate(result_id)
-    return summary
+    return {**summary, "title": summary["title"] or given.get(FILE_NAME, "")}
 
 
 LONGEST_NAME, LONGEST_NOTES = 200, 4000

@@ -31,6 +31,8 @@ PACKING = 2
 
 # Key of the metadata of a dataset that is a stored scan to be corrected; its id is ``origin``.
 CORRECTION = "correction"
+# Key of the metadata that the process is not told: the name of the file.
+FILE_NAME = "filename"
 
 # Accepted types, with a description of the formats.
 ACCEPTED = {

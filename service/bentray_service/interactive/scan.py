@@ -52,8 +52,8 @@ class Scan:
 
     @property
     def title(self) -> str:
-        """The title in the file."""
-        return self.dataset.title
+        """The title in the file, else the name of the file."""
+        return self.dataset.title or self.name
 
     @property
     def position_m(self) -> NDArray[np.float64]:
@@ -116,7 +116,7 @@ class Scan:
         size = np.ptp(own.element_position_m, axis=0) * 1e3
         rows.append(("array", " x ".join(f"{length:.1f}" for length in size) + " mm"))
         rows += [("source", own.source), ("licence", own.license)]
-        return figures_html(own.title or self.name, [row for row in rows if row[1]])
+        return figures_html(self.title, [row for row in rows if row[1]])
 
     def _counts(self) -> list[tuple[str, str]]:
         own = self.dataset

@@ -97,6 +97,7 @@ class Kind(ABC, Generic[R]):
         request: model of the request.
         example: request for the OpenAPI description.
         settings: parses the settings stored with a job.
+        words: the kind, for people.
         table: of its results.
         lane: worker resource of its tasks, a key of ``cluster.resources.OFFERED``.
     """
@@ -104,6 +105,7 @@ class Kind(ABC, Generic[R]):
     request: ClassVar[type[JobRequest]]
     example: ClassVar[Example]
     settings: ClassVar[TypeAdapter[Any]]
+    words: ClassVar[str]
     table: ClassVar[type[ResultRow]]
     lane: ClassVar[str]
 
@@ -131,6 +133,10 @@ class Kind(ABC, Generic[R]):
     @abstractmethod
     def results(self, job: JobRow) -> tuple[dict[str, str], dict[str, str]]:
         """Ids of the results of a successful job by field of its record, and links."""
+
+    def title(self, job: JobRow) -> str:
+        """What a job does, for one without a name."""
+        return self.words
 
     def discard(self, files: TenantFiles, target: Path) -> None:
         """Remove the result of a job that was cancelled after it finished."""

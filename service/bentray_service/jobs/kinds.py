@@ -13,7 +13,7 @@ from fastapi.openapi.models import Example
 from pydantic import Field, TypeAdapter
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography.model_selection.selection import advice_of
+from bentray_kernels.tomography.model_selection.selection import advice_of, image_label, label
 from bentray_kernels.tomography.result import Reconstruction
 from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.stored_settings import from_stored
@@ -28,6 +28,7 @@ from bentray_workers.simulation.simulation_run import simulate_to_file
 from ..compute import Compute, check_renderable
 from ..files.tenant_files import TenantFiles
 from ..rows.ids import Tenant, dataset_of, field_of, volume_of
+from ..rows.job_queue import MADE_BY
 from ..rows.jobs import NewJob
 from ..rows.tables import DatasetRow, FieldRow, JobRow, Plain, ResultVolumeRow
 from ..settings_request import DEFAULTS
@@ -46,7 +47,7 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
     """Sound speed from one dataset."""
 
     request, settings = ReconstructionRequest, TypeAdapter(Settings)
-    table, lane = ResultVolumeRow, "recon"
+    table, lane, words = ResultVolumeRow, "recon", "Reconstruction"
     example: ClassVar[Example] = {
         "summary": "Sound speed from a scan",
         "value": {
@@ -90,6 +91,20 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
         here = f"/v1/volumes/{volume}"
         return {"volume": volume}, {"volume": here, "image": f"{here}/slice.png", "data": f"{here}/data"}
 
+    def title(self, job: JobRow) -> str:
+        """Such as ``Best: full waveform to 450 kHz``: what made the image; before its end, what is asked."""
+        asked = job.settings
+        method, rays = asked.get("method", "sart"), asked.get("rays", "curved")
+        best = method == "waveform" or (method == "auto" and bool(asked.get("minutes")))
+        words = {
+            "auto": "full waveform where it is better" if best else "rays and method chosen automatically",
+            "waveform": "full waveform",
+        }.get(method) or label({"rays": rays, "method": method})
+        words = (job.plan or {}).get(MADE_BY) or words
+        words = words.replace("Gauss-N", "Gauss\N{EN DASH}N")
+        grade = "Best: " if best else "Fast: " if method == "auto" else ""
+        return grade + words if grade else words[0].upper() + words[1:]
+
 
 def in_stated_water(settings: Settings, dataset: DatasetRow) -> Settings:
     """The settings with the temperature that the user states for the scan, unless they have their own."""
@@ -110,7 +125,7 @@ class SimulationKind(Kind[SimulationRequest]):
     """A simulated scan as a dataset."""
 
     request, settings = SimulationRequest, TypeAdapter(PhantomScan)
-    table, lane = DatasetRow, "recon"
+    table, lane, words = DatasetRow, "recon", "Simulated scan"
     example: ClassVar[Example] = {
         "summary": "A scan of a phantom, with noise on its travel times",
         "value": {"kind": "simulation", "settings": {"nodes": 64, "elements": 64, "noise_s": 2e-8}},
@@ -149,7 +164,7 @@ class RefractionKind(Kind[RefractionRequest]):
     """A turntable animation of one volume; it has no row of its own."""
 
     request, settings = RefractionRequest, TypeAdapter(Turntable)
-    table, lane = ResultVolumeRow, "render"
+    table, lane, words = ResultVolumeRow, "render", "Turntable"
     example: ClassVar[Example] = {
         "summary": "A turntable animation of a volume",
         "value": {"kind": "refraction", "volume": "vol-0123456789abcdef0123", "settings": {"format": "zip"}},
@@ -190,7 +205,7 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
     """The geometry field of one mesh."""
 
     request, settings = GeometryFieldRequest, TypeAdapter(FieldSettings)
-    table, lane = FieldRow, "render"
+    table, lane, words = FieldRow, "render", "Geometry field"
     example: ClassVar[Example] = {
         "summary": "The geometry field of a mesh",
         "value": {"kind": "geometry-field", "mesh": "mesh-0123456789abcdef0123"},
@@ -258,7 +273,11 @@ def _describe(result: Reconstruction) -> Plain:
         "origin_m": [finite(value) for value in result.origin_m],
         "speed_range_mps": [float(result.speed.min()), float(result.speed.max())],
         "water_speed_mps": float(result.water_speed_mps),
-        "provenance": {**result.provenance, **({"advice": advice} if advice else {})},
+        "provenance": {
+            **result.provenance,
+            MADE_BY: image_label(result),
+            **({"advice": advice} if advice else {}),
+        },
     }
 
 

@@ -88,6 +88,7 @@ def job_record(
         ahead=ahead,
         minutes=minutes,
         batch=row.batch_id,
+        title=row.name or KINDS[row.kind].title(row),
         doubtful=(row.advice or "").startswith(DOUBTFUL),
         webhook=_webhook_record(row.webhook, delivery),
     )

@@ -23,6 +23,9 @@ MAX_ATTEMPTS = 3
 # Time after which a service that does not renew its lease is considered dead, s.
 LEASE_S = 30.0
 
+# Key in the provenance of a result, and then in the plan of its job: what made the image, in words.
+MADE_BY = "made_by"
+
 
 class Queue(Repository):
     """Job states from ``queued`` through ``running`` (and ``cancelling``) to the end.
@@ -147,10 +150,14 @@ class Queue(Repository):
         """
         with self._database.write() as session:
             now = time.time()
-            advice = (result or {}).get("provenance", {}).get("advice")
-            if not self._end(session, job_id, ("running",), "succeeded", finished=now, advice=advice):
+            said = (result or {}).get("provenance", {})
+            ended = {"finished": now, "advice": said.get("advice")}
+            if not self._end(session, job_id, ("running",), "succeeded", **ended):
                 return False
-            tenant = session.scalars(select(JobRow.tenant).where(JobRow.id == job_id)).one()
+            tenant, plan = session.execute(select(JobRow.tenant, JobRow.plan).filter_by(id=job_id)).one()
+            if plan and MADE_BY in said:
+                plan = {**plan, MADE_BY: said[MADE_BY]}
+                session.execute(update(JobRow).filter_by(id=job_id).values(plan=plan))
             if result is None:
                 usage.store(session, tenant, job_id, size)
             else:

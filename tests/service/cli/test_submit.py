@@ -27,6 +27,7 @@ class StandIn:
 
     asked: ClassVar[list[Any]] = []
     scan: ClassVar[Path]
+    filename: ClassVar[str]
 
     def __init__(self, url: str, on_wait: Callable[[str], None]) -> None:
         self.url = url.rstrip("/")
@@ -38,9 +39,9 @@ class StandIn:
     def __exit__(self, *ending: object) -> None:
         self.asked.append("closed")
 
-    def upload(self, path: Path, on_progress: Callable[[int, int], None]) -> SimpleNamespace:
+    def upload(self, path: Path, on_progress: Callable[[int, int], None], filename: str) -> SimpleNamespace:
         on_progress(1, 2)
-        StandIn.scan = path
+        StandIn.scan, StandIn.filename = path, filename
         return SimpleNamespace(id="dataset-1")
 
     def submit(self, dataset: str, settings: dict[str, Any], webhook: str | None = None) -> JobRecord:
@@ -79,7 +80,7 @@ class StandIn:
             "created": 0.0,
             "links": {"self": "/v1/jobs/job-1"},
         }
-        texts = dict.fromkeys(("name", "notes", "started_by"), "")
+        texts = dict.fromkeys(("name", "title", "notes", "started_by"), "")
         return JobRecord.model_validate({**dict.fromkeys(JobRecord.model_fields), **texts, **given})
 
 
@@ -124,6 +125,7 @@ def test_a_scan_of_another_program_is_converted_before_it_is_sent(
     assert result.exit_code == 0, result.stderr
     assert "20 °C (1482.4 m/s) is assumed" in " ".join(result.stdout.split())
     assert not client.scan.exists(), "the converted file is removed"
+    assert client.filename == "own.mat"
     assert sorted(path.suffix for path in out.iterdir()) == [".h5", ".json", ".png"]
 
 
@@ -167,7 +169,7 @@ def test_a_refusal_is_one_line(
     code: int,
     line: str,
 ) -> None:
-    def refuse(*given: object) -> None:
+    def refuse(*given: object, **named: object) -> None:
         raise error
 
     monkeypatch.setattr(StandIn, "upload", refuse)

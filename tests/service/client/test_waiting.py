@@ -11,7 +11,7 @@ from bentray_service.routes.models.job_records import JobRecord
 
 JOB = {
     **dict.fromkeys(JobRecord.model_fields),
-    **dict.fromkeys(("name", "notes", "started_by"), ""),
+    **dict.fromkeys(("name", "title", "notes", "started_by"), ""),
     "id": "job-1",
     "kind": "reconstruction",
     "settings": {},

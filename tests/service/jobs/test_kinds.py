@@ -261,6 +261,20 @@ def test_other_refusals_of_a_field(start, monkeypatch):
     assert (body["status"], body["field"]) == (422, "mesh")
 
 
+@pytest.mark.parametrize(
+    ("settings", "made_by", "title"),
+    [
+        ({"method": "auto", "minutes": 30}, "full waveform to 450 kHz", "Best: full waveform to 450 kHz"),
+        ({"method": "auto"}, "bent rays, Gauss-Newton", "Fast: bent rays, Gauss\N{EN DASH}Newton"),
+        ({"method": "waveform"}, None, "Best: full waveform"),
+        ({"method": "sart", "rays": "straight"}, None, "Straight rays, SART"),
+    ],
+)
+def test_a_title_says_what_made_the_image(settings, made_by, title):
+    row = JobRow(settings=settings, plan={"made_by": made_by} if made_by else None)
+    assert kinds.KINDS["reconstruction"].title(row) == title
+
+
 def test_task_rejection_fails_the_field_with_a_message(serving, until):
     with serving() as http:
         done = until(http, ask_field(http, put_mesh(http), image_threshold=1e-12).json()["id"])

@@ -25,6 +25,26 @@ def problem(answer):
     return answer.json()
 
 
+@pytest.mark.parametrize(
+    ("disposition", "title"),
+    [
+        ('attachment; filename="/scans/left breast.h5"', "left breast.h5"),
+        ("filename=left.h5", "left.h5"),
+        ("attachment; filename*=UTF-8''linke%20Br%C3%BCste.h5", "linke Brüste.h5"),
+        ('attachment; filename="linke Brüste.h5"'.encode(), "linke Brüste.h5"),
+        ("attachment; filename*=idna''%ff", ""),
+        (";;=", ""),
+    ],
+)
+def test_the_title_of_a_file_without_one_is_its_name(start, scan, disposition, title):
+    http, headers = start(), {"Content-Disposition": disposition, "Content-Type": "application/x-hdf5"}
+    untitled = scan(lambda file: file.attrs.pop("title")).read_bytes()
+    assert http.post("/v1/datasets", content=untitled, headers=headers).json()["title"] == title
+    if title == "left.h5":
+        own = http.post("/v1/datasets", content=scan().read_bytes(), headers=headers)
+        assert own.json()["title"] == "Sixteen elements"
+
+
 def test_upload_answers_with_the_record(start, scan):
     http = start()
     content = scan().read_bytes()

@@ -95,8 +95,10 @@ def test_automatic_choices_are_returned(http, dataset, work, until):
         Candidate({"rays": "curved", "method": "sart"}, 3e-8, 1e-8),
     )
     job = ask(http, dataset, {"nodes": 16, "method": "auto"}).json()
-    assert job["advice"] is None
-    told = until(http, job["id"])["advice"]
+    assert (job["advice"], job["title"]) == (None, "Fast: rays and method chosen automatically")
+    ended = until(http, job["id"])
+    assert ended["title"] == "Fast: bent rays, SART"
+    told = ended["advice"]
     assert told.startswith("auto chose straight rays, SART: bent rays do not")
 
 

@@ -41,7 +41,7 @@ def test_it_sharpens_until_the_result_is_shown(page, address, scan, turns):
     page.get_by_text("The image appears after the first iteration").wait_for()
     page.get_by_text("The workers compile their kernels for this processor.").wait_for()
     page.get_by_text("0 % of this step").wait_for()
-    page.get_by_role("heading", level=1, name="SART, bent rays").wait_for()
+    page.get_by_role("heading", level=1, name="Bent rays, SART").wait_for()
     picture, curve = page.locator("canvas.preview"), page.locator(".misfit svg")
     turns.put(None)
     expect(picture).to_have_attribute("aria-label", "Sound speed so far, 1500 to 1520 m/s")

@@ -282,6 +282,16 @@ def advice_of(result: Reconstruction) -> str:
     return "; ".join(sentence for sentence in advice if sentence)
 
 
+def image_label(result: Reconstruction) -> str:
+    """What made an image, such as ``bent rays, Gauss-Newton`` or ``full waveform to 450 kHz``."""
+    settings = result.settings
+    if settings.method == "waveform":
+        bands = [one.band_hz[1] for one in result.history if one.band_hz and not one.of_attenuation]
+        return f"full waveform to {1e-3 * max(bands):.0f} kHz" if bands else "full waveform"
+    width = settings.numerics.ray_width_m
+    return label({"rays": settings.rays, "method": settings.method, "ray_width_m": width})
+
+
 def label(changes: dict[str, Any]) -> str:
     """Label such as ``straight rays, SART`` or ``bent finite-frequency rays, Gauss-Newton``."""
     rays = "straight" if changes["rays"] == "straight" else "bent"

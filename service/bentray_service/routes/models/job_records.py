@@ -21,7 +21,9 @@ class DatasetRecord(ShownRecord):
     columns: ClassVar = ("id", "title", "elements", "slices", "has_traces", "created")
 
     id: str
-    title: str = Field(description="The name given to it, else the title in the file.")
+    title: str = Field(
+        description="The name given to it, else the title in the file, else the name of the file."
+    )
     notes: str = Field(description="Notes of the user.")
     source: str
     license: str
@@ -167,11 +169,15 @@ class WebhookRecord(BaseModel):
 class JobRecord(ShownRecord):
     """One job."""
 
-    columns: ClassVar = ("id", "kind", "state", "name", "dataset", "volume", "seconds", "created")
+    columns: ClassVar = ("id", "title", "kind", "state", "dataset", "volume", "seconds", "created")
 
     id: str
     kind: str
     name: str = Field(description="The name given to it; empty without one.")
+    title: str = Field(
+        description="This name, else what it does, such as `Best: full waveform to 450 kHz`; what made the "
+        "image is known at the end."
+    )
     notes: str = Field(description="Notes of the user.")
     started_by: str = Field(description="Id of the key, or user of the proxy, that started it; else empty.")
     state: State

@@ -14,12 +14,13 @@ from starlette.requests import ClientDisconnect
 from ...errors import Busy
 from ...ingest.canonical import IngestLimits, make_canonical
 from ...ingest.fair_queue import FairQueue
-from ...ingest.ingest_process import ACCEPTED
+from ...ingest.ingest_process import ACCEPTED, FILE_NAME
 from ...ingest.receive import Received, check_announced, receive
 from ...rows.ids import Tenant, new_id
 from ...rows.stored_tables import UploadedTable
 from ...rows.tables import DatasetRow, MeshRow, UploadedVolumeRow
 from ...wiring import Access, Background, Stores
+from .upload_metadata import name_of_body
 
 # Longest wait of a request in the ingest queue, s; proxies rarely wait longer.
 LONGEST_WAIT_S = 300.0
@@ -32,7 +33,14 @@ def body_of(what: str, media_types: tuple[str, ...]) -> dict[str, Any]:
     """The body of an upload, for the OpenAPI description."""
     content = {media: {"schema": {"type": "string", "format": "binary"}} for media in media_types}
     problems = ACCEPTED[what][0].upper() + ACCEPTED[what][1:] + "."
-    return {"requestBody": {"required": True, "description": problems, "content": content}}
+    name = {
+        "name": "Content-Disposition",
+        "in": "header",
+        "description": 'Name of the file, as `attachment; filename="left.h5"`: the title of what has none.',
+        "schema": {"type": "string", "maxLength": 1000},
+    }
+    body = {"required": True, "description": problems, "content": content}
+    return {"requestBody": body, "parameters": [name]}
 
 
 async def receive_upload(
@@ -57,6 +65,7 @@ async def receive_upload(
     announced = request.headers.get("content-length")
     length = int(announced) if announced else None
     check_announced(length, access.settings.max_upload_bytes, ACCEPTED[what])
+    given = {**given, FILE_NAME: name_of_body(request.headers.get("content-disposition", ""))}
     files, settings, quota = stores.files.of(tenant), access.settings, stores.quota
     path = files.incoming(upload_id)
     resize = partial(quota.resize, tenant, upload_id)

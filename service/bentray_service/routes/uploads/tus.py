@@ -82,7 +82,8 @@ def create_upload(
         Header(
             max_length=4000,
             description="Names with values in base 64: kind (dataset, volume or mesh; default dataset), "
-            "title; for volumes spacing_m, shape and dtype; for scans map and unit, separated by commas, "
+            "title, and filename, the title of what has none; for volumes spacing_m, shape and dtype; for "
+            "scans map and unit, separated by commas, "
             "temperature_c, sound_speed_mps and frequency_hz; other names are ignored.",
             json_schema_extra={"pattern": METADATA},
         ),

@@ -1,17 +1,19 @@
-"""Metadata of an upload: from query parameters or from the metadata header of tus."""
+"""Metadata of an upload: from query parameters, the name of the file, or the metadata header of tus."""
 
 from __future__ import annotations
 
 import base64
 import re
 from collections.abc import Callable, Sequence
+from email.message import Message
 from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.limits import SPACING_M
 from bentray_kernels.ranges import Range
+from bentray_workers.files.dataset.record import text
 
-from ...ingest.ingest_process import ACCEPTED
+from ...ingest.ingest_process import ACCEPTED, FILE_NAME
 
 LONGEST_TITLE = 200
 # Nodes along an axis of a volume of raw bytes.
@@ -20,6 +22,7 @@ FORM = "names, each with its value in base 64, separated by commas"
 KNOWN = (
     "kind",
     "title",
+    "filename",
     "spacing_m",
     "shape",
     "dtype",
@@ -60,7 +63,9 @@ def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
         if name not in KNOWN:
             continue
         try:
-            metadata[name] = base64.b64decode(value).decode()
+            # The name of a file may have any bytes.
+            errors = "replace" if name == "filename" else "strict"
+            metadata[name] = base64.b64decode(value).decode(errors=errors)
         except UnicodeDecodeError:
             raise InvalidInput(
                 "Upload-Metadata", repr(pair[:80]), f"{FORM}; the value of {name} is text"
@@ -69,18 +74,38 @@ def read_metadata(header: str) -> tuple[str, dict[str, Any]]:
     if what not in ACCEPTED:
         raise InvalidInput("Upload-Metadata kind", repr(what[:80]), " or ".join(ACCEPTED))
     title = metadata.get("title", "")[:LONGEST_TITLE]
+    file = {FILE_NAME: named} if (named := file_name(metadata.get("filename", ""))) else {}
     if what == "mesh":
-        return what, {"title": title}
+        return what, {"title": title, **file}
     if what == "volume":
-        return what, volume_metadata(
+        given = volume_metadata(
             title, metadata.get("spacing_m"), metadata.get("shape"), metadata.get("dtype")
         )
+        return what, {**given, **file}
     variables, units = (metadata[name].split(",") if metadata.get(name) else [] for name in ("map", "unit"))
     temperature_c, sound_speed_mps, frequency_hz = (
         _number(name, metadata[name]) if metadata.get(name) else None
         for name in ("temperature_c", "sound_speed_mps", "frequency_hz")
     )
-    return what, scan_metadata(variables, units, temperature_c, sound_speed_mps, frequency_hz)
+    stated = scan_metadata(variables, units, temperature_c, sound_speed_mps, frequency_hz)
+    return what, {**stated, **file}
+
+
+def name_of_body(disposition: str) -> str:
+    """The name of a file in the header Content-Disposition of its upload; empty without one."""
+    message = Message()
+    # Headers are read as Latin-1; people and curl write UTF-8.
+    message["Content-Disposition"] = disposition.encode("latin-1", "replace").decode(errors="replace")
+    try:
+        return file_name(message.get_filename(""))
+    except (UnicodeError, ValueError):
+        # An unusable character set of RFC 2231.
+        return ""
+
+
+def file_name(path: str) -> str:
+    """The last part of a path of any system, printable."""
+    return text(re.split(r"[/\\]", path)[-1].strip())
 
 
 def scan_metadata(

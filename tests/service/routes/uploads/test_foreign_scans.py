@@ -103,7 +103,7 @@ def test_they_are_metadata_of_a_resumable_upload():
         ["element_position=pos", "delta_tof=dtof"],
         ["mm", "us"],
     )
-    assert given["temperature_c"] == 24.0
+    assert (given["temperature_c"], given["filename"]) == (24.0, "scan.mat")
     assert read_metadata(packed(kind="dataset")) == ("dataset", {})
     for wrong in ({"temperature_c": "warm"}, {"unit": "inch"}, {"map": "pos"}):
         with pytest.raises(InvalidInput):

@@ -103,7 +103,7 @@ def test_volumes_and_meshes_too(start):
     volume = http.get(settled(http, location)["links"]["result"]).json()
     assert (volume["title"], volume["spacing_m"]) == ("A head", [0.002] * 3)
     content = b"OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
-    location = begin(http, len(content), kind="mesh", title="Tetra")
+    location = begin(http, len(content), kind="mesh", filename=r"C:\meshes\Tetra")
     piece(http, location, 0, content)
     mesh = http.get(settled(http, location)["links"]["result"]).json()
     assert (mesh["title"], mesh["vertices"], mesh["faces"]) == ("Tetra", 4, 4)

@@ -8,7 +8,7 @@ import { loadTitles, titleOfJob } from "../parts/titles.js";
 import { Alert, Button, html, useRead, useState } from "../parts/view.js";
 import { glassOf, queryOf, shownBy } from "../parts/views.js";
 import { useJobs } from "./followed_jobs.js";
-import { duration, placeInQueue, summaryOf, tasksInWords } from "./job_words.js";
+import { duration, placeInQueue, settingsOf, tasksInWords } from "./job_words.js";
 import { residuals, Sparkline } from "./misfit_curve.js";
 
 // An image that links to a larger one.
@@ -90,16 +90,15 @@ function Links({ job: { links }, onCancel }) {
 }
 
 function JobCard({ job, title, onCancel }) {
-  const [what, settings] = summaryOf(job);
   const course = residuals(job.history);
   const { values } = course;
   const unfinished = job.state === "running" || job.state === "cancelling";
   return html`<li class="job" id=${job.id}>
     <div class="pictures"><${Pictures} key=${job.state} job=${job} title=${title} /></div>
     <div>
-      <h2><a href=${`#/jobs/${job.id}`}>${job.name || what}</a><span class=${`state ${job.state}`}>${job.state}</span></h2>
+      <h2><a href=${`#/jobs/${job.id}`}>${job.title}</a><span class=${`state ${job.state}`}>${job.state}</span></h2>
       <p class="input">${title}</p>
-      <p>${job.name ? `${what}: ${settings}` : settings}</p>
+      <p>${settingsOf(job)}</p>
       ${job.ahead !== null && html`<p>${placeInQueue(job.ahead)}</p>`}
       ${job.plan && html`<${Plan} plan=${job.plan} />`}
       ${job.advice && html`<p>${job.advice}</p>`}

@@ -6,15 +6,13 @@ import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { loadTitles, titleOfJob } from "../parts/titles.js";
 import { Alert, Button, Choice, Field, html, useEffect, useRef, useState } from "../parts/view.js";
 import { useJobs } from "./followed_jobs.js";
-import { duration, inWords, methodOf, moment } from "./job_words.js";
+import { duration, inWords, moment } from "./job_words.js";
 
 const PAGE = 25;
 const ENDED = ["succeeded", "failed", "cancelled"];
 const PLACES = { dataset: "scans", volume: "rendering", mesh: "surfaces" };
 // On a small screen the name of the column stands before each text.
 const COLUMNS = ["Name", "Kind", "Scan", "State", "Started by", "When", "Duration", "Actions"];
-
-const nameOf = (job) => job.name || (job.kind === "reconstruction" ? methodOf(job) : inWords(job.kind));
 
 // What the job reads, or the scan that it made.
 function source(job) {
@@ -27,14 +25,14 @@ function State({ job }) {
   return html`<div class="state-cell">
     <span class=${`state ${job.state}`}>${job.state}</span>
     ${job.state === "running" && total > 0 && html`
-      <progress max=${total} value=${done} aria-label=${`Progress of ${nameOf(job)}`}></progress>
+      <progress max=${total} value=${done} aria-label=${`Progress of ${job.title}`}></progress>
       <small>${phase} ${Math.floor((100 * done) / total)} %</small>`}
     ${job.error && html`<small class="reason">${job.error.detail}</small>`}
   </div>`;
 }
 
 function Actions({ job, act }) {
-  const name = `${nameOf(job)} of ${moment(job.created)}`;
+  const name = `${job.title} of ${moment(job.created)}`;
   function remove() {
     const made = job.kind === "simulation" ? "Its scan stays." : "What it made is deleted too.";
     if (confirm(`Delete ${name}? ${made}`)) act(job.links.self, "DELETE");
@@ -48,7 +46,7 @@ function Actions({ job, act }) {
 // Roles in full, since a table that is laid out as cards is no table for a screen reader.
 function Row({ job, act }) {
   const cells = [
-    html`<a href=${`#/jobs/${job.id}`}>${nameOf(job)}</a>`, inWords(job.kind), source(job), html`<${State} job=${job} />`, job.started_by || "–",
+    html`<a href=${`#/jobs/${job.id}`}>${job.title}</a>`, inWords(job.kind), source(job), html`<${State} job=${job} />`, job.started_by || "–",
     html`<time datetime=${job.created} title=${inTime(job.created)}>${moment(job.created)}</time>`,
     job.seconds === null ? "–" : duration(job.seconds), html`<${Actions} job=${job} act=${act} />`,
   ];

@@ -3,7 +3,7 @@ import { counted, inTime } from "../parts/amounts.js";
 import { send } from "../parts/api.js";
 
 const KINDS = { reconstruction: "Reconstruction", simulation: "Simulated scan", refraction: "Turntable", "geometry-field": "Geometry field" };
-const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton", auto: "Automatic", waveform: "Full waveform" };
+const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton" };
 const PHANTOMS = { table7: "3-D breast phantom", detailed: "Detailed 2-D breast phantom" };
 
 // A word of the service as a label: a kind by its name on the page, another by itself.
@@ -11,24 +11,19 @@ export function inWords(word) {
   return KINDS[word] ?? word.charAt(0).toUpperCase() + word.slice(1).replaceAll("-", " ");
 }
 
-export function methodOf({ settings: { method, rays } }) {
-  if (method === "auto" || method === "waveform") return METHODS[method];
-  return `${METHODS[method] ?? method}, ${rays === "straight" ? "straight" : "bent"} rays`;
-}
-
-// The request in a heading and a line.
-export function summaryOf({ kind, settings }) {
-  if (kind === "geometry-field") return [KINDS[kind], `${settings.samples} samples per edge, image of ${settings.image_size} pixels`];
-  if (kind === "refraction") return [KINDS[kind], `${settings.frames} frames of ${settings.width} × ${settings.height}, index ${settings.index.join(", ")}`];
+// The request in a line, below the title of the job.
+export function settingsOf({ kind, settings }) {
+  if (kind === "geometry-field") return `${settings.samples} samples per edge, image of ${settings.image_size} pixels`;
+  if (kind === "refraction") return `${settings.frames} frames of ${settings.width} × ${settings.height}, index ${settings.index.join(", ")}`;
   if (kind === "simulation") {
     const phantom = PHANTOMS[settings.phantom] ?? "2-D breast phantom";
-    return [KINDS[kind], `${phantom}, ${settings.waveform ? "traces" : "travel times"}, ${settings.elements} elements`];
+    return `${phantom}, ${settings.waveform ? "traces" : "travel times"}, ${settings.elements} elements`;
   }
-  if (kind !== "reconstruction") return [inWords(kind), ""];
+  if (kind !== "reconstruction") return "";
   const { method, rays, nodes, iterations = settings.sweeps } = settings; // sweeps: of earlier versions
-  const words = { auto: "automatic", waveform: "full waveform" }[method] ?? METHODS[method];
+  const words = { auto: "automatic", waveform: "full waveform" }[method] ?? `${METHODS[method]}, ${rays === "straight" ? "straight" : "bent"} rays`;
   const grid = nodes ? `${nodes} × ${nodes} nodes, ` : "";
-  return [method === "auto" ? METHODS.auto : rays === "straight" ? "Straight rays" : "Bent rays", `${words}, ${grid}${iterations} iterations`];
+  return `${words}, ${grid}${iterations} iterations`;
 }
 
 export function duration(seconds) {

@@ -4,7 +4,7 @@ import { loadTitles, titleOfJob } from "../parts/titles.js";
 import { Alert, Button, html, useEffect, useNewest, useRead, useReducer, useRef, useState } from "../parts/view.js";
 import { useJobs } from "./followed_jobs.js";
 import { Plan } from "./job_cards.js";
-import { duration, methodOf, placeInQueue, summaryOf } from "./job_words.js";
+import { duration, placeInQueue, settingsOf } from "./job_words.js";
 import { comparesModels, MisfitCurve } from "./misfit_curve.js";
 import { PreviewPicture } from "./preview_picture.js";
 import { ProgressEstimate } from "./progress_estimate.js";
@@ -151,15 +151,13 @@ export function LiveJob({ first, onSuccess }) {
   const seen = useRef(false);
   seen.current ||= running && job.kind === "reconstruction";
   useTicks();
-  const [summary, settings] = summaryOf(job);
-  const what = job.kind === "reconstruction" ? methodOf(job) : summary;
   const problem = job.error ? `${inWords(job.error)}${advice(job)}` : error;
   return html`
     <p class="crumb"><a href="#/jobs">Jobs</a>
       ${job.dataset && job.kind === "reconstruction" && html`<span class="live-scan"> · <a href=${`#/scans/${job.dataset}`}>Scan</a></span>`}
     </p>
-    <h1>${job.name || what}</h1>
-    <p class="facts live-facts">${jobs && titleOfJob(job)} · ${job.name ? `${what}: ${settings}` : settings}</p>
+    <h1>${job.title}</h1>
+    <p class="facts live-facts">${jobs && titleOfJob(job)} · ${settingsOf(job)}</p>
     <section class="panel" aria-label="State">
       <p class="live-what" role="status">${happening(job, compiling)}</p>
       <${Progress} job=${job} estimate=${estimate} elapsed=${elapsedOf(job)} />

@@ -1,5 +1,4 @@
 // Two to four results with one range of colours and one cursor: side by side, as difference, or with a border to swipe.
-import { methodOf } from "../jobs/job_words.js";
 import { keepQuery } from "../parts/address.js";
 import { facts, loadResult, nameOf } from "../parts/result_tables.js";
 import { Facts, html } from "../parts/view.js";
@@ -16,12 +15,12 @@ export async function open({ id, query }) {
   const dimensions = new Set(results.map(({ volume }) => volume.shape.length));
   if (dimensions.size > 1) throw new Error("An image and a volume cannot be compared");
   document.title = "Comparison – Bentray";
-  const panes = results.map(({ job, values, summary }, k) => ({ title: `${LETTERS[k]} ${methodOf(job)}`, values, stored: summary.quantities }));
+  const panes = results.map(({ job, values, summary }, k) => ({ title: `${LETTERS[k]} ${job.title}`, values, stored: summary.quantities }));
   return html`<div class="wide">
     <h1>Comparison</h1>
     <ol class="compared">
       ${results.map((result, k) => html`<li>
-        <a href=${`#/jobs/${result.job.id}`}>${LETTERS[k]}: ${nameOf(result)}, ${methodOf(result.job)}</a>
+        <a href=${`#/jobs/${result.job.id}`}>${LETTERS[k]}: ${nameOf(result)}</a>
         <${Facts}>${facts(result)}</${Facts}>
       </li>`)}
     </ol>

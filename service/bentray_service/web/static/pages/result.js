@@ -1,5 +1,4 @@
 // The result of a reconstruction: image to measure in, how it was made, and what can be done with it.
-import { methodOf } from "../jobs/job_words.js";
 import { go, keepQuery } from "../parts/address.js";
 import { inTime } from "../parts/amounts.js";
 import { kept, request, send } from "../parts/api.js";
@@ -46,7 +45,7 @@ function CompareMenu({ job }) {
     <${Form} class="sheet" onChange=${choose} onSubmit=${() => go(`/compare/${[job.id, ...chosen].join(",")}`)}>
       <div class="others">
         ${others.map((other) => html`<label key=${other.id}><input type="checkbox" name="other" value=${other.id} /> ${" "}
-          ${other.name || methodOf(other)}, ${isSame(other) ? "this scan" : "another scan"}, ${inTime(other.created)}</label>`)}
+          ${other.title}, ${isSame(other) ? "this scan" : "another scan"}, ${inTime(other.created)}</label>`)}
       </div>
       <${Facts}>One to three others</${Facts}>
       <button type="submit" disabled=${chosen.length < 1 || chosen.length > 3}>Compare</button>

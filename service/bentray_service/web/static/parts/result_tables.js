@@ -1,5 +1,5 @@
 // A result, read from the service: how it was made and how good it is, as tables: errors against the truth, what auto compared, the plan.
-import { duration, methodOf } from "../jobs/job_words.js";
+import { duration } from "../jobs/job_words.js";
 import { inNanoseconds } from "./amounts.js";
 import { request } from "./api.js";
 import { HeadedTable, Pairs } from "./tables.js";
@@ -29,7 +29,7 @@ export function facts({ job, volume, summary }) {
   const residual = job.history.at(-1)?.residual_rms_s;
   const { truth, resolution_width_m: widths } = summary;
   return [
-    methodOf(job), `${size} nodes${spacing}`, `water ${volume.water_speed_mps.toFixed(1)} m/s`,
+    volume.provenance.made_by ?? job.title, `${size} nodes${spacing}`, `water ${volume.water_speed_mps.toFixed(1)} m/s`,
     residual && `residual ${inNanoseconds(residual)}`,
     truth?.rmse_mps != null && `error ${truth.rmse_mps.toFixed(2)} m/s rms (${truth.region})`,
     widths.length && `resolution width ${(1e3 * widths[Math.floor(widths.length / 2)]).toFixed(1)} mm`,

@@ -32,7 +32,7 @@ function send(file, metadata, onProgress) {
     const upload = new window.tus.Upload(file, {
       endpoint: "/v1/uploads",
       chunkSize: PIECE,
-      metadata,
+      metadata: { filename: file.name, ...metadata },
       headers: authorization(),
       retryDelays: WAITS,
       removeFingerprintOnSuccess: true,
