@@ -150,9 +150,6 @@ MANY = (
 )
 LEVELS = ((64, 64, 1), (128, 128, 3), (256, 192, 2), (64, 96, 12)), ((100, 128, 6),)
 VOLUMES = ((12, 48, 8), (24, 64, 12), (32, 64, 6), (24, 80, 8), (16, 112, 10)), ((20, 72, 9),)
-# Many nodes for their few rays, and many rays for their nodes.
-LARGE = ((*VOLUMES[0], (6, 192, 2)), VOLUMES[1])
-DENSE = ((*VOLUMES[0], (96, 64, 24)), VOLUMES[1])
 BLOCKS = ((6, 64, 2), (6, 96, 2), (8, 128, 2), (64, 96, 2), (6, 192, 2)), ((12, 112, 2), (6, 160, 2))
 SPACE, SLAB = {"decomposition": "volume"}, {"decomposition": "volume", "blocks": 3, "iterations": 1}
 TIMED: tuple[tuple[dict[str, Any], Any, tuple[str, ...]], ...] = (
@@ -165,9 +162,9 @@ TIMED: tuple[tuple[dict[str, Any], Any, tuple[str, ...]], ...] = (
     ({"method": "gauss-newton", **MAPS}, FEW, MAP_TASKS),
     ({"method": "gauss-newton", "rays": "straight", **MAPS}, FEW, MAP_TASKS),
     ({"method": "sart", "device": "opencl"}, LEVELS, ()),
-    ({"method": "sart", **SPACE}, LARGE, ()),
+    ({"method": "sart", **SPACE}, VOLUMES, ()),
     ({"method": "sart", "rays": "straight", **SPACE}, VOLUMES, ()),
-    ({"method": "gauss-newton", **SPACE}, DENSE, ()),
+    ({"method": "gauss-newton", **SPACE}, VOLUMES, ()),
     ({"method": "gauss-newton", "rays": "straight", **SPACE}, VOLUMES, ()),
     ({"method": "gauss-newton", **SPACE, **MAPS}, VOLUMES, MAP_TASKS),
     ({"method": "gauss-newton", "rays": "straight", **SPACE, **MAPS}, VOLUMES, MAP_TASKS),

@@ -9,9 +9,8 @@ from __future__ import annotations
 import json
 import sys
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import nullcontext
-from functools import partial
 from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,9 +23,8 @@ from bentray_kernels.arrays import Floats
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.cluster import task_costs
-from bentray_workers.cluster.capacities import MIB, REAL
+from bentray_workers.cluster.capacities import MIB
 from bentray_workers.cluster.task_costs import FIXED
-from bentray_workers.reconstruction.planning import ENTRY_BYTES
 
 from . import _measured_pictures, _measured_tasks
 from ._measured_tasks import Job, Measured
@@ -40,16 +38,8 @@ RECORD = Path(__file__).with_name("task_peaks.json")
 # more is planned than measured, beside what the idle worker itself varies by.
 MARGIN, MOST, IDLE_BYTES, IDLE_S = 0.15, 0.4, 8 * MIB, 0.5
 
-# Lowest coefficients. What a task holds for sure grows with the scan, also where the few sizes that were
-# measured can be explained without it: a travel time, which was measured by itself; a volume; times and
-# losses, and those of recent problems; the entries of rays, where all are held at once.
-SHARES = {
-    "bytes of a wave front": 1.0,
-    "bytes of the volume": 1.0,
-    "pairs of the scan": 3.0 * REAL,
-    "pairs of problems": 3.0 * REAL,
-}
-HELD_RAYS, OF_HELD_RAYS = ("gauss-newton", "maps", "uncertainty"), {"entries of rays": ENTRY_BYTES}
+# Lowest coefficients: a travel time was measured by itself and is whole in each task that computes one.
+SHARES = {"bytes of a wave front": 1.0}
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
@@ -82,28 +72,24 @@ def fitted(measured: Sequence[Measured]) -> dict[str, dict[str, float]]:
     names = [FIXED, *dict.fromkeys(name for task in measured for name in task.counts)]
     counts = np.array([[{FIXED: 1.0, **task.counts}.get(name, 0.0) for name in names] for task in measured])
     found = {}
-    shares = SHARES | (OF_HELD_RAYS if measured[0].kind.startswith(HELD_RAYS) else {})
-    for quantity, fit in (("bytes", partial(envelope, shares=shares)), ("seconds", nearest)):
+    for quantity, fit in (("bytes", envelope), ("seconds", nearest)):
         values = np.array([float(getattr(task, quantity)) for task in measured])
         if values.any():
             found[quantity] = fit(names, counts, values)
     return found
 
 
-def envelope(
-    names: Sequence[str], counts: Floats, peaks: Floats, shares: Mapping[str, float] = SHARES
-) -> dict[str, float]:
+def envelope(names: Sequence[str], counts: Floats, peaks: Floats) -> dict[str, float]:
     """Coefficients, none negative, with ``counts @ coefficients`` at least ``peaks`` and the margin.
 
     Args:
         names: (n,) of the counts.
         counts: (m, n) of each measurement.
         peaks: (m,), bytes; those below ``IDLE_BYTES`` may be exceeded by as much.
-        shares: the lowest coefficients, of counts that have one.
     """
     scale = counts.max(axis=0) + (counts.max(axis=0) == 0.0)
     weights = 1.0 / np.maximum(peaks, IDLE_BYTES)
-    lowest = np.array([shares.get(name, 0.0) for name in names]) * scale
+    lowest = np.array([SHARES.get(name, 0.0) for name in names]) * scale
     scaled = counts / scale
     bounds = [(least, None) for least in lowest]
     solved = linprog(weights @ scaled, A_ub=-scaled, b_ub=-(1.0 + MARGIN) * peaks, bounds=bounds)

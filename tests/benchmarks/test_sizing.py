@@ -107,22 +107,6 @@ def test_plans_cover_what_was_recorded_and_little_more() -> None:
     assert not wrong(recorded())
 
 
-@pytest.mark.parametrize(
-    ("kind", "count", "least"),
-    [
-        ("gauss-newton in space", "entries of rays", 12.0),
-        ("maps in space", "entries of rays", 12.0),
-        ("gauss-newton straight", "pairs of the scan", 24.0),
-        ("sart in space", "pairs of problems", 24.0),
-        ("summary", "bytes of the volume", 1.0),
-        ("truth", "bytes of the volume", 1.0),
-    ],
-)
-def test_what_a_task_holds_for_sure_grows_with_the_scan(kind: str, count: str, least: float) -> None:
-    # Without these, a volume with many rays was planned at a third of what it took.
-    assert table()["bytes"][kind][count] >= least
-
-
 def test_every_kind_is_measured_and_checked() -> None:
     fitted = {task.kind for task in recorded() if task.bytes and not task.check}
     checked = {task.kind for task in recorded() if task.bytes and task.check}
