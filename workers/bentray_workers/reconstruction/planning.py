@@ -165,9 +165,11 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         field: str = "nodes" if name not in waves else "method" if name == "validate_image" else "minutes"
         found = settings.reflection.pixel_m if name in echoes else getattr(settings, field)
         field = "reflection.pixel_m" if name in echoes else field
+        part, part_bytes = max(largest.parts.items(), key=lambda item: item[1])
         raise InvalidInput(
             field,
-            f"{found}, for which a task ({task_in_words(name)}) takes {_size_in_words(largest)}",
+            f"{found}, for which a task ({task_in_words(name)}) takes {size} bytes, {part_bytes} of them for "
+            f"{part}",
             f"settings whose tasks take at most {limit:.0f} bytes" + _advice(scan, settings, limit),
         )
     able = [one for one in fitting if one.task_bytes >= size]
@@ -196,11 +198,6 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         cost.speed_known,
         _why(scan, settings, decomposition, lane, tasks, (name, size), capacities, able),
     )
-
-
-def _size_in_words(size: TaskSize) -> str:
-    part, part_bytes = max(size.parts.items(), key=lambda item: item[1])
-    return f"{size.bytes} bytes, {part_bytes} of them for {part}"
 
 
 def call_sizes(scan: Summary, settings: Settings) -> dict[str, TaskSize]:
