@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests and jobs start hundreds of Python processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint tables docs bench task-costs bench-device mutants release lock clean
+.PHONY: help install compiled install-dev install-tests install-docs demo test test-all serve lint tables docs bench bench-device mutants release lock clean
 
 help: ## list the targets
 	@echo "Bentray: make TARGET"
@@ -54,9 +54,6 @@ docs: install-docs ## build the documentation into build/docs, with the gallery;
 bench: install ## run the benchmark NAME; NAME=reconstruction ARGS=--quick
 	@mkdir -p build/bench
 	@$(BIN)/bentray bench $(NAME) $(ARGS) --json build/bench/$(NAME).json --pictures build/bench
-
-task-costs: install ## measure all kinds of tasks and fit the table that plans are made of (an hour); ARGS='"picture, "' narrows it
-	@$(BIN)/python -m benchmarks.tasks.sizing $(ARGS)
 
 bench-device: install ## measure each engine and whole reconstructions on the OpenCL device of this machine; ARGS=--quick on a processor
 	@mkdir -p build/bench

@@ -23,7 +23,7 @@ from bentray_workers.files.dataset.summary import summary_of
 from bentray_workers.reconstruction.planning import plan
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
-from ..shared._worker_use import forget_peak, peak_bytes
+from ._worker_use import forget_peak, peak_bytes
 
 WATER_MPS, RADIUS_M = 1500.0, 0.054
 # Four rings that receive each other; side of the medium, m.

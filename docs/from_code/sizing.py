@@ -1,4 +1,4 @@
-"""Tables of memory, disk space and processor time: planned for reconstructions, and measured of tasks."""
+"""Tables of memory, disk space and processor time of reconstructions: planned, and measured."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from .tables import table
 SIZES = ((64, 96, 1), (128, 128, 1), (256, 192, 1), (256, 192, 40), (512, 256, 1), (512, 256, 44))
 METHODS = ("sart", "gauss-newton")
 MIB = 2.0**20
+# Ends of the labels of rows.
+MEMORY, DISK = ": memory above a warm worker", ": disk"
 ROWS = Path(__file__).resolve().parents[2] / "benchmarks" / "results" / "sizing.json"
 
 
@@ -34,17 +36,26 @@ def sizing() -> str:
 
 
 def measured_sizing(file: Path = ROWS) -> str:
-    """One row for each task of ``bentray bench sizing``; bold where a plan is exceeded."""
+    """One row for each size and method of ``bentray bench sizing``; bold where a plan is exceeded."""
+    recorded = {row["target"]: row for row in json.loads(file.read_text())}
     rows = []
-    for row in json.loads(file.read_text()):
-        kind, _, job = row["target"].partition(": ")
-        rows.append((kind, job, *_beside_plan(row)))
-    return table(("task", "job and size", "memory", "planned"), rows)
+    for target, memory in recorded.items():
+        if not target.endswith(MEMORY):
+            continue
+        disk, figures = recorded[target.removesuffix(MEMORY) + DISK], memory["figures"]
+        elements, nodes, slices = (f"{figures[name]:.0f}" for name in ("elements", "nodes", "slices"))
+        seconds = f"{figures['CPU, s']:.1f} s", f"{figures['planned CPU, s']:.0f} s"
+        method = target.removesuffix(MEMORY).rpartition(", ")[2]
+        files = (f"{figures[f'{name}, MiB']:.1f} MiB" for name in ("scan", "checkpoints", "volume"))
+        cells = (*_beside_plan(memory), *seconds, *files, f"{disk['goal']:.1f} MiB")
+        rows.append((elements, f"{nodes}²", slices, method, *cells))
+    head = ("elements", "nodes", "slices", "method", "memory", "planned", "CPU", "planned", "scan")
+    return table((*head, "checkpoints", "volume", "both planned"), rows)
 
 
 def _beside_plan(row: dict[str, Any]) -> tuple[str, str]:
-    measured = f"{row['value']:.1f} MiB"
-    return measured if row["met"] else f"**{measured}**", f"{row['goal']:.1f} MiB"
+    measured = f"{row['value']:.0f} MiB"
+    return measured if row["met"] else f"**{measured}**", f"{row['goal']:.0f} MiB"
 
 
 def _scan(elements: int, slices: int) -> DatasetCounts:

@@ -164,7 +164,7 @@ class Pictures:
 
     async def summary(self, volume: VolumeRow, scan: DatasetRow) -> dict[str, Any]:
         """Summarise a reconstruction, see ``images.result_summary``."""
-        cost = picture_cost.summary_cost(VolumeFile.from_row(volume.values()), scan.values())
+        cost = picture_cost.truth_cost(VolumeFile.from_row(volume.values()), scan.values())
         return dict(await self._one(volume, cost, result_summary, {"scan": await self._fetched(scan)}))
 
     def waiting(self, tenant: Tenant) -> int:
@@ -209,7 +209,7 @@ class Pictures:
         """
         account = self._accounts.of(item.tenant)
         workers = await self._queue.workers()
-        picture_cost.check_memory(*(refused or _named(item)), cost.bytes, list(workers.values()))
+        picture_cost.check_memory(*(refused or _named(item)), cost, list(workers.values()))
         try:
             async with self._queue.admitted(account, cost.seconds), asyncio.timeout(RENDER_SECONDS):
                 tasks = tasks_of(await self._fetched(item))

@@ -38,6 +38,7 @@ class Method:
         summary: one line for help texts.
         run_many: as ``run`` for problems of one shape and spacing, into an array (batch, nx, ny[, nz]); None
             where the method runs each problem alone.
+        swept_grids: grids of ``diagonals.Diagonals`` that a solve takes, in two and in three dimensions.
         on_device: whether ``run_many`` parallelises a sequence itself; threads must not share it.
     """
 
@@ -48,6 +49,7 @@ class Method:
     factored: bool
     summary: str
     run_many: Callable[..., None] | None = None
+    swept_grids: tuple[int, int] = (0, 0)
     on_device: bool = False
 
     def options(self) -> tuple[str, ...]:
@@ -67,6 +69,8 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 2,
                 True,
                 "factored second order in the order of a first-order sweep (default); option supersample",
+                # Two of times and crossings, and the mask of known nodes or a copy for each order.
+                swept_grids=(5, 5),
             ),
             Method(
                 "fmm",
@@ -85,6 +89,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 False,
                 "fast sweeping, first order; options tolerance, threads",
                 fast_sweeping_many,
+                swept_grids=(5, 5),
             ),
             Method(
                 "fsm-simultaneous",
@@ -93,6 +98,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 1,
                 False,
                 "fsm with all orders at the same time, as published; options tolerance, threads",
+                swept_grids=(8, 12),
             ),
             Method("fim", fast_iterative, 1, 1, False, "fast iterative, first order; option tolerance"),
             Method(

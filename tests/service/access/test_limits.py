@@ -38,7 +38,6 @@ from bentray_service.rows.tables import DatasetRow
 from bentray_service.rows.uploads import MAX_INCOMPLETE, Uploads
 from bentray_service.rows.usage import reserve
 from bentray_service.settings import ServiceSettings
-from bentray_workers.cluster.task_costs import TaskSize
 from bentray_workers.rendering.picture_cost import Cost
 from bentray_workers.rendering.tiles import PictureTasks
 
@@ -172,9 +171,7 @@ def pictures(world: World) -> tuple[int, Use]:
 
     async def run(tenant: Tenant) -> None:
         scan = DatasetRow(id=new_id("dataset"), tenant=tenant)
-        task = asyncio.ensure_future(
-            made._made(scan, Cost(TaskSize("map", {"pixels": 0}), 0.0), lambda path: PictureTasks([], None))
-        )
+        task = asyncio.ensure_future(made._made(scan, Cost(0.0, 0), lambda path: PictureTasks([], None)))
         await asyncio.sleep(0.0)
         if task.done():
             await task

@@ -13,7 +13,8 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.summary import summary_of
-from bentray_workers.reconstruction import picking_batches, reconstruction_run
+from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.reconstruction.memory import picking_memory
 
 from ...kernels.acquisition.traces import FREQUENCY_HZ, RATE_HZ, absorbed, blob_delay, scan
 
@@ -30,7 +31,7 @@ def lossy():
 
 
 def test_jobs_read_the_same_amplitudes_as_in_memory(lossy, tmp_path, monkeypatch):
-    monkeypatch.setattr(picking_batches, "TASK_SAMPLES", 30_000)
+    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 30_000)
     plan = PLAN.changed(amplitudes="spectrum")
     picked = replace(pick(lossy), waveform=lossy.waveform)
     expected = reconstruct_here(picked, plan)

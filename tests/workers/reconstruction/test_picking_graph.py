@@ -18,7 +18,8 @@ from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.findings import read_findings
-from bentray_workers.reconstruction import picking_batches, reconstruction_run
+from bentray_workers.reconstruction import reconstruction_run
+from bentray_workers.reconstruction.memory import picking_memory
 from bentray_workers.reconstruction.picking_graph import (
     PICKED,
     PickingFiles,
@@ -90,13 +91,13 @@ def assert_same(one, other):
 @pytest.mark.parametrize("samples", [30_000, 10**9])
 @pytest.mark.parametrize("picker", PICKERS)
 def test_batches_equal_the_whole(tmp_path, monkeypatch, picker, samples):
-    monkeypatch.setattr(picking_batches, "TASK_SAMPLES", samples)
+    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", samples)
     assert_same(arrived(clean(), tmp_path, picker, examined=False)[0], pick(clean(), picker))
 
 
 @pytest.mark.parametrize("whole", [True, False])
 def test_faults_are_found_and_corrected_as_in_one_piece(tmp_path, monkeypatch, whole):
-    monkeypatch.setattr(picking_batches, "TASK_SAMPLES", 10**9 if whole else 30_000)
+    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 10**9 if whole else 30_000)
     both = stacked(clean(), spoilt(clean(), damaged))
     expected = examine(both)
     picked, found = arrived(both, tmp_path)
@@ -126,7 +127,7 @@ def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(tmp_path):
 
 
 def test_progress_counts_examined_and_picked_emissions(tmp_path, monkeypatch):
-    monkeypatch.setattr(picking_batches, "TASK_SAMPLES", 50_000)
+    monkeypatch.setattr(picking_memory, "TASK_SAMPLES", 50_000)
     write_dataset(tmp_path / "scan.h5", clean())
     told = []
     reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN, told.append)

@@ -1,12 +1,15 @@
-"""Plans: those larger than any worker are rejected, with what fits; choices are told in words."""
+"""Memory plans: what tasks use; plans larger than any worker are rejected."""
 
 import json
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.shared._synthetic_scan import made_up_scan
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,15 +21,71 @@ from bentray_kernels.tomography.sart.device_slices import SliceSize
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.cluster.task_words import task_in_words
 from bentray_workers.files.dataset.counts import DatasetCounts, Summary, Traces
-from bentray_workers.files.dataset.summary import summary_of
-from bentray_workers.files.reconstruction import write_reconstruction
+from bentray_workers.reconstruction.memory.ray_memory import ray_task_parts
 from bentray_workers.reconstruction.planning import plan
-from bentray_workers.reconstruction.ray_task_sizes import ray_task_sizes
-from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
+PROGRAM = Path(__file__).with_name("ray_task_memory.py")
+ROOT = Path(__file__).parents[3]
 RING = Summary(256, 256, 256 * 256, 1, False, 0.0, 0.16, 0, True)
 BOTH = ("recon", "render")
 LARGE, SMALL = WorkerCapacity(8 * 1024 * MIB, BOTH), WorkerCapacity(560 * MIB, BOTH)
+
+
+def ring(elements, heights):
+    slices = heights or 1
+    height_m = 0.004 * max(0, heights - 1)
+    return Summary(elements, elements, slices * elements**2, slices, False, height_m, 0.16, 0, True)
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("asked", "elements", "heights"),
+    [
+        ({"nodes": 64, "resolution_check": True, "uncertainty": True}, 128, 0),
+        ({"nodes": 96}, 192, 0),
+        ({"nodes": 64, "method": "gauss-newton", "resolution_check": True, "uncertainty": True}, 128, 0),
+        ({"nodes": 96, "method": "gauss-newton"}, 144, 0),
+        ({"nodes": 48, "method": "gauss-newton", "decomposition": "volume"}, 12, 8),
+        ({"nodes": 64, "decomposition": "volume", "attenuation": False}, 12, 8),
+        ({"nodes": 128, "decomposition": "volume", "attenuation": False, "blocks": 3}, 24, 20),
+    ],
+    ids=[
+        "sart 64",
+        "sart 96",
+        "gauss-newton 64",
+        "gauss-newton 96",
+        "gauss-newton volume",
+        "sart volume",
+        "sart volume in blocks",
+    ],
+)
+def test_tasks_stay_within_the_planned_memory(asked, elements, heights):
+    settings = {**asked, "iterations": 2}
+    # Freed arrays go back at once, so that a fork's peak is that of its own.
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT),
+        "MALLOC_MMAP_THRESHOLD_": "65536",
+        "MALLOC_TRIM_THRESHOLD_": "65536",
+    }
+    command = [sys.executable, str(PROGRAM), json.dumps(settings), str(elements), str(heights)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    measured = json.loads(done.stdout)
+    told = plan(
+        ring(elements, heights), Settings.from_values(**{"method": "sart", **settings}), []
+    ).call_bytes
+    assert set(told) == set(measured)
+    # What freed arrays leave in a worker is not measured here.
+    parts = ray_task_parts(ring(elements, heights), Settings.from_values(**{"method": "sart", **settings}))
+    told = {name: size - parts[name].get("freed arrays", 0) for name, size in told.items()}
+    # Of the smallest calls a few pages more or less that a fork happens to touch are a third.
+    wrong = {
+        name: (told[name], taken)
+        for name, taken in measured.items()
+        if not taken <= told[name] <= 1.5 * taken + 5 * MIB
+    }
+    assert not wrong
 
 
 def test_rejects_grids_larger_than_worker_memory_with_one_that_fits():
@@ -45,17 +104,20 @@ def test_rejects_grids_larger_than_worker_memory_with_one_that_fits():
     assert plan(RING, asked, [WorkerCapacity(0, BOTH)]).workers == 1
 
 
-@pytest.mark.parametrize(("method", "nodes"), [("gauss-newton", 128), ("sart", 512)])
-def test_refusal_states_what_takes_most_memory(method, nodes):
+@pytest.mark.parametrize(
+    ("method", "nodes", "name", "part"),
+    [("gauss-newton", 128, "update_gauss_newton", "rays"), ("sart", 512, "update_sart", "a travel time")],
+)
+def test_refusal_states_what_takes_most_memory(method, nodes, name, part):
     asked = Settings.from_values(method=method, decomposition="volume", nodes=nodes, attenuation=False)
     scan = replace(RING, slices=32, pairs=32 * 256**2, height_m=0.08)
     with pytest.raises(InvalidInput) as refusal:
         plan(scan, asked, [SMALL])
-    size = max(ray_task_sizes(scan, asked).values(), key=lambda one: one.bytes)
-    part = max(size.parts, key=size.parts.__getitem__)
-    found = f"takes {size.bytes} bytes, {size.parts[part]} of them for {part}"
+    parts = ray_task_parts(scan, asked)[name]
+    assert parts[part] == max(parts.values())
+    said = task_in_words(name)
+    found = f"a task ({said}) takes {sum(parts.values())} bytes, {parts[part]} of them for {part}"
     assert found in refusal.value.value
-    assert any(f"({task_in_words(one)})" in refusal.value.value for one in ray_task_sizes(scan, asked))
 
 
 def test_no_limit_is_none():
@@ -116,8 +178,8 @@ def test_traces_are_planned_for():
         found.call_bytes
     )
     assert found.tasks > plan(RING, Settings(method="sart", nodes=64), []).tasks + 2 * 64
-    # No call holds all traces, which are 3 GiB.
-    assert found.largest[1] < scan.traces_bytes / 3
+    # No call holds more than an emission of what is 3 GiB.
+    assert found.largest[1] < scan.traces_bytes / 8
     unseen = plan(scan, Settings.from_values(method="sart", nodes=64, examine=False), [])
     assert "measure_traces" not in unseen.call_bytes
     assert "finish_slice" in plan(replace(RING, period=True), Settings(method="sart"), []).call_bytes
@@ -161,8 +223,7 @@ def test_more_nodes_and_more_slices_never_take_less(nodes, method, volume, check
     )
     found = plan(scan, asked, [])
     finer = plan(scan, replace(asked, nodes=nodes + 64), [])
-    assert all(finer.call_bytes[name] >= size for name, size in found.call_bytes.items())
-    assert finer.largest[1] > found.largest[1]
+    assert all(finer.call_bytes[name] > size for name, size in found.call_bytes.items())
     assert plan(replace(scan, slices=8), asked, []).tasks > found.tasks
 
 
@@ -190,17 +251,3 @@ def test_a_device_that_cannot_hold_one_slice_or_emitter_is_refused_by_number():
         InvalidInput, match=r"method: found 'waveform', for which an emitter takes \d+ bytes on"
     ):
         plan(waves, waveform, offer(2**23))
-
-
-def test_result_and_checkpoints_take_no_more_than_the_planned_disk(tmp_path):
-    settings = Settings.from_values(method="gauss-newton", nodes=24, iterations=2, attenuation=False)
-    scan, work, stored = made_up_scan(tmp_path / "scan.h5", 12, 2), tmp_path / "work", [0]
-    work.mkdir()
-
-    def saved():
-        stored.append(sum(file.stat().st_size for file in work.rglob("*") if file.is_file()))
-
-    result = reconstruct(None, scan, settings, work_dir=work, on_saved=saved)
-    write_reconstruction(tmp_path / "volume.h5", result)
-    found = max(stored) + (tmp_path / "volume.h5").stat().st_size
-    assert 0 < found <= plan(summary_of(scan, settings), settings, ()).stored_bytes

@@ -159,7 +159,7 @@ def test_the_figures_for_memory_are_no_less_than_what_is_used():
     kept, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert scene.layers.isos == (0.5,)
-    nodes = scene_cache.padded_nodes(volume.values.shape)
-    assert spline <= nodes * scene_cache.SPLINE_BYTES
-    assert kept <= nodes * scene_cache.SCENE_BYTES
-    assert peak <= scene_cache.building_bytes(volume.values.shape)
+    shape = volume.values.shape
+    assert spline <= scene_cache.needed_bytes(shape, scene_cache.SPLINE_BYTES)
+    assert kept <= scene_cache.needed_bytes(shape, scene_cache.SCENE_BYTES)
+    assert peak <= scene_cache.needed_bytes(shape, scene_cache.BUILDING_BYTES)

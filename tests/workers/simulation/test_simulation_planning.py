@@ -1,6 +1,11 @@
 """Plans of simulations: what does not fit is refused by name, and more of anything takes more."""
 
+import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -9,10 +14,13 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.simulation import simulation_planning
+from bentray_workers.simulation.cost import task_bytes
 from bentray_workers.simulation.parts import parts_of
 from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_planning import plan_simulation
 
+PROGRAM = Path(__file__).with_name("simulation_memory.py")
+ROOT = Path(__file__).parents[3]
 WORKER = WorkerCapacity(1024 * MIB, ("recon", "render"))
 WAVES = PhantomScan(waveform=True)
 
@@ -59,7 +67,7 @@ def test_every_emitter_is_in_one_part(elements, nodes, slices):
         (PhantomScan(phantom="table7", three_d=True, refinement=4), "nodes"),
         (PhantomScan(waveform=True, frequency_hz=5e6), "frequency_hz"),
         (PhantomScan(phantom="table7", waveform=True, frequency_hz=4e5), "frequency_hz"),
-        (PhantomScan(waveform=True, elements=4096, side_m=0.6, frequency_hz=3e5), "elements"),
+        (PhantomScan(waveform=True, elements=4096, side_m=0.3), "elements"),
         (PhantomScan(phantom="table7", elements=4096, slices=1000), "elements"),
     ],
 )
@@ -84,3 +92,20 @@ def test_without_workers_it_is_planned_for_one():
     alone, none = plan_simulation(WAVES, [WORKER]), plan_simulation(WAVES, [])
     assert (alone.minutes, alone.workers, none.workers) == (none.minutes, 1, 0)
     assert "none is connected yet" in none.why
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+def test_tasks_stay_within_the_planned_memory():
+    scans = [
+        {"nodes": 100, "elements": 300, "snr": 10.0},
+        {"waveform": True, "frequency_hz": 3e5, "emissions": 2, "elements": 256, "snr": 9.0},
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, str(PROGRAM), json.dumps(scans)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    for scan, measured in zip(scans, json.loads(done.stdout), strict=True):
+        told = task_bytes(PhantomScan(**scan).chosen())
+        assert set(told) == set(measured)
+        for name, taken in measured.items():
+            assert taken <= told[name] <= 2.2 * taken + 24 * MIB, (scan, name, told[name], taken)

@@ -18,7 +18,7 @@ from ..files.dataset.scan import ScanHeader, read_header
 from ..files.dataset.traces import open_slice
 from ..files.findings import read_findings
 from ..files.reference import reference_path, with_reference
-from .ray_task_sizes import PROBLEMS_KEPT
+from .memory.ray_memory import PROBLEMS_KEPT
 
 # How many values of each kind a process keeps. Two jobs may alternate; more problems of waves would cost
 # memory, since they hold the traces of the object. Slices that a device updates together are of one job.

@@ -49,7 +49,7 @@ from ..files.dataset.write import write_dataset
 from ..files.findings import ScanFindings, write_findings
 from ..files.reference import reference_path, with_reference, write_reference
 from .file_scan import read_once
-from .picking_batches import batches_of
+from .memory.picking_memory import parts_of
 
 PICKED, FINDINGS = "picked.h5", "findings.json"
 
@@ -177,7 +177,7 @@ class PickingGraph:
             self._picks = True
         self._estimates = source.estimates_water
         if self._picks or self._estimates:
-            self._parts = batches_of(len(dataset.tx), source.header.samples * len(dataset.rx))
+            self._parts = parts_of(len(dataset.tx), source.header.samples * len(dataset.rx))
         self._examines = source.examine and not dataset.picked
         self._measures = self._examines or self._estimates
         # Of the object, until the chords through water are found in them.

@@ -26,27 +26,27 @@ from bentray_kernels.tomography.stage_graphs import BATCH
 
 from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of, without_device
 from ..cluster.checkpoints import KEPT
-from ..cluster.task_costs import TaskSize
 from ..cluster.task_words import task_in_words
 from ..files.dataset.counts import Summary
 from ..files.dataset.format import PAIR_ARRAYS
 from ..files.quantities import IMAGES
 from .blocks.block_choice import fitting_blocks
-from .picking_batches import picking_tasks
-from .ray_task_sizes import (
+from .memory.block_memory import block_files_bytes
+from .memory.picking_memory import picking_tasks
+from .memory.ray_memory import (
+    call_bytes,
     emitters_of,
-    entries_of,
-    front_size,
-    picking_task_sizes,
-    problems_of,
-    ray_task_sizes,
+    field_bytes,
+    ray_task_parts,
     rays_of,
+    rows_bytes,
     shape_of,
     slice_bytes,
+    state_bytes,
 )
+from .memory.reflection_memory import reflection_bytes, reflection_task_bytes, reflection_tasks
+from .memory.waveform_memory import budgeted, least_batch_bytes, wave_task_bytes, wave_tasks
 from .reconstruction_cost import reconstruction_cost
-from .reflection_sizes import reflection_bytes, reflection_task_sizes, reflection_tasks
-from .waveform_sizes import budgeted, least_batch_bytes, wave_task_sizes, wave_tasks
 
 Decomposition = Literal["slices", "emitters", "volume"]
 
@@ -55,13 +55,6 @@ RECORD_BYTES = 64 * 2**10
 
 # Nodes crossed by rays in half a second of SART on a core of 2020; for the estimated number of tasks.
 NODES_IN_A_TASK = 1.5e7
-
-# Bytes of a matrix entry of a ray: a ray has 1.55 of 8 bytes for each node of a side; and of the ray itself.
-ENTRY_BYTES, RAY_BYTES = 1.55 * 8, 2 * REAL
-
-# Arrays of the size of a volume in the files of blocks: times before and after, sums, and three states of two
-# images.
-BLOCK_ARRAYS = 2 + 2 + 3 * 2
 
 # Tasks about a block for each emitter: some sweeps, its rays, their back-projection, and the update.
 BLOCK_TASKS = 6
@@ -142,34 +135,32 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     methods = [settings]
     if settings.selects_model:
         methods = [final_settings(settings, changes) for changes in CANDIDATES]
-    calls: dict[str, TaskSize] = {}
+    calls: dict[str, int] = {}
     for method in methods:
-        for name, task in call_sizes(scan, method).items():
-            calls[name] = max(task, calls.get(name, task), key=_bytes)
+        for name, size in call_bytes(scan, method).items():
+            calls[name] = max(size, calls.get(name, 0))
     if settings.method == "waveform":
         samples = 0 if scan.traces is None else scan.traces.samples
         check_waveform(settings, samples, scan.slices, in_space=scan.in_space)
     # Candidates of 3-D arrays are validated by times alone.
     traces = None if scan.in_space and settings.method == "auto" else scan.traces
     refining = budgeted(traces, scan.width_m, scan.slices, settings)
-    waves = wave_task_sizes(traces, scan.width_m, refining)
+    waves = wave_task_bytes(traces, scan.width_m, refining)
     calls |= waves
     check_reflection(settings, traces=scan.echoes is not None, in_space=scan.in_space)
-    echoes = reflection_task_sizes(scan, settings)
+    echoes = reflection_task_bytes(scan, settings)
     calls |= echoes
     _check_device(scan, methods, least_batch_bytes(traces, scan.width_m, refining), fitting)
     limit = max((one.task_bytes for one in fitting), default=math.inf)
-    name, largest = max(calls.items(), key=lambda item: item[1].bytes)
-    size = largest.bytes
+    name, size = max(calls.items(), key=lambda item: item[1])
     if size > limit:
         field: str = "nodes" if name not in waves else "method" if name == "validate_image" else "minutes"
         found = settings.reflection.pixel_m if name in echoes else getattr(settings, field)
         field = "reflection.pixel_m" if name in echoes else field
-        part, part_bytes = max(largest.parts.items(), key=lambda item: item[1])
         raise InvalidInput(
             field,
-            f"{found}, for which a task ({task_in_words(name)}) takes {size} bytes, {part_bytes} of them for "
-            f"{part}",
+            f"{found}, for which a task ({task_in_words(name)}) takes {size} bytes"
+            + _largest_part(scan, methods, name),
             f"settings whose tasks take at most {limit:.0f} bytes" + _advice(scan, settings, limit),
         )
     able = [one for one in fitting if one.task_bytes >= size]
@@ -185,10 +176,10 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         lane,
         tasks,
         len(able),
-        {task: one.bytes for task, one in calls.items()},
-        max(front_size(shape, method.ray_eikonal).bytes for method in methods),
-        max(_rows_bytes(scan, method) for method in methods),
-        _state_bytes(shape, settings),
+        calls,
+        max(field_bytes(shape, method.ray_eikonal) for method in methods),
+        max(rows_bytes(scan, method, rays_of(scan, method)) for method in methods),
+        state_bytes(shape, settings),
         _stored_bytes(scan, settings, shape),
         settings.numerics.blocks,
         settings.grid_nodes,
@@ -198,26 +189,6 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
         cost.speed_known,
         _why(scan, settings, decomposition, lane, tasks, (name, size), capacities, able),
     )
-
-
-def call_sizes(scan: Summary, settings: Settings) -> dict[str, TaskSize]:
-    """The tasks of one method by name, with those that pick travel times; ``method`` is never auto."""
-    return {**picking_task_sizes(scan, settings), **ray_task_sizes(scan, settings)}
-
-
-def _bytes(size: TaskSize) -> int:
-    return size.bytes
-
-
-def _rows_bytes(scan: Summary, settings: Settings) -> int:
-    rays = rays_of(scan, settings)
-    return math.ceil(ENTRY_BYTES * entries_of(scan, settings, rays)) + RAY_BYTES * rays
-
-
-def _state_bytes(shape: tuple[int, ...], settings: Settings) -> int:
-    """Slowness and coverage; with Gauss–Newton the best image, the start and the dual too."""
-    images = 2 if settings.method == "sart" else 4 + len(shape)
-    return images * REAL * math.prod(shape)
 
 
 def _check_extent(scan: Summary) -> None:
@@ -266,7 +237,7 @@ def _methods(settings: Settings) -> tuple[str, ...]:
 
 def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     """Estimated number of tasks, with stages on coarser grids."""
-    problems = problems_of(scan, settings)
+    problems = 1 if settings.decomposition == "volume" else scan.slices
     emitters = emitters_of(scan, settings)
     parts = -(-emitters // BATCH)
     passes = settings.iterations * (settings.numerics.coarser_grids + 1)
@@ -284,11 +255,11 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
 
 def _stored_bytes(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
     """Without compression: all images of the result, checkpoints, and picked times."""
-    problems = problems_of(scan, settings)
+    problems = 1 if settings.decomposition == "volume" else scan.slices
     picked = len(PAIR_ARRAYS) * REAL * scan.pairs if scan.traces_bytes else 0
-    each = len(IMAGES) * REAL * math.prod(shape) + KEPT * _state_bytes(shape, settings) + RECORD_BYTES
+    each = len(IMAGES) * REAL * math.prod(shape) + KEPT * state_bytes(shape, settings) + RECORD_BYTES
     each += reflection_bytes(scan, settings)
-    each += BLOCK_ARRAYS * REAL * math.prod(shape) if settings.numerics.blocks > 1 else 0
+    each += block_files_bytes(shape) if settings.numerics.blocks > 1 else 0
     return problems * each + picked + _trials_bytes(scan, settings)
 
 
@@ -297,15 +268,23 @@ def _trials_bytes(scan: Summary, settings: Settings) -> int:
     if not settings.selects_model:
         return 0
     plans = candidate_settings(settings, (*CANDIDATES, *WIDE))
-    return sum(KEPT * _state_bytes(shape_of(scan, one), one) + RECORD_BYTES for one in plans)
+    return sum(KEPT * state_bytes(shape_of(scan, one), one) + RECORD_BYTES for one in plans)
+
+
+def _largest_part(scan: Summary, methods: Sequence[Settings], name: str) -> str:
+    """What takes most memory of a task that uses rays, in words; empty for other tasks."""
+    parts = [parts for method in methods if (parts := ray_task_parts(scan, method).get(name))]
+    if not parts:
+        return ""
+    part, size = max(max(parts, key=lambda one: sum(one.values())).items(), key=lambda item: item[1])
+    return f", {size} of them for {part}"
 
 
 def _advice(scan: Summary, settings: Settings, limit: float) -> str:
     """The largest grid that fits, in words; empty without one."""
 
     def fits(nodes: int) -> bool:
-        sizes = call_sizes(scan, settings.changed(nodes=nodes, coarser_grids=0))
-        return max(map(_bytes, sizes.values())) <= limit
+        return max(call_bytes(scan, settings.changed(nodes=nodes, coarser_grids=0)).values()) <= limit
 
     if settings.selects_model or not fits(MIN_NODES):
         return _blocks_advice(scan, settings)

@@ -1,4 +1,4 @@
-"""CPU time of a reconstruction, estimated from its counted work and the speeds in ``task_costs.json``.
+"""CPU time of a reconstruction, estimated from its counted work and speeds measured on a core of 2020.
 
 The count is exact enough to compare jobs of one class with each other; the speeds are orders of magnitude.
 The service multiplies the estimate by the measured time of earlier jobs of the same class.
@@ -7,7 +7,9 @@ The service multiplies the estimate by the measured time of earlier jobs of the 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import WIDE
 from bentray_kernels.tomography.model_selection.selection import (
@@ -17,11 +19,17 @@ from bentray_kernels.tomography.model_selection.selection import (
 )
 from bentray_kernels.tomography.settings import DEVIATION, Settings
 
-from ..cluster.task_costs import TaskSize
 from ..files.dataset.counts import Summary
-from .ray_task_sizes import emitters_of, problems_of, shape_of
-from .reflection_sizes import reflection_seconds
-from .waveform_sizes import budgeted, wave_minutes
+from .memory.ray_memory import emitters_of, shape_of
+from .memory.reflection_memory import reflection_seconds
+from .memory.waveform_memory import budgeted, wave_minutes
+
+# Node visits of a core in a second, see ``_visits``: 256 emitters on 128 x 128 nodes take 0.96 ms an emitter
+# with SART and 7 ms with Gauss-Newton (benchmarks/results/distributed.json).
+VISITS_PER_S: Mapping[str, float] = MappingProxyType({"sart": 6.8e7, "gauss-newton": 9.3e6})
+
+# Samples of traces that a core examines and picks in a second.
+SAMPLES_PER_S = 1.3e7
 
 # Start, final image and file of any reconstruction, s.
 OVERHEAD_S = 1.0
@@ -60,13 +68,13 @@ def reconstruction_cost(scan: Summary, settings: Settings, workers: int) -> Reco
     picking = 0.0
     if scan.traces_bytes and scan.traces is not None:
         samples = 2.0 * scan.slices * scan.traces.emissions * scan.traces.receivers * scan.traces.samples
-        picking = TaskSize("picked samples", {"samples": samples}).seconds
+        picking = samples / SAMPLES_PER_S
     sequential = settings.method == "sart"
-    problems = problems_of(scan, settings)
+    problems = 1 if settings.decomposition == "volume" else scan.slices
     at_once = max(1, min(workers, problems) if sequential else workers)
     parallel = picking + waves + reflection_seconds(scan, settings)
-    duration = OVERHEAD_S + rays / at_once + parallel / max(1, workers)
-    return ReconstructionCost(_class(scan, settings, waves > 0.0), duration, _speed_known(settings))
+    seconds = OVERHEAD_S + rays / at_once + parallel / max(1, workers)
+    return ReconstructionCost(_class(scan, settings, waves > 0.0), seconds, _speed_known(settings))
 
 
 def _class(scan: Summary, settings: Settings, waves: bool) -> str:
@@ -103,26 +111,20 @@ def _rays_seconds(scan: Summary, settings: Settings) -> float:
 
 
 def _method_seconds(scan: Summary, settings: Settings) -> float:
-    problems = problems_of(scan, settings)
+    problems = 1 if settings.decomposition == "volume" else scan.slices
     return problems * _problem_seconds(scan, settings)
 
 
 def _problem_seconds(scan: Summary, settings: Settings) -> float:
     """CPU time of all stages of one slice, or of a volume, by one method, s."""
-    further = int(settings.attenuation.enabled and scan.amplitudes) + int(settings.resolution_check)
-    # Rays are traced once more, and sixteen probes cost about as much as that.
-    further += 2 * int(settings.uncertainty)
-    traced = further * _visits(scan, settings, settings.grid_nodes)
-    passes = passes_of(scan, settings).seconds
-    return passes + TaskSize("passes by gauss-newton", {"visits": traced}).seconds
-
-
-def passes_of(scan: Summary, settings: Settings) -> TaskSize:
-    """All iterations of one slice, or of a volume, by one method; for their CPU time."""
     numerics = settings.numerics
     grids = [-(-settings.grid_nodes // 2**k) for k in range(numerics.coarser_grids + 1)]
     visits = sum(settings.iterations * _visits(scan, settings, nodes) for nodes in grids)
-    return TaskSize(f"passes by {settings.method}", {"visits": visits})
+    seconds = visits / VISITS_PER_S[settings.method]
+    further = int(settings.attenuation.enabled and scan.amplitudes) + int(settings.resolution_check)
+    # Rays are traced once more, and sixteen probes cost about as much as that.
+    further += 2 * int(settings.uncertainty)
+    return seconds + further * _visits(scan, settings, settings.grid_nodes) / VISITS_PER_S["gauss-newton"]
 
 
 def _visits(scan: Summary, settings: Settings, nodes: int) -> float:

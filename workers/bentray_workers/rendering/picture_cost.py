@@ -1,8 +1,7 @@
 """Cost of a picture, estimated before it starts: CPU time and memory, checked against the workers.
 
-Both are from the table of task costs, but for the CPU time of rays: no fit can hold, since nobody knows
-before how many surfaces they meet. The speeds here are typical for a core of 2023; rough volumes take several
-times as long.
+Seconds are typical for a core of 2023: rough volumes take several times as long. Bytes are an upper bound,
+compared with measured peaks in ``tests/workers/rendering/test_picture_cost.py``.
 """
 
 from __future__ import annotations
@@ -10,18 +9,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from bentray_kernels.errors import InvalidInput
 
-from ..cluster.capacities import MIB, REAL, WorkerCapacity
+from ..cluster.capacities import MIB, WorkerCapacity
 from ..cluster.resources import RECONSTRUCTION, RENDER
-from ..cluster.task_costs import TaskSize
 from ..files.dataset.counts import BLOCK_BYTES
-from ..files.export.registry import FormatName
+from ..files.export.registry import EXPORTED, FormatName
+from .field_tasks import FACE_BYTES
 from .field_view import FieldView
 from .refraction_view import RefractionView
-from .scene_cache import padded_nodes
+from .scene_cache import BUILDING_BYTES, needed_bytes
 from .tiles import TASK_RAYS
 
 # Of one interactive picture, s; longer ones need a job.
@@ -32,46 +31,51 @@ MAX_SECONDS = 60.0
 BESIDE_PART = 0.05
 MARGIN_BYTES = 96 * MIB
 
-# Of any picture, per ray and per surface on it, and per node of a volume that is filtered.
-FLOOR_S, RAY_S, SURFACE_S, SMOOTH_SCENE_S = 0.3, 6e-7, 1.5e-7, 2.5e-7
-# Of a geometry field: per camera ray, and per surface at which it may continue (twice with exact lookups).
-# Measured: 0.3 to 2.4 us per ray at depths to 16, of which most rays need few; 22 us for glass that fills the
-# picture.
-FIELD_RAY_S, FIELD_SURFACE_S = 1e-6, 3e-7
+# Overhead of Python and Matplotlib.
+FLOOR_BYTES, FLOOR_SECONDS = 48 * MIB, 0.3
 
+# Per ray of a tile, and per pixel of a picture while tiles are stacked and compressed.
+RAY_BYTES, PIXEL_BYTES = 160, 8
+RAY_S, SURFACE_S = 6e-7, 1.5e-7
+SMOOTH_SCENE_S = 2.5e-7
+
+# Per pixel drawn and compressed by Matplotlib.
+DRAWN_BYTES, DRAWN_S = 56, 2e-7
 # Sides of a picture without a given size, pixels.
 USUAL_SIZE = 1200
 
 # A reconstruction has four images at most, float64 each, and is read whole; a volume float32 at most.
-IMAGES = 4
+IMAGES, REAL = 4, 8
+READ_S = 2e-9
+
+# Of a geometry field: per camera ray, and per surface at which it may continue (twice with exact lookups).
+# Measured: 0.3 to 2.4 us per ray at depths to 16, of which most rays need few; 22 us for glass that fills the
+# picture.
+FIELD_RAY_S, FIELD_SURFACE_S = 1e-6, 3e-7
+SCENE_BYTES = 96 * MIB
+
+# Bytes of traces that a core examines in a second.
+TRACE_BYTES_PER_S = 2**25
 
 
-class Cost(NamedTuple):
+@dataclass(frozen=True)
+class Cost:
     """Cost of one picture.
 
     Attributes:
-        size: its largest task.
-        rays_s: CPU time of a picture of rays; None for others.
+        seconds: estimated CPU time.
+        bytes: memory of its largest task.
     """
 
-    size: TaskSize
-    rays_s: float | None = None
-
-    @property
-    def seconds(self) -> float:
-        """Estimated CPU time."""
-        return self.size.seconds if self.rays_s is None else self.rays_s
-
-    @property
-    def bytes(self) -> int:
-        """Memory of its largest task."""
-        return self.size.bytes
+    seconds: float
+    bytes: int
 
 
 def slice_cost(stored: VolumeFile, size: int | None) -> Cost:
     """Cost of a slice of a volume; ``size`` as in ``images.slice_style.SliceStyle``."""
-    counts = {"bytes of the volume": stored.read_bytes, "pixels": (size or USUAL_SIZE) ** 2}
-    return Cost(TaskSize("slice", counts))
+    pixels = (size or USUAL_SIZE) ** 2
+    seconds = FLOOR_SECONDS + READ_S * stored.read_bytes + DRAWN_S * pixels
+    return Cost(seconds, FLOOR_BYTES + stored.read_bytes + DRAWN_BYTES * pixels)
 
 
 def refraction_cost(stored: VolumeFile, view: RefractionView) -> Cost:
@@ -89,7 +93,7 @@ def refraction_cost(stored: VolumeFile, view: RefractionView) -> Cost:
         view.height,
         ", or submit a job of kind `refraction` (frames: 1)",
     )
-    return Cost(largest(refraction_size(stored.shape, view), view), scene + rays)
+    return Cost(scene + rays, refraction_bytes(stored.shape, view))
 
 
 def refraction_seconds(shape: Sequence[int], view: RefractionView) -> tuple[float, float]:
@@ -98,7 +102,7 @@ def refraction_seconds(shape: Sequence[int], view: RefractionView) -> tuple[floa
     # Filters of a higher degree use more nodes per value.
     order = int(view.filter[-1]) if view.filter.startswith("bspline") else 3
     ray_s = (RAY_S + SURFACE_S * _depth(view)) * (1.0 + 0.5 * max(0, order - 3))
-    return FLOOR_S + SMOOTH_SCENE_S * math.prod(shape), _rays(view) // spacing**2 * ray_s
+    return FLOOR_SECONDS + SMOOTH_SCENE_S * math.prod(shape), _rays(view) // spacing**2 * ray_s
 
 
 def _depth(view: RefractionView) -> int:
@@ -106,30 +110,24 @@ def _depth(view: RefractionView) -> int:
     return 1 if view.mode == "shaded" else view.depth
 
 
-def largest(tile: TaskSize, view: RefractionView | FieldView) -> TaskSize:
-    """The larger of a tile, and of the task that stacks all of them."""
-    return max(tile, stacking_size(view), key=lambda size: size.bytes)
-
-
-def stacking_size(view: RefractionView | FieldView) -> TaskSize:
-    """The whole picture, while its tiles are stacked and compressed."""
-    return TaskSize("stacking", {"pixels": view.width * view.height})
-
-
-def refraction_size(shape: Sequence[int], view: RefractionView) -> TaskSize:
-    """A tile of that picture."""
-    return TaskSize("refraction", {"filtered nodes": padded_nodes(shape), **_tile(view)})
+def refraction_bytes(shape: Sequence[int], view: RefractionView) -> int:
+    """Memory of a task of that picture; reading the volume takes less than its scene."""
+    return _tile_bytes(view) + needed_bytes(shape, BUILDING_BYTES)
 
 
 def histogram_cost(stored: VolumeFile) -> Cost:
     """Cost of a histogram of a volume, with the filter of a picture of it."""
-    filtered = padded_nodes(stored.shape) if len(stored.shape) == 3 else 0
-    return Cost(TaskSize("histogram", {**_read(stored), "filtered nodes": filtered}))
+    filtered = needed_bytes(stored.shape, BUILDING_BYTES) if len(stored.shape) == 3 else 0
+    # NumPy converts pieces of the values; the mean and deviation take one copy in float64.
+    needed = FLOOR_BYTES + stored.read_bytes + max(REAL * math.prod(stored.shape), filtered)
+    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * math.prod(stored.shape), needed)
 
 
 def coefficients_cost(stored: VolumeFile) -> Cost:
     """Cost of a filtered volume, sent as float32: one array and its file."""
-    return Cost(TaskSize("coefficients", {**_read(stored), "filtered nodes": padded_nodes(stored.shape)}))
+    nodes = math.prod(stored.shape)
+    needed = FLOOR_BYTES + stored.read_bytes + needed_bytes(stored.shape, BUILDING_BYTES + REAL)
+    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * nodes, needed)
 
 
 def field_cost(figures: Mapping[str, Any], view: FieldView) -> Cost:
@@ -148,68 +146,65 @@ def field_cost(figures: Mapping[str, Any], view: FieldView) -> Cost:
         view.height,
         ", or a smaller depth",
     )
-    return Cost(largest(field_size(figures, view), view), FLOOR_S + rays * ray_s)
-
-
-def field_size(figures: Mapping[str, Any], view: FieldView) -> TaskSize:
-    """A tile of a scene with a geometry field."""
-    tables, pixels = int(figures.get("outer_bytes", 0)), int(figures.get("image_pixels", 0)) ** 2
-    counts = {
-        "bytes of outer tables": tables,
-        "bytes of inner tables": int(figures.get("inner_bytes", 0)),
-        "faces": int(figures.get("faces", 0)),
-        "pixels of the image": pixels,
-        # The tables that such a view reads are made from the image.
-        "bytes of made tables": tables if view.reads_image else 0,
-        "pixels of the made image": pixels if view.reads_image else 0,
-    }
-    return TaskSize("geometry field", {**counts, **_tile(view)})
+    tables = sum(int(figures.get(name, 0)) for name in ("outer_bytes", "inner_bytes"))
+    surface = 2 * FACE_BYTES * int(figures.get("faces", 0)) + 24 * int(figures.get("image_pixels", 0)) ** 2
+    # One byte per eight entries of the outer table marks equal entries.
+    needed = SCENE_BYTES + tables + tables // 8 + surface
+    if view.reads_image:
+        # As many bytes of (u, v) as of the outer table, and the image, once more while they are made.
+        needed += 2 * (int(figures.get("outer_bytes", 0)) + 24 * int(figures.get("image_pixels", 0)) ** 2)
+    return Cost(FLOOR_SECONDS + rays * ray_s, _tile_bytes(view) + needed)
 
 
 def map_cost(figures: Mapping[str, Any]) -> Cost:
     """Cost of a geometry image or a normal map."""
-    return Cost(TaskSize("map", {"pixels": int(figures.get("image_pixels", 0)) ** 2}))
+    pixels = int(figures.get("image_pixels", 0)) ** 2
+    return Cost(FLOOR_SECONDS + DRAWN_S * pixels, FLOOR_BYTES + 96 * pixels)
 
 
 def quality_cost(dataset: Mapping[str, Any]) -> Cost:
     """Cost of the examination of a scan with the counts in its row."""
-    return Cost(TaskSize("quality", _scan(dataset)))
+    pairs = int(dataset["ntx"]) * int(dataset["nrx"]) * int(dataset["slices"])
+    traces = int(dataset["bytes"]) if dataset["has_traces"] else 0
+    # Traces of one emission of object and water at a time, with a few copies.
+    emission = 16 * traces // max(1, int(dataset["ntx"]) * int(dataset["slices"]))
+    seconds = 1.0 + traces / TRACE_BYTES_PER_S + 2e-6 * pairs
+    return Cost(seconds, 2 * FLOOR_BYTES + DRAWN_BYTES * USUAL_SIZE**2 + emission + 256 * pairs)
 
 
 def geometry_cost(dataset: Mapping[str, Any]) -> Cost:
     """Cost of reading a scan without its traces."""
-    return Cost(TaskSize("geometry", _scan(dataset)))
+    pairs = int(dataset["ntx"]) * int(dataset["nrx"]) * int(dataset["slices"])
+    return Cost(FLOOR_SECONDS + 1e-7 * pairs, FLOOR_BYTES + 64 * pairs)
 
 
 def emission_cost(dataset: Mapping[str, Any]) -> Cost:
     """Cost of the traces of one emission, of which the chunks that hold it are read."""
-    return Cost(TaskSize("emission", _scan(dataset)))
+    whole = geometry_cost(dataset)
+    emission = int(dataset["bytes"]) // max(1, int(dataset["ntx"]) * int(dataset["slices"]))
+    return Cost(whole.seconds + emission / TRACE_BYTES_PER_S, whole.bytes + 2 * BLOCK_BYTES + 16 * emission)
 
 
 def mesh_cost(stored: VolumeFile) -> Cost:
     """Cost of the iso-surface of a volume as a mesh."""
-    return Cost(TaskSize("mesh", _read(stored)))
+    nodes = math.prod(stored.shape)
+    return Cost(4.0 + 3e-8 * nodes, 4 * FLOOR_BYTES + stored.read_bytes + 16 * nodes)
 
 
 def export_cost(stored: VolumeFile, name: FormatName) -> Cost:
-    """Cost of an export to a format: the volume is read whole, and copied to write it."""
-    return Cost(TaskSize(f"export to {name}", _read(stored)))
+    """Cost of an export to one of ``EXPORTED``: the volume is read whole, and copied to write it."""
+    written = EXPORTED[name]
+    needed = FLOOR_BYTES + written.library_bytes + int(written.copies * stored.read_bytes)
+    return Cost(FLOOR_SECONDS + 4 * READ_S * stored.read_bytes, needed)
 
 
 def truth_cost(stored: VolumeFile, dataset: Mapping[str, Any]) -> Cost:
-    """Cost of an export of the truth: the volume, and the scan without its traces, are read whole."""
-    return Cost(TaskSize("truth", _with_truth(stored, dataset)))
-
-
-def summary_cost(stored: VolumeFile, dataset: Mapping[str, Any]) -> Cost:
-    """Cost of a summary of a reconstruction, compared with the truth."""
-    return Cost(TaskSize("summary", _with_truth(stored, dataset)))
-
-
-def _with_truth(stored: VolumeFile, dataset: Mapping[str, Any]) -> dict[str, float]:
+    """Cost of a comparison with the truth: the volume, and the scan without its traces, are read whole."""
+    scan = 256 * int(dataset["ntx"]) * int(dataset["nrx"]) * int(dataset["slices"])
     # Without traces the file is mostly the truth, which may be compressed to a tenth.
     truth = 0 if dataset["has_traces"] else 10 * int(dataset["bytes"])
-    return {**_read(stored), **_scan(dataset), "bytes of the truth": truth}
+    reading = Cost(1.0 + 8 * READ_S * stored.read_bytes, 2 * FLOOR_BYTES + 3 * stored.read_bytes)
+    return Cost(reading.seconds, reading.bytes + scan + truth)
 
 
 @dataclass(frozen=True)
@@ -261,15 +256,15 @@ def placed(size: int, workers: Mapping[str, WorkerCapacity]) -> dict[str, Any]:
     return placement if len(able) in (0, len(workers)) else {**placement, "workers": list(able)}
 
 
-def check_memory(field: str, what: str, needed: int, capacities: Sequence[WorkerCapacity]) -> None:
+def check_memory(field: str, what: str, cost: Cost, capacities: Sequence[WorkerCapacity]) -> None:
     """Reject a picture that no connected worker can draw; without workers nothing is checked.
 
     Raises:
         InvalidInput: naming ``field``, with the bytes found and accepted.
     """
     limit = max((capacity.task_bytes for capacity in capacities), default=math.inf)
-    if needed > limit:
-        given = f"{what}, which takes {needed} bytes of a worker"
+    if cost.bytes > limit:
+        given = f"{what}, which takes {cost.bytes} bytes of a worker"
         accepted = f"at most {limit:.0f} bytes, or a worker with more memory"
         raise InvalidInput(field, given, accepted)
 
@@ -278,27 +273,11 @@ def _rays(view: RefractionView | FieldView) -> int:
     return view.width * view.height * view.times**2
 
 
-def _tile(view: RefractionView | FieldView) -> dict[str, float]:
+def _tile_bytes(view: RefractionView | FieldView) -> int:
+    """Memory of a tile, or of the whole picture while its tiles are stacked."""
     # At least one row, and one more on each side for post-refraction supersampling.
     rays = min(_rays(view), max(TASK_RAYS, view.width * view.times**2)) + 2 * view.width * view.times**2
-    return {"rays of a tile": rays}
-
-
-def _read(stored: VolumeFile) -> dict[str, float]:
-    return {"bytes of the volume": stored.read_bytes, "nodes": math.prod(stored.shape)}
-
-
-def _scan(dataset: Mapping[str, Any]) -> dict[str, float]:
-    """Counts of a scan from its row."""
-    emissions = int(dataset["ntx"]) * int(dataset["slices"])
-    traces = int(dataset["bytes"]) if dataset["has_traces"] else 0
-    emission = traces // max(1, emissions)
-    return {
-        "pairs": emissions * int(dataset["nrx"]),
-        "bytes of an emission": emission,
-        "bytes of a read": max(emission, min(traces, BLOCK_BYTES)),
-        "bytes of traces": traces,
-    }
+    return FLOOR_BYTES + max(RAY_BYTES * rays, PIXEL_BYTES * view.width * view.height)
 
 
 def _check_seconds(field: str, given: str, seconds: float, width: int, height: int, alternative: str) -> None:

@@ -15,15 +15,15 @@ from bentray_kernels.splines import Spline
 
 from ..cluster.memory_cache import MemoryCache
 from ..cluster.task_cancellation import cancellation_check
-from ..cluster.task_costs import TaskSize
 from ..files.bounded_reading import LARGEST_BYTES
 from ..files.hdf5_reading import Limits, opened
 from ..files.volume import Volume
 from ..files.volume_formats import import_volume
 from .refraction_view import RefractionView, check_even
 
-# Bytes per node, measured for 128³ nodes and rounded up: of a cached spline, and of a scene with it.
-SPLINE_BYTES, SCENE_BYTES = 9, 15
+# Bytes per node, measured for 128³ nodes and rounded up: of a spline, of a scene with it, and at the peak
+# while they are made.
+SPLINE_BYTES, SCENE_BYTES, BUILDING_BYTES = 9, 15, 48
 # Nodes that filters add along each axis, at most.
 BORDER = 6
 
@@ -57,9 +57,9 @@ _SPLINES = MemoryCache(KEPT_BYTES // 2)
 _SCENES = MemoryCache(KEPT_BYTES // 2)
 
 
-def padded_nodes(shape: Sequence[int]) -> int:
-    """Nodes of a volume of that shape after filtering."""
-    return math.prod(n + BORDER for n in shape)
+def needed_bytes(shape: Sequence[int], each: int) -> int:
+    """Bytes of a volume of that shape with so many per node."""
+    return math.prod(n + BORDER for n in shape) * each
 
 
 def check_size(shape: Sequence[int]) -> None:
@@ -68,16 +68,10 @@ def check_size(shape: Sequence[int]) -> None:
     Raises:
         InvalidInput: naming ``volume``.
     """
-    needed = building_bytes(shape)
+    needed = needed_bytes(shape, BUILDING_BYTES)
     if needed > MAX_BUILDING_BYTES:
-        most = f"volumes that need at most {MAX_BUILDING_BYTES} bytes"
+        most = f"volumes that need at most {MAX_BUILDING_BYTES} bytes, {BUILDING_BYTES} a node"
         raise InvalidInput("volume", f"shape {tuple(shape)}, which needs {needed} bytes to render", most)
-
-
-def building_bytes(shape: Sequence[int]) -> int:
-    """Peak memory of making a scene of a volume of that shape."""
-    counts = {"filtered nodes": padded_nodes(shape), "rays of a tile": 0}
-    return TaskSize("refraction", counts).bytes
 
 
 def scene_at(path: Path, view: RefractionView) -> Scene:
@@ -92,10 +86,10 @@ def scene_at(path: Path, view: RefractionView) -> Scene:
     # The octree depends on iso-values and surroundings alone, so other refractive indices cost nothing.
     scene: Scene = _SCENES.get(
         (source, layers.isos, layers.surroundings),
-        SCENE_BYTES * padded_nodes(shape),
+        needed_bytes(shape, SCENE_BYTES),
         lambda: build_scene(filtered, layers),
         # The spline is cached already.
-        building_bytes(shape) - SPLINE_BYTES * padded_nodes(shape),
+        needed_bytes(shape, BUILDING_BYTES - SPLINE_BYTES),
     )
     return replace(scene, layers=layers)
 
@@ -126,9 +120,9 @@ def _filtered(path: Path, shape: tuple[int, ...], view: RefractionView) -> tuple
     source = SceneSource(path, status.st_mtime_ns, status.st_size, view.filter, view.smoothing)
     filtered: FilteredVolume = _SPLINES.get(
         source,
-        SPLINE_BYTES * padded_nodes(shape),
+        needed_bytes(shape, SPLINE_BYTES),
         lambda: filter_volume(import_volume(path), view),
-        building_bytes(shape),
+        needed_bytes(shape, BUILDING_BYTES),
     )
     return source, filtered
 

@@ -22,7 +22,7 @@ from ..cluster.task_pool import JobControl, Placement, run_job
 from ..files.atomic import atomic_replace, write_bytes
 from ..images.png import device_of, stated
 from .drawing_device import Drawn
-from .picture_cost import largest, placed, refraction_size
+from .picture_cost import placed, refraction_bytes
 from .refraction import tile_image
 from .refraction_view import RefractionView
 from .scene_cache import stored_shape
@@ -145,7 +145,7 @@ def draw_turntable(
         Cancelled: when ``stop`` returned true.
         InvalidInput: from the file or the view.
     """
-    size = largest(refraction_size(stored_shape(path), turntable), turntable).bytes
+    size = refraction_bytes(stored_shape(path), turntable)
 
     def placement() -> Placement:
         return placed(size, capacities_by_address(client))

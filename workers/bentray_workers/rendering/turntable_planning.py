@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..cluster.capacities import MIB, WorkerCapacity
-from .picture_cost import check_memory, largest, refraction_seconds, refraction_size
+from .picture_cost import Cost, check_memory, refraction_bytes, refraction_seconds
 from .tiles import tile_rows
 from .turntable import Turntable, draw_frame_tile, write_frame
 
@@ -51,8 +51,8 @@ def plan_turntable(
     Raises:
         InvalidInput: naming ``volume``, where no worker has enough memory, with the bytes found and accepted.
     """
-    size = largest(refraction_size(shape, turntable), turntable).bytes
-    check_memory("volume", f"shape {tuple(shape)}", size, capacities)
+    size = refraction_bytes(shape, turntable)
+    check_memory("volume", f"shape {tuple(shape)}", Cost(0.0, size), capacities)
     able = sum(capacity.task_bytes >= size for capacity in capacities)
     scene, frame = refraction_seconds(shape, turntable)
     # Every worker filters the volume once.

@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from ..cluster.capacities import MIB, WorkerCapacity
 from ..cluster.task_words import task_in_words
 from ..files.hdf5_reading import Limits
-from .cost import costly_setting, cpu_seconds, result_bytes, task_sizes
+from .cost import costly_setting, cpu_seconds, result_bytes, task_bytes
 from .parts import count_of
 from .request import PhantomScan
 
@@ -29,7 +29,7 @@ class SimulationPlan:
         workers: connected workers that can run each of them.
         call_bytes: memory of each kind of task.
         result_bytes: of the file, at most; the parts take as much until the job ends.
-        minutes: estimated duration on these workers, if they are idle.
+        minutes: estimated duration on these workers, if they are idle cores of 2020.
         why: summary in a sentence.
     """
 
@@ -58,8 +58,7 @@ def plan_simulation(request: PhantomScan, capacities: Sequence[WorkerCapacity]) 
             the setting with the largest effect.
     """
     settings = request.chosen()
-    calls = {name: task.bytes for name, task in task_sizes(settings).items()}
-    size = result_bytes(settings)
+    calls, size = task_bytes(settings), result_bytes(settings)
     most = Limits().total_bytes
     if size > most:
         given = f"{settings.elements}, a file of {size} bytes"
@@ -68,7 +67,7 @@ def plan_simulation(request: PhantomScan, capacities: Sequence[WorkerCapacity]) 
     limit = max((capacity.task_bytes for capacity in able), default=math.inf)
     name, largest = max(calls.items(), key=lambda item: item[1])
     if largest > limit:
-        field = costly_setting(settings)
+        field = costly_setting(settings, name)
         given = (
             f"{getattr(settings, field):g}, for which a task ({task_in_words(name)}) takes {largest} bytes"
         )

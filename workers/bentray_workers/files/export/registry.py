@@ -36,6 +36,8 @@ class ExportFormat:
         media_type: of a download.
         extension: of a download, without a dot; empty: the first suffix.
         local: suffixes of files that a service does not send.
+        copies: memory while it is written, in sizes of the volume as it is read (measured).
+        library_bytes: memory of the libraries that it is written by.
     """
 
     title: str
@@ -49,6 +51,8 @@ class ExportFormat:
     media_type: str = "application/octet-stream"
     extension: str = ""
     local: tuple[str, ...] = ()
+    copies: float = 2.0
+    library_bytes: int = 0
 
     @property
     def download_extension(self) -> str:
@@ -136,6 +140,7 @@ FORMATS: Mapping[FormatName, ExportFormat] = MappingProxyType(
             media_type="application/zip",
             extension="ome.zarr.zip",
             local=(".zarr",),
+            library_bytes=96 * 2**20,
         ),
         "dicom": ExportFormat(
             "DICOM",
@@ -144,6 +149,8 @@ FORMATS: Mapping[FormatName, ExportFormat] = MappingProxyType(
             "LPS, mm (`ImageOrientationPatient`)",
             writer="dicom_writing",
             media_type="application/dicom",
+            copies=3.0,
+            library_bytes=160 * 2**20,
         ),
     }
 )

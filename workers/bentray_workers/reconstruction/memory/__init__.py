@@ -1,0 +1,1 @@
+"""Memory of the tasks of a reconstruction, computed before they run."""
