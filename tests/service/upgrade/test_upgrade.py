@@ -10,7 +10,8 @@ import pytest
 
 from bentray_kernels.tomography import reconstruct
 from bentray_kernels.tomography.stored_settings import from_stored
-from bentray_service.backup.archive import Description, digest_of_file, write_sums
+from bentray_service.backup.archive import Description, write_sums
+from bentray_service.files.disk import sha256_of
 from bentray_service.backup.restore import restore
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import Deliveries
@@ -119,7 +120,7 @@ def test_a_backup_of_an_earlier_version_is_restored(left, start, work, tmp_path)
             source.backup(target)
     assert version <= VERSION
     files = [path for path in backup.rglob("*") if path.is_file()]
-    sums = write_sums(backup, {str(path.relative_to(backup)): digest_of_file(path) for path in files})
+    sums = write_sums(backup, {str(path.relative_to(backup)): sha256_of(path) for path in files})
     Description("0.1.0", version, 1.0, "0" * 32, len(files) - 1, 1, (), sums).write(backup)
     restore(backup, ServiceSettings(data_dir=tmp_path / "restored"))
     headers = keys_for(tmp_path / "restored", ("clinic", "lab"))

@@ -80,7 +80,7 @@ def test_state_of_a_step_holds_no_problem():
             assert self.called, "the graph asked for a problem"
             return super().problem(number)
 
-    scan_ = Remote(scan(), SETTINGS)
+    scan_ = Remote(MemorySource(scan()), SETTINGS)
     scan_.called = False
     graph = RefinementGraph(scan_, water())
     tasks = graph.first()
