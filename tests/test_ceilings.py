@@ -19,10 +19,10 @@ SOURCES = (".py", ".cl", ".js", ".css", ".html")
 # to which the ceilings are lowered as code is removed.
 LINES = {
     # folders: (ceiling, goal)
-    ("kernels", "workers", "service"): (94_400, 87_000),
-    ("service",): (32_700, 31_000),
-    ("tests",): (69_000, 58_000),
-    ("benchmarks",): (15_500, 13_000),
+    ("kernels", "workers", "service"): (95_000, 87_000),
+    ("service",): (33_000, 31_000),
+    ("tests",): (69_700, 58_000),
+    ("benchmarks",): (14_900, 13_000),
 }
 
 FILES = 28

@@ -11,8 +11,8 @@ import pytest
 from bentray_kernels.tomography import reconstruct
 from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_service.backup.archive import Description, write_sums
-from bentray_service.files.disk import sha256_of
 from bentray_service.backup.restore import restore
+from bentray_service.files.disk import sha256_of
 from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import Deliveries
 from bentray_service.rows.ids import Tenant
