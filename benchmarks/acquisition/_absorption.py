@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from bentray_kernels.arrays import Floats
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.wave.light_cone import everywhere
 from bentray_kernels.wave.medium import EDGE_NODES, Medium

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from bentray_kernels.arrays import Floats, Int32s
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.geometry_field.image.geometry_image import geometry_image
 from bentray_kernels.geometry_field.layout.parameterisation import parameterise
 from bentray_kernels.geometry_field.tables.inner_field import build_inner_rows, inner_field, spread_points

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.arrays import Float32s, Int32s
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.geometry_field.tables.accurate_lookup import NOTHING, TOGETHER, meet
 from bentray_kernels.geometry_field.tables.agreement import AGREE, NONE
 from bentray_kernels.geometry_field.tables.cube import line_of

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bentray_kernels.arrays import Float32s, Floats, Int32s
-from bentray_kernels.compiled import kernel
-from bentray_kernels.float32 import real, whole
+from bentray_kernels.compilation.compiled import kernel
+from bentray_kernels.compilation.float32 import real, whole
 from bentray_kernels.geometry_field.tables.accurate_lookup import TOGETHER, enter
 from bentray_kernels.geometry_field.tables.cube import samples
 from bentray_kernels.geometry_field.tables.outer_field import OuterField

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bentray_kernels.arrays import Float32s, Ints
-from bentray_kernels.compiled import kernel
-from bentray_kernels.float32 import real
+from bentray_kernels.compilation.compiled import kernel
+from bentray_kernels.compilation.float32 import real
 from bentray_kernels.geometry_field.tables.accurate_lookup import NOTHING, TOGETHER
 from bentray_kernels.geometry_field.tables.cube import line_of, number_at
 from bentray_kernels.geometry_field.tables.quadrilinear import nearest_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import fields
 
-from bentray_kernels.ranges import RANGE
-from bentray_kernels.request_fields import choices_of, effective_when
+from bentray_kernels.requests.ranges import RANGE
+from bentray_kernels.requests.request_fields import choices_of, effective_when
 from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_service.cli.options.option_tables import default_of
 from bentray_service.cli.options.settings_options import OPTIONS

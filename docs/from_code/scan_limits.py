@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from bentray_kernels import limits
-from bentray_kernels.ranges import Range
+from bentray_kernels.requests import limits
+from bentray_kernels.requests.ranges import Range
 
 from .tables import table
 
@@ -36,7 +36,7 @@ MEANING = {
 
 
 def scan_limits() -> str:
-    """Quantity and accepted range, for every ``Range`` of ``bentray_kernels.limits``."""
+    """Quantity and accepted range, for every ``Range`` of ``bentray_kernels.requests.limits``."""
     found = {name: value for name, value in vars(limits).items() if isinstance(value, Range)}
     rows = [(MEANING[name], within.words.removeprefix("a number ")) for name, within in found.items()]
     return table(("what", "accepted"), rows)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.request_fields import check_used
+from bentray_kernels.requests.request_fields import check_used
 from bentray_kernels.tomography.settings import NUMERICAL, PLACES, Settings
 from bentray_kernels.tomography.stored_settings import WITHDRAWN
 

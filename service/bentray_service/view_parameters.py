@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 from fastapi import Depends, Query, Request
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.request_fields import check_used
+from bentray_kernels.requests.request_fields import check_used
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.refraction_view import RefractionView
 

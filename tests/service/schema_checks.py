@@ -11,7 +11,7 @@ from schemathesis.generation.meta import CoverageScenario
 from schemathesis.openapi.checks import RejectedPositiveData
 from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 
-from bentray_kernels.request_fields import effective_when
+from bentray_kernels.requests.request_fields import effective_when
 from bentray_kernels.tomography.settings import Settings
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.refraction_view import RefractionView

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from bentray_kernels.ranges import RANGE
+from bentray_kernels.requests.ranges import RANGE
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.openapi import description
 from bentray_workers.rendering.field_settings import FieldSettings

@@ -11,8 +11,8 @@ from typing import Any, get_args, get_type_hints
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range, ranges_of
-from bentray_kernels.request_fields import FACTS, Uses, check_used, choices_of, declared
+from bentray_kernels.requests.ranges import Range, ranges_of
+from bentray_kernels.requests.request_fields import FACTS, Uses, check_used, choices_of, declared
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.jobs.kinds import KINDS
 from bentray_workers.rendering.field_settings import FieldSettings

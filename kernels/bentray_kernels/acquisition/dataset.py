@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import refuse_mask
 from ..errors import InvalidInput
-from ..limits import (
+from ..requests.limits import (
     ATTENUATION_NP_M,
     FREQUENCY_HZ,
     SAMPLING_HZ,
@@ -19,7 +19,7 @@ from ..limits import (
     TIME_S,
     check_size,
 )
-from ..ranges import check_ranges, ranged
+from ..requests.ranges import check_ranges, ranged
 from . import rules
 from .impossible_times import Geometry, without_impossible
 from .simulation.phantom_truth import Truth

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Flags, Floats
 from ..errors import InvalidInput
-from ..limits import DEVIATION_S, LOG_RATIO_NP, PLACE_M, PRESSURE, RADIUS_M, TIME_S, WIDTH_M
+from ..requests.limits import DEVIATION_S, LOG_RATIO_NP, PLACE_M, PRESSURE, RADIUS_M, TIME_S, WIDTH_M
 from . import rules
 from .arrangement import FASTEST_MPS, SLOWEST_MPS, Arrangement, Mismatch, find_mismatch
 from .dataset import POSITION, Dataset

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import InvalidInput
-from ..limits import FREQUENCY_HZ
+from ..requests.limits import FREQUENCY_HZ
 
 # Emissions whose spectra are computed.
 EMISSIONS = 8

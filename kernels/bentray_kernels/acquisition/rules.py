@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
-from ..ranges import Range
+from ..requests.ranges import Range
 
 
 def shape(name: str, array: NDArray[Any], expected: tuple[int, ...]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..errors import InvalidInput
-from ..limits import WATER_C
+from ..requests.limits import WATER_C
 
 # W. Marczak, "Water as a standard in the measurements of speed of sound in liquids",
 # J. Acoust. Soc. Am. 102 (1997) 2776-2779, table II: powers 0 to 5 of the temperature in °C.

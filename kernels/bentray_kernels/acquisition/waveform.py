@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
-from ..limits import SCALE
+from ..requests.limits import SCALE
 from . import rules
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import int64, kernel
+from ..compilation.compiled import int64, kernel
 from ..errors import InvalidInput
 from ..splines import refined
 from .fast_marching import high_accuracy_fast_marching

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Float32s
-from ..compiled import kernel
-from ..float32 import lower
+from ..compilation.compiled import kernel
+from ..compilation.float32 import lower
 from .diagonals import FIRST, Diagonals, mirror, move
 
 # First and last j, first and last k, counted from 1.

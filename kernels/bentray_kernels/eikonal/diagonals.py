@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
-from ..thread_team import SINGLE_THREAD, ThreadTeam
+from ..compilation.compiled import kernel
+from ..compilation.thread_team import SINGLE_THREAD, ThreadTeam
 
 AnyFloats = NDArray[np.floating[Any]]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import int64, kernel
+from ..compilation.compiled import int64, kernel
 from ..errors import InvalidInput
 from .problem import PointSource
 from .updates import first_order_2d, first_order_3d

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 from .heap import DONE, FAR, Nodes
 from .problem import PointSource

@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..atomics import add, wait_for
-from ..compiled import kernel
+from ..compilation.atomics import add, wait_for
+from ..compilation.compiled import kernel
+from ..compilation.float32 import higher, lower
+from ..compilation.thread_team import SINGLE_THREAD, ThreadTeam, thread_team
 from ..errors import InvalidInput
-from ..float32 import higher, lower
-from ..thread_team import SINGLE_THREAD, ThreadTeam, thread_team
 from .diagonals import FIRST, NONE, RUN, Columns, Diagonals, include
 from .problem import PointSource
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..compiled import int64, kernel
+from ..compilation.compiled import int64, kernel
 
 Nodes = NDArray[np.int32]
 

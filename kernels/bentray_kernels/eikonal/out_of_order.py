@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..compiled import int64, kernel
+from ..compilation.compiled import int64, kernel
 from .heap import DONE, FAR, Nodes, pop_min, push_or_update
 from .updates import TIE, Front, factored_update
 

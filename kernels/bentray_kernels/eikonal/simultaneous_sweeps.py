@@ -13,8 +13,8 @@ import math
 import numpy as np
 
 from ..arrays import Floats
-from ..compiled import kernel
-from ..thread_team import thread_team
+from ..compilation.compiled import kernel
+from ..compilation.thread_team import thread_team
 from .diagonals import Columns, Diagonals
 from .fast_sweeping import Grid, check_options, update_diagonal
 from .problem import PointSource

@@ -9,7 +9,7 @@ list.
 
 from __future__ import annotations
 
-from ..compiled import int64, kernel
+from ..compilation.compiled import int64, kernel
 from .heap import DONE, FAR, Nodes
 
 

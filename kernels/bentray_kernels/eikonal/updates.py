@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 
 # Two nodes at one distance from the source differ by rounding; neither is later.
 TIE = 1e-12

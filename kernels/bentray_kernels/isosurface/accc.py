@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .cell_weights import CellWeights
 
 # Newton's steps on a convex, piecewise linear function seldom number more than five.

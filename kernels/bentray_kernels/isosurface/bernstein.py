@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 
 # Only its length is used. That of a tuple is part of the type: loops over it are unrolled, in a kernel for
 # each length. That of an array is not.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .bernstein import contract, hull
 
 # Halvings along each axis: the hull approaches a critical value as the square of the width.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 from ..splines.spline import Spline
 from .accc import product_ranges, weighted_range

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from ..arrays import Vector
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..splines.sampler import Sampler
 from .octree import Octree
 from .roots import Ray, brent, field_at, first_root_of_cubic, newton

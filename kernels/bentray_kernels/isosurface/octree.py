@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
-from ..rendering_limits import MAX_ISOS
+from ..requests.rendering_limits import MAX_ISOS
 from .cell_bounds import CellRanges
 
 Masks = NDArray[np.uint8]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Vector
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..splines.sampler import Sampler, sampled_value, sampled_value_and_gradient
 
 # Steps of either method; both halve what is left at worst every third.

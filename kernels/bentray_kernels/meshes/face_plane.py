@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..arrays import Float32s, Int32s
-from ..compiled import kernel
-from ..float32 import lower, real
+from ..compilation.compiled import kernel
+from ..compilation.float32 import lower, real
 
 # Distance, in lengths of the direction; weights of the corners 0, 1 and 2; the determinant, above 0 where the
 # outside of the face is seen.

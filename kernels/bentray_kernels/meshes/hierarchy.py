@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 
 BINS = 16
 # Faces of a leaf; three bits of a child's word count them.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float32s, Floats, Int32s, Vector
-from ..compiled import int64, kernel
+from ..compilation.compiled import int64, kernel
 from .surface import Surface
 
 # Size of the traversal stack: more than a hierarchy has levels.

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .mesh import TriangleMesh
 
 # Cells along the longest side of the box: about as long as three sides of a face, within these bounds.

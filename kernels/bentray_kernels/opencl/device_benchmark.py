@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..sources import digest
+from ..compilation.sources import digest
 from .child_process import answers_of
 from .devices import Device
 from .records import read_record, record_file, write_record

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..cache_folder import use_writable_folder
+from ..compilation.cache_folder import use_writable_folder
 from .library import files_of
 
 # Folder of the system's drivers, unless one of these variables names another one.

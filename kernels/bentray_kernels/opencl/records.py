@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ..cache_folder import cache_folder
+from ..compilation.cache_folder import cache_folder
 from .devices import Device
 from .processor import processor
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..splines.cubic import jet_2d, jet_3d
 from .newton_step import MIN_LENGTH, Bending, factorise, shift
 

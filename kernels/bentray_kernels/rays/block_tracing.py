@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Flags, Floats, Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .descent import (
     ARRIVED,
     CAUGHT,

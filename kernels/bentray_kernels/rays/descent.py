@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .fan import Fan
 from .squared_time_spline import spline_slope
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, refuse_mask
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
-from ..ray_gradient_names import RayGradient
+from ..requests.ray_gradient_names import RayGradient
 from .squared_time_spline import squared_time_spline
 
 RayKind = Literal["curved", "straight"]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 
 # Largest shift of a point in a step, nodes: the quadratic model is local.
 MAX_SHIFT = 2.0

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..splines.cubic import jet_2d, jet_3d
 from .bending import STRIDE, bend
 from .descent import empty_path, trace_curved

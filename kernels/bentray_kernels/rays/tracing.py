@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
-from ..ray_gradient_names import RayGradient
+from ..compilation.compiled import kernel
+from ..requests.ray_gradient_names import RayGradient
 from .descent import STEP, empty_path, trace_ray
 from .fan import Fan, RayKind
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..eikonal.problem import SlownessGrid
 from ..errors import InvalidInput
 from ..splines import coefficients

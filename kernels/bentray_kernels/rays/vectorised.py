@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Float32s, Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 
 ZERO, HALF, ONE = (np.float32(x) for x in (0.0, 0.5, 1.0))
 

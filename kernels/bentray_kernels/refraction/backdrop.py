@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 from .relief import Place, meet_relief
 from .texels import Texels, packed

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Vector
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 
 

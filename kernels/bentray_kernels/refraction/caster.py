@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Vector
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..isosurface.crossing import MAX_HALVINGS, Search, leave_interval
 from ..isosurface.octree import Octree
 from ..isosurface.roots import Ray, field_at, point_at, ray_of

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 
 Planes = NDArray[np.int8]
 Fates = NDArray[np.uint8]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .backdrop import Backdrop, Colours
 from .texels import STEP_BITS, STEPS, WHOLE, Texels, between_texels, reduced, unpacked
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 
 # Most cells of the height field on the way of a ray; a ray almost along an endless backdrop passes more.
 MAX_CELLS = 1 << 16

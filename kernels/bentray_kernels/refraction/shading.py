@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Vector
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 from ..isosurface.crossing import MAX_HALVINGS, Search, leave_interval
 from .backdrop import Colours

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Flags, Floats, Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .backdrop import Backdrop, Colours, colour_at
 from .picture_supersampling import filter_picture
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 
 Texels = NDArray[np.uint64]
 

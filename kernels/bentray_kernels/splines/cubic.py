@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .prefilter import prefilter
 
 # Nodes added by mirroring before the first and after the last one, so that every point has four.

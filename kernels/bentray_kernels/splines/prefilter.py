@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import correlate1d
 
 from ..arrays import Floats, refuse_mask
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
-from ..rendering_limits import MAX_SMOOTHING
+from ..requests.rendering_limits import MAX_SMOOTHING
 from .filters import bspline
 
 # Lines filtered together: whole vectors, and few enough to stay in the first-level cache.

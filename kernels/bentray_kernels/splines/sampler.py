@@ -12,7 +12,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from ..arrays import Floats, Vector
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .lanes import DOUBLE, FLOAT, INDEX, SHORT, Lanes, axes_at, point_vector, value, value_and_gradient
 
 if TYPE_CHECKING:

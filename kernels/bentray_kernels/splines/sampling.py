@@ -11,7 +11,7 @@ from numba.core.errors import NumbaTypeError
 from numba.extending import intrinsic
 from numpy.typing import DTypeLike
 
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .filters import Filter
 from .lanes import (
     DOUBLE,

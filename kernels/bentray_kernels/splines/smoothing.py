@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from ..arrays import Floats, refuse_mask
 from ..errors import InvalidInput
-from ..rendering_limits import MAX_SMOOTHING
+from ..requests.rendering_limits import MAX_SMOOTHING
 from .prefilter import sampled_bspline, symbols
 
 # Rounding to whole numbers leaves errors that are uniform over one step.

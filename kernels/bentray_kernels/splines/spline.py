@@ -9,7 +9,7 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 from numpy.typing import ArrayLike, DTypeLike
 
 from ..arrays import Floats, refuse_mask
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 from .filters import Filter, bspline, filter_of
 from .prefilter import prefilter as coefficients_of

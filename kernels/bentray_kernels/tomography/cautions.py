@@ -10,7 +10,7 @@ import numpy as np
 
 from ..acquisition import Dataset
 from ..arrays import Floats, Ints
-from ..request_fields import declared, unused, value_at
+from ..requests.request_fields import declared, unused, value_at
 from .directivity import within_opening
 from .pairs import reciprocal_differences
 from .result import Caution, Iteration, Reconstruction, residual_within

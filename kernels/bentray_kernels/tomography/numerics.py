@@ -6,9 +6,9 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-from ..ranges import SEED, Range, ranged
-from ..ray_gradient_names import RayGradient
-from ..request_fields import check
+from ..requests.ranges import SEED, Range, ranged
+from ..requests.ray_gradient_names import RayGradient
+from ..requests.request_fields import check
 
 BANDS = 4
 

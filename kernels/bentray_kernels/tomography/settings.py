@@ -6,11 +6,11 @@ from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal
 
 from ..errors import InvalidInput
-from ..limits import LEFT_OUT, MAX_LEFT_OUT, SPEED_MPS, WATER_C
-from ..picker_names import DEFAULT_PICKER, PickerName
-from ..ranges import Range
-from ..request_fields import ABOVE_ZERO, Uses, check, declared, setting
-from ..solver_names import SolverName
+from ..requests.limits import LEFT_OUT, MAX_LEFT_OUT, SPEED_MPS, WATER_C
+from ..requests.picker_names import DEFAULT_PICKER, PickerName
+from ..requests.ranges import Range
+from ..requests.request_fields import ABOVE_ZERO, Uses, check, declared, setting
+from ..requests.solver_names import SolverName
 from .numerics import Numerics
 
 # The wave front of the compiled pass over a slice; see ``eikonal.deviation``.

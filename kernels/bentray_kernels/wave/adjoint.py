@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 from .cache_lines import zeros
 from .light_cone import BLOCK_STEPS, TILE, Spans, everywhere, light_cone

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Ints
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .cache_lines import LINE_NODES
 from .medium import Medium
 from .points import REACH, Points

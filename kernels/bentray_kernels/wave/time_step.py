@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .light_cone import TILE
 from .points import REACH
 from .stencil import HALO

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..compiled import kernel
+from ..compilation.compiled import kernel
 from .stencil import HALO
 from .time_step import FLUSH, TAPS
 

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from bentray_kernels.limits import MAX_LEFT_OUT
-from bentray_kernels.picker_names import DEFAULT_PICKER, PickerName
+from bentray_kernels.requests.limits import MAX_LEFT_OUT
+from bentray_kernels.requests.picker_names import DEFAULT_PICKER, PickerName
 
 from .options.paths import output_folder
 from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options

@@ -57,7 +57,7 @@ def reconstruct(
             unknown setting the one that is spelt most like it.
         KeyboardInterrupt: once the tasks have stopped, which takes up to a few seconds.
     """
-    from bentray_kernels.ranges import Range
+    from bentray_kernels.requests.ranges import Range
     from bentray_kernels.tomography.requirements import check_scan
     from bentray_workers.compilation.cache_misses import announce
     from bentray_workers.reconstruction.reconstruction_run import reconstruct as run

@@ -2,9 +2,9 @@
 
 from typing import Literal, TypedDict
 
-from bentray_kernels.device_request import DeviceRequest
-from bentray_kernels.picker_names import PickerName
-from bentray_kernels.solver_names import SolverName
+from bentray_kernels.requests.device_request import DeviceRequest
+from bentray_kernels.requests.picker_names import PickerName
+from bentray_kernels.requests.solver_names import SolverName
 
 Method = Literal["sart", "gauss-newton", "auto", "waveform"]
 PhantomName = Literal["table6", "table6-vertical", "detailed", "table7"]

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 from fastapi.openapi.models import Example
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 
-from bentray_kernels.request_fields import check_used
+from bentray_kernels.requests.request_fields import check_used
 from bentray_workers.cluster.task_pool import JobControl
 
 from ..compute import Compute

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import FREQUENCY_HZ
+from bentray_kernels.requests.limits import FREQUENCY_HZ
 from bentray_workers.files.export.registry import FORMATS, SINGLE, FormatName
 from bentray_workers.files.quantities import QuantityName
 from bentray_workers.files.reconstruction import shape_of_quantity

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Query, Request, Response, status
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range
-from bentray_kernels.rendering_limits import MAX_SMOOTHING
+from bentray_kernels.requests.ranges import Range
+from bentray_kernels.requests.rendering_limits import MAX_SMOOTHING
 from bentray_workers.files.quantities import QUANTITIES, QuantityName
 from bentray_workers.files.volume_formats import RAW_TYPES
 from bentray_workers.rendering.coefficients import check_nodes

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.isosurface import BOUNDS, cell_ranges, crossing
 from bentray_kernels.isosurface.crossing import (
     ANALYTIC,

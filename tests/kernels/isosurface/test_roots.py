@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.isosurface.roots import Ray, brent, field_at, first_root_of_cubic, ray_of
 from bentray_kernels.splines import Spline
 from bentray_kernels.splines.sampler import Sampler, sampler_of

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from bentray_kernels import cache_folder
+from bentray_kernels.compilation import cache_folder
 from bentray_kernels.opencl import records, self_test_results
 from bentray_kernels.opencl.self_test import STAGES
 from bentray_kernels.opencl.self_test_results import SelfTestResult, examine, in_a_child, self_test_result

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels import eikonal, rays
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.rays.squared_time_spline import spline_slope, squared_time_spline
 from bentray_kernels.tomography import Settings

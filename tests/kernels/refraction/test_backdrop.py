@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.refraction import Backdrop, Plane, backdrop_of, checkerboard
 from bentray_kernels.refraction.backdrop import colour_at, locate

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import spline_filter
 
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.splines.cubic import coefficients, jet_2d, jet_3d, refined
 
 from ...effort import effort

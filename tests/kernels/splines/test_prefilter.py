@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline
 from scipy.ndimage import spline_filter1d
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.rendering_limits import MAX_SMOOTHING
+from bentray_kernels.requests.rendering_limits import MAX_SMOOTHING
 from bentray_kernels.splines.prefilter import prefilter, sampled_bspline, symbols
 
 from ...effort import effort

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.splines import FILTERS, Spline
 from bentray_kernels.splines.sampler import sampled_value, sampled_value_and_gradient, sampler_of
 from bentray_kernels.splines.sampling import (

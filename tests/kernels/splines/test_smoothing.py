@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.rendering_limits import MAX_SMOOTHING
+from bentray_kernels.requests.rendering_limits import MAX_SMOOTHING
 from bentray_kernels.splines import Spline, noise_of, smoothing_for_noise
 from bentray_kernels.splines.prefilter import symbols
 from bentray_kernels.splines.smoothing import ROUNDING, response

@@ -8,7 +8,7 @@ import pytest
 from bentray_kernels.acquisition import PICKERS
 from bentray_kernels.eikonal import methods
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.request_fields import check_used, choices_of
+from bentray_kernels.requests.request_fields import check_used, choices_of
 from bentray_kernels.tomography import (
     AttenuationSettings,
     GaussNewtonSettings,

@@ -10,7 +10,7 @@ import pytest
 
 from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.request_fields import check_used, declared, unused
+from bentray_kernels.requests.request_fields import check_used, declared, unused
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_kernels.tomography.device_choice import ScanSize, device_work
 

@@ -7,7 +7,7 @@ import pytest
 
 import bentray
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range
+from bentray_kernels.requests.ranges import Range
 from bentray_service.client import AsyncClient, Client, ClientError
 from bentray_service.client.lists import JobKind
 from bentray_service.html_tables import RecordList

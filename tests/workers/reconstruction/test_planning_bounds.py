@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import (
+from bentray_kernels.requests.limits import (
     ELEMENTS,
     EMISSIONS,
     FREQUENCY_HZ,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.request_fields import MAX_PIXELS
+from bentray_kernels.requests.request_fields import MAX_PIXELS
 from bentray_workers.cluster.capacities import WorkerCapacity
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.files.volume_export import export_volume

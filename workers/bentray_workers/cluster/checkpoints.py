@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bentray_kernels.sources import digest
+from bentray_kernels.compilation.sources import digest
 from bentray_kernels.task_graph import Checkpoint
 from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.reflection.reflection_graph import RECORDS

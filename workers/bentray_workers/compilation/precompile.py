@@ -25,9 +25,9 @@ import numpy as np
 from llvmlite import binding  # type: ignore[import-untyped]
 
 from bentray_kernels.acquisition import PICKERS, Dataset, Waveform
+from bentray_kernels.compilation.sources import ROOT, digest
 from bentray_kernels.meshes.example_surfaces import bumpy_ball
 from bentray_kernels.phantoms import ONE_HOLE, sampled
-from bentray_kernels.sources import ROOT, digest
 from bentray_kernels.splines import FILTERS
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.gauss_newton.penalties import PENALTIES

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import SPACING_M
-from bentray_kernels.ranges import Range
+from bentray_kernels.requests.limits import SPACING_M
+from bentray_kernels.requests.ranges import Range
 
 from .complex_numbers import check_real
 from .hdf5_reading import Limits, Reader, opened, printable

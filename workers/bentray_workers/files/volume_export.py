@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import FREQUENCY_HZ
+from bentray_kernels.requests.limits import FREQUENCY_HZ
 from bentray_kernels.tomography import Reconstruction
 
 from .export.content import Content

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import COUNTED, OVER_PAIRS, check_size
+from bentray_kernels.requests.limits import COUNTED, OVER_PAIRS, check_size
 
 # Of an array that is read whole.
 LARGEST_WHOLE = 256 * 2**20

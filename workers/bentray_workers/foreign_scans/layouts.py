@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.plausibility import check_plausible
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import check_size
+from bentray_kernels.requests.limits import check_size
 
 from ..files.dataset.format import NUMBERS, PAIR_ARRAYS
 from .arrays import Arrays, read_small

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bentray_kernels.acquisition import speed_from_temperature
 from bentray_kernels.acquisition.plausibility import LENGTHS, TIMES
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import ELEMENTS, FREQUENCY_HZ, SPEED_MPS, TEMPERATURE_C
+from bentray_kernels.requests.limits import ELEMENTS, FREQUENCY_HZ, SPEED_MPS, TEMPERATURE_C
 
 from .arrays import Arrays
 

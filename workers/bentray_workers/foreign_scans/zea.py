@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import check_size
+from bentray_kernels.requests.limits import check_size
 
 from ..files.complex_numbers import ACCEPTED
 from ..files.hdf5_reading import Reader

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from bentray_kernels.cache_folder import use_writable_folder
+from bentray_kernels.compilation.cache_folder import use_writable_folder
 
 # Before matplotlib is imported, which keeps a list of fonts and says on each start that it cannot.
 _SETTINGS = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")  # noqa: PTH111

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range
+from bentray_kernels.requests.ranges import Range
 
 COLORMAPS = ("viridis", "magma", "inferno", "plasma", "cividis", "gray", "bone", "turbo", "coolwarm")
 # Interpolation between nodes, and its name in Matplotlib.

@@ -38,7 +38,7 @@ from bentray_kernels.acquisition.reference import (
 )
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import MAX_LEFT_OUT
+from bentray_kernels.requests.limits import MAX_LEFT_OUT
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import WIDTH_M
+from bentray_kernels.requests.limits import WIDTH_M
 from bentray_kernels.tomography.directivity import check_normals
 from bentray_kernels.tomography.model_selection.finite_frequency_candidates import WIDE
 from bentray_kernels.tomography.model_selection.selection import (

@@ -13,8 +13,8 @@ from bentray_kernels.acquisition.calibration import Calibration, calibrate, wate
 from bentray_kernels.acquisition.quality import Examined, Finding, Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import MAX_LEFT_OUT
-from bentray_kernels.picker_names import DEFAULT_PICKER
+from bentray_kernels.requests.limits import MAX_LEFT_OUT
+from bentray_kernels.requests.picker_names import DEFAULT_PICKER
 
 from ..cluster.task_cancellation import cancellation_check
 from ..files.dataset import Limits, read_dataset

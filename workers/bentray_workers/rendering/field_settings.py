@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range
-from bentray_kernels.rendering_limits import MAX_SAMPLES
-from bentray_kernels.request_fields import check, setting
+from bentray_kernels.requests.ranges import Range
+from bentray_kernels.requests.rendering_limits import MAX_SAMPLES
+from bentray_kernels.requests.request_fields import check, setting
 
 # Largest mesh for the layout in one task; the time grows slightly faster than linearly.
 MAX_FACES = 300_000

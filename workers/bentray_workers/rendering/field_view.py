@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from bentray_kernels.device_request import DESCRIPTION, DeviceRequest
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range
-from bentray_kernels.rendering_limits import MAX_REFERENCE_SAMPLES
-from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
+from bentray_kernels.requests.device_request import DESCRIPTION, DeviceRequest
+from bentray_kernels.requests.ranges import Range
+from bentray_kernels.requests.rendering_limits import MAX_REFERENCE_SAMPLES
+from bentray_kernels.requests.request_fields import MAX_PIXELS, MAX_RAYS, check, setting
 
 # Public names, and those of the kernels.
 LOOKUPS = {

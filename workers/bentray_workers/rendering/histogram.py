@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range
+from bentray_kernels.requests.ranges import Range
 
 from ..files.quantities import QUANTITIES
 from ..files.reconstruction import read_reconstruction

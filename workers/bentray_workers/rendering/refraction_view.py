@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from bentray_kernels.device_request import DESCRIPTION, DeviceRequest
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range
-from bentray_kernels.rendering_limits import MAX_ISOS, MAX_SMOOTHING
-from bentray_kernels.request_fields import MAX_PIXELS, MAX_RAYS, Uses, check, setting
+from bentray_kernels.requests.device_request import DESCRIPTION, DeviceRequest
+from bentray_kernels.requests.ranges import Range
+from bentray_kernels.requests.rendering_limits import MAX_ISOS, MAX_SMOOTHING
+from bentray_kernels.requests.request_fields import MAX_PIXELS, MAX_RAYS, Uses, check, setting
 
 if TYPE_CHECKING:
     import numpy as np

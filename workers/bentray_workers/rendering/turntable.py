@@ -13,8 +13,8 @@ from distributed import Client
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range
-from bentray_kernels.request_fields import setting
+from bentray_kernels.requests.ranges import Range
+from bentray_kernels.requests.request_fields import setting
 from bentray_kernels.task_graph import Task
 
 from ..cluster.capacities import capacities_by_address

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
-from bentray_kernels.sources import digest
+from bentray_kernels.compilation.sources import digest
 from bentray_kernels.wave.time_blocks import Poll
 
 from ..cluster.checkpoints import UNREADABLE

@@ -15,7 +15,6 @@ from bentray_kernels.acquisition.simulation.fine_medium import FineMedium
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import (
     DETAILED_SIDE_M,
     TABLE6_SIDE_M,
@@ -24,7 +23,8 @@ from bentray_kernels.phantoms import (
     table6,
     table6_vertical,
 )
-from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
+from bentray_kernels.requests.limits import SPEED_MPS
+from bentray_kernels.requests.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.tomography.problem import MARGIN_NODES
 
 from .ranges import ELEMENTS, NODES, NOISE_S, REFINEMENT, SNR

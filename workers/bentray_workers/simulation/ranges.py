@@ -1,6 +1,6 @@
 """Ranges of the settings of simulated scans; those of some kinds of scan are narrower."""
 
-from bentray_kernels.ranges import Range
+from bentray_kernels.requests.ranges import Range
 
 NODES = Range(16, 1024)
 ELEMENTS = Range(3, 4096)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any, Literal
 
-from bentray_kernels.limits import SPEED_MPS
-from bentray_kernels.ranges import SEED
-from bentray_kernels.request_fields import ABOVE_ZERO, Uses, check, check_used, setting
+from bentray_kernels.requests.limits import SPEED_MPS
+from bentray_kernels.requests.ranges import SEED
+from bentray_kernels.requests.request_fields import ABOVE_ZERO, Uses, check, check_used, setting
 
 from . import ranges
 

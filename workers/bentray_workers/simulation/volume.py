@@ -14,9 +14,9 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.acquisition.simulation.volume_scan import VolumeScan
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE7_FREQUENCY_HZ, TABLE7_GRIDS, TABLE7_SIDE_M, table7, table7_slices
-from bentray_kernels.ranges import SEED, check_ranges, ranged
+from bentray_kernels.requests.limits import SPEED_MPS
+from bentray_kernels.requests.ranges import SEED, check_ranges, ranged
 
 from .plane import ring_radius
 from .ranges import ELEMENTS, NODES, REFINEMENT, SLICES, SNR

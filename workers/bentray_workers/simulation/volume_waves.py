@@ -12,7 +12,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.phantoms import TABLE7_SIDE_M, table7
 from bentray_kernels.phantoms.table7 import CHEST_M, NIPPLE_M
 from bentray_kernels.phantoms.volume import PhantomSlice
-from bentray_kernels.ranges import ranged
+from bentray_kernels.requests.ranges import ranged
 from bentray_kernels.wave.medium import EDGE_NODES
 from bentray_kernels.wave.points import REACH
 

@@ -14,10 +14,10 @@ from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import SPEED_MPS
 from bentray_kernels.phantoms import TABLE6_SIDE_M, EllipsePhantom, table6, table6_vertical
 from bentray_kernels.phantoms.volume import PhantomSlice
-from bentray_kernels.ranges import SEED, Range, check_ranges, ranged
+from bentray_kernels.requests.limits import SPEED_MPS
+from bentray_kernels.requests.ranges import SEED, Range, check_ranges, ranged
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.points import REACH
 from bentray_kernels.wave.simulation import simulate

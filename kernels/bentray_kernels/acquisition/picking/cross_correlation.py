@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from .onset import FAINTEST, Trace
 from .peak_interpolation import crest
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from .cross_correlation import delay_deviation, find_delay, match_pulse, noise_fraction
 from .onset import Trace, prepare
 from .pickers import CORRELATION, onset

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 
 Trace = NDArray[Any]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...errors import InvalidInput
 from ..dataset import Dataset
 from .onset import Trace, prepare

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from .peak_interpolation import vertex
 
 Trace = NDArray[Any]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 
 
 @kernel(inline="always")

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...errors import InvalidInput
 from .energy_onsets import energy_ratio, sta_lta
 from .onset import Trace, aic, first_strong, threshold

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...arrays import refuse_mask
 from ...errors import InvalidInput
-from ...limits import PLACE_M, SPACING_M, TRUE_SPEED_MPS
+from ...requests.limits import PLACE_M, SPACING_M, TRUE_SPEED_MPS
 from .. import rules
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Flags, Floats, Ints
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...errors import InvalidInput
 from ...meshes.mesh import Chart
 from ...meshes.topology import topology_of

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
 from ...arrays import Flags, Floats, Ints
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...meshes.mesh import Chart, TriangleMesh
 from ...meshes.topology import topology_of
 from .raster import INSIDE, Raster, seam_sides

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...arrays import Floats
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 
 
 def signed_areas(uv: Floats) -> Floats:

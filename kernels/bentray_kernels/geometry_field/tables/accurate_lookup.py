@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Float32s, Int32s
-from ...compiled import kernel
-from ...float32 import real
+from ...compilation.compiled import kernel
+from ...compilation.float32 import real
 from ...meshes.face_plane import Meeting, beyond, meet_plane
 from ...meshes.surface import Surface
 from .cube import line_of, number_at

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled import kernel
-from ...float32 import real
+from ...compilation.compiled import kernel
+from ...compilation.float32 import real
 from .outer_field import OuterField
 
 # Entries agree if their positions differ by at most this many sample distances.

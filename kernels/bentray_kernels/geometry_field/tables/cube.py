@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats
-from ...compiled import kernel
+from ...compilation.compiled import kernel
+from ...compilation.float32 import higher, lower, real, whole
 from ...errors import InvalidInput
-from ...float32 import higher, lower, real, whole
-from ...rendering_limits import MAX_SAMPLES
+from ...requests.rendering_limits import MAX_SAMPLES
 
 # Replaces a 0 of a direction: its reciprocal is finite in float32, and so are products with it.
 ALMOST_ZERO = real(1e-18)

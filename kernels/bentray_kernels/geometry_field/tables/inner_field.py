@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats, Int32s
-from ...compiled import int64, kernel
+from ...compilation.compiled import int64, kernel
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING, closest
 from ...meshes.surface import Surface

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Float32s, Floats, Int32s
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING, closest
 from ...meshes.surface import Surface

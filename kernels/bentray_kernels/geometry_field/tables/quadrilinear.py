@@ -7,8 +7,8 @@ so the first of them is 1 − (x − ⌊x⌋) here.
 from __future__ import annotations
 
 from ...arrays import Float32s
-from ...compiled import kernel
-from ...float32 import higher, lower, real, whole
+from ...compilation.compiled import kernel
+from ...compilation.float32 import higher, lower, real, whole
 
 # The entry with the lower samples; the way from there to the next sample in x₀, x₁, x₂, x₃.
 Corner = tuple[int, float, float, float, float]

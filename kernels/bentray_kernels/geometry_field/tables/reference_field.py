@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Flags, Float32s, Int32s
-from ...compiled import kernel
+from ...compilation.compiled import kernel
+from ...compilation.float32 import higher, lower, real, whole
 from ...errors import InvalidInput
-from ...float32 import higher, lower, real, whole
 from ...meshes.face_plane import meet_plane
 from ...meshes.surface import Surface
-from ...rendering_limits import MAX_REFERENCE_SAMPLES
+from ...requests.rendering_limits import MAX_REFERENCE_SAMPLES
 from .cube import samples
 from .inner_field import InnerField
 from .outer_field import OuterField

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Float32s, Floats, Int32s
-from ...compiled import kernel
+from ...compilation.compiled import kernel
+from ...compilation.float32 import higher, lower, real
 from ...errors import InvalidInput
-from ...float32 import higher, lower, real
 from ...meshes.face_plane import meet_plane
 from ...meshes.surface import Surface
 from .cube import samples

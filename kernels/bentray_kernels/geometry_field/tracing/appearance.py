@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...arrays import Vector
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from .packed_scene import World
 
 

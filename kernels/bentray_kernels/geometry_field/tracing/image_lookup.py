@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Vector
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ..tables.cube import number_at
 from ..tables.quadrilinear import corner_of, nearest_of
 from ..tables.reference_field import image_at, linear_uv_at

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Int32s, Vector
-from ...compiled import int64, kernel
+from ...compilation.compiled import int64, kernel
 from ...meshes.face_plane import meet_plane
 from ...meshes.intersector import closest
 from ..tables.accurate_lookup import STEPS, settle

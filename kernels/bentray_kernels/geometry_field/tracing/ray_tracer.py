@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Floats, Int32s, Vector
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING
 from ...refraction.backdrop import Colours

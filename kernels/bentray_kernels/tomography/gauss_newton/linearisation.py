@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from ...arrays import Floats, Ints
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...eikonal import solve
 from ...rays.bending import STRIDE, bend
 from ...rays.descent import PARTS, empty_path, list_entries, merge_entries, trace_ray

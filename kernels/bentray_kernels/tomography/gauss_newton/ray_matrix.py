@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Ints
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 
 LANES = np.uint64(4)
 

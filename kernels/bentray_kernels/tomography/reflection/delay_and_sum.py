@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Flags, Float32s, Floats, Ints
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from .element_times import ElementTimes, Views, view_pixels
 
 # Pairs whose rays make a larger angle at a pixel are left out, degrees; the weight of a pair falls with its

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Float32s, Floats, Ints
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...eikonal import solve
 from ...splines.cubic import coefficients, jet_2d
 

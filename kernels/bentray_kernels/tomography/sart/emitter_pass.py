@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Flags, Float32s, Floats
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...eikonal.deviation import SweepArrays, allocate_sweep_arrays, deviate
 from ...rays.vectorised import Bundle, allocate_bundle, back_project, interleave, trace_bundle
 

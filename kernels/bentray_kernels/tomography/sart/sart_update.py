@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from ...arrays import Flags, Floats, Ints
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 from ...eikonal import solve
 from ...rays.descent import PARTS, STEP, empty_path, list_entries, trace_ray
 from ...rays.fan import Fan

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Ints
-from ...compiled import kernel
+from ...compilation.compiled import kernel
 
 # Probes of one product; a constant, so that the innermost loops are vectorised.
 LANES = 8

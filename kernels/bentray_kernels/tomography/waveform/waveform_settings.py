@@ -6,8 +6,8 @@ from dataclasses import MISSING, dataclass
 from typing import Literal, NamedTuple
 
 from ...errors import InvalidInput
-from ...limits import SPACING_M, SPEED_MPS
-from ...ranges import SEED, Range, check_ranges, ranged
+from ...requests.limits import SPACING_M, SPEED_MPS
+from ...requests.ranges import SEED, Range, check_ranges, ranged
 from ...wave.emissions import Engine
 from ...wave.simulation import Unknown
 from .misfits import Misfit, correlation, least_squares

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from bentray_kernels.request_fields import check_used
+from bentray_kernels.requests.request_fields import check_used
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.field_view import FieldView
 

@@ -10,8 +10,8 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import typer
 
-from bentray_kernels.ranges import RANGE
-from bentray_kernels.request_fields import choices_of
+from bentray_kernels.requests.ranges import RANGE
+from bentray_kernels.requests.request_fields import choices_of
 
 Command = Callable[..., None]
 

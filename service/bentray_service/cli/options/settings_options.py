@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
-from bentray_kernels.request_fields import choices_of
+from bentray_kernels.requests.request_fields import choices_of
 from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_kernels.tomography.stored_settings import WITHDRAWN
 

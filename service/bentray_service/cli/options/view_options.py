@@ -9,7 +9,7 @@ from typing import Any
 
 from typer.core import TyperCommand
 
-from bentray_kernels.request_fields import check_used, choices_of
+from bentray_kernels.requests.request_fields import check_used, choices_of
 from bentray_workers.rendering.refraction_view import RefractionView
 
 from .option_tables import options_of, with_options

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from bentray_kernels.request_fields import check_used
+from bentray_kernels.requests.request_fields import check_used
 from bentray_kernels.tomography.settings import Settings
 
 from ...html_tables import ShownRecord

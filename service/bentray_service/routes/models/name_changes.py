@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from bentray_kernels.limits import FREQUENCY_HZ, SAMPLING_HZ, WATER_C
+from bentray_kernels.requests.limits import FREQUENCY_HZ, SAMPLING_HZ, WATER_C
 
 # PostgreSQL stores no NUL in a text.
 TEXT = r"^[^\u0000]*$"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables.cube import line_of, number_at, samples
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentray_kernels.compiled import kernel
+from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables import reference_inner_field
 from bentray_kernels.geometry_field.tables.cube import samples

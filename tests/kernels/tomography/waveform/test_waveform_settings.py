@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import ranges_of
+from bentray_kernels.requests.ranges import ranges_of
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings, bands
 from bentray_kernels.wave.simulation import MIN_POINTS_OPTIMISED
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bentray_kernels.request_fields import choices_of
+from bentray_kernels.requests.request_fields import choices_of
 from bentray_kernels.splines import FILTERS
 from bentray_service.cli.options.field_options import SETTINGS, VIEW, FieldOptions
 from bentray_service.cli.options.view_options import OPTIONS, ViewOptions

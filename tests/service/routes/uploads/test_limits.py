@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sqlalchemy import text
 
-from bentray_kernels.limits import ELEMENTS, EMISSIONS, SAMPLES, SLICES
+from bentray_kernels.requests.limits import ELEMENTS, EMISSIONS, SAMPLES, SLICES
 from bentray_service.ingest.ingest_process import convert_upload
 
 

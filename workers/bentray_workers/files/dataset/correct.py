@@ -11,7 +11,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.arrangement import rearranged
 from bentray_kernels.acquisition.plausibility import ImplausibleUnit, WrongArrangement, check_plausible
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import FREQUENCY_HZ, SAMPLING_HZ
+from bentray_kernels.requests.limits import FREQUENCY_HZ, SAMPLING_HZ
 
 from ..hdf5_reading import Limits
 from .copy import copy_dataset

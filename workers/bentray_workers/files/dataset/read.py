@@ -20,7 +20,7 @@ from bentray_kernels.acquisition import (
 )
 from bentray_kernels.acquisition.plausibility import ImplausibleUnit, WrongArrangement, check_plausible
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import COUNTED, OVER_NODES, OVER_PAIRS, check_size
+from bentray_kernels.requests.limits import COUNTED, OVER_NODES, OVER_PAIRS, check_size
 
 from ..hdf5_reading import Limits, Reader, opened
 from .format import FORMAT, IMPOSSIBLE, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION

@@ -13,7 +13,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.limits import check_size
+from bentray_kernels.requests.limits import check_size
 from bentray_kernels.tomography.settings import Settings
 
 from ..hdf5_reading import Limits, Reader, opened

@@ -7,7 +7,7 @@ from typing import Any
 from numba import types
 from numba.extending import intrinsic
 
-from .arrays import Ints
+from ..arrays import Ints
 from .compiled import kernel
 
 # Spins before a waiting thread gives its core to others, about a microsecond.

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from .cache_folder import VARIABLE, cache_folder
 
-ROOT = Path(__file__).parent
+ROOT = Path(__file__).parents[1]
 
 # ``from ..rays.descent import STEP, trace_ray``, also over several lines in brackets.
 _IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)

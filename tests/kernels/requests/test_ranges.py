@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import LONGEST_FIELD, LONGEST_VALUE, InvalidInput
-from bentray_kernels.ranges import Range, check_ranges, ranged, ranges_of
+from bentray_kernels.requests.ranges import Range, check_ranges, ranged, ranges_of
 from bentray_kernels.tomography.numerics import Numerics
 from bentray_kernels.tomography.settings import GaussNewtonSettings, SartSettings, Settings
 
-from ..extremes import EXTREMES
+from ...extremes import EXTREMES
 
 numbers = st.sampled_from(EXTREMES) | st.floats() | st.integers()
 

@@ -5,8 +5,8 @@ import threading
 import numpy as np
 import pytest
 
+from bentray_kernels.compilation.thread_team import SINGLE_THREAD, thread_team
 from bentray_kernels.eikonal.diagonals import Diagonals
-from bentray_kernels.thread_team import SINGLE_THREAD, thread_team
 
 
 @pytest.mark.parametrize(("planes", "least", "groups"), [(9, 3, 3), (8, 3, 2), (2, 3, 1), (40, 1, 4)])

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Floats
+from ..arrays import Floats
 
 
 @dataclass(frozen=True)

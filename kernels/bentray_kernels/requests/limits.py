@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .errors import InvalidInput
+from ..errors import InvalidInput
 from .ranges import Range
 
 # Share of the pairs of a scan that its examination may leave out, by default and as a setting.

@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.ranges import Range, check_ranges, ranged
+from bentray_kernels.requests.ranges import Range, check_ranges, ranged
 
 # Of a side of a picture, and of the square of it in rays.
 MAX_PIXELS = 4096

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bentray_kernels import sources
+from bentray_kernels.compilation import sources
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from .errors import InvalidInput
+from ..errors import InvalidInput
 
 # Under this key a field's metadata holds its ``Range``.
 RANGE = "range"

@@ -10,8 +10,8 @@ from pathlib import Path
 import numba
 import pytest
 
-from bentray_kernels import cache_folder as module
-from bentray_kernels.cache_folder import (
+from bentray_kernels.compilation import cache_folder as module
+from bentray_kernels.compilation.cache_folder import (
     CacheFolderWarning,
     cache_folder,
     use_writable_folder,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bentray_kernels.compiled import CacheLocator, kernel
+from bentray_kernels.compilation.compiled import CacheLocator, kernel
 
 
 @kernel(inline="always")

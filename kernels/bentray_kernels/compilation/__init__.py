@@ -1,0 +1,1 @@
+"""Compiled kernels: decorator, cache on disk, atomics, single precision and thread teams."""
