@@ -1,7 +1,5 @@
 """Shared fixtures: test order, hypothesis profiles, drawn figures, an OpenCL device, PostgreSQL."""
 
-from __future__ import annotations
-
 import gc
 import os
 import secrets

@@ -1,7 +1,5 @@
 """nginx with deploy/nginx.conf in front of a service of this machine, from Debian's package `nginx-light`."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import socket

@@ -1,7 +1,5 @@
 """How much a test tries: a little for each change (`make test`), a lot at night (`make test-all`)."""
 
-from __future__ import annotations
-
 import os
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """Numbers that break arithmetic: huge, tiny, infinite and none at all."""
 
-from __future__ import annotations
-
 import math
 import sys
 

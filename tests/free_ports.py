@@ -1,7 +1,5 @@
 """Ports for servers that a test starts, perhaps again, as processes of their own."""
 
-from __future__ import annotations
-
 import os
 import socket
 from contextlib import suppress

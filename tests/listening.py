@@ -1,7 +1,5 @@
 """Listening sockets of processes and web pages on them: for tests that nothing is published."""
 
-from __future__ import annotations
-
 import ipaddress
 
 import httpx

@@ -5,8 +5,6 @@ narrows it. It works in a checkout of the last commit in ``build/mutants``, with
 that a run can be ended at any time and continues where it was.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import random

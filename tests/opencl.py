@@ -1,7 +1,5 @@
 """Fixture: the OpenCL device of this machine."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from bentray_kernels.eikonal import METHODS

@@ -1,7 +1,5 @@
 """A PostgreSQL server of a test's own, from the programs that Debian's package `postgresql` installs."""
 
-from __future__ import annotations
-
 import os
 import pwd
 import secrets

@@ -1,7 +1,5 @@
 """Requests that no library would send, and the statuses of all answers on their connection."""
 
-from __future__ import annotations
-
 import re
 import socket
 from collections.abc import Sequence

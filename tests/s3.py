@@ -1,7 +1,5 @@
 """An S3 server of a test's own on loopback: moto's, behind a switch that lets it fail."""
 
-from __future__ import annotations
-
 import logging
 import secrets
 import threading

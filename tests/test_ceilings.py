@@ -3,8 +3,6 @@
 A change that needs more room takes something out in the same commit, or raises the ceiling and says why.
 """
 
-from __future__ import annotations
-
 import ast
 import subprocess
 from collections import Counter
@@ -21,7 +19,7 @@ LINES = {
     # folders: (ceiling, goal)
     ("kernels", "workers", "service"): (95_000, 87_000),
     ("service",): (33_000, 31_000),
-    ("tests",): (69_700, 58_000),
+    ("tests",): (69_500, 58_000),
     ("benchmarks",): (14_900, 13_000),
 }
 

@@ -1,7 +1,5 @@
 """The examples of the documentation run, page by page, against a service that the test starts."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """The Sphinx extensions of docs/: formulas as MathML, pages without inline code."""
 
-from __future__ import annotations
-
 import re
 import sys
 import zipfile

@@ -1,7 +1,5 @@
 """Every message and page that tells how to install something names what pyproject.toml has."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

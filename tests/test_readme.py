@@ -1,7 +1,5 @@
 """The README and its neighbours are true: commands and addresses exist, tables hold the real defaults."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

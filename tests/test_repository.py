@@ -1,7 +1,5 @@
 """The repository itself: first lines, lock files, and no paths of one machine."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """A ring of 24 elements round a disc, its travel times those of straight rays, exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 from benchmarks.reconstruction._travel_times import TravelTimes
 

@@ -1,7 +1,5 @@
 """The benchmarks are a namespace package of the checkout, as `bentray bench` has them."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

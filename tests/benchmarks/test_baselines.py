@@ -1,7 +1,5 @@
 """Baselines of an image error: constants by the norm, straight rays likewise, and default settings."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

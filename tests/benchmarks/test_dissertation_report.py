@@ -1,7 +1,5 @@
 """Tables and figures of the dissertation, their states, and the page that shows them."""
 
-from __future__ import annotations
-
 import json
 import re
 from importlib import import_module

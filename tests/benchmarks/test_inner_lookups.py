@@ -1,7 +1,5 @@
 """Rays that leave a surface: exact ones on a known ball, errors of the published inner field and of ours."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.geometry_field._inner_lookups import found_points, leaving_rays, world_with_fields

@@ -1,7 +1,5 @@
 """k-Wave against our simulator on a tiny grid, without network access; skipped where it is not installed."""
 
-from __future__ import annotations
-
 import importlib.util
 import urllib.request
 import warnings

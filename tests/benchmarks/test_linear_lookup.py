@@ -1,7 +1,5 @@
 """Linear interpolation of places on rays, and where it is not done."""
 
-from __future__ import annotations
-
 import numpy as np
 from benchmarks.geometry_field._linear_lookup import find_linear
 

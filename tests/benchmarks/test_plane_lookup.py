@@ -1,7 +1,5 @@
 """The cut with the nearest entry's plane."""
 
-from __future__ import annotations
-
 import numpy as np
 from benchmarks.geometry_field._plane_lookup import find_by_plane, plane_table
 

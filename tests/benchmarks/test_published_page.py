@@ -1,7 +1,5 @@
 """The page of published systems agrees with the recorded rows, and names settings that exist."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rows of rays and wave fronts: exact times and arcs, and what B-splines and first order do to them."""
 
-from __future__ import annotations
-
 import numpy as np
 from benchmarks.published._published_rays import distance_from_arcs, exact_times, times_of
 

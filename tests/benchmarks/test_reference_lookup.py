@@ -1,7 +1,5 @@
 """The published lookups of (u, v), on a ball whose (u, v) are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.geometry_field._reference_lookup import linear_uv, nearest_uv

@@ -1,7 +1,5 @@
 """The results page and README agree with the recorded rows, and every missed goal is on the page."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """Scaling model of one scheduler: fitted costs equal those of synthetic runs, and limits follow."""
 
-from __future__ import annotations
-
 import pytest
 from benchmarks.cluster._scaling_cluster import Run
 from benchmarks.cluster._scaling_model import BUSY, Model, beats

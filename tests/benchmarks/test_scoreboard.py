@@ -1,7 +1,5 @@
 """The scoreboard: layouts of public cases, their region and errors, its scans, and its table in the guide."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

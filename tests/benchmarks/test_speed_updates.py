@@ -1,7 +1,5 @@
 """Readings of the data-driven update: stretched ranges, and the recorded rows on the page."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """docker-compose.yml as a test reads it: variables filled in, commands and environment of each part."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

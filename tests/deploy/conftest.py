@@ -1,7 +1,5 @@
 """Wheel and sdist of this tree, built once for all tests of packages."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

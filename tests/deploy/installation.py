@@ -1,7 +1,5 @@
 """The parts of docker-compose.yml as processes of this machine: same commands and environment, own ports."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Programs that tests of packages run to their end."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """docker-compose.yml: valid, only the edge published, locked down, pinned; and its scripts."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The conda-forge recipe has the dependencies of pyproject.toml; the paper has its sources and figures."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """The installation of docker-compose.yml, as processes: it works, and again after any part was killed."""
 
-from __future__ import annotations
-
 import subprocess
 import time
 from collections.abc import Callable, Iterator

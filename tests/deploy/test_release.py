@@ -1,7 +1,5 @@
 """The release: complete packages that work without the repository, and a bill of materials."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """deploy/trim.sh: which files of the image's libraries are removed, and that the rest still loads."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 import shutil

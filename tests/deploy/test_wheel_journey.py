@@ -1,7 +1,5 @@
 """The wheel in an empty environment outside the repository: demo, session, service, pages, client."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Resource use of a service at one moment (memory, descriptors, threads, rows, files), and its growth."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Sequence
 from contextlib import closing

@@ -1,7 +1,5 @@
 """A tenant who uses the service normally and checks every answer."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import io

@@ -1,7 +1,5 @@
 """Hostile connections from an address of their own: idle, slow or oversize."""
 
-from __future__ import annotations
-
 import socket
 import time
 from contextlib import ExitStack, suppress

@@ -1,7 +1,5 @@
 """Hostile requests: oversize, malformed, unauthenticated, or for objects of other tenants."""
 
-from __future__ import annotations
-
 import itertools
 import random
 import time

@@ -1,7 +1,5 @@
 """Record of all responses of a service: counts by status, and which ids each tenant received."""
 
-from __future__ import annotations
-
 import re
 import threading
 from collections import Counter, defaultdict

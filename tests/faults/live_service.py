@@ -1,7 +1,5 @@
 """`bentray serve` as a process of its own, with embedded workers and keys for some tenants."""
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -1,7 +1,5 @@
 """A scheduler, workers and a service, each a process that can be killed and started again at any time."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

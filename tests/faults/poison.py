@@ -1,7 +1,5 @@
 """A scan that ends every process that looks at it, but for the one that made it."""
 
-from __future__ import annotations
-
 import os
 import signal
 from pathlib import Path

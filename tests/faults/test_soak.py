@@ -1,7 +1,5 @@
 """Mixed hostile and honest traffic for a long time: honest jobs finish, waits and resources stay bounded."""
 
-from __future__ import annotations
-
 import logging
 import os
 import statistics

@@ -1,7 +1,5 @@
 """A database of SQLite that another program holds."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager

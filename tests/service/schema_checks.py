@@ -1,7 +1,5 @@
 """Checks that schemathesis loads: two in place of its own, whose right exceptions are listed by name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The page for data-protection officers states what each table of the database holds."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from bentray_service.rows.tables import Base

@@ -1,7 +1,5 @@
 """A client that a public generator makes of openapi.json: it compiles, uploads, and runs a job to its end."""
 
-from __future__ import annotations
-
 import compileall
 import importlib
 import json

@@ -1,7 +1,5 @@
 """However many threads a service has, the allocator divides its memory into few arenas."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

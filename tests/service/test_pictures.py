@@ -1,7 +1,5 @@
 """Pictures beside other requests: they hold no thread, take turns, end with their client, fit a worker."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Each parameter of a GET request is refused outside its description: by name, with what is accepted."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Each setting of a job or picture is refused outside its range, its choices and its use: by its place."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace

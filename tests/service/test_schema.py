@@ -1,7 +1,5 @@
 """The whole API against its own description: schemathesis makes the requests, right ones and wrong ones."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """Views from queries: a parameter for each field, with its type, default and meaning."""
 
-from __future__ import annotations
-
 import inspect
 from dataclasses import fields
 from typing import Any, get_args

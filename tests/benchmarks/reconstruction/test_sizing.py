@@ -1,7 +1,5 @@
 """The recorded sizing rows are within the plans of the present code, and in the documentation."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Straight-ray peers, on a disc whose travel times are known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

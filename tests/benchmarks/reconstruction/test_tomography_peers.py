@@ -1,7 +1,5 @@
 """Tomography peers: installed ones recover a disc, missing ones are named with the reason."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

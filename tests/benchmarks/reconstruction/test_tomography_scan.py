@@ -1,7 +1,5 @@
 """The scan of the slice that nothing was tuned on, with times of straight rays in place of a peer's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.reconstruction._tomography_scan import (

@@ -1,7 +1,5 @@
 """Input of the peers: pairs, elements, grid and starting speed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The dataset in memory: differences, slices, and the rules its fields keep."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Traces read an emission at a time give, after any exchanges and turns, what arrays of them give."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

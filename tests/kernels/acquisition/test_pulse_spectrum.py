@@ -1,7 +1,5 @@
 """Centre frequency and bandwidth from traces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Speed of sound in water: published values, and back again."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Made-up ring scans: Ricker pulses at known delays."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Waveform

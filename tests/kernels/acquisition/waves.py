@@ -1,7 +1,5 @@
 """A small ring scan by simulated waves: pulses that spread, bend and scatter, as no shifted pulse does."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshes with trivial charts, and fields of them, for the tests of the geometry field."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bentray_kernels.geometry_field.tables.inner_field import (

@@ -1,7 +1,5 @@
 """ACCC over a range of iso-values equals equation 18 for each of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Every bound holds every value of every cell, for every filter; the closer ones are closer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

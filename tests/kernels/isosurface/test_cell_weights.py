@@ -1,7 +1,5 @@
 """Weights over a cell: their extremes, their Bernstein form, and how many nodes act."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.polynomial import polynomial

@@ -1,7 +1,5 @@
 """Crossings along rays: the first one is found, for every filter and by every structure, however grazing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """The octree: each node covers exactly the iso-values of its cells."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Roots along a ray: Brent's method on a spline, and the first root of a cubic."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings

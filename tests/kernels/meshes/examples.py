@@ -1,7 +1,5 @@
 """Meshes that tests share."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The exact intersector against all triangles one by one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Fixtures of this folder: the opened OpenCL device, and simulated devices."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

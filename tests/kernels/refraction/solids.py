@@ -1,7 +1,5 @@
 """Volumes whose refraction is known exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bentray_kernels.arrays import Floats

@@ -1,7 +1,5 @@
 """Backdrops: where a ray ends, on which plane, and what colour is there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Cameras: the middle and the edges of the image, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

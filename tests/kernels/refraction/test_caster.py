@@ -1,7 +1,5 @@
 """Rays through whole objects: a ball's exact refraction, the way back, layers, cut faces and limits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The caster on an OpenCL device: all cases of the compiled one, its rays, its pictures, its refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

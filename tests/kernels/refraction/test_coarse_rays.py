@@ -1,7 +1,5 @@
 """Previews from fewer rays than pixels: interpolated within a piece of the picture, and only there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Refraction at one interface: Snell's angle, energy that adds up, and total reflection where it must be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

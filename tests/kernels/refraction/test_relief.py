@@ -1,7 +1,5 @@
 """Warped backdrops: exact intersections with height fields, and pictures before them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

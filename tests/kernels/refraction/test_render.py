@@ -1,7 +1,5 @@
 """Refraction pictures: maps in metres, supersampling, independence of threads, rejected settings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

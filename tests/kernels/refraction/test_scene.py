@@ -1,7 +1,5 @@
 """Scenes: rejected input, and the box of the octree."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The shaded surface: distances and normals of a ball, and Lambert's and Phong's shares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

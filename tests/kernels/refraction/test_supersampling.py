@@ -1,7 +1,5 @@
 """Supersampling after refraction: the low-pass of known patterns, and nothing across a border."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

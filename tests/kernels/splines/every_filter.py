@@ -1,7 +1,5 @@
 """Requirements on every filter; the tests of each engine inherit the class."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import ClassVar
 

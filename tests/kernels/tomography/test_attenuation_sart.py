@@ -1,7 +1,5 @@
 """SART of the attenuation: equation 1 by hand, the true image stays, bounds and region hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.sparse import csr_array

@@ -1,7 +1,5 @@
 """Statistics of discs and balls: nodes, size, contrast to the surroundings, and what is refused."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Blocks of time steps: every step once, the bits of one run, and prompt cancellation."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

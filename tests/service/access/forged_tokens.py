@@ -3,8 +3,6 @@
 References: OpenID Connect Core 1.0, 2 and 3.1.3.7; RFC 7515, 4.1 and 10; RFC 7519, 4.1 and 7.2; RFC 8725.
 """
 
-from __future__ import annotations
-
 import base64
 import hmac
 import json

@@ -1,7 +1,5 @@
 """An OpenID provider from the package index on a socket, which checks PKCE and can be made to lie."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -4,8 +4,6 @@ Nothing is listed by hand: a route that is new is tried too, and one whose ids o
 fails by name.
 """
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import json

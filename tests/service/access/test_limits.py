@@ -1,7 +1,5 @@
 """Every limit of a tenant, used by its projects in turn: they share it, and other tenants have theirs."""
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Projects: only members see anything of one, on every route; roles; and requests of removed members end."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from pathlib import Path

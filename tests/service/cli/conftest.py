@@ -1,7 +1,5 @@
 """Fixtures of the command line: a runner and a small scan."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

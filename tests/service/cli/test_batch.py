@@ -1,7 +1,5 @@
 """`bentray submit --batch`: results as of `reconstruct`, finished ones left out, failures by themselves."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The bench frame, with a benchmark made for the test."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable

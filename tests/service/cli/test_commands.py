@@ -1,7 +1,5 @@
 """Every command has a full help text, and showing it imports no heavy module."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """`bentray compare`: figures, statistics of regions, picture, and input that is refused."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

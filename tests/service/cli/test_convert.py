@@ -1,7 +1,5 @@
 """`bentray convert`: a scan of another program becomes a dataset file, or the field at fault is named."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

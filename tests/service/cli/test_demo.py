@@ -1,7 +1,5 @@
 """`bentray demo`: the whole path through a real service, small; and its validation of the two results."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

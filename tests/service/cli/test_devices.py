@@ -1,7 +1,5 @@
 """`bentray devices` lists devices, rejected ones with the reason, and the one in use."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from collections.abc import Callable

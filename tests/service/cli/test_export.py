@@ -1,7 +1,5 @@
 """`bentray export`: the suffix selects the format; what cannot be written is named."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`bentray geometry-field`: a mesh in, a field and three pictures out, reused and resumed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`bentray keys`: a key is shown once, works in a service that runs, and ends when it is revoked."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

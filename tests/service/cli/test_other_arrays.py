@@ -1,7 +1,5 @@
 """`bentray reconstruct` and `quality` of an arc: limited angle and opening angle are stated first."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

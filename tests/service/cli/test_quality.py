@@ -1,7 +1,5 @@
 """`bentray quality`: report, page and exit codes; an unusable scan fails with a reason."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`bentray reconstruct`: three files and honest figures, with no server about."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

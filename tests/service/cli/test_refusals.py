@@ -1,7 +1,5 @@
 """What commands refuse: exit code 2, and one line that names the option; nothing is written or asked."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`bentray render`: every format in, a picture and a map out, bad words in one line."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """`bentray reproduce`: the same bits from a result's own record; differences are located."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

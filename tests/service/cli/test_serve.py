@@ -1,7 +1,5 @@
 """`bentray serve`: prints its address and reachability, and rejects bad settings in one line."""
 
-from __future__ import annotations
-
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path

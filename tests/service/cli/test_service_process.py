@@ -1,7 +1,5 @@
 """A service in a child process: it answers inside the block and is gone after it, however the block ends."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

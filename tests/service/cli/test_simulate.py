@@ -1,7 +1,5 @@
 """`bentray simulate`: a dataset file with its truth, the same for the same words."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

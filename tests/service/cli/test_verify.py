@@ -1,7 +1,5 @@
 """`bentray verify`: names damaged files, adds missing checksums, removes orphans."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from contextlib import closing

@@ -1,7 +1,5 @@
 """`bentray worker`: joins a scheduler, works, reconnects, and stops on a signal."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

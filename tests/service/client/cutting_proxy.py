@@ -1,7 +1,5 @@
 """A proxy on loopback that breaks connections off after so many bytes, as a bad line does."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 import struct

@@ -1,7 +1,5 @@
 """Retries of the client: only idempotent requests, bounded, while the service is away."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 import time

@@ -1,7 +1,5 @@
 """Buckets, and the databases of ``tests/service/rows``."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

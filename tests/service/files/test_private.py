@@ -1,7 +1,5 @@
 """File modes: stored files are private to the service's user; older folders are closed at start."""
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Damaged copies of a sound file: bits turned over, ends cut off, stretches lost; always the same ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -4,8 +4,6 @@
 JSON for each file: the answer, how the fork ended, its seconds and the most memory that it held.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

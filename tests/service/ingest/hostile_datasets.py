@@ -1,7 +1,5 @@
 """Hostile scans: each spoils one field of a valid file and names the expected error."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Collection
 from pathlib import Path

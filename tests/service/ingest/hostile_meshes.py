@@ -1,7 +1,5 @@
 """Meshes that are built to harm, in every format, with the field that each is to be refused for."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

@@ -1,7 +1,5 @@
 """Further damaged files of every format, one fault each, with the field that each is to be refused for."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

@@ -1,7 +1,5 @@
 """Volumes that are built to harm, in every format, with the field that each is to be refused for."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import struct

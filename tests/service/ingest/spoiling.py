@@ -1,7 +1,5 @@
 """Ways to spoil an open scan: each makes a function that is given the file."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Hostile and damaged files: each is refused by the name of a field, and takes little time and memory."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Every damaged file is rejected by field, cheaply, without echoing its content."""
 
-from __future__ import annotations
-
 import pytest
 
 from bentray_kernels.errors import LONGEST_VALUE

@@ -1,7 +1,5 @@
 """A small simulated scan for all tests of the session."""
 
-from __future__ import annotations
-
 import pytest
 
 import bentray

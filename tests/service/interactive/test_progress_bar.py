@@ -1,7 +1,5 @@
 """The progress bar: in the cell of a notebook, silent where nobody watches, off on request."""
 
-from __future__ import annotations
-
 import sys
 from types import ModuleType, SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Results: pictures, comparisons, conversions and files, with places and units that agree."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reading scans in a Python session: every reader of the service, its messages, and no files left behind."""
 
-from __future__ import annotations
-
 import gc
 import os
 from pathlib import Path

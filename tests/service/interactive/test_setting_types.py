@@ -1,7 +1,5 @@
 """Settings as types: names and values of the records, and errors of a type checker for wrong ones."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

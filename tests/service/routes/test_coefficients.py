@@ -1,7 +1,5 @@
 """/v1/volumes/{id}/coefficients: the arrays of the spline, and every refusal."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

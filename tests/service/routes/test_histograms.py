@@ -1,7 +1,5 @@
 """/v1/volumes/{id}/histogram: NumPy's numbers, computed once; and every refusal."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

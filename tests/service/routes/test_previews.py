@@ -1,7 +1,5 @@
 """/v1/jobs/{id}/preview: the image of a running reconstruction for its owner, else a reason."""
 
-from __future__ import annotations
-
 import base64
 
 import numpy as np

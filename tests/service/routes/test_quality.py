@@ -1,7 +1,5 @@
 """/v1/datasets/{id}/quality: the report and the page, by a worker; and every way of being refused."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import numpy as np

@@ -1,7 +1,5 @@
 """/v1/datasets/{id}/geometry and /traces: values of the file, by a worker; and every way of being refused."""
 
-from __future__ import annotations
-
 import base64
 
 import h5py

@@ -1,7 +1,5 @@
 """Every kind of database that the service can use, and what jobs need to be in one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -8,8 +8,6 @@ It writes ``version-N.tar.xz`` beside this file, with the data folder (database,
 ``expected.json``, what the service answered to each tenant before it was killed.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

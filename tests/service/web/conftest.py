@@ -1,7 +1,5 @@
 """Debian's Chromium, and a page in it that must raise no error and keep to the Content-Security-Policy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path

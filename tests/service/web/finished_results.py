@@ -1,7 +1,5 @@
 """Results with known values, as jobs of a service that a browser visits."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A reconstruction of known images, each made when a test says so, as a job that a browser watches."""
 
-from __future__ import annotations
-
 import queue
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Structural similarity of two pictures."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter

@@ -1,7 +1,5 @@
 """nginx with deploy/nginx.conf: hostile connections end there, and nothing is held back or stored."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import re

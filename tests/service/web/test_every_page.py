@@ -1,7 +1,5 @@
 """Every page: axe finds nothing serious, nothing scrolls sideways, no request leaves the service."""
 
-from __future__ import annotations
-
 import io
 import time
 

@@ -1,7 +1,5 @@
 """The page of a running job: progress, image and misfit of each iteration, cancellation, a failure."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from playwright.sync_api import expect

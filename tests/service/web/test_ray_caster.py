@@ -1,7 +1,5 @@
 """The ray caster in the browser, by WebGL2 in software: the pictures of the service, and when it is used."""
 
-from __future__ import annotations
-
 import base64
 import io
 from urllib.parse import urlencode

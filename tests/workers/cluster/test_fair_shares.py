@@ -1,7 +1,5 @@
 """Shares: a tenant alone has all workers, several have equal parts, and a small job is not held up."""
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, field

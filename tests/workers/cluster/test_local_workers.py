@@ -1,7 +1,5 @@
 """Workers that join: each is replaced when it is lost, and all begin again when their scheduler is gone."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
 from pathlib import Path

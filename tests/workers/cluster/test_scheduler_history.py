@@ -1,7 +1,5 @@
 """Scheduler, streams and workers keep no state of finished tasks."""
 
-from __future__ import annotations
-
 import gc
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The lane of short jobs: they run beside long tasks that hold every worker; long ones leave it."""
 
-from __future__ import annotations
-
 import threading
 import time
 from pathlib import Path

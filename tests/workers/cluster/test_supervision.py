@@ -1,7 +1,5 @@
 """Supervision: workers are replaced whatever ended them, also while replacements start."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

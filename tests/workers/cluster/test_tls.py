@@ -1,7 +1,5 @@
 """TLS folders: those of the script are accepted, encrypt traffic, and reject other clients."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

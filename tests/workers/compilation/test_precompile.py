@@ -1,7 +1,5 @@
 """Precompilation: jobs on other scans compile nothing more, and compilation is logged."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

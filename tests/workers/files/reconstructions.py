@@ -1,7 +1,5 @@
 """Made-up reconstructions, with every field set."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bentray_kernels.acquisition import Truth

@@ -1,7 +1,5 @@
 """Atomic files: the old content or the new, and no temporary files left."""
 
-from __future__ import annotations
-
 import pytest
 
 from bentray_workers.files.atomic import atomic_replace, write_bytes

@@ -1,7 +1,5 @@
 """Dataset files: round trip, and errors that name each invalid field."""
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path

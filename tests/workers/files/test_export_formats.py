@@ -1,7 +1,5 @@
 """Exports as the libraries of their users read them: the same numbers and units."""
 
-from __future__ import annotations
-
 import json
 import math
 import zipfile

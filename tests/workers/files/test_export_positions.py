@@ -1,7 +1,5 @@
 """One marker in every export: the same place for the library of each format, and for files that come back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Findings as a file: round trip, bit for bit of every pair."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import fields

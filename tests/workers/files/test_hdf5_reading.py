@@ -1,7 +1,5 @@
 """HDF5 files: data elsewhere are not read, and limits hold; most hostile files: ``hostile_datasets``."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

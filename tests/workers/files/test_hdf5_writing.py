@@ -1,7 +1,5 @@
 """HDF5 files that are written whole, or fail with an ordinary error."""
 
-from __future__ import annotations
-
 import errno
 import resource
 import signal

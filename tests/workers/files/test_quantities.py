@@ -1,7 +1,5 @@
 """The quantities of a reconstruction: every list of them knows each."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reconstruction files: exact round trips, the promised names, and refusals."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Truths from files: every format puts the same speeds at the same places; what does not fit is named."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

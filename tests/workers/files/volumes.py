@@ -1,7 +1,5 @@
 """A small volume, and the words in which a bad one is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small scans as zea and openUSCT write them, by their public descriptions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

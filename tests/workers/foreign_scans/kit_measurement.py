@@ -1,7 +1,5 @@
 """A small measurement as KIT 3D USCT stores it, by its access scripts (USCT_data_convert.m)."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

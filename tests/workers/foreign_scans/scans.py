@@ -1,7 +1,5 @@
 """Small scans as other programs write them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py

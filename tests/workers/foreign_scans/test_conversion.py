@@ -1,7 +1,5 @@
 """Foreign scans become canonical files with the same numbers; invalid values are named."""
 
-from __future__ import annotations
-
 import io
 import pickle
 import struct

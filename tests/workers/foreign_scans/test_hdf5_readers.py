@@ -1,7 +1,5 @@
 """Scans of zea and openUSCT become canonical files; other acquisitions are rejected by name."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

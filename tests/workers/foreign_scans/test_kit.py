@@ -1,7 +1,5 @@
 """Measurements of KIT 3D USCT: their signals, and folders and zips of both generations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.io import savemat

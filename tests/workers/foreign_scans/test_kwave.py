@@ -1,7 +1,5 @@
 """k-Wave outputs in a zip with their geometry: traces are preserved, and invalid values are named."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The table of readers: each documented with shapes and units, none confused by names of other formats."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Types of traces in every format: integers of any width and order are kept, complex numbers are named."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

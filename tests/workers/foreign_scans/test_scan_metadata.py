@@ -1,7 +1,5 @@
 """Own names of variables, units, temperature and frequency that the user states for a foreign scan."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

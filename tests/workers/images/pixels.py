@@ -1,7 +1,5 @@
 """The pixels of a PNG, and where one colour is."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

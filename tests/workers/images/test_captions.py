@@ -1,7 +1,5 @@
 """Captions of pictures: stages and iterations."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

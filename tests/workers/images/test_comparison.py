@@ -1,7 +1,5 @@
 """The comparison: a column a result, common colour bars, and the errors of `compare`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib.contour import ContourSet

@@ -1,7 +1,5 @@
 """The curves: plain numbers on a logarithmic axis, and a scale that fits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The quality page: its panels and text, also for scans without traces or times."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

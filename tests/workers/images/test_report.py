@@ -1,7 +1,5 @@
 """The report: its panels, the middle slice, errors, and captions without a truth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

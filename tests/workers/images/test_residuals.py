@@ -1,7 +1,5 @@
 """The residuals: shares by size, and a panel whose areas are counts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

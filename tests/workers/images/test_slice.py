@@ -1,7 +1,5 @@
 """The picture of a slice: right colours, up is up, and bad arguments are named."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 

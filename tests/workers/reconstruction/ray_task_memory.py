@@ -6,8 +6,6 @@ process, less a fork that does nothing; the bytes of what was there before are a
 arguments.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import fields, is_dataclass

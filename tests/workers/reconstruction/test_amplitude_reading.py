@@ -1,7 +1,5 @@
 """Amplitudes that jobs read from traces: as in memory, in batches, beside picked and recorded times."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Batches: a bounded number at once, in order, each failing by itself, and all stopped by Ctrl-C."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Scans read by tasks: a wave comparison ends when its job has been deleted."""
 
-from __future__ import annotations
-
 import pytest
 
 from bentray_kernels.tomography.waveform.band_inversion import Model

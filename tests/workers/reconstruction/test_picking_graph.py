@@ -1,7 +1,5 @@
 """Examination and picking of jobs: what `examine` and `pick` give at once, from a file, a batch a call."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The image of an unfinished reconstruction: the values of its newest checkpoint, read without a trace."""
 
-from __future__ import annotations
-
 import base64
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The quality tasks: report and page of a file, the slice with most faults, and a bound on traces."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The views of a scan: geometry, traces and picks are those of the dataset; a reduction keeps peaks."""
 
-from __future__ import annotations
-
 import base64
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The setting water_temperature_c: the same result as a file that states it, and the file stays as it is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshes and geometry fields in folders, for the tests of what makes and shows them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from bentray_kernels.meshes.mesh import TriangleMesh

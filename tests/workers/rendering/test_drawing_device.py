@@ -1,7 +1,5 @@
 """Pictures drawn by an OpenCL device: those of compiled code within a bound, with its name; lost devices."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Estimated cost of pictures: at least the measured memory, and rejections that name what fits."""
 
-from __future__ import annotations
-
 import math
 import multiprocessing
 from pathlib import Path

@@ -4,8 +4,6 @@ Called as ``simulation_memory.py SCANS``, a list of settings as JSON; prints for
 JSON. Parts are made up for the task that writes the file.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import tempfile

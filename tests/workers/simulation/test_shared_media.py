@@ -1,7 +1,5 @@
 """Media that threads share: each is made once, and a small one does not wait for a large one."""
 
-from __future__ import annotations
-
 import threading
 from concurrent.futures import ThreadPoolExecutor
 

@@ -1,7 +1,5 @@
 """Calibration: planted positions, delays and speed are recovered, with correct standard deviations."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

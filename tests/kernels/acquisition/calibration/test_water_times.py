@@ -1,7 +1,5 @@
 """Travel times of water shots follow the true element positions, not the nominal ones."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

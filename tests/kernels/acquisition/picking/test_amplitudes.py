@@ -1,7 +1,5 @@
 """Log ratios from traces: of pulses that lost exactly so much, however high they are, and under noise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Inconsistent picks: only these go."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset

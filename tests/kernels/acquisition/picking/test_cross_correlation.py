@@ -1,7 +1,5 @@
 """The likeliest delay over a wide range: a pulse wins over noise, and the rim is no answer."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st

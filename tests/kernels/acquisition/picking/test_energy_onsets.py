@@ -1,7 +1,5 @@
 """Onsets by energy: they move with the pulse, by fractions of a sample, and do not depend on its unit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

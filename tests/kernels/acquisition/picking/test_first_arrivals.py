@@ -1,7 +1,5 @@
 """Every picker: known delays are recovered, sigma equals the error, and invalid traces are NaN."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Gating of a pulse: position, power spectrum, noise power, and excluded traces."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

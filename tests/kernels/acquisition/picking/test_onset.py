@@ -1,7 +1,5 @@
 """Onsets of single traces: accurate to a fraction of a sample, and missing where there is no pulse."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

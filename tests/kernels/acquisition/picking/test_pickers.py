@@ -1,7 +1,5 @@
 """The registry of pickers: names, codes, and that the settings offer all of them."""
 
-from __future__ import annotations
-
 from typing import get_args, get_type_hints
 
 import pytest

@@ -1,7 +1,5 @@
 """The measured pulse, and traces after deconvolution with it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Checks that need pulses at known times, and clean scans; most faults: ``test_planted_faults``."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

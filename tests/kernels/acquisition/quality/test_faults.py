@@ -1,7 +1,5 @@
 """Faults that real scans have, one planted in each scan, with its water shot and without."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -14,6 +12,7 @@ from bentray_kernels.acquisition.quality import Finding, examine
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.acquisition.quality.estimated_water import estimate_water
 from bentray_kernels.acquisition.quality.recording import Measured, check_traces
+from bentray_kernels.acquisition.quality.shadow import find_scatterer
 
 from ..reference.object_scans import disc_delay_s, without_water
 from ..traces import RADIUS_M, WATER_MPS, scan
@@ -161,6 +160,18 @@ def test_a_bubble(water):
     assert finding.check == "strong scatterer"
     assert "(12, -4) mm" in finding.found
     assert (left[finding.pairs] < 0.6).all()
+
+
+@pytest.mark.parametrize(("half_waves", "seen"), [(1.5, True), (9.0, False)])
+def test_a_scatterer_is_small_against_the_dark_chords_around_it(half_waves, seen):
+    """A wide object, such as dense tissue, is no bubble, although all chords through it are dark."""
+    dataset = replace(recorded(), waveform=None, delta_tof_s=np.zeros((ELEMENTS, ELEMENTS)))
+    start, end = (dataset.element_position_m[elements] for elements in np.indices((ELEMENTS, ELEMENTS)))
+    along = (end - start) / np.maximum(np.linalg.norm(end - start, axis=-1, keepdims=True), 1e-9)
+    passing_m = np.abs(along[..., 0] * start[..., 1] - along[..., 1] * start[..., 0])
+    radius_m = half_waves * 0.5 * WATER_MPS / dataset.center_frequency_hz
+    findings = find_scatterer(dataset, np.where(passing_m < radius_m, -2.0, 0.0))
+    assert [finding.check for finding in findings] == ["strong scatterer"] * seen
 
 
 @both

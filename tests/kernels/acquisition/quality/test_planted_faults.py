@@ -1,7 +1,5 @@
 """Faults planted in simulated waves: each is found, named, and survived or refused with a reason."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """The stated water speed against the travel times of chords through water."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Scans of a disc: pulses at the straight time through it, with delays and gains of elements."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

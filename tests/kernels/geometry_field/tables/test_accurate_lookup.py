@@ -1,7 +1,5 @@
 """The walk from the nearest entry: how far from the exact answer, and that it never makes faces up."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

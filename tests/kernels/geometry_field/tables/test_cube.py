@@ -1,7 +1,5 @@
 """The samples of the cube: their numbers, and where rays enter and leave."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

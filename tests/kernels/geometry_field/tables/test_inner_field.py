@@ -1,7 +1,5 @@
 """The inner field: its points, every entry of a small one, and its batches."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The outer field: every entry of a small one against the exact intersector, and its batches."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The published table of (u, v): averages over entries that hit, and bilinear geometry images."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

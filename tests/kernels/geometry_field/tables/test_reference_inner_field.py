@@ -1,7 +1,5 @@
 """The published inner table of (u, v): its own rays, averages over exits, and rejected arguments."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Ray-traced pictures: known optics, energy conservation, transforms, and every lookup of the fields."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The tracer on an OpenCL device: the compiled one's pictures, and its refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

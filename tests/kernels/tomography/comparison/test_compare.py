@@ -1,7 +1,5 @@
 """The errors against a truth, and the region they are read in."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

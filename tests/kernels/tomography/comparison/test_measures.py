@@ -1,7 +1,5 @@
 """Errors and similarity of images, against their definitions written out node by node."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

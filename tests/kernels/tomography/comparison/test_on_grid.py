@@ -1,7 +1,5 @@
 """The truth on the nodes of an image: interpolation, axes, and what cannot be laid on it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -218,6 +218,14 @@ def test_window_opens_after_the_pulse_and_closes_with_the_record():
     assert window[3, np.searchsorted(at, expected[0, 3] + DELAY + 8e-6)] == 1.0
 
 
+def test_the_window_rises_and_falls_by_raised_cosines_of_a_period():
+    at, period = np.arange(41) * 1e-6, 8e-6
+    ((*window,),) = echo_window(np.array([3e-6]), Pulse(4e-6, 5e-6), at, period)
+    rise = np.sin(np.pi / 16.0 * np.arange(9)) ** 2
+    # The pulse of 5 µs is over at 12 µs, the record at 40 µs.
+    np.testing.assert_allclose(window, [*np.zeros(12), *rise, *np.ones(11), *rise[::-1]], atol=1e-12)
+
+
 def test_a_scan_of_zeros_has_no_pulse():
     with pytest.raises(InvalidInput, match="pulse"):
         measure_pulse([np.zeros((2, 50))], np.zeros((1, 2)), np.ones((1, 2), bool), np.arange(50) * 1e-7)

@@ -80,3 +80,26 @@ def test_without_pairs_measured_both_ways_a_misfit_is_no_evidence():
     unknown = errors(noise_s=0.0, misfit_s=2e-7)
     assert unknown.unexplained == 1.0
     assert unknown.caution == ""
+
+
+def test_errors_are_added_by_their_equation():
+    """Of 9 (m/s)² of the posterior, a contrast of 10 m/s, and a mean square of 40 (m/s)²."""
+    plain = ModelErrors(np.array(10.0), 40.0, 0.5, 0.0, 0.25, 0.0, 1.0, 1.0)
+    assert plain.added_to(np.array(9.0)) == pytest.approx(1.375 * 9.0 + 0.4 * 0.75 * 100.0 + 0.1 * 0.5 * 40.0)
+
+
+def test_contrast_misfit_and_excess_of_rays_are_measured_by_their_definitions():
+    """A chequered image, whose surroundings are water, and rays gathered in waves of six nodes."""
+    chequers = WATER + 20.0 * np.where(np.add.outer(range(NODES), range(NODES)) % 2, 1.0, -1.0)
+    everywhere, wave = np.ones((NODES, NODES), bool), 2.0 * np.pi / 6.0
+    density = 5.0 + np.sin(wave * (np.arange(NODES) + 0.5))[:, None] * np.ones(NODES)
+    result = ModelErrors.from_misfit(chequers, everywhere, density, 1e-8, 2e-8, SPACING_M, WATER)
+    assert result.mean_square == pytest.approx(20.0**2, rel=0.01)
+    # Of the variance, three quarters are not noise.
+    assert result.unexplained == pytest.approx(0.75**2)
+    # A fifth of the mean, as far as the count of rays shows the wave; half of it is excess.
+    assert result.guided == pytest.approx(0.2 * np.exp(-0.5 * (0.75 * wave) ** 2) / 2.0, rel=0.1)
+    doubled = ModelErrors.from_misfit(
+        2.0 * chequers - WATER, everywhere, density, 1e-8, 2e-8, SPACING_M, WATER
+    )
+    assert (doubled.guided, doubled.mean_square) == pytest.approx((result.guided, 4.0 * result.mean_square))

@@ -11,7 +11,11 @@ from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeSca
 from bentray_kernels.phantoms import EllipsePhantom
 from bentray_kernels.phantoms.ellipses import Ellipse
 from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.tomography.gauss_newton.linearisation import Rows
+from bentray_kernels.tomography.problem import Problem
 from bentray_kernels.tomography.uncertainty import model_errors
+from bentray_kernels.tomography.uncertainty import ray_uncertainty as module
+from bentray_kernels.tomography.uncertainty.ray_uncertainty import ray_uncertainty
 
 WATER, SIDE, NODES, RING = 1500.0, 0.16, 48, Ring(48, 0.07)
 PLAN = Settings.from_values(method="gauss-newton", nodes=NODES, side_m=SIDE, iterations=3, uncertainty=True)
@@ -125,3 +129,63 @@ def test_the_result_states_why_its_deviations_may_be_too_small(times, monkeypatc
     )
     assert reconstruct(stacked, plan).caution("uncertainty") == f"{alone} (One of 2 of 2 slices.)"
     assert not reconstruct(flat, replace(plan, uncertainty=False)).caution("uncertainty")
+
+
+def row_sums(residual, noise_s=0.0):
+    """The problem of one ray along each row of an image of water, its rays with these residuals, s."""
+    nodes = len(residual)
+    nowhere = np.zeros((1, 2))
+    problem = Problem(
+        nowhere,
+        nowhere[None],
+        np.zeros(1, np.int64),
+        np.zeros((1, 1)),
+        np.ones((nodes, nodes), bool),
+        1e-3,
+        (0.0, 0.0),
+        WATER,
+        noise_s=noise_s,
+    )
+    pointers = nodes * np.arange(nodes + 1, dtype=np.int64)
+    columns, lengths = np.arange(nodes**2, dtype=np.int32), np.ones(nodes**2, np.float32)
+    return (
+        problem,
+        PLAN,
+        np.full((nodes, nodes), 1.0 / WATER),
+        [Rows(pointers, columns, lengths, np.asarray(residual), np.array([nodes]))],
+    )
+
+
+@pytest.fixture
+def weights(monkeypatch):
+    """Inverse variances that the posterior is given, 1/s²."""
+    seen = []
+
+    class Seen(module.Posterior):
+        def __init__(self, parts, weights, *others):
+            seen.extend(np.concatenate(weights))
+            super().__init__(parts, weights, *others)
+
+    monkeypatch.setattr(module, "Posterior", Seen)
+    return seen
+
+
+def test_a_ray_beyond_the_limit_counts_less_by_its_distance_from_it(weights):
+    """The Huber weight is influence over residual: 1 within the limit, then limit over size."""
+    residual = 1e-8 * np.where(np.arange(16) % 2, 1.0, -1.0)
+    residual[[4, 9]] = 1e-7, -2e-7
+    ray_uncertainty(*row_sums(residual))
+    relative = np.array(weights) / max(weights)
+    assert np.count_nonzero(relative == 1.0) == 14
+    limit = relative[4] * 1e-7
+    assert 1e-8 < limit < 1e-7
+    assert relative[9] == pytest.approx(limit / 2e-7)
+    # The unit is the root mean square of all residuals, clipped to the limit.
+    assert max(weights) == pytest.approx(16.0 / (14 * 1e-8**2 + 2 * limit**2))
+
+
+@pytest.mark.parametrize(("noise_s", "expected_s"), [(0.0, 1e-8), (4e-9, 1e-8), (3e-8, 3e-8)])
+def test_times_are_no_better_than_pairs_measured_both_ways_agree(weights, noise_s, expected_s):
+    """An image that follows the noise has a smaller misfit than its data have errors."""
+    ray_uncertainty(*row_sums(1e-8 * np.where(np.arange(16) % 2, 1.0, -1.0), noise_s))
+    np.testing.assert_allclose(weights, expected_s**-2)

@@ -71,6 +71,17 @@ def test_half_the_difference_of_the_halves_is_the_deviation():
     assert np.allclose(found, np.abs(edge.speed - gaussian_filter(edge.speed, 2.0, mode="nearest")))
 
 
+def test_differences_are_averaged_over_three_widths_of_the_smoothed_truth():
+    """A difference at one node spreads as a Gaussian of that size; its root falls half as fast."""
+    flat = Image(np.full((81, 81), 1500.0), 1e-3, (0.0, 0.0))
+    speed = flat.speed.copy()
+    speed[40, 40] += 100.0
+    spread = deviation(flat, [flat, replace(flat, speed=speed)], 2e-3)[40, 40:]
+    away = 1e-3 * np.arange(13)
+    np.testing.assert_allclose(spread[:13], spread[0] * np.exp(-((away / 6e-3) ** 2) / 4.0), rtol=0.01)
+    assert spread[0] == pytest.approx(50.0 / (6.0 * np.sqrt(2.0 * np.pi)), rel=0.01)
+
+
 @pytest.fixture(scope="module")
 def refined():
     plan = Settings.from_values(

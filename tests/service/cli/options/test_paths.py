@@ -1,7 +1,5 @@
 """Paths are refused before work starts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

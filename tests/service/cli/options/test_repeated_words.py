@@ -1,7 +1,5 @@
 """A row of numbers after an option is the option repeated; every other word stays as it was."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

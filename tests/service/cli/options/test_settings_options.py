@@ -1,7 +1,5 @@
 """Options of a reconstruction set the settings of the same name, and their help shows the true defaults."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The options of views and of a geometry field: one for each field, with its default and its choices."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from pathlib import Path
 

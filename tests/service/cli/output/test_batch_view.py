@@ -1,7 +1,5 @@
 """The live table of a batch: running entries first, at most as high as the terminal, and its columns."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """A benchmark row: whether a goal is met follows from its figures."""
 
-from __future__ import annotations
-
 import json
 import math
 

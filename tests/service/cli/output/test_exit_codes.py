@@ -1,7 +1,5 @@
 """Exit codes: 0 done, 1 failed, 2 bad input, 3 doubtful; one line on stderr without a traceback."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

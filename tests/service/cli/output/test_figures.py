@@ -1,7 +1,5 @@
 """The figures of a result: plain values, and the same errors as in the pictures."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

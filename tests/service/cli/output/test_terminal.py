@@ -1,7 +1,5 @@
 """Figures go to stdout, everything else to stderr, and JSON stays JSON."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """A body that is announced to be too large is rejected before any of it comes, by its true reason."""
 
-from __future__ import annotations
-
 import pytest
 
 from ....raw_http import exchange

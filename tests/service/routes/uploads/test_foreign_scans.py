@@ -1,7 +1,5 @@
 """POST /v1/datasets with scans of other programs: taken by content, refused with the field at fault."""
 
-from __future__ import annotations
-
 import base64
 import io
 

@@ -1,7 +1,5 @@
 """Reading scans without a centre frequency."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

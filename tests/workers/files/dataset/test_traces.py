@@ -1,7 +1,5 @@
 """Traces of a slice from a file: an emission at a time as a whole, however they are stored; damage."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import h5py

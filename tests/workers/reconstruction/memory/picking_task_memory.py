@@ -4,8 +4,6 @@ Called as ``picking_task_memory.py FOLDER PICKER ELEMENTS SAMPLES WATER``; print
 those of the traces. FOLDER is for the file of the scan, WATER is ``water`` or ``object``.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -4,8 +4,6 @@ Called as ``wave_task_memory.py SETTINGS ELEMENTS SAMPLES``, the settings as JSO
 JSON, of the last of the bands.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace
