@@ -44,6 +44,7 @@ def setting(
     words: Mapping[str, str] | None = None,
     used_when: Uses = ALWAYS,
     neutral: tuple[Any, ...] = (),
+    basic: bool = False,
 ) -> Any:
     """A field of a dataclass with the metadata for OpenAPI, the command line, the web page and the documents.
 
@@ -58,8 +59,15 @@ def setting(
         words: accepted values on a form, where they are not as in the file.
         used_when: when the field has an effect, see ``Uses``.
         neutral: values that ask for nothing, as the default does.
+        basic: whether a form shows it before the others.
     """
-    shown = {"x-label": label, "x-unit": unit, "x-unset": unset, "x-words": dict(words or {})}
+    shown: dict[str, Any] = {"x-label": label, "x-unit": unit, "x-unset": unset, "x-words": dict(words or {})}
+    shown |= {"x-basic": basic}
+    if used_when != ALWAYS:
+        shown["x-used-when"] = [
+            {name: getattr(accepted, "schema", accepted) for name, accepted in use.items()}
+            for use in used_when
+        ]
     extra = {
         **((schema or {}) if within is None else within.schema),
         **{name: value for name, value in shown.items() if value},

@@ -196,6 +196,7 @@ class Settings:
         "other; gauss-newton: all emitters at once, regularised; waveform: full-waveform refinement of the "
         "image of auto, for slices with traces.",
         label="Method",
+        basic=True,
         words={
             "auto": "Automatic (recommended)",
             "sart": "SART",
@@ -208,6 +209,7 @@ class Settings:
         "curved: corrected for refraction; straight: without refraction. Method auto compares both, unless "
         "straight is requested.",
         label="Rays",
+        basic=True,
         words={"curved": "Bent", "straight": "Straight"},
     )
     eikonal: SolverName = setting(  # noqa: RUF009 - a string, by its alias
@@ -239,6 +241,7 @@ class Settings:
         WATER_C,
         unset="as the scan states it",
         label="Water temperature",
+        basic=True,
         unit="°C",
     )
     nodes: int | None = setting(
@@ -247,6 +250,7 @@ class Settings:
         Range(MIN_NODES, 2048),
         unset="from the width of the array, the pitch of its elements and the wavelength",
         label="Nodes per side",
+        basic=True,
     )
     side_m: float | None = setting(
         None,
@@ -296,6 +300,7 @@ class Settings:
         "ways. Full waveforms: from two more inversions, each with half of the emitters, in about as much "
         "time again.",
         label="Uncertainty",
+        basic=True,
     )
     minutes: float | None = setting(
         None,
@@ -305,6 +310,7 @@ class Settings:
         Range(0.0, 1e6, unit="minutes"),
         unset="waveform: no limit; auto: no refinement",
         label="Time for full waveforms",
+        basic=True,
         unit="minutes of one core",
         used_when=({"method": ("auto", "waveform"), "scan_traces": (True,)},),
     )

@@ -112,6 +112,18 @@ def test_the_value_and_the_colour_under_the_pointer_are_those_of_the_array(page,
     assert middle == pytest.approx((X0 + 11.5 * DX, Y0 + 7.5 * DY), abs=0.1)
 
 
+@pytest.mark.parametrize("size", [(1400, 900), (1280, 720), (390, 844)])
+def test_image_colour_bar_and_read_out_fit_the_window(page, result, size):
+    ready(page, result)
+    page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+    redrawn(page)
+    for shown in ("#result-viewer canvas.plane", "#result-viewer .readout", "#result-viewer .colour-bar"):
+        expect(page.locator(shown)).to_be_in_viewport(ratio=1.0)
+    canvas = page.locator("canvas.plane").bounding_box()
+    assert min(canvas["width"], canvas["height"]) >= 350
+    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+
+
 @pytest.mark.nightly
 def test_the_attenuation_is_in_decibels_per_centimetre(page, result):
     ready(page, result)
@@ -460,6 +472,7 @@ def test_the_copied_code_reads_the_values(page, result):
     ready(page, result)
     page.get_by_role("button", name="Coverage").click()
     page.locator(".colour-bar").get_by_text("ray length per node (m)").wait_for()
+    page.get_by_text("More", exact=True).click()
     copied(page, "Copy as Python")
     names = {}
     exec(page.evaluate("navigator.clipboard.readText()"), names)
@@ -481,6 +494,7 @@ def test_a_result_is_exported_and_deleted(page, own_result):
     np.testing.assert_array_equal(np.load(download.value.path()), SPEED - 1300.0)
     page.on("dialog", lambda dialog: dialog.accept())
     expect(page.get_by_role("heading", name="Provenance")).to_be_visible()
+    page.get_by_text("More", exact=True).click()
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("heading", name="Jobs").wait_for()
     assert httpx.get(own_result.replace("/#/jobs/", "/v1/jobs/")).status_code == 404
@@ -489,6 +503,7 @@ def test_a_result_is_exported_and_deleted(page, own_result):
 @pytest.mark.nightly
 def test_a_result_is_renamed(page, own_result):
     ready(page, own_result)
+    page.get_by_text("More", exact=True).click()
     page.get_by_role("button", name="Rename").click()
     page.get_by_label("Name", exact=True).fill("With the new water speed")
     page.locator("#rename").get_by_role("button", name="Rename").click()
@@ -523,6 +538,7 @@ def test_provenance_is_told_in_words_and_copied_as_json(page, result):
     box = page.locator(".provenance")
     job = httpx.get(result.replace("/#/jobs/", "/v1/jobs/")).json()
     volume = httpx.get(result.partition("/#/")[0] + job["links"]["volume"]).json()
+    box.get_by_text("Provenance", exact=True).click()
     box.get_by_text("Settings", exact=True).click()
     # The form of settings names them, once its description is read.
     box.get_by_role("row", name="Region of interest only").wait_for()

@@ -65,6 +65,7 @@ def test_upload_start_watch(page, address, scan, work):
 def test_only_changed_settings_are_sent(page, address, scan, work):
     sent(page, address, scan)
     page.get_by_text("All settings").click()
+    page.get_by_text("Advanced").click()
     page.get_by_label("Iterations").fill("2")
     page.get_by_label("Relaxation factor").fill("0.25")
     page.get_by_label("Speed bounds, highest").fill("1700")
@@ -87,7 +88,7 @@ def test_every_setting_has_a_field_with_its_default(page, address, scan):
     sent(page, address, scan)
     page.get_by_text("Nothing has run yet").wait_for()
     page.get_by_text("All settings").click()
-    page.get_by_label("Iterations").wait_for()
+    page.get_by_label("Nodes per side").wait_for()
     for place in PLACES.values():
         record, _, leaf = place.rpartition(".")
         value = getattr(getattr(Settings(), record) if record else Settings(), leaf)
@@ -99,7 +100,7 @@ def test_every_setting_has_a_field_with_its_default(page, address, scan):
         elif place != "sart.speed_range_mps":
             shown = "" if value is None else f"{value:g}" if isinstance(value, int | float) else value
             expect(page.locator(f'[name="{place}"]')).to_have_value(shown)
-    assert page.locator("#run-settings :is(input, select)").count() == len(PLACES) + 2
+    assert page.locator("#run-settings .setting :is(input, select)").count() == len(PLACES) + 2
 
 
 def test_a_refused_setting_is_told_at_its_field(page, address, scan, work):
@@ -116,12 +117,20 @@ def test_a_refused_setting_is_told_at_its_field(page, address, scan, work):
     assert page.locator("#run-error").is_hidden()
     nodes.fill("16")
     expect(field.get_by_role("alert")).to_be_hidden()
+    # Six settings come first, and what has no effect beside the others is not shown.
     lowest = page.get_by_label("Known speed range, lowest")
+    page.get_by_label("Find a setting").fill("known speed")
+    expect(page.locator("#run-settings .setting:visible")).to_have_count(0)
+    page.get_by_label("Find a setting").fill("")
+    page.get_by_label("Method", exact=True).select_option("SART")
+    page.get_by_label("Find a setting").fill("known speed")
+    expect(page.locator("#run-settings .setting:visible")).to_have_count(1)
+    lowest.fill("1600")
+    page.get_by_label("Known speed range, highest").fill("1400")
+    # Which the service knows, and the form does not.
+    expect(page.locator(".setting", has=lowest).get_by_role("alert")).to_contain_text("Found")
     lowest.fill("1400")
     page.get_by_label("Known speed range, highest").fill("1600")
-    # Which the service knows, and the form does not.
-    expect(page.locator(".setting", has=lowest).get_by_role("alert")).to_contain_text("method is sart")
-    page.get_by_label("Method", exact=True).select_option("SART")
     page.get_by_text("16 nodes per side").wait_for()
     page.get_by_role("button", name="Start").click()
     page.locator(".job").get_by_text("succeeded").wait_for()
@@ -147,6 +156,7 @@ def test_the_residual_curve_shows_where_a_stage_begins(page, address, scan, work
     work.stages = 2
     sent(page, address, scan)
     page.get_by_text("All settings").click()
+    page.get_by_text("Advanced").click()
     page.get_by_label("Iterations").fill("3")
     page.get_by_role("button", name="Start").click()
     curve = page.get_by_role("img", name="Residual of 6 iterations in 2 stages")

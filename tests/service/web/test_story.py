@@ -70,6 +70,7 @@ def test_from_a_dropped_file_over_a_killed_service_to_an_export(page, service, b
     page.get_by_text("All settings").click()
     page.get_by_label("Method", exact=True).select_option("SART")
     page.get_by_label("Nodes per side").fill(str(SETTINGS.nodes))
+    page.get_by_text("Advanced").click()
     page.get_by_label("Iterations").fill(str(SETTINGS.iterations))
     page.get_by_role("button", name="Start").click()
     page.locator(".job h2 a").click()
@@ -126,6 +127,8 @@ def test_the_whole_story_by_keyboard_alone(page, service, breast, tmp_path):
     page.wait_for_url("**/#/scans/*")
     press(page.get_by_text("All settings"))
     for name, text in (("Method", "SART"), ("Nodes per side", "32"), ("Iterations", "1")):
+        if name == "Iterations":
+            press(page.get_by_text("Advanced"))
         tab_to(page, page.get_by_label(name, exact=True))
         page.keyboard.type(text)
     press(page.get_by_role("button", name="Start"))
@@ -146,6 +149,7 @@ def test_the_whole_story_by_keyboard_alone(page, service, breast, tmp_path):
     assert float(page.locator(".readout").get_attribute("data-value")) == values[17, 16]
     page.locator("#page").focus()
     press(page.get_by_role("main").get_by_role("link", name="Scan", exact=True))
+    press(page.locator("#result-actions").get_by_text("More", exact=True))
     press(page.get_by_role("button", name="Delete"))
     page.get_by_text("No scan yet").wait_for()
     assert http.get(f"{service.url}{job['links']['self']}").status_code == 404

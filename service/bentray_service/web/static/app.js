@@ -98,6 +98,10 @@ async function showHealth() {
   checkHealthIn(at("offline").hidden ? HEALTH_MS : LOST_MS);
 }
 
+// Pages that fit the window leave room for the bar at the top.
+const bar = document.querySelector(".top");
+new ResizeObserver(() => document.documentElement.style.setProperty("--top", `${bar.offsetHeight}px`)).observe(bar);
+
 // A file that misses the drop zone must not take the place of the page.
 for (const name of ["dragover", "drop"]) {
   addEventListener(name, (event) => event.dataTransfer?.types.includes("Files") && event.preventDefault());

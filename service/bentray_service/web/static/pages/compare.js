@@ -1,7 +1,7 @@
 // Two to four results with one range of colours and one cursor: side by side, as difference, or with a border to swipe.
 import { keepQuery } from "../parts/address.js";
 import { facts, loadResult, nameOf } from "../parts/result_tables.js";
-import { Facts, html } from "../parts/view.js";
+import { html } from "../parts/view.js";
 import { stateOf } from "../viewer/state.js";
 import { Viewer } from "../viewer/viewer.js";
 
@@ -16,12 +16,12 @@ export async function open({ id, query }) {
   if (dimensions.size > 1) throw new Error("An image and a volume cannot be compared");
   document.title = "Comparison – Bentray";
   const panes = results.map(({ job, values, summary }, k) => ({ title: `${LETTERS[k]} ${job.title}`, values, stored: summary.quantities }));
-  return html`<div class="wide">
-    <h1>Comparison</h1>
+  return html`<div class="wide screen">
+    <div class="head"><h1>Comparison</h1></div>
     <ol class="compared">
-      ${results.map((result, k) => html`<li>
+      ${results.map((result, k) => html`<li class="line">
         <a href=${`#/jobs/${result.job.id}`}>${LETTERS[k]}: ${nameOf(result)}</a>
-        <${Facts}>${facts(result)}</${Facts}>
+        <span class="facts"> ${facts(result)}</span>
       </li>`)}
     </ol>
     <${Viewer} panes=${panes} state=${stateOf(query)} keep=${keepQuery} aria-label="Images" />

@@ -84,26 +84,34 @@ function Result({ result: first, query }) {
     go("/jobs");
   });
   const stored = () => QUANTITIES[state.quantity].reads[0];
-  return html`<div class="wide">
-    <p class="crumb"><a href="#/jobs">Jobs</a> · <a id="result-scan" href=${`#/scans/${job.dataset}`}>Scan</a></p>
-    <h1 id="result-name">${name}</h1>
-    <p id="result-facts" class="facts">${facts(result)}</p>
+  return html`<div class="wide screen">
+    <div class="head">
+      <p class="crumb"><a href="#/jobs">Jobs</a> · <a id="result-scan" href=${`#/scans/${job.dataset}`}>Scan</a></p>
+      <h1 id="result-name">${name}</h1>
+      <div id="result-actions" class="links">
+        <${CompareMenu} job=${job} />
+        <${ExportMenu} result=${result} state=${state} />
+        <a class="button quiet" href=${`#/scans/${job.dataset}?from=${job.id}`}>Run again with changes</a>
+        <${Menu} title="More">
+          <div class="sheet">
+            <${CopyButton} title="Copy link" text=${() => location.href} />
+            <${CopyButton} title="Copy as Python" text=${() => pythonOf(result, stored())} />
+            <${CopyButton} title="Copy as curl" text=${() => curlOf(result, stored())} />
+            <${Button} onClick=${() => setRenaming(!renaming)}>Rename</${Button}>
+            <${Button} onClick=${remove}>Delete</${Button}>
+          </div>
+        </${Menu}>
+      </div>
+    </div>
+    <p id="result-facts" class="facts line" title=${facts(result)}>${facts(result)}</p>
     <div id="result-cautions">
       ${summary.cautions.map(({ doubtful, text }) => html`<p class=${doubtful ? "error" : "notice"} role="note">${doubtful && "Doubtful result. "}${text}</p>`)}
-    </div>
-    <div id="result-actions" class="links">
-      <${CompareMenu} job=${job} />
-      <${ExportMenu} result=${result} state=${state} />
-      <${CopyButton} title="Copy link" text=${() => location.href} />
-      <${CopyButton} title="Copy as Python" text=${() => pythonOf(result, stored())} />
-      <${CopyButton} title="Copy as curl" text=${() => curlOf(result, stored())} />
-      <a class="button quiet" href=${`#/scans/${job.dataset}?from=${job.id}`}>Run again with changes</a>
-      <${Button} onClick=${() => setRenaming(!renaming)}>Rename</${Button}>
-      <${Button} onClick=${remove}>Delete</${Button}>
     </div>
     ${renaming && html`<${Rename} job=${job} onRename=${rename} />`}
     <${Alert} id="result-error" error=${error} />
     <${Viewer} panes=${[{ title: name, values, stored: summary.quantities }]} state=${state} keep=${keepQuery} id="result-viewer" aria-label="Image" />
+  </div>
+  <div class="wide">
     <div id="result-tables" class="result-tables">
       <${ChoiceTable} ...${summary} advice=${job.advice} />
       <${TruthTable} truth=${summary.truth} />

@@ -57,7 +57,7 @@ function Run({ scan, from, changes, onStarted }) {
   const [groups, earlier] = read ?? [];
   const [opened, setOpened] = useState(false);
   const [error, act, setError] = useAct();
-  const form = useSettings(groups);
+  const form = useSettings(groups, { scan_traces: scan.has_traces, scan_picks: !scan.has_travel_times });
   const [plan, later] = usePlan(scan, form);
   useEffect(() => {
     if (earlier) setOpened(true);

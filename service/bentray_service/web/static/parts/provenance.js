@@ -4,7 +4,7 @@ import { CopyButton } from "./copying.js";
 import { captionOf } from "./settings_fields.js";
 import { readSettings } from "./settings_form.js";
 import { Pairs } from "./tables.js";
-import { html, useRead } from "./view.js";
+import { FoldedSection, html, useRead } from "./view.js";
 
 const SOFTWARE = { bentray: "Bentray", python: "Python", numpy: "NumPy", numba: "Numba", scipy: "SciPy" };
 const SAID = {
@@ -92,14 +92,11 @@ export function Provenance({ job, volume }) {
   ];
   const everything = { job: job.id, volume: volume.id, scan: job.dataset, finished: job.finished, settings: job.settings, numerics, provenance };
   if (rayNumerics) everything.ray_numerics = rayNumerics;
-  return html`<section class="panel provenance">
-    <div class="section-head">
-      <h2>Provenance</h2>
-      <${CopyButton} title="Copy JSON" text=${() => `${JSON.stringify(everything, null, 2)}\n`} />
-    </div>
+  return html`<${FoldedSection} title="Provenance" className="provenance">
+    <${CopyButton} title="Copy JSON" text=${() => `${JSON.stringify(everything, null, 2)}\n`} />
     <${Pairs} rows=${rows} />
     <${Settings} settings=${job.settings} />
     ${numerics && html`<${Folded} title="Numerical parameters, chosen automatically" rows=${fixed(numerics)} />`}
     ${rayNumerics && html`<${Folded} title="Those of the rays before full waveforms" rows=${fixed(rayNumerics)} />`}
-  </section>`;
+  </${FoldedSection}>`;
 }

@@ -3,7 +3,7 @@ import { duration } from "../jobs/job_words.js";
 import { inNanoseconds } from "./amounts.js";
 import { request } from "./api.js";
 import { HeadedTable, Pairs } from "./tables.js";
-import { html } from "./view.js";
+import { FoldedSection, html } from "./view.js";
 import { Values } from "../viewer/quantities.js";
 
 // { job, volume, summary, values } of a job.
@@ -82,5 +82,5 @@ export function PlanTable({ plan }) {
     ...(plan.blocks > 1 ? [["Blocks of the volume", plan.blocks]] : []),
     ...(plan.minutes ? [["Estimated time", duration(60 * plan.minutes)]] : []),
   ];
-  return html`<${Section} title="Plan" words=${plan.why}><${Pairs} rows=${rows} /></${Section}>`;
+  return html`<${FoldedSection} title="Plan"><p>${plan.why}</p><${Pairs} rows=${rows} /></${FoldedSection}>`;
 }

@@ -90,14 +90,26 @@ export function changedIn(form, setting) {
   return value === undefined || JSON.stringify(value) === JSON.stringify(setting.schema.default) ? undefined : value;
 }
 
+// The value of a setting in the form, its default without one; undefined for a wrong number.
+export function valueIn(form, setting) {
+  try {
+    return KINDS[setting.kind].read(inputsOf(form, setting)) ?? setting.schema.default;
+  } catch {
+    return undefined;
+  }
+}
+
+// What a filter finds a setting by.
+export const wordsOf = ({ path, schema }) => [path, captionOf(schema), schema.description, ...Object.values(schema["x-words"] ?? {})].join(" ");
+
 // value: the one to begin with; fault: what is wrong, "" for nothing.
-export function SettingField({ setting: { path, schema, kind, nullable }, value, fault }) {
+export function SettingField({ setting: { path, schema, kind, nullable }, value, fault, hidden }) {
   const id = `set-${path.replaceAll(".", "-")}`;
   const { inputs, about, unset = "Empty" } = KINDS[kind];
   const label = html`<label class="caption" for=${id}>${captionOf(schema)}${schema["x-unit"] && ` (${schema["x-unit"]})`}</label>`;
   const hint = [schema.description, about(schema), schema["x-unset"] && `${unset}: ${schema["x-unset"]}.`].filter(Boolean).join(" ");
   const described = { "aria-describedby": `${id}-hint ${id}-error`, ...(fault && { "aria-invalid": "true" }) };
-  return html`<div class=${`setting setting-${kind}`} data-path=${path}>
+  return html`<div class=${`setting setting-${kind}`} data-path=${path} hidden=${hidden}>
     ${kind !== "yes" && label}
     <div class="setting-inputs">
       <${inputs} schema=${schema} nullable=${nullable} value=${value ?? schema.default} name=${path} id=${id} ...${described} />

@@ -22,6 +22,11 @@ export function Section({ id, title, className = "panel", children, ...more }) {
   return html`<section class=${className} aria-labelledby=${`${id}-title`} ...${more}><h2 id=${`${id}-title`}>${title}</h2>${children}</section>`;
 }
 
+// A part of a page that is opened by its heading.
+export function FoldedSection({ title, className = "", children }) {
+  return html`<details class=${`panel folded ${className}`.trim()}><summary><h2>${title}</h2></summary>${children}</details>`;
+}
+
 // A field below its caption.
 export function Labelled({ caption, children, ...more }) {
   return html`<label ...${more}><span class="caption">${caption}</span>${children}</label>`;

@@ -210,7 +210,7 @@ export function Viewer({ panes, state, keep, ...more }) {
     redraw();
     save();
   };
-  return html`<section aria-busy=${words ? "true" : undefined} ...${more}>
+  return html`<section class="image-viewer" aria-busy=${words ? "true" : undefined} ...${more}>
     <div class="viewer-bar">
       <${ChoiceBar} label="Quantity" className="quantities" entries=${names.map((name) => [name, QUANTITIES[name].title])} chosen=${state.quantity}
         onChoose=${(name) => change({ quantity: name, window: null, map: null })} />
