@@ -65,7 +65,7 @@ def known_setting(name: str, names: Iterable[str], known: str) -> str:
         names: what it may be meant for.
         known: the list to show.
     """
-    # A person writes the last part of ``sart.relaxation`` alone.
+    # A person writes the last part of ``picking.picker`` alone.
     by_spelling = {spelt: one for one in names for spelt in (one.rpartition(".")[2], one)}
     near = get_close_matches(name, by_spelling, 1)
     meant = f"{by_spelling[near[0]]} is spelt like it; " if near else ""

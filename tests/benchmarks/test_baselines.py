@@ -60,7 +60,11 @@ def test_straight_rays_have_the_method_penalty_and_width_of_the_image() -> None:
     )
     images.straight(bent.result)
     straight = spy.asked[-1]
-    assert (straight.rays, straight.method, straight.eikonal) == ("straight", "gauss-newton", "deviation")
+    assert (straight.rays, straight.method, straight.numerics.eikonal) == (
+        "straight",
+        "gauss-newton",
+        "deviation",
+    )
     assert (straight.gauss_newton.penalty_strength, straight.numerics.ray_width_m) == (0.7, 0.002)
 
 

@@ -106,11 +106,11 @@ def test_simulation_resumes_from_finished_emissions(machine, tmp_path):
 
 
 def keep_busy(machine, dataset, jobs):
-    """Queue more jobs, each by SART with its own relaxation, until at least three are not at their end."""
+    """Queue more jobs, each by SART with its own bounds, until at least three are not at their end."""
     while sum(machine.job(job)["state"] in ("queued", "running") for job in jobs) < 3:
         plan = PLANS[len(jobs) % len(PLANS)]
         if plan["method"] != "gauss-newton":
-            plan = {**plan, "sart": {"relaxation": 0.1 + 0.001 * len(jobs)}}
+            plan = {**plan, "speed_bounds_mps": [1300.0, 1800.0 + len(jobs)]}
         jobs[machine.submit(dataset, **plan)] = plan
 
 

@@ -48,7 +48,6 @@ SETTINGS = {
         "attenuation.focusing",
         "decomposition",
         "opening_angle_deg",
-        "sart.speed_range_mps",
         "speed_bounds_mps",
     ),
     # Settings that only some simulations have, or have in a narrower range; what is too large in all.

@@ -26,7 +26,7 @@ KINDS = {
 }
 # Numbers whose range depends on another one, and lists of them.
 OTHERS = {
-    "reconstruction": ("speed_bounds_mps", "sart.speed_range_mps"),
+    "reconstruction": ("speed_bounds_mps",),
     "refraction": ("iso", "index", "surroundings"),
 }
 

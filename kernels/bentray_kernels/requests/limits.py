@@ -93,3 +93,15 @@ def check_size(path: str, shape: Sequence[int], shown: str = "") -> None:
         count = math.prod(shape[: len(shape) - len(counts)])
         if path in paths and count > within.most:
             raise InvalidInput(shown or path, f"{count} {what}", f"at most {within.most} {what}")
+
+
+def check_speeds(name: str, pair: tuple[float, float]) -> None:
+    """Refuse a lowest and a highest speed, m/s, that are no range of speeds.
+
+    Raises:
+        InvalidInput: naming ``name``.
+    """
+    slowest, fastest = SPEED_MPS.least, SPEED_MPS.most
+    if len(pair) != 2 or not slowest <= pair[0] < pair[1] <= fastest:
+        accepted = f"(lowest, highest) in m/s, {slowest:g} <= lowest < highest <= {fastest:g}"
+        raise InvalidInput(name, tuple(pair), accepted)

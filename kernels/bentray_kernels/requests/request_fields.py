@@ -145,7 +145,7 @@ def declared(kind: Any, path: str = "") -> dict[str, Declared]:
 
 
 def value_at(record: Any, path: str) -> Any:
-    """The value of a field by its place, such as ``sart.relaxation``."""
+    """The value of a field by its place, such as ``picking.picker``."""
     for name in path.split("."):
         record = getattr(record, name)
     return record

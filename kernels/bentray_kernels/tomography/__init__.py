@@ -6,7 +6,6 @@ from .settings import (
     AttenuationSettings,
     GaussNewtonSettings,
     PickingSettings,
-    SartSettings,
     Settings,
 )
 
@@ -52,7 +51,6 @@ __all__ = [
     "Reconstruction",
     "RegionStatistics",
     "RoundRegion",
-    "SartSettings",
     "Settings",
     "correlation",
     "mean_absolute_error",

@@ -35,7 +35,7 @@ def solve(
     for iteration in range(settings.iterations):
         for k in np.random.default_rng((settings.numerics.seed, iteration)).permutation(len(emitters)):
             change = _smoothed(_update(emitters[k], image - water), settings.numerics.smoothing_nodes)
-            moved = np.clip(image + settings.sart.relaxation * change, *bounds)
+            moved = np.clip(image + settings.numerics.relaxation * change, *bounds)
             image[region] = moved[region]
     return image
 

@@ -6,11 +6,15 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Literal
 
+from ..requests.limits import check_speeds
 from ..requests.ranges import SEED, Range, ranged
 from ..requests.ray_gradient_names import RayGradient
 from ..requests.request_fields import check
+from ..requests.solver_names import SolverName
 
 BANDS = 4
+# The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
+DEVIATION = "deviation"
 
 
 @dataclass(frozen=True)
@@ -18,6 +22,14 @@ class Numerics:
     """Parameters that no user sets. The defaults are the automatic decision, None one that needs the scan.
 
     Attributes:
+        eikonal: method of wave fronts of bent rays; deviation is for SART on slices, elsewhere accurate
+            replaces it, and in blocks fsm.
+        relaxation: factor λ of an update of SART (Li 2008, chapter 6, equation 1).
+        speed_range_mps: of SART, lowest and highest speed known in the object, m/s, to which the image is
+            stretched before the wave front is tracked (data-driven speed, Li 2008, chapter 6, equation 6);
+            None: the image as it is.
+        pixel_m: spacing of the pixels of a reflection image, m; None: an eighth of the wavelength in water at
+            the centre frequency, at most 2048 pixels along a side.
         coarser_grids: grids, each of half the nodes of the next, that come first.
         stop_rms_s: stop once the rms residual is at most this, s (Morozov's discrepancy principle); None:
             ``method`` auto takes it from the noise of the times, other methods do not stop early.
@@ -49,6 +61,10 @@ class Numerics:
         InvalidInput: naming the parameter.
     """
 
+    eikonal: SolverName = "deviation"
+    relaxation: float = ranged(0.1, Range(0.0, 2.0, above=True, below=True))
+    speed_range_mps: tuple[float, float] | None = None
+    pixel_m: float | None = ranged(None, Range(1e-6, 1.0, unit="m"))
     coarser_grids: int = ranged(0, Range(0, 6))
     stop_rms_s: float | None = ranged(None, Range(0.0, 1.0, unit="s"))
     ray_width_m: float = ranged(0.0, Range(0.0, 0.1, unit="m"))
@@ -69,6 +85,8 @@ class Numerics:
 
     def __post_init__(self) -> None:
         check(self)
+        if self.speed_range_mps is not None:
+            check_speeds("speed_range_mps", self.speed_range_mps)
 
     def residual_within_noise(self, rms_s: float) -> bool:
         """Whether a residual, s, is small enough to stop."""

@@ -6,66 +6,30 @@ from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal
 
 from ..errors import InvalidInput
-from ..requests.limits import LEFT_OUT, MAX_LEFT_OUT, SPEED_MPS, WATER_C
+from ..requests.limits import LEFT_OUT, MAX_LEFT_OUT, SPEED_MPS, WATER_C, check_speeds
 from ..requests.picker_names import DEFAULT_PICKER, PickerName
 from ..requests.ranges import Range
 from ..requests.request_fields import ABOVE_ZERO, Uses, check, declared, setting
-from ..requests.solver_names import SolverName
-from .numerics import Numerics
-
-# The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
-DEVIATION = "deviation"
+from .numerics import DEVIATION, Numerics
 
 MIN_NODES = 16
 # What a speed may be, as JSON Schema says it.
 SPEED = {"type": "number", **SPEED_MPS.schema}
 # What holds before the scan is known.
 AUTOMATIC = Numerics()
-# When a setting has an effect: auto tries SART and Gauss-Newton, and waveform begins with its image.
-SART, GAUSS_NEWTON = ("sart", "auto", "waveform"), ("gauss-newton", "auto", "waveform")
+# When a setting has an effect: auto tries Gauss-Newton, and waveform begins with the image of auto.
+GAUSS_NEWTON = ("gauss-newton", "auto", "waveform")
 LOSSES = {"attenuation": (True,), "scan_amplitudes": (True,)}
 ECHOES: Uses = ({"reflection": (True,)},)
-BY_SART: Uses = ({"method": SART},)
 # The compiled pass of SART over a slice exists for devices, full waveforms and reflection.
-_SLICES = {"method": ("sart", "auto"), "decomposition": (None, "slices")}
 ON_DEVICES: Uses = (
-    {**_SLICES, "eikonal": (DEVIATION,), "speed_range_mps": (None,)},
-    {**_SLICES, "rays": ("straight",)},
+    {"method": ("sart", "auto"), "decomposition": (None, "slices")},
     {"method": ("waveform",)},
     {"method": ("auto",), "minutes": ABOVE_ZERO},
     *ECHOES,
 )
 # No unknown names in JSON.
 FORBID = {"extra": "forbid"}
-
-
-@dataclass(frozen=True)
-class SartSettings:
-    """SART: the image is updated after each emitter (Li 2008, chapter 6)."""
-
-    __pydantic_config__: ClassVar[dict[str, str]] = FORBID
-
-    relaxation: float = setting(
-        0.1,
-        "Relaxation factor λ of an update (Li 2008, chapter 6, equation 1).",
-        Range(0.0, 2.0, above=True, below=True),
-        label="Relaxation factor λ",
-        used_when=BY_SART,
-    )
-    speed_range_mps: tuple[float, float] | None = setting(
-        None,
-        "Lowest and highest speed known in the object, m/s. The image is stretched to this range before the "
-        "wave front is tracked (data-driven speed, Li 2008, chapter 6, equation 6).",
-        unset="the image as it is",
-        label="Known speed range",
-        unit="m/s",
-        used_when=({"method": ("sart",), "rays": ("curved",)},),
-    )
-
-    def __post_init__(self) -> None:
-        check(self, place="sart")
-        if self.speed_range_mps is not None:
-            _check_speeds("sart.speed_range_mps", self.speed_range_mps)
 
 
 @dataclass(frozen=True)
@@ -159,15 +123,6 @@ class ReflectionSettings:
         "travel times along bent rays and summed.",
         label="Make a reflection image",
     )
-    pixel_m: float | None = setting(
-        None,
-        "Spacing of the pixels, m; at most the wavelength, and at most 4096 pixels along a side.",
-        Range(1e-6, 1.0, unit="m"),
-        unset="an eighth of the wavelength in water at the centre frequency, at most 2048 along a side",
-        label="Pixel spacing",
-        unit="m",
-        used_when=ECHOES,
-    )
 
     def __post_init__(self) -> None:
         check(self, place="reflection")
@@ -211,12 +166,6 @@ class Settings:
         label="Rays",
         basic=True,
         words={"curved": "Bent", "straight": "Straight"},
-    )
-    eikonal: SolverName = setting(  # noqa: RUF009 - a string, by its alias
-        DEVIATION,
-        "Eikonal solver for bent rays. deviation is for SART on slices; elsewhere accurate replaces it.",
-        label="Eikonal solver",
-        used_when=({"rays": ("curved",)}, {"uncertainty": (True,)}),
     )
     decomposition: Literal["slices", "volume"] | None = setting(
         None,
@@ -314,7 +263,6 @@ class Settings:
         unit="minutes of one core",
         used_when=({"method": ("auto", "waveform"), "scan_traces": (True,)},),
     )
-    sart: SartSettings = field(default=SartSettings(), metadata=_record("SART", "For method sart."))
     gauss_newton: GaussNewtonSettings = field(
         default=GaussNewtonSettings(),
         metadata=_record("Gauss-Newton", "For gauss-newton, and the attenuation."),
@@ -333,7 +281,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         check(self)
-        _check_speeds("speed_bounds_mps", self.speed_bounds_mps)
+        check_speeds("speed_bounds_mps", self.speed_bounds_mps)
         if self.method == "waveform" and self.decomposition == "volume":
             raise InvalidInput("decomposition", "'volume'", "slices, with method waveform")
         if self.reflection.enabled and self.decomposition == "volume":
@@ -348,8 +296,8 @@ class Settings:
         """These settings with some values changed.
 
         Args:
-            values: by the name of the setting, whatever record it is in (``relaxation=0.2`` for
-                ``sart.relaxation``, ``attenuation=False`` for ``attenuation.enabled``), by the name of a
+            values: by the name of the setting, whatever record it is in (``picker="threshold"`` for
+                ``picking.picker``, ``attenuation=False`` for ``attenuation.enabled``), by the name of a
                 record, or by that of a numerical parameter (see ``Numerics``) to fix it.
 
         Raises:
@@ -404,8 +352,8 @@ class Settings:
 
         In blocks times are computed by fast sweeping: no other method has them.
         """
-        if self.eikonal != DEVIATION:
-            return self.eikonal
+        if self.numerics.eikonal != DEVIATION:
+            return self.numerics.eikonal
         return "accurate" if self.numerics.blocks == 1 else "fsm"
 
     def to_dict(self) -> dict[str, Any]:
@@ -433,12 +381,5 @@ class FixedSettings(Settings):
 
 PUBLIC = tuple(field.name for field in fields(Settings))
 NUMERICAL = tuple(field.name for field in fields(Numerics))
-# Where each setting is, by the name that is its own: ``relaxation`` is ``sart.relaxation``.
+# Where each setting is, by the name that is its own: ``picker`` is ``picking.picker``.
 PLACES = {name: setting.place for name, setting in declared(Settings).items()}
-
-
-def _check_speeds(name: str, pair: tuple[float, float]) -> None:
-    slowest, fastest = SPEED_MPS.least, SPEED_MPS.most
-    if len(pair) != 2 or not slowest <= pair[0] < pair[1] <= fastest:
-        accepted = f"(lowest, highest) in m/s, {slowest:g} <= lowest < highest <= {fastest:g}"
-        raise InvalidInput(name, tuple(pair), accepted)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..eikonal import METHODS
 from ..wave.emissions import Engine
-from .settings import DEVIATION, Settings
+from .numerics import DEVIATION
+from .settings import Settings
 
 
 class Solver(NamedTuple):
@@ -30,8 +30,8 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
         dimensions: of an image, 2 or 3.
     """
     straight = settings.rays == "straight"
-    differences = settings.numerics.ray_gradient == "differences"
-    supported = straight or (settings.eikonal == DEVIATION and differences)
+    numerics = settings.numerics
+    supported = straight or (numerics.eikonal == DEVIATION and numerics.ray_gradient == "differences")
     if settings.method == "sart" and dimensions == 2 and supported:
         return Solver(True, None if straight else DEVIATION)
     return Solver(False, None if straight else settings.ray_eikonal)
@@ -39,7 +39,7 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
 
 def sart_engine(settings: Settings, dimensions: int) -> Engine:
     """The engine of SART on slices: a device has the compiled pass, with a wave front in the image itself."""
-    changed = settings.sart.speed_range_mps is not None
+    changed = settings.numerics.speed_range_mps is not None
     able = solver_of(settings, dimensions).compiled and not (changed and settings.rays == "curved")
     return "opencl" if settings.device == "opencl" and able else "compiled"
 
@@ -55,9 +55,9 @@ def undivided_reason(settings: Settings, *, amplitudes: bool) -> str:
     reasons = {
         f"decomposition {settings.decomposition}": settings.decomposition != "volume",
         f"method {settings.method}": settings.method != "sart",
-        f"eikonal {settings.eikonal}": settings.rays == "curved"
-        and settings.eikonal not in (DEVIATION, "fsm"),
-        "sart.speed_range_mps": settings.sart.speed_range_mps is not None,
+        f"eikonal {numerics.eikonal}": settings.rays == "curved"
+        and numerics.eikonal not in (DEVIATION, "fsm"),
+        "speed_range_mps": numerics.speed_range_mps is not None,
         "coarser grids": numerics.coarser_grids > 0,
         "other gradients": numerics.ray_gradient != "differences",
         "resolution_check": settings.resolution_check,
@@ -81,11 +81,4 @@ def needs_device(settings: Settings) -> bool:
     """Whether a call of the reconstruction computes on an OpenCL device."""
     dimensions = 3 if settings.decomposition == "volume" else 2
     engines = wave_engine(settings), echo_engine(settings), sart_engine(settings, dimensions)
-    return tracks_on_device(settings) or "opencl" in engines
-
-
-def tracks_on_device(settings: Settings) -> bool:
-    """Whether wave fronts are tracked on an OpenCL device."""
-    # Candidate models have curved rays whatever the setting.
-    straight = settings.rays == "straight" and not settings.selects_model
-    return not straight and METHODS[settings.ray_eikonal].on_device
+    return "opencl" in engines

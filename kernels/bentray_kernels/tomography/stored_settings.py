@@ -13,8 +13,7 @@ from .settings import Settings
 WITHDRAWN = MappingProxyType(
     {
         "seed": "no such setting: the random order of the emitters is always the same",
-        "smoothing_nodes": "no such setting: updates are smoothed over one node; choose sart.relaxation and "
-        "iterations",
+        "smoothing_nodes": "no such setting: updates are smoothed over one node; choose iterations",
         "penalty": "no such setting: total variation is used; choose gauss_newton.penalty_strength",
         "edge_mps": "no such setting: method auto tries sharp edges by itself; choose "
         "gauss_newton.penalty_strength",
@@ -27,7 +26,12 @@ WITHDRAWN = MappingProxyType(
         "gain": "no such setting: amplitudes are not compensated",
         "sweeps": "iterations, which replaces it",
         "wave_minutes": "minutes, which replaces it",
-        "speed_update": "sart.speed_range_mps alone",
+        "speed_update": "no such setting: the wave front is tracked in the image as it is",
+        "eikonal": "no such setting: the solver follows from method and decomposition",
+        "relaxation": "no such setting: updates of SART are relaxed by 0.1; choose iterations",
+        "speed_range_mps": "no such setting: choose speed_bounds_mps, which the image stays within",
+        "sart": "no such record: its settings are automatic; choose iterations and speed_bounds_mps",
+        "pixel_m": "no such setting: pixels of an eighth of the wavelength, at most 2048 along a side",
     }
 )
 # Parameters that are not even internal any more, with the one value that is left.
@@ -60,7 +64,7 @@ def from_stored(values: Mapping[str, Any], numerics: Mapping[str, Any] | None = 
     for name, value in values.items():
         inner = value if isinstance(value, Mapping) else {name: value}
         current |= {name if leaf == "enabled" else leaf: _plain(value) for leaf, value in inner.items()}
-    current |= numerics or {}
+    current |= {name: _plain(value) for name, value in (numerics or {}).items()}
     for name, left in FIXED.items():
         if (value := current.pop(name, left)) != left:
             raise InvalidInput(name, value, f"{left}: {WITHDRAWN.get(name, 'it was removed')}")

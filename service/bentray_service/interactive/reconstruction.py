@@ -45,7 +45,7 @@ def reconstruct(
         progress: show a progress bar.
         threads: of this process; None: one for each core.
         settings: as in the table of settings, each by the last part of its name: ``rays="straight"``,
-            ``iterations=8``, ``relaxation=0.2``, ``attenuation=False``.
+            ``iterations=8``, ``penalty_strength=0.5``, ``attenuation=False``.
 
     Returns:
         The result: ``speed`` (nx, ny[, nz]) in m/s and ``coverage`` in m; with amplitudes ``attenuation`` in

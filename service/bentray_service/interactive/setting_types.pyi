@@ -4,14 +4,12 @@ from typing import Literal, TypedDict
 
 from bentray_kernels.requests.device_request import DeviceRequest
 from bentray_kernels.requests.picker_names import PickerName
-from bentray_kernels.requests.solver_names import SolverName
 
 Method = Literal["sart", "gauss-newton", "auto", "waveform"]
 PhantomName = Literal["table6", "table6-vertical", "detailed", "table7"]
 
 class ReconstructionSettings(TypedDict, total=False):
     rays: Literal["curved", "straight"]
-    eikonal: SolverName
     decomposition: Literal["slices", "volume"] | None
     opening_angle_deg: float | None
     water_temperature_c: float | None
@@ -24,8 +22,6 @@ class ReconstructionSettings(TypedDict, total=False):
     resolution_check: bool
     uncertainty: bool
     minutes: float | None
-    relaxation: float
-    speed_range_mps: tuple[float, float] | None
     penalty_strength: float
     picker: PickerName
     examine: bool
@@ -33,7 +29,6 @@ class ReconstructionSettings(TypedDict, total=False):
     attenuation: bool
     amplitudes: Literal["recorded", "ratio", "spectrum"]
     reflection: bool
-    pixel_m: float | None
 
 class SimulationSettings(TypedDict, total=False):
     waveform: bool

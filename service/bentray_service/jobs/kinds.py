@@ -81,7 +81,7 @@ class ReconstructionKind(Kind[ReconstructionRequest]):
         )
         if not np.isfinite(result.speed).all():
             found = f"no finite speed at {np.count_nonzero(~np.isfinite(result.speed))} nodes"
-            accepted = "settings with which it converges: smaller relaxation or larger penalty_strength"
+            accepted = "settings with which it converges: fewer iterations or larger penalty_strength"
             raise InvalidInput("settings", found, accepted)
         write_reconstruction(run.target, result)
         return {"id": run.target.stem, **_describe(result), "bytes": run.target.stat().st_size}

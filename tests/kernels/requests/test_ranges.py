@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bentray_kernels.errors import LONGEST_FIELD, LONGEST_VALUE, InvalidInput
 from bentray_kernels.requests.ranges import Range, check_ranges, ranged, ranges_of
 from bentray_kernels.tomography.numerics import Numerics
-from bentray_kernels.tomography.settings import GaussNewtonSettings, SartSettings, Settings
+from bentray_kernels.tomography.settings import GaussNewtonSettings, Settings
 
 from ...extremes import EXTREMES
 
@@ -44,7 +44,7 @@ def test_the_first_wrong_field_is_named_by_its_place():
     assert json.loads(json.dumps(ranges_of(Two)["size"].schema)) == {"exclusiveMinimum": 0.0, "maximum": 2.0}
 
 
-KINDS = (Settings, SartSettings, GaussNewtonSettings, Numerics)
+KINDS = (Settings, GaussNewtonSettings, Numerics)
 NUMBERS = [
     (kind, item.name) for kind in KINDS for item in fields(kind) if item.type.split()[0] in ("int", "float")
 ]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bentray_kernels.eikonal import methods
+from bentray_kernels.acquisition import PICKERS
 from bentray_kernels.errors import InvalidInput
 from bentray_service.client import Client, ClientError
 from bentray_service.rows.keys import ApiKey
@@ -46,10 +46,10 @@ def test_a_scan_is_fetched(client, scan, tmp_path):
 
 def test_refusal_carries_the_fields(client, dataset):
     with pytest.raises(ClientError) as caught:
-        client.submit(dataset, {"eikonal": "magic"})
+        client.submit(dataset, {"picking": {"picker": "magic"}})
     error = caught.value
-    assert (error.status, error.field, error.found) == (422, "settings.eikonal", "'magic'")
-    assert all(method in str(error) for method in methods())
+    assert (error.status, error.field, error.found) == (422, "settings.picking.picker", "'magic'")
+    assert all(picker in str(error) for picker in PICKERS)
 
 
 def test_failed_job_raises_its_problem(client, dataset, work):

@@ -99,13 +99,16 @@ def test_a_volume_is_rendered(client, tmp_path):
 
 def test_settings_by_name_join_nested_ones(client, scan):
     dataset = client.upload(scan())
-    nested = {"sart": {"speed_range_mps": [1400, 1600]}, "iterations": 9}
-    job = client.submit(dataset, nested, method="sart", relaxation=np.float64(0.2), iterations=1, nodes=16)
-    assert job.settings["sart"]["speed_range_mps"] == [1400, 1600]
-    assert (job.settings["sart"]["relaxation"], job.settings["iterations"]) == (0.2, 1)
-    assert nested == {"sart": {"speed_range_mps": [1400, 1600]}, "iterations": 9}
-    with pytest.raises(InvalidInput, match=r"relaxtion: found .*; accepted: relaxation is spelt like it"):
-        client.submit(dataset, relaxtion=0.2)
+    nested = {"picking": {"examine": False}, "iterations": 9}
+    job = client.submit(
+        dataset, nested, penalty_strength=np.float64(0.2), iterations=1, nodes=16, picker="energy-ratio"
+    )
+    picking = job.settings["picking"]
+    assert (picking["examine"], picking["picker"]) == (False, "energy-ratio")
+    assert (job.settings["gauss_newton"], job.settings["iterations"]) == ({"penalty_strength": 0.2}, 1)
+    assert nested == {"picking": {"examine": False}, "iterations": 9}
+    with pytest.raises(InvalidInput, match=r"penalty_strenth: found .*; accepted: penalty_strength is spelt"):
+        client.submit(dataset, penalty_strenth=0.2)
     with pytest.raises(ClientError, match=r"settings\.itertions: found 2; accepted: iterations is spelt"):
         client.submit(dataset, {"itertions": 2})
     with pytest.raises(InvalidInput, match="elemnts: found 8; accepted: elements is spelt like it"):

@@ -13,7 +13,7 @@ CODE = """
 import bentray
 
 scan = bentray.simulate("table7", nodes=32, three_d=True)
-bentray.reconstruct(scan, "sart", rays="straight", relaxation=0.2, iterations=2)
+bentray.reconstruct(scan, "sart", rays="straight", penalty_strength=0.2, iterations=2)
 bentray.reconstruct(scan, itertions=2)  # wrong: Unexpected keyword argument "itertions"
 bentray.reconstruct(scan, rays="strait")  # wrong: incompatible type "Literal['strait']"
 bentray.reconstruct(scan, "gauss")  # wrong: incompatible type "Literal['gauss']"
@@ -22,8 +22,8 @@ bentray.simulate(elemnts=16)  # wrong: Unexpected keyword argument "elemnts"
 bentray.simulate("table8")  # wrong: incompatible type "Literal['table8']"
 
 client = bentray.Client("http://127.0.0.1:8000", "key", patience_s=0.0)
-client.submit("ds-1", method="sart", relaxation=0.2)
-client.submit("ds-1", relaxtion=0.2)  # wrong: Unexpected keyword argument "relaxtion"
+client.submit("ds-1", method="sart", penalty_strength=0.2)
+client.submit("ds-1", penaltie=0.2)  # wrong: Unexpected keyword argument "penaltie"
 client.reconstruct(scan, rays="strait")  # wrong: incompatible type "Literal['strait']"
 client.refraction_png("vol-1", widht=64)  # wrong: Unexpected keyword argument "widht"
 client.datsets()  # wrong: has no attribute "datsets"
@@ -32,8 +32,8 @@ bentray.Client("http://127.0.0.1:8000", patience=0.0)  # wrong: Unexpected keywo
 
 async def main() -> None:
     async with bentray.AsyncClient("http://127.0.0.1:8000") as client:
-        await client.submit("ds-1", relaxation=0.2)
-        await client.submit("ds-1", relaxtion=0.2)  # wrong: Unexpected keyword argument "relaxtion"
+        await client.submit("ds-1", penalty_strength=0.2)
+        await client.submit("ds-1", penaltie=0.2)  # wrong: Unexpected keyword argument "penaltie"
 """
 
 

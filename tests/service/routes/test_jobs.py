@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import pytest
 
-from bentray_kernels.eikonal import methods
+from bentray_kernels.acquisition import PICKERS
 from bentray_kernels.tomography.result import Candidate
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.rows.ids import LOCAL
@@ -78,8 +78,8 @@ def test_a_task_that_no_worker_can_hold_is_rejected_before_it_is_stored(http, da
 
 
 def test_a_device_that_no_worker_offers_is_rejected(http, dataset):
-    body = problem(ask(http, dataset, {"eikonal": "fim-opencl"}))
-    assert (body["status"], body["field"]) == (422, "eikonal")
+    body = problem(ask(http, dataset, {"method": "sart", "device": "opencl"}))
+    assert (body["status"], body["field"]) == (422, "device")
 
 
 def test_jobs_are_taken_while_no_worker_is_connected(http, dataset, cluster):
@@ -107,10 +107,10 @@ def test_newest_first(http, dataset):
     assert [job["id"] for job in http.get("/v1/jobs?limit=2").json()["jobs"]] == [made[2], made[1]]
 
 
-def test_unknown_method_lists_the_known_ones(http, dataset):
-    body = problem(ask(http, dataset, {"eikonal": "magic"}))
-    assert (body["status"], body["field"], body["found"]) == (422, "settings.eikonal", "'magic'")
-    assert all(method in body["accepted"] for method in methods())
+def test_unknown_picker_lists_the_known_ones(http, dataset):
+    body = problem(ask(http, dataset, {"picking": {"picker": "magic"}}))
+    assert (body["status"], body["field"], body["found"]) == (422, "settings.picking.picker", "'magic'")
+    assert all(picker in body["accepted"] for picker in PICKERS)
 
 
 def test_unknown_setting_lists_the_known_ones(http, dataset):
@@ -125,7 +125,8 @@ def test_unknown_setting_lists_the_known_ones(http, dataset):
         ({"sart": 2}, "settings.sart"),
         ({"speed_bounds_mps": [-1, 1500]}, "settings.speed_bounds_mps"),
         ({"speed_bounds_mps": [0, 1500]}, "settings.speed_bounds_mps"),
-        ({"method": "auto", "sart": {"speed_range_mps": [1400, 1600]}}, "settings.sart.speed_range_mps"),
+        ({"sart": {"relaxation": 0.2}}, "settings.sart"),
+        ({"reflection": {"pixel_m": 1e-3}}, "settings.reflection.pixel_m"),
         ({"gauss_newton": {"edge_mps": 7}}, "settings.gauss_newton.edge_mps"),
         ({"reflection": {"gain": "spreading"}}, "settings.reflection.gain"),
         ({"seed": 0}, "settings.seed"),
@@ -144,12 +145,12 @@ def test_wrong_settings(http, dataset, settings, field):
 def test_a_setting_of_the_earlier_flat_record_is_rejected_with_what_to_use_instead(http, dataset):
     for name, value, accepted in (
         ("sweeps", 3, "iterations, which replaces it"),
-        ("relaxation", 0.1, "sart.relaxation, which replaces it"),
+        ("relaxation", 0.1, "no such setting: updates of SART are relaxed by 0.1"),
         ("attenuation", False, "attenuation.enabled, which replaces it"),
         ("picker", "aic", "picking.picker, which replaces it"),
         ("coarser_grids", 1, "no such setting: it is decided automatically"),
         ("bands", 1, "no such setting: it is decided automatically, from minutes"),
-        ("speed_update", "fixed", "sart.speed_range_mps alone"),
+        ("speed_update", "fixed", "no such setting: the wave front"),
         ("numerics", {}, "a known setting: "),
     ):
         body = problem(ask(http, dataset, {name: value}))
@@ -168,7 +169,7 @@ def test_no_json(http):
 
 
 def test_a_request_of_megabytes(http, dataset):
-    body = problem(ask(http, dataset, {"eikonal": "x" * 1_000_000}))
+    body = problem(ask(http, dataset, {"method": "x" * 1_000_000}))
     assert (body["status"], body["type"], body["field"]) == (413, "/problems/too-large", "body")
 
 

@@ -144,7 +144,7 @@ def test_the_place_in_the_queue(start, uploaded):
     [
         ('{"nodes": 1e400}', "settings.nodes"),
         ('{"iterations": 99999999999999999999999999}', "settings.iterations"),
-        ('{"eikonal": "fim-opencl"}', "eikonal"),
+        ('{"method": "sart", "device": "opencl"}', "device"),
         ("[]", "settings"),
     ],
 )

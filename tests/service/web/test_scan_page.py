@@ -67,20 +67,20 @@ def test_only_changed_settings_are_sent(page, address, scan, work):
     page.get_by_text("All settings").click()
     page.get_by_text("Advanced").click()
     page.get_by_label("Iterations").fill("2")
-    page.get_by_label("Relaxation factor").fill("0.25")
+    page.get_by_label("Strength of the penalty").fill("0.25")
     page.get_by_label("Speed bounds, highest").fill("1700")
     page.get_by_label("Check the scan first").uncheck()
     with page.expect_request("**/v1/jobs") as asked:
         page.get_by_role("button", name="Start").click()
     assert asked.value.post_data_json["settings"] == {
         "iterations": 2,
-        "sart": {"relaxation": 0.25},
+        "gauss_newton": {"penalty_strength": 0.25},
         "speed_bounds_mps": [1300, 1700],
         "picking": {"examine": False},
     }
     page.locator(".job").get_by_text("succeeded").wait_for()
     settings = work.calls[0][1]
-    assert (settings.method, settings.iterations, settings.sart.relaxation) == ("auto", 2, 0.25)
+    assert (settings.method, settings.iterations, settings.gauss_newton.penalty_strength) == ("auto", 2, 0.25)
 
 
 @pytest.mark.nightly
@@ -97,10 +97,10 @@ def test_every_setting_has_a_field_with_its_default(page, address, scan):
                 expect(page.locator(f'[name="{place}.{end}"]')).to_have_value(f"{one:g}")
         elif isinstance(value, bool):
             expect(page.locator(f'[name="{place}"]')).to_be_checked(checked=value)
-        elif place != "sart.speed_range_mps":
+        else:
             shown = "" if value is None else f"{value:g}" if isinstance(value, int | float) else value
             expect(page.locator(f'[name="{place}"]')).to_have_value(shown)
-    assert page.locator("#run-settings .setting :is(input, select)").count() == len(PLACES) + 2
+    assert page.locator("#run-settings .setting :is(input, select)").count() == len(PLACES) + 1
 
 
 def test_a_refused_setting_is_told_at_its_field(page, address, scan, work):
@@ -118,23 +118,23 @@ def test_a_refused_setting_is_told_at_its_field(page, address, scan, work):
     nodes.fill("16")
     expect(field.get_by_role("alert")).to_be_hidden()
     # Six settings come first, and what has no effect beside the others is not shown.
-    lowest = page.get_by_label("Known speed range, lowest")
-    page.get_by_label("Find a setting").fill("known speed")
-    expect(page.locator("#run-settings .setting:visible")).to_have_count(0)
-    page.get_by_label("Find a setting").fill("")
-    page.get_by_label("Method", exact=True).select_option("SART")
-    page.get_by_label("Find a setting").fill("known speed")
-    expect(page.locator("#run-settings .setting:visible")).to_have_count(1)
-    lowest.fill("1600")
-    page.get_by_label("Known speed range, highest").fill("1400")
+    shown, find = page.locator("#run-settings .setting:visible"), page.get_by_label("Find a setting")
+    find.fill("may be left out")
+    expect(shown).to_have_count(1)
+    find.fill("check the scan")
+    page.get_by_label("Check the scan first").uncheck()
+    find.fill("may be left out")
+    expect(shown).to_have_count(0)
+    find.fill("speed bounds")
+    lowest = page.get_by_label("Speed bounds, lowest")
+    lowest.fill("1900")
     # Which the service knows, and the form does not.
     expect(page.locator(".setting", has=lowest).get_by_role("alert")).to_contain_text("Found")
     lowest.fill("1400")
-    page.get_by_label("Known speed range, highest").fill("1600")
     page.get_by_text("16 nodes per side").wait_for()
     page.get_by_role("button", name="Start").click()
     page.locator(".job").get_by_text("succeeded").wait_for()
-    assert work.calls[0][1].sart.speed_range_mps == (1400.0, 1600.0)
+    assert work.calls[0][1].speed_bounds_mps == (1400.0, 1800.0)
     assert len(work.calls) == 1
 
 

@@ -12,7 +12,7 @@ from bentray_workers.cluster.resources import OPENCL
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction import reconstruction_run
 
-WITH_DEVICE = Settings(method="sart", nodes=16, iterations=1, eikonal="fim-opencl")
+WITH_DEVICE = Settings(method="sart", nodes=16, iterations=1, device="opencl")
 
 
 @pytest.fixture
@@ -39,17 +39,12 @@ def test_devices_are_tested_only_on_request(fresh, monkeypatch):
     assert lanes(fresh) == {"recon", "render", "short"}
 
 
-def test_without_a_device_the_method_is_rejected(fresh, monkeypatch):
+def test_without_a_device_one_is_rejected(fresh, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: False)
-    with pytest.raises(InvalidInput, match="eikonal"):
-        capacities.resources_for(fresh, WITH_DEVICE)
+    for settings in (WITH_DEVICE, Settings(method="waveform", device="opencl")):
+        with pytest.raises(InvalidInput, match="device: found 'opencl', which no connected worker has"):
+            capacities.resources_for(fresh, settings)
     assert "opencl" not in lanes(fresh)
-
-
-def test_without_a_device_waveforms_on_a_device_are_rejected(fresh, monkeypatch):
-    monkeypatch.setattr(capacities, "_has_device", lambda: False)
-    with pytest.raises(InvalidInput, match="device: found 'opencl', which no connected worker has"):
-        capacities.resources_for(fresh, Settings(method="waveform", device="opencl"))
 
 
 def test_a_device_is_offered_once_it_has_passed(fresh, monkeypatch):
@@ -64,7 +59,7 @@ def test_a_device_is_offered_once_it_has_passed(fresh, monkeypatch):
 
 def test_external_cluster_is_not_queried(fresh, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: pytest.fail("tried"))
-    with open_cluster(fresh.scheduler.address) as joined, pytest.raises(InvalidInput, match="eikonal"):
+    with open_cluster(fresh.scheduler.address) as joined, pytest.raises(InvalidInput, match="device"):
         capacities.resources_for(joined.client, WITH_DEVICE)
 
 

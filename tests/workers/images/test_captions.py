@@ -47,7 +47,7 @@ def test_the_sweeps_of_all_stages_are_counted():
     [
         (Settings(method="sart", rays="straight"), "straight rays  "),
         (Settings(method="sart"), "bent rays (deviation)"),
-        (Settings(method="sart", eikonal="fsm"), "bent rays (fsm)"),
+        (Settings.from_values(method="sart", eikonal="fsm"), "bent rays (fsm)"),
         (Settings(method="gauss-newton"), "bent rays (accurate)"),
         (Settings(method="sart", decomposition="volume"), "bent rays (accurate)"),
     ],

@@ -126,13 +126,13 @@ def test_no_limit_is_none():
 
 
 def test_device_tasks_need_a_worker_with_a_device():
-    asked = Settings(method="sart", eikonal="fim-opencl")
-    with pytest.raises(InvalidInput, match="eikonal"):
+    asked = Settings(method="sart", device="opencl")
+    with pytest.raises(InvalidInput, match="device"):
         plan(RING, asked, [LARGE])
     found = plan(RING, asked, [LARGE, WorkerCapacity(0, (*BOTH, "opencl"))])
     assert (found.lane, found.workers) == ("opencl", 1)
     assert "OpenCL" in found.why
-    assert plan(RING, replace(asked, rays="straight"), [LARGE]).lane == "recon"
+    assert plan(RING, replace(asked, device="cpu"), [LARGE]).lane == "recon"
 
 
 def test_array_in_space_that_is_no_ring_is_planned_as_a_volume():

@@ -155,8 +155,8 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     name, size = max(calls.items(), key=lambda item: item[1])
     if size > limit:
         field: str = "nodes" if name not in waves else "method" if name == "validate_image" else "minutes"
-        found = settings.reflection.pixel_m if name in echoes else getattr(settings, field)
-        field = "reflection.pixel_m" if name in echoes else field
+        found = name in echoes or getattr(settings, field)
+        field = "reflection" if name in echoes else field
         raise InvalidInput(
             field,
             f"{found}, for which a task ({task_in_words(name)}) takes {size} bytes"

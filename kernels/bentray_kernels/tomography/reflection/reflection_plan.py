@@ -106,12 +106,12 @@ def plan_reflection(
     elements = dataset.element_position_m[members]
     wavelength = dataset.water_speed_mps / dataset.center_frequency_hz
     low, extent = elements.min(axis=0), np.ptp(elements, axis=0)
-    pixel = pixel_size(settings.reflection.pixel_m, float(extent.max()), wavelength)
+    pixel = pixel_size(settings.numerics.pixel_m, float(extent.max()), wavelength)
     shape = tuple(int(n) for n in np.floor(extent / pixel + 1e-9) + 1)
     first = low + 0.5 * (extent - pixel * (np.array(shape) - 1))
     inside = inside_array(elements, shape, pixel, first, RIM_WAVES * wavelength / pixel)
     if not inside.any():
-        raise InvalidInput("reflection.pixel_m", pixel, "several pixels inside the array")
+        raise InvalidInput("pixel_m", pixel, "several pixels inside the array")
     used = dataset.tx[:, None] != dataset.rx[None, :]
     if dataset.valid is not None:
         used = used & dataset.valid
@@ -144,7 +144,7 @@ def pixel_size(requested_m: float | None, extent_m: float, wavelength_m: float) 
     least = extent_m / (MAX_SIDE - 1)
     if not least <= requested_m <= wavelength_m:
         accepted = f"from {least:.3g} m ({MAX_SIDE} pixels a side) to the wavelength, {wavelength_m:.3g} m"
-        raise InvalidInput("reflection.pixel_m", requested_m, accepted)
+        raise InvalidInput("pixel_m", requested_m, accepted)
     return requested_m
 
 

@@ -120,7 +120,7 @@ def _advance(session: Session, calls: Sequence[SliceCall], settings: Settings) -
             np.stack([call.problem.region for call in calls]),
             emissions,
             update,
-            np.full(len(calls), settings.sart.relaxation),
+            np.full(len(calls), settings.numerics.relaxation),
         )
         slices.run()
         slowness, coverage = slices.images()

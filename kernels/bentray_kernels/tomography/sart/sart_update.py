@@ -33,14 +33,14 @@ def update_for(problem: Problem, settings: Settings) -> Update:
 def propagation_speed(slowness: Floats, region: Flags, settings: Settings, *, warm: bool) -> Floats:
     """The speed F of the wave front (chapter 6, equations 5 and 6, with k = 1).
 
-    Without ``settings.sart.speed_range_mps`` it is the image itself. With it the range of the image is
+    Without ``settings.numerics.speed_range_mps`` it is the image itself. With it the range of the image is
     stretched to this range of the object (data-driven speed), so that rays bend fully before the contrast of
     the image has grown; not in the first iteration, before which there is no contrast (``warm``).
     """
     speed = 1.0 / slowness
-    if settings.sart.speed_range_mps is None or not warm:
+    if settings.numerics.speed_range_mps is None or not warm:
         return speed
-    low, high = settings.sart.speed_range_mps
+    low, high = settings.numerics.speed_range_mps
     inside = speed[region]
     if not inside.size:
         return speed
@@ -63,7 +63,7 @@ def _compiled(problem: Problem, settings: Settings) -> Update:
             front = None
             if settings.rays == "curved":
                 front = slowness
-                if settings.sart.speed_range_mps is not None:
+                if settings.numerics.speed_range_mps is not None:
                     front = 1.0 / propagation_speed(slowness, problem.region, settings, warm=iteration > 0)
             residuals.append(work.trace(slowness, front, problem.spacing, source, receivers, measured))
         work.update(
@@ -71,7 +71,7 @@ def _compiled(problem: Problem, settings: Settings) -> Update:
             coverage,
             problem.region,
             problem.spacing,
-            settings.sart.relaxation,
+            settings.numerics.relaxation,
             settings.numerics.smoothing_nodes,
             bounds_of(settings),
         )
@@ -132,7 +132,7 @@ def smoothing_reach(settings: Settings) -> int:
 
 def apply_update(slowness: Floats, update: Floats, region: Flags, settings: Settings) -> None:
     """Change the slowness in place, within its bounds; the arguments are as of ``smoothed_update``."""
-    updated = slowness + settings.sart.relaxation * update
+    updated = slowness + settings.numerics.relaxation * update
     slowness[region] = np.clip(updated, *bounds_of(settings))[region]
 
 

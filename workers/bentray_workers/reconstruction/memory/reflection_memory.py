@@ -37,7 +37,7 @@ PAIRS_PER_S = 2.5e8
 def pixels_of(traces: Traces, width_m: float, settings: Settings) -> int:
     """Pixels along a side of the image."""
     wavelength = traces.water_mps / traces.frequency_hz
-    return side_pixels(width_m, pixel_size(settings.reflection.pixel_m, width_m, wavelength))
+    return side_pixels(width_m, pixel_size(settings.numerics.pixel_m, width_m, wavelength))
 
 
 def reflection_task_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
