@@ -19,7 +19,7 @@ TRACES = Traces(64, 64, 512, 4, 2e6, 2e5, 1500.0)
 
 def summary(traces):
     size = 0 if traces is None else 64**2 * 512 * 4
-    return Summary(64, 64, 4096, 1, False, 0.0, 0.2, size, True, traces, period=True)
+    return Summary(64, 64, 4096, 1, False, 0.0, 0.2, size, True, traces, period=True, recorded=traces)
 
 
 def plans():

@@ -44,6 +44,8 @@ def test_jobs_read_the_same_amplitudes_as_in_memory(lossy, tmp_path, monkeypatch
         for settings, reads in ((plan, True), (PLAN, False)):
             summary = summary_of(path, settings)
             assert summary.amplitudes is reads
+            # Those of a scan with times are examined.
+            assert summary_of(path, settings.changed(examine=True)).traces_bytes > 0
             assert (summary.traces_bytes > 0) is (reads or name == "traces")
     assert reconstruction_run.reconstruct(None, tmp_path / "times.h5", PLAN).attenuation is None
 

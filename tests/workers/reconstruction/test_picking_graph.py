@@ -26,6 +26,7 @@ from bentray_workers.reconstruction.picking_graph import (
     measure_traces,
     pick_emissions,
 )
+from bentray_workers.reconstruction.quality_report import examine_file
 
 from ...kernels.acquisition.traces import RATE_HZ, blob_delay, scan
 from ...kernels.tomography.waveform.scans import SETTINGS
@@ -118,10 +119,13 @@ def test_a_clean_scan_gives_the_image_that_it_gave_unexamined(tmp_path):
     expected = reconstruct_here(pick(clean()), PLAN)
     result = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN)
     np.testing.assert_array_equal(result.speed, expected.speed)
-    assert result.provenance == {**expected.provenance, "quality": "nothing found"}
+    used = int(np.isfinite(pick(clean()).delta_tof_s).sum())
+    pairs = f"{used} of {ELEMENTS * (ELEMENTS - 1)} pairs used"
+    found = {"quality": "nothing found", "pairs": f"{pairs}, 0 left out"}
+    assert result.provenance == {**expected.provenance, **found}
     plain = reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN.changed(examine=False))
     np.testing.assert_array_equal(plain.speed, expected.speed)
-    assert plain.provenance == expected.provenance
+    assert plain.provenance == {**expected.provenance, "pairs": f"{pairs}, not examined"}
 
 
 def test_progress_counts_examined_and_picked_emissions(tmp_path, monkeypatch):
@@ -173,20 +177,63 @@ def test_a_scan_that_must_not_be_used_is_rejected(tmp_path):
         reconstruction_run.reconstruct(None, tmp_path / "scan.h5", PLAN)
 
 
-def test_times_that_came_with_a_scan_are_examined_where_half_a_period_is_known(tmp_path):
+def planted(pair, seconds, **changes):
     delta = blob_delay(ELEMENTS).copy()
-    delta[2, 9] += 3e-6
-    known = replace(clean(), waveform=None, delta_tof_s=delta, sigma_s=None)
-    picked, found = arrived(known, tmp_path)
-    assert np.isnan(picked.differential_tof()[2, 9])
-    assert "cycle jumps: 1 pairs" in found.words(stacked=False)
-    for other in (replace(known, center_frequency_hz=None), replace(known, delta_tof_s=blob_delay(ELEMENTS))):
-        (tmp_path / PICKED).unlink(missing_ok=True)
-        kept, found = arrived(other, tmp_path)
-        np.testing.assert_array_equal(kept.delta_tof_s, other.delta_tof_s)
-        assert not (tmp_path / PICKED).exists()
-        assert found.findings == ()
-    assert found.words(stacked=False) == "nothing found"
+    delta[pair] += seconds
+    return replace(clean(), delta_tof_s=delta, sigma_s=None, **changes)
+
+
+def silent(dataset):
+    """The scan whose element 5 records nothing, beside its times."""
+    traces = [data.copy() for data in (dataset.waveform.object, dataset.waveform.water)]
+    for data in traces:
+        data[:, 5] = 0.0
+    return replace(dataset, waveform=Waveform(*traces))
+
+
+TIMES = {"waveform": None}
+
+
+@pytest.mark.parametrize(
+    ("dataset", "check"),
+    [
+        (planted((2, 9), 3e-6, **TIMES), "cycle jumps"),
+        (planted((2, 9), 3e-6, center_frequency_hz=None, **TIMES), "outliers"),
+        (planted((2, 9), 3e-6, center_frequency_hz=None), "outliers"),
+        (planted((2, 9), -2e-5, center_frequency_hz=None, **TIMES), "apparent speed"),
+        (planted((2, 9), 3e-6), "cycle jumps"),
+        (silent(planted((2, 9), 3e-6)), "dead elements"),
+        (planted((2, 9), 0.0, center_frequency_hz=None, **TIMES), None),
+        (planted((2, 9), 0.0), None),
+        (clean(), None),
+        (spoilt(clean(), damaged), "polarity"),
+    ],
+)
+def test_a_reconstruction_leaves_out_what_the_quality_report_says(tmp_path, dataset, check):
+    """Times of the file or picked, with and without a frequency and traces: pair for pair, in one count."""
+    picked, found = arrived(dataset, tmp_path)
+    quality = examine_file(tmp_path / "scan.h5", draw=False)
+    report = quality.examined
+    # An estimated frequency is stated elsewhere in a result.
+    findings = [finding for finding in report.findings if finding.check != "centre frequency"]
+    assert [f.to_dict() for f in found.findings] == [f.to_dict() for f in findings]
+    for mine, theirs in zip(found.findings, findings, strict=True):
+        np.testing.assert_array_equal(mine.pairs, theirs.pairs)
+    assert (found.pairs, found.usable) == (report.pairs, report.usable)
+    assert found.pairs_used.startswith(f"{report.usable:,} of {report.pairs:,} pairs used, ")
+    np.testing.assert_array_equal(picked.differential_tof(), quality.picked.differential_tof())
+    assert (tmp_path / PICKED).exists() is (check is not None or not dataset.picked)
+    assert check is None or check in {finding.check for finding in found.findings}
+    assert found.left_out == (0 if check is None else report_left_out(dataset, report))
+
+
+def report_left_out(dataset, report):
+    out = np.zeros((ELEMENTS, ELEMENTS), dtype=bool)
+    for finding in report.findings:
+        if finding.action == "left out" and finding.pairs is not None:
+            out |= finding.pairs
+    known = np.isfinite(dataset.differential_tof()) if dataset.picked else ~np.eye(ELEMENTS, dtype=bool)
+    return int((out & known).sum())
 
 
 def test_without_a_water_shot_the_times_are_nearly_the_same(tmp_path):

@@ -172,7 +172,7 @@ def test_choice_is_described_in_one_sentence(changes, decomposition, words):
 
 def test_traces_are_planned_for():
     heard = Traces(256, 256, 12_000, 2, 5e7, 2.5e6, 1500.0)
-    scan = replace(RING, traces=heard, traces_bytes=2 * heard.bytes_of(heard.emissions))
+    scan = replace(RING, traces=heard, recorded=heard, traces_bytes=2 * heard.bytes_of(heard.emissions))
     found = plan(scan, Settings(method="sart", nodes=64), [])
     assert {"measure_traces", "examine_slice", "pick_emissions", "finish_slice", "write_picked"} < set(
         found.call_bytes

@@ -50,7 +50,7 @@ def test_workers_share_what_can_be_shared():
 
 def test_waves_and_picking_add_their_time():
     traced = replace(RING, traces=TRACES)
-    picked = replace(traced, traces_bytes=2 * 64 * 64 * 2000 * 4)
+    picked = replace(traced, recorded=TRACES, traces_bytes=2 * 64 * 64 * 2000 * 4)
     assert seconds(picked) > seconds(traced) == seconds(RING)
     plain = seconds(traced, method="auto")
     refined = seconds(traced, method="auto", minutes=30.0)

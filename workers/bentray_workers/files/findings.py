@@ -13,7 +13,6 @@ import numpy as np
 
 from bentray_kernels.acquisition.quality import Finding
 from bentray_kernels.acquisition.quality.finding import words
-from bentray_kernels.acquisition.quality.left_out import IMPOSSIBLE
 from bentray_kernels.acquisition.quality.recording import OF_TRACES, OF_WATER
 from bentray_kernels.arrays import Flags
 
@@ -27,11 +26,22 @@ class ScanFindings(NamedTuple):
         findings: of all slices.
         examined: whether the scan was examined.
         changed: whether the picked dataset differs from the file of the scan.
+        pairs, usable: numbers of pairs of different elements, and of those with valid times.
+        left_out: number of pairs with a time, or a trace to pick, that the findings leave out.
     """
 
     findings: tuple[Finding, ...]
     examined: bool
     changed: bool
+    pairs: int = 0
+    usable: int = 0
+    left_out: int = 0
+
+    @property
+    def pairs_used(self) -> str:
+        """Numbers of pairs in words, as the quality report counts them."""
+        more = f", {self.left_out:,} left out" if self.examined else ", not examined"
+        return f"{self.usable:,} of {self.pairs:,} pairs used{more}"
 
     def of_traces(self, index: int) -> tuple[Finding, ...]:
         """Findings in the traces of a slice, without those in picked times."""
@@ -40,11 +50,7 @@ class ScanFindings(NamedTuple):
 
     def words(self, *, stacked: bool) -> str:
         """Summary in one line; see ``finding.words``."""
-        sentence = words(self.findings, stacked=stacked) if self.findings or self.examined else ""
-        if self.examined or any(finding.check != IMPOSSIBLE for finding in self.findings):
-            return sentence
-        unchecked = "travel times not examined, which needs a centre frequency; bentray quality checks them"
-        return "; ".join(text for text in (sentence, unchecked) if text)
+        return words(self.findings, stacked=stacked) if self.findings or self.examined else ""
 
 
 def write_findings(path: Path, findings: ScanFindings, picked: Path | None = None) -> None:
@@ -80,7 +86,8 @@ def read_findings(path: Path, picked: Path | None = None) -> ScanFindings:
     if picked is not None and content["changed"] and _digest_of(picked) != content["picked_sha256"]:
         raise ValueError(f"{picked.name} is damaged")
     findings = tuple(_finding(plain) for plain in content["findings"])
-    return ScanFindings(findings, bool(content["examined"]), bool(content["changed"]))
+    counts = (int(content[name]) for name in ("pairs", "usable", "left_out"))
+    return ScanFindings(findings, bool(content["examined"]), bool(content["changed"]), *counts)
 
 
 def _digest(content: dict[str, Any]) -> str:

@@ -23,9 +23,10 @@ from bentray_kernels.acquisition.quality import Finding
 from bentray_kernels.acquisition.quality.chords import examine_chords
 from bentray_kernels.acquisition.quality.correction import apply, stacked
 from bentray_kernels.acquisition.quality.estimated_water import estimate_from_pulses
-from bentray_kernels.acquisition.quality.examination import check_times
+from bentray_kernels.acquisition.quality.examination import check_times, examines_traces
 from bentray_kernels.acquisition.quality.left_out import (
     count_left_out,
+    count_usable,
     find_impossible,
     find_too_few,
 )
@@ -123,9 +124,9 @@ class PickingSource(NamedTuple):
         return read_once(self.path, self.stamp, self.water_temperature_c)
 
     @property
-    def examines_times(self) -> bool:
-        """Whether times are examined: this needs the period, which bounds the difference of neighbours."""
-        return self.examine and self.dataset.center_frequency_hz is not None
+    def examines_traces(self) -> bool:
+        """Whether traces are examined."""
+        return self.examine and examines_traces(self.dataset, traces=self.header.samples > 0)
 
     @property
     def reads_amplitudes(self) -> bool:
@@ -154,8 +155,7 @@ class PickingSource(NamedTuple):
 class PickingGraph:
     """Task graph of examination and picking; its result is ``Files``.
 
-    Of a scan with travel times only these are examined, see ``PickingSource.examines_times``; its traces are
-    read if amplitudes are taken from them.
+    The traces of a scan with travel times are examined too, and read if amplitudes are taken from them.
 
     Args:
         source: the scan.
@@ -176,9 +176,9 @@ class PickingGraph:
                 require_traces(scan_2d, water=False)
             self._picks = True
         self._estimates = source.estimates_water
-        if self._picks or self._estimates:
+        self._examines = source.examines_traces
+        if self._picks or self._estimates or self._examines:
             self._parts = parts_of(len(dataset.tx), source.header.samples * len(dataset.rx))
-        self._examines = source.examine and not dataset.picked
         self._measures = self._examines or self._estimates
         # Of the object, until the chords through water are found in them.
         self._measured: dict[int, list[Any]] = {}
@@ -344,7 +344,7 @@ def finish_slice(
         ratio = np.concatenate([pick.ratio for pick in picks if pick.ratio is not None])
         ratio = np.where(np.isfinite(dataset.differential_tof()), ratio, np.nan)
         dataset = replace(dataset, log_ratio_np=ratio, amplitude_frequency_hz=dataset.center_frequency_hz)
-    if source.examines_times:
+    if source.examine:
         later = _usable(source, index, check_times(dataset))
         dataset, findings = apply(dataset, later), (*findings, *later)
     return dataset, findings
@@ -356,19 +356,20 @@ def write_picked(
     """Task: write the picked dataset, unless it equals the scan, and then all findings."""
     whole = source.dataset
     impossible = find_impossible(whole.impossible_times)
+    counted = [count_left_out(whole.slice(k), of_slice) for k, (_, of_slice) in enumerate(slices)]
     if source.examine:
-        counted = [count_left_out(whole.slice(k), of_slice) for k, (_, of_slice) in enumerate(slices)]
         too_few = find_too_few(counted, whole.impossible_times, source.max_left_out)
         _usable(source, 0, too_few)
     of_slices = (replace(finding, slice=k) for k, (_, faults) in enumerate(slices) for finding in faults)
     findings = (*impossible, *of_slices)
     corrected = any(finding.action != "reported" for finding in findings)
     changed = source.reads_amplitudes or not whole.picked or corrected
+    datasets = [dataset for dataset, _ in slices]
+    picked = datasets[0] if whole.slice_z_m is None else stacked(whole, datasets)
     if changed:
-        datasets = [dataset for dataset, _ in slices]
-        picked = datasets[0] if whole.slice_z_m is None else stacked(whole, datasets)
         write_dataset(files.picked, replace(picked, truth=whole.truth))
-    record = ScanFindings(findings, source.examines_times, changed)
+    left_out = sum(pairs.left_out for pairs in counted)
+    record = ScanFindings(findings, source.examine, changed, *count_usable(picked), left_out)
     write_findings(files.findings, record, files.picked if changed else None)
 
 

@@ -169,7 +169,7 @@ def plan(scan: Summary, settings: Settings, capacities: Sequence[WorkerCapacity]
     tasks = sum(_tasks(scan, method, shape) for method in methods)
     tasks += scan.slices * wave_tasks(traces, scan.width_m, refining) + reflection_tasks(scan, settings)
     if scan.traces_bytes:
-        tasks += picking_tasks(scan.traces, scan.slices, settings)
+        tasks += picking_tasks(scan.recorded, scan.slices, settings)
     cost = reconstruction_cost(scan, settings, len(able))
     return Plan(
         decomposition,

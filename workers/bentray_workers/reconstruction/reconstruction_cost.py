@@ -66,8 +66,8 @@ def reconstruction_cost(scan: Summary, settings: Settings, workers: int) -> Reco
     )
     rays = _rays_seconds(scan, settings)
     picking = 0.0
-    if scan.traces_bytes and scan.traces is not None:
-        samples = 2.0 * scan.slices * scan.traces.emissions * scan.traces.receivers * scan.traces.samples
+    if (recorded := scan.recorded) is not None:
+        samples = 2.0 * scan.slices * recorded.emissions * recorded.receivers * recorded.samples
         picking = samples / SAMPLES_PER_S
     sequential = settings.method == "sart"
     problems = 1 if settings.decomposition == "volume" else scan.slices

@@ -99,6 +99,7 @@ def reconstruct(
         )
     if settings.picking.examine or findings.findings:
         estimated["quality"] = findings.words(stacked=result.speed.ndim == 3)
+    estimated["pairs"] = findings.pairs_used
     result = replace(result, provenance={**result.provenance, **estimated})
     return with_settings_caution(result, settings, picks=not header.dataset.picked)
 

@@ -113,13 +113,12 @@ def screen_times(dataset: Dataset, delta: Floats, sigma: Floats, *, screened: bo
     Returns:
         Copies, with NaN for removed times.
     """
-    assert dataset.center_frequency_hz is not None
     delta = delta.copy()
     if dataset.valid is not None:
         delta[~dataset.valid] = np.nan
     delta[dataset.tx[:, None] == dataset.rx[None, :]] = np.nan
     if screened:
-        delta = consistent(dataset, delta, 0.5 / dataset.center_frequency_hz)
+        delta = consistent(dataset, delta)
     return delta, np.where(np.isfinite(delta), sigma, np.nan)
 
 

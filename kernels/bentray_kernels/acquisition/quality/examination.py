@@ -16,7 +16,7 @@ from ...requests.picker_names import DEFAULT_PICKER
 from ..dataset import Dataset
 from ..picking.first_arrivals import pick
 from .array_shape import COVERAGE, find_limited_angle, inapplicable
-from .contradictions import find_contradictions
+from .contradictions import APPARENT, CYCLES, find_contradictions
 from .correction import apply, stacked
 from .dead import find_dead
 from .estimated_water import WATER_SHOT, estimate_water
@@ -26,14 +26,15 @@ from .left_out import (
     LEFT_OUT,
     Pairs,
     count_left_out,
+    count_usable,
     find_impossible,
     find_too_few,
 )
 from .order import ORDER, find_wrong_order
 from .recording import Measured, check_traces
-from .time_zero import find_time_shift
+from .time_zero import OBJECT, find_time_shift
 
-OF_TIMES = (ORDER, "time zero of the object scan", "cycle jumps", "outliers", "reciprocity")
+OF_TIMES = (ORDER, OBJECT, APPARENT, CYCLES, "outliers", "reciprocity")
 
 
 @dataclass(frozen=True)
@@ -114,18 +115,27 @@ def examine_slices(
         # A single slice keeps its truth and position; several lose them when sliced.
         combined = whole[0] if dataset.slice_z_m is None else stacked(dataset, whole)
         picked = replace(combined, truth=dataset.truth, waveform=None)
-    other = (dataset.tx[:, None] != dataset.rx[None, :]).sum() * dataset.slices
-    usable = 0 if picked is None else int(np.isfinite(picked.differential_tof()).sum())
+    pairs, usable = count_usable(replace(dataset, tof_s=None, delta_tof_s=None) if picked is None else picked)
     name = "" if dataset.picked else picker
     findings += find_limited_angle(dataset)
     excluded = inapplicable(dataset, checked)
     done = (IMPOSSIBLE, *(name for name in checked if name not in excluded), COVERAGE, LEFT_OUT)
-    return Examined(Report(tuple(findings), done, int(other), usable, name, excluded), picked)
+    return Examined(Report(tuple(findings), done, pairs, usable, name, excluded), picked)
+
+
+def examines_traces(dataset: Dataset, *, traces: bool) -> bool:
+    """Whether the traces of a scan are examined, here and in jobs: also beside stored travel times.
+
+    Args:
+        dataset: its traces may remain in the file.
+        traces: whether there are any.
+    """
+    return traces and not (dataset.picked and dataset.center_frequency_hz is None)
 
 
 def _times_read(dataset: Dataset) -> int:
     """Number of passes over an emission of a slice: one per scan to measure it, one to pick it."""
-    if dataset.waveform is None:
+    if dataset.waveform is None or not examines_traces(dataset, traces=True):
         return 0
     return 1 + (dataset.waveform.water is not None) + (not dataset.picked)
 
@@ -137,7 +147,7 @@ def _slice(
     findings: list[Finding] = []
     checked: tuple[str, ...] = ()
     measured = None
-    if dataset.waveform is not None:
+    if examines_traces(dataset, traces=dataset.waveform is not None):
         measured = Measured.from_dataset(dataset, range(len(dataset.tx)), step)
         findings, checked = check_traces(dataset, measured)
     if any(finding.action == "refused" for finding in findings):
@@ -167,7 +177,7 @@ def check_times(dataset: Dataset) -> list[Finding]:
     findings = find_wrong_order(dataset)
     if findings:
         return findings
-    if dataset.waveform is None and dataset.valid is None:
+    if dataset.valid is None:
         findings += find_dead(dataset, _detected(dataset, dataset.differential_tof()))
     findings += find_time_shift(dataset, dataset.differential_tof())
     if any(finding.action == "refused" for finding in findings):

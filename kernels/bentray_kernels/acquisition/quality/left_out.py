@@ -40,6 +40,12 @@ def count_left_out(dataset: Dataset, findings: Iterable[Finding]) -> Pairs:
     return Pairs(int(usable.sum()), int((usable & out).sum()))
 
 
+def count_usable(dataset: Dataset) -> tuple[int, int]:
+    """Numbers of pairs of different elements over all slices, and of those with a valid travel time."""
+    pairs = int((dataset.tx[:, None] != dataset.rx[None, :]).sum()) * dataset.slices
+    return pairs, int(np.isfinite(dataset.differential_tof()).sum()) if dataset.picked else 0
+
+
 def find_impossible(counts: Mapping[str, int]) -> list[Finding]:
     """Report the impossible times that a scan came with, which are missing.
 

@@ -28,6 +28,10 @@ MOST_PERIODS, MOST_FLIGHT = 10.0, 0.25
 # scatter by less than the last part of it.
 SMALL_PERIODS, SMALL_FLIGHT, MOST_SCATTER = 3.0, 0.05, 1.0 / 3.0
 
+# Times of the nearer and the farther half of the pairs that differ by more than this part of their median
+# grow with the distance, as a time zero does not.
+GROWING = 0.5
+
 # Largest accepted median of their times, fraction of a period; without a frequency, s.
 LARGEST_OFFSET = 0.1
 LARGEST_OFFSET_S = 5e-8
@@ -59,7 +63,8 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
         dataset: of one slice.
         delta: (ntx, nrx), s.
     """
-    missing = delta[(chord_offset(dataset) >= OUTSIDE) & np.isfinite(delta)]
+    outside = (chord_offset(dataset) >= OUTSIDE) & np.isfinite(delta)
+    missing = delta[outside]
     if missing.size < MIN_PAIRS:
         return []
     offset = float(np.median(missing))
@@ -69,6 +74,12 @@ def find_time_shift(dataset: Dataset, delta: Floats) -> list[Finding]:
     if abs(offset) <= max(largest, scatter):
         return []
     action, more = _correctable(dataset, offset, scatter)
+    distance = dataset.distance_m()[outside]
+    farther = distance > np.median(distance)
+    if farther.any() and not farther.all():
+        near, far = (float(np.median(missing[half])) for half in (~farther, farther))
+        if abs(far - near) > max(GROWING * abs(offset), scatter, largest):
+            action, more = "reported", ", but grow with the distance: the object is there, or other water"
     return [
         Finding(
             OBJECT,

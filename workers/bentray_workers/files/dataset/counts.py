@@ -66,7 +66,7 @@ class Summary:
         in_space: whether the elements have 3-D positions.
         height_m: from the lowest height to the highest, m.
         width_m: of the array, m.
-        traces_bytes: of the waveforms, 0 with travel times.
+        traces_bytes: of the waveforms that are examined or picked.
         amplitudes: whether there are amplitudes.
         traces: for a full-waveform refinement; None without traces of the object.
         period: whether the centre frequency is known, so that times are examined.
@@ -74,6 +74,7 @@ class Summary:
         decomposition: where the settings leave it open.
         normals: whether the directions of the elements are known.
         echoes: traces of the object for a reflection image; None if there are none, or none is requested.
+        recorded: traces that are examined or picked; None if there are none, or the frequency is unknown.
     """
 
     emitters: int
@@ -91,6 +92,7 @@ class Summary:
     decomposition: str = "slices"
     normals: bool = False
     echoes: Traces | None = None
+    recorded: Traces | None = None
 
 
 @dataclass(frozen=True)
@@ -163,6 +165,9 @@ class DatasetCounts:
         """
         both = (self.elements, self.elements)
         emitters, receivers = both if settings.numerics.reciprocity else (self.emissions, self.receivers)
+        reads = not self.times or settings.reads_amplitudes
+        # As ``quality.examination.examines_traces`` decides.
+        reads |= settings.picking.examine and self.frequency_hz is not None
         estimated = not self.times or settings.reads_amplitudes or settings.method == "waveform"
         return Summary(
             emitters=emitters,
@@ -172,7 +177,8 @@ class DatasetCounts:
             in_space=self.in_space,
             height_m=self.height_m,
             width_m=self.width_m,
-            traces_bytes=0 if self.times and not settings.reads_amplitudes else self.traces_bytes,
+            traces_bytes=self.traces_bytes if reads else 0,
+            recorded=self._traces() if reads else None,
             amplitudes=self.amplitudes or settings.reads_amplitudes,
             traces=self._traces() if self.water_shot or estimated else None,
             period=self.frequency_hz is not None,

@@ -113,8 +113,8 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
     """
     sizes: dict[str, int] = {}
     if scan.traces_bytes:
-        sizes |= picking_task_bytes(scan.traces, scan.pairs, settings)
-    elif scan.period and settings.picking.examine:
+        sizes |= picking_task_bytes(scan.recorded, scan.pairs, settings)
+    elif settings.picking.examine:
         sizes["finish_slice"] = finish_slice_bytes(scan.pairs // scan.slices)
     return sizes | {name: sum(parts.values()) for name, parts in ray_task_parts(scan, settings).items()}
 
