@@ -45,6 +45,7 @@ from bentray_workers.images.maps import SPEED, draw_bar, draw_map
 from bentray_workers.images.report import COLORMAPS
 from bentray_workers.images.slice import usual_limits
 from bentray_workers.simulation.plane import SimulationSettings
+from bentray_workers.simulation.request import SAMPLE
 from bentray_workers.simulation.simulation_run import simulate
 
 # The benchmarks are a namespace package of the checkout.
@@ -63,18 +64,6 @@ ENDS: dict[str, dict[str, Any]] = {
 }
 BENTRAY = [sys.executable, "-m", "bentray_service.cli"]
 MM = 1e3
-
-# A simulated scan with traces, as that of the start page.
-SAMPLE = {
-    "phantom": "table6",
-    "waveform": True,
-    "nodes": 64,
-    "elements": 64,
-    "emissions": 32,
-    "frequency_hz": 3e5,
-    "side_m": 0.06,
-    "snr": 30,
-}
 
 
 def fronts() -> Image.Image:

@@ -1,7 +1,7 @@
 """Analytic phantoms, sampled on any grid."""
 
 from .cube_fields import CubeField, eight_bit, in_nodes, sampled
-from .detailed_breast import DENSITIES, DETAILED_SIDE_M, Anatomy, DetailedBreast
+from .detailed_breast import DENSITIES, DETAILED_SIDE_M, LARGE_LESIONS, Anatomy, DetailedBreast
 from .ellipses import Ellipse, EllipsePhantom, HalfEllipse
 from .fringe_sphere import ONE_HOLE, TWO_HOLES, FringeSphere
 from .marschner_lobb import MarschnerLobb
@@ -13,6 +13,7 @@ from .volume import Part, PhantomSlice, VolumePhantom
 __all__ = [
     "DENSITIES",
     "DETAILED_SIDE_M",
+    "LARGE_LESIONS",
     "ONE_HOLE",
     "TABLE6_SIDE_M",
     "TABLE7_FREQUENCY_HZ",

@@ -68,6 +68,20 @@ class Anatomy(NamedTuple):
 # The breast of the benchmarks.
 DETAILED = Anatomy()
 
+# A breast with mostly glandular tissue, and lesions large enough that images by rays show them, too.
+LARGE_LESIONS = Anatomy(
+    71,
+    (0.080, 0.074),
+    0.80,
+    -1.5,
+    (
+        Ellipse((-0.030, 0.016), (0.013, 0.010), 1580.0, 25.0, "tumour", 0.5),
+        Ellipse((0.032, -0.018), (0.010, 0.010), 1575.0, 25.0, "small tumour"),
+        Ellipse((0.014, 0.024), (0.014, 0.011), 1430.0, 5.0, "fat lobule", -0.4),
+        Ellipse((-0.012, -0.026), (0.011, 0.011), 1460.0, 0.0, "cyst"),
+    ),
+)
+
 
 def _tumour_and_cyst(
     tumour: tuple[float, float], small: tuple[float, float], cyst: tuple[float, float]
@@ -181,7 +195,8 @@ class DetailedBreast:
 
     def speed_range(self) -> tuple[float, float]:
         """Lowest and highest speed of the object, m/s, the coupling left out; of fat three deviations."""
-        return FAT.speed_mps - 3.0 * FAT.variation_mps, self.anatomy.lesions[0].speed_mps
+        lesions = [lesion.speed_mps for lesion in self.anatomy.lesions]
+        return min(FAT.speed_mps - 3.0 * FAT.variation_mps, *lesions), max(lesions)
 
     def _means(self, nodes: int, side_m: float, quantity: int) -> Floats:
         axis = node_positions(nodes, side_m)

@@ -6,7 +6,7 @@ from bentray_kernels.requests.device_request import DeviceRequest
 from bentray_kernels.requests.picker_names import PickerName
 
 Method = Literal["sart", "gauss-newton", "auto", "waveform"]
-PhantomName = Literal["table6", "table6-vertical", "detailed", "table7"]
+PhantomName = Literal["table6", "table6-vertical", "detailed", "breast", "table7"]
 
 class ReconstructionSettings(TypedDict, total=False):
     rays: Literal["curved", "straight"]

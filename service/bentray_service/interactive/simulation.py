@@ -20,7 +20,8 @@ def simulate(
 
     Args:
         phantom: ``table6``: 2-D breast (Li 2008, Table 6); ``table6-vertical``: its vertical slice;
-            ``detailed``: 2-D with skin and glandular texture; ``table7``: 3-D breast (Li 2008, Table 7).
+            ``detailed``: 2-D with skin and glandular texture; ``breast``: the same with large lesions;
+            ``table7``: 3-D breast (Li 2008, Table 7).
         progress: show a progress bar.
         settings: ``nodes`` along a side of the truth (128), ``elements`` of the ring (256), ``coupling_mps``,
             the speed of the water (1500), ``snr``, a ratio of amplitudes (no noise), ``seed``,

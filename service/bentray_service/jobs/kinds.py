@@ -22,7 +22,7 @@ from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.rendering import geometry_field
 from bentray_workers.rendering.field_settings import FieldSettings, check_faces
 from bentray_workers.rendering.turntable import Turntable, draw_turntable
-from bentray_workers.simulation.request import PhantomScan
+from bentray_workers.simulation.request import SAMPLE, PhantomScan
 from bentray_workers.simulation.simulation_run import simulate_to_file
 
 from ..compute import Compute, check_renderable
@@ -127,8 +127,8 @@ class SimulationKind(Kind[SimulationRequest]):
     request, settings = SimulationRequest, TypeAdapter(PhantomScan)
     table, lane, words = DatasetRow, "recon", "Simulated scan"
     example: ClassVar[Example] = {
-        "summary": "A scan of a phantom, with noise on its travel times",
-        "value": {"kind": "simulation", "settings": {"nodes": 64, "elements": 64, "noise_s": 2e-8}},
+        "summary": "The sample scan: traces of a breast with four lesions",
+        "value": {"kind": "simulation", "settings": dict(SAMPLE)},
     }
 
     def plan(self, request: SimulationRequest, tenant: Tenant, sources: Sources, compute: Compute) -> NewJob:

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.phantoms import DENSITIES, DETAILED_SIDE_M, DetailedBreast
+from bentray_kernels.phantoms import DENSITIES, DETAILED_SIDE_M, LARGE_LESIONS, DetailedBreast
 
 BREAST = DetailedBreast(1480.0, 0.2)
 
@@ -44,12 +44,13 @@ CLASSES = {
     "scattered": (0.25, 0.5),
     "heterogeneous": (0.5, 0.75),
     "dense": (0.75, 1.0),
+    "large lesions": (0.5, 0.75),
 }
 
 
-@pytest.mark.parametrize("name", DENSITIES)
+@pytest.mark.parametrize("name", [*DENSITIES, "large lesions"])
 def test_each_density_has_its_share_of_gland_and_its_lesions(name):
-    anatomy = DENSITIES[name]
+    anatomy = DENSITIES.get(name, LARGE_LESIONS)
     breast = DetailedBreast(1500.0, anatomy=anatomy)
     low, high = CLASSES[name]
     assert low < breast.glandular(93, DETAILED_SIDE_M) < high

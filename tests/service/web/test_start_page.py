@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 from scipy.io import savemat
 
 from bentray_service.jobs import kinds
-from bentray_workers.simulation.waves import WaveSimulationSettings
+from bentray_workers.simulation.request import SAMPLE, PhantomScan
 
 from ...workers.foreign_scans.scans import delta_tof, positions
 
@@ -127,8 +127,7 @@ def test_a_sample_scan_is_simulated_and_opened(page, address, monkeypatch):
     page.get_by_role("heading", name="A phantom").wait_for()
     assert "#/scans/" in page.url
     (request,) = requests
-    assert isinstance(request, WaveSimulationSettings)
-    assert (request.elements, request.emissions) == (64, 32)
+    assert request == PhantomScan(**SAMPLE).chosen()
 
 
 def test_an_upload_goes_on_after_a_broken_connection_and_a_reload(page, address, scan):

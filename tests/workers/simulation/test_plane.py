@@ -85,10 +85,15 @@ def test_the_vertical_slice_is_simulated_by_its_name():
     np.testing.assert_array_equal(scan.roi, table6_vertical().inside(nodes, TABLE6_SIDE_M))
 
 
-def test_the_detailed_breast_is_simulated_by_its_name(tmp_path):
-    scan = simulate(replace(SMALL, phantom="detailed", coupling_mps=1480.0))
-    assert scan.title == "2-D breast phantom with glandular texture, coupling 1480 m/s"
+@pytest.mark.parametrize(
+    ("phantom", "title"),
+    [
+        ("detailed", "2-D breast phantom with glandular texture"),
+        ("breast", "2-D breast phantom with skin, fat, gland and four lesions"),
+    ],
+)
+def test_a_breast_with_texture_is_simulated_by_its_name(phantom, title):
+    scan = simulate(replace(SMALL, phantom=phantom, coupling_mps=1480.0))
+    assert scan.title == f"{title}, coupling 1480 m/s"
     assert scan.truth.sound_speed_mps.max() > 1500.0
-    with pytest.raises(InvalidInput, match="phantom"):
-        PhantomScan(phantom="detailed", waveform=True)
-    assert PhantomScan(phantom="detailed").plain()["phantom"] == "detailed"
+    assert PhantomScan(phantom=phantom).plain()["phantom"] == phantom

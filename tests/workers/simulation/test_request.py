@@ -2,14 +2,17 @@
 
 import json
 
+import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bentray_workers.simulation.plane import SimulationSettings
-from bentray_workers.simulation.request import PhantomScan
+from bentray_kernels.phantoms import DETAILED_SIDE_M
+from bentray_workers.simulation.plane import SimulationSettings, plane_phantom
+from bentray_workers.simulation.request import SAMPLE, PhantomScan
 from bentray_workers.simulation.volume import VolumeSimulationSettings
 from bentray_workers.simulation.volume_waves import VolumeWaveSettings
-from bentray_workers.simulation.waves import VerticalWaveSettings, WaveSimulationSettings
+from bentray_workers.simulation.waves import BreastWaveSettings, VerticalWaveSettings, WaveSimulationSettings
 
 SIZES = {"nodes": st.integers(16, 1024), "elements": st.integers(8, 4096), "seed": st.integers(0, 2**40)}
 NOISE = {"snr": st.none() | st.floats(0.1, 1e6), "coupling_mps": st.floats(1300.0, 1700.0)}
@@ -51,6 +54,21 @@ def test_request_selects_the_phantom():
     assert PhantomScan(phantom="table6-vertical").chosen() == SimulationSettings(phantom="table6-vertical")
     in_space = PhantomScan(phantom="table7", waveform=True, nodes=256, elements=128).chosen()
     assert in_space == VolumeWaveSettings()
+
+
+@pytest.mark.parametrize("phantom", ["detailed", "breast"])
+def test_waves_cross_a_breast_with_texture_scaled_to_the_side(phantom):
+    waves = PhantomScan(phantom=phantom, waveform=True, side_m=0.06, frequency_hz=3e5).chosen()
+    breast = plane_phantom(phantom, 1500.0)
+    np.testing.assert_array_equal(waves.speed(), breast.speed(waves.fine_nodes, DETAILED_SIDE_M))
+    low, high = waves.speeds
+    assert low <= waves.speed().min() < 1460.0 < 1560.0 < waves.speed().max() <= high
+
+
+def test_the_sample_is_a_request_of_traces():
+    waves = PhantomScan(**json.loads(json.dumps(dict(SAMPLE)))).chosen()
+    assert isinstance(waves, BreastWaveSettings)
+    assert waves.emissions == SAMPLE["emissions"] < waves.elements
 
 
 def test_every_element_of_a_small_ring_emits():

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from bentray_kernels.errors import InvalidInput
+from collections.abc import Mapping
+from types import MappingProxyType
 
 from .plane import SimulationSettings
 from .volume import VolumeSimulationSettings
 from .volume_waves import VolumeWaveSettings
-from .waves import VerticalWaveSettings, WaveSimulationSettings
+from .waves import BreastWaveSettings, DetailedWaveSettings, VerticalWaveSettings, WaveSimulationSettings
 
 Simulated = SimulationSettings | VolumeSimulationSettings | WaveSimulationSettings
 
+WAVES: Mapping[str, type[WaveSimulationSettings]] = MappingProxyType(
+    {
+        "table6": WaveSimulationSettings,
+        "table6-vertical": VerticalWaveSettings,
+        "detailed": DetailedWaveSettings,
+        "breast": BreastWaveSettings,
+        "table7": VolumeWaveSettings,
+    }
+)
+
 
 def kind_of(phantom: str, *, waveform: bool) -> type[Simulated]:
-    """The settings of a kind of scan.
-
-    Raises:
-        InvalidInput: for a phantom through which no waves are simulated.
-    """
+    """The settings of a kind of scan."""
     if not waveform:
         return VolumeSimulationSettings if phantom == "table7" else SimulationSettings
-    if phantom == "detailed":
-        raise InvalidInput("phantom", repr(phantom), "table6, table6-vertical or table7, with waveform true")
-    return {"table6-vertical": VerticalWaveSettings, "table7": VolumeWaveSettings}.get(
-        phantom, WaveSimulationSettings
-    )
+    return WAVES[phantom]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Literal
 
@@ -17,6 +18,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import (
     DETAILED_SIDE_M,
+    LARGE_LESIONS,
     TABLE6_SIDE_M,
     DetailedBreast,
     EllipsePhantom,
@@ -29,15 +31,26 @@ from bentray_kernels.tomography.problem import MARGIN_NODES
 
 from .ranges import ELEMENTS, NODES, NOISE_S, REFINEMENT, SNR
 
-PlanePhantom = Literal["table6", "table6-vertical", "detailed"]
+PlanePhantom = Literal["table6", "table6-vertical", "detailed", "breast"]
 TITLES = {
     "table6": "2-D breast phantom (Li 2008, Table 6)",
     "table6-vertical": "2-D breast phantom (Li 2008, Table 6), vertical slice",
     "detailed": "2-D breast phantom with glandular texture",
+    "breast": "2-D breast phantom with skin, fat, gland and four lesions",
 }
-SIDES_M = {"table6": TABLE6_SIDE_M, "table6-vertical": TABLE6_SIDE_M, "detailed": DETAILED_SIDE_M}
+SIDES_M = {
+    "table6": TABLE6_SIDE_M,
+    "table6-vertical": TABLE6_SIDE_M,
+    "detailed": DETAILED_SIDE_M,
+    "breast": DETAILED_SIDE_M,
+}
 PLANE_PHANTOMS: Mapping[str, Callable[[float], EllipsePhantom | DetailedBreast]] = MappingProxyType(
-    {"table6": table6, "table6-vertical": table6_vertical, "detailed": DetailedBreast}
+    {
+        "table6": table6,
+        "table6-vertical": table6_vertical,
+        "detailed": DetailedBreast,
+        "breast": partial(DetailedBreast, anatomy=LARGE_LESIONS),
+    }
 )
 
 
@@ -47,7 +60,7 @@ class SimulationSettings:
 
     Attributes:
         phantom: that of Li 2008, Table 6, in its horizontal or vertical slice, or one with skin and glandular
-            texture.
+            texture, of small or of large lesions.
         nodes: nodes along a side of the truth image, and of the reconstruction it is meant for.
         elements: of the ring, each emitter and receiver.
         coupling_mps: speed of sound in the coupling medium around the breast, m/s.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from bentray_kernels.requests.limits import SPEED_MPS
@@ -20,6 +22,22 @@ TRACES: Uses = ({"waveform": (True,)},)
 VOLUMES: Uses = ({"waveform": (False,), "phantom": ("table7",)},)
 NOISE: Uses = ({"snr": ABOVE_ZERO}, {"noise_s": ABOVE_ZERO})
 
+# The sample scan of the page, of `bentray demo` and of the README: traces of a ring of 12 cm in warm water.
+# Bent rays show its lesions within seconds, full waveforms within half a minute.
+SAMPLE: Mapping[str, Any] = MappingProxyType(
+    {
+        "phantom": "breast",
+        "waveform": True,
+        "nodes": 128,
+        "elements": 72,
+        "emissions": 18,
+        "coupling_mps": 1520.0,
+        "frequency_hz": 2.5e5,
+        "side_m": 0.12,
+        "snr": 30.0,
+    }
+)
+
 
 @dataclass(frozen=True)
 class PhantomScan:
@@ -29,11 +47,11 @@ class PhantomScan:
         InvalidInput: naming the first field that is wrong, or belongs to another kind of scan.
     """
 
-    phantom: Literal["table6", "table6-vertical", "detailed", "table7"] = setting(
+    phantom: Literal["table6", "table6-vertical", "detailed", "breast", "table7"] = setting(
         "table6",
         "table6: 2-D breast phantom (Li 2008, Table 6); table6-vertical: its vertical slice, half an "
-        "ellipse; detailed: 2-D, with skin and glandular texture, travel times only; table7: 3-D breast "
-        "phantom (Li 2008, Table 7).",
+        "ellipse; detailed: 2-D, with skin and glandular texture; breast: the same with large lesions, fast "
+        "and slow; table7: 3-D breast phantom (Li 2008, Table 7).",
     )
     waveform: bool = setting(
         False, "Simulate waves and record traces of object and water, not travel times; table7: in 3-D."
@@ -65,7 +83,7 @@ class PhantomScan:
         "2-D phantoms: standard deviation of the travel-time noise, s.",
         ranges.NOISE_S,
         unset="0",
-        used_when=({"waveform": (False,), "phantom": ("table6", "table6-vertical", "detailed")},),
+        used_when=({"waveform": (False,), "phantom": ("table6", "table6-vertical", "detailed", "breast")},),
     )
     slices: int | None = setting(
         None,

@@ -14,7 +14,7 @@ from bentray_kernels.acquisition import Dataset, Truth, Waveform
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.phantoms import TABLE6_SIDE_M, EllipsePhantom, table6, table6_vertical
+from bentray_kernels.phantoms import DetailedBreast, EllipsePhantom
 from bentray_kernels.phantoms.volume import PhantomSlice
 from bentray_kernels.requests.limits import SPEED_MPS
 from bentray_kernels.requests.ranges import SEED, Range, check_ranges, ranged
@@ -24,7 +24,7 @@ from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import longest_step, phase_error
 from bentray_kernels.wave.time_blocks import Poll, no_poll
 
-from .plane import ring_radius
+from .plane import SIDES_M, TITLES, PlanePhantom, plane_phantom, ring_radius
 from .ranges import DEFAULT_EMISSIONS, EMISSIONS, FREQUENCY_HZ, NODES, SIDE_M, SNR
 from .shared_media import made_once
 
@@ -78,8 +78,9 @@ class WaveSimulationSettings:
     # These differ in 3-D.
     dimensions: ClassVar[int] = 2
     edge_nodes: ClassVar[int] = EDGE_NODES
-    phantom_side_m: ClassVar[float] = TABLE6_SIDE_M
-    phantom_name: ClassVar[str] = "2-D breast phantom (Li 2008, Table 6)"
+    plane: ClassVar[PlanePhantom] = "table6"
+    phantom_side_m: ClassVar[float] = SIDES_M["table6"]
+    phantom_name: ClassVar[str] = TITLES["table6"]
 
     def __post_init__(self) -> None:
         check_ranges(self)
@@ -91,9 +92,9 @@ class WaveSimulationSettings:
             raise InvalidInput("frequency_hz", self.frequency_hz, f"at most {most:.3g} for this side")
 
     @property
-    def phantom(self) -> EllipsePhantom | PhantomSlice:
+    def phantom(self) -> EllipsePhantom | DetailedBreast | PhantomSlice:
         """The phantom in the plane of the ring."""
-        return table6(self.coupling_mps)
+        return plane_phantom(self.plane, self.coupling_mps)
 
     @property
     def grid(self) -> tuple[int, ...]:
@@ -168,12 +169,27 @@ class WaveSimulationSettings:
 class VerticalWaveSettings(WaveSimulationSettings):
     """Like ``WaveSimulationSettings`` in the vertical slice of the phantom."""
 
-    phantom_name: ClassVar[str] = "2-D breast phantom (Li 2008, Table 6), vertical slice"
+    plane: ClassVar[PlanePhantom] = "table6-vertical"
+    phantom_side_m: ClassVar[float] = SIDES_M["table6-vertical"]
+    phantom_name: ClassVar[str] = TITLES["table6-vertical"]
 
-    @property
-    def phantom(self) -> EllipsePhantom:
-        """The half ellipse in the plane of the ring."""
-        return table6_vertical(self.coupling_mps)
+
+@dataclass(frozen=True)
+class DetailedWaveSettings(WaveSimulationSettings):
+    """Like ``WaveSimulationSettings`` in the breast with glandular texture."""
+
+    plane: ClassVar[PlanePhantom] = "detailed"
+    phantom_side_m: ClassVar[float] = SIDES_M["detailed"]
+    phantom_name: ClassVar[str] = TITLES["detailed"]
+
+
+@dataclass(frozen=True)
+class BreastWaveSettings(WaveSimulationSettings):
+    """Like ``WaveSimulationSettings`` in the breast with large lesions."""
+
+    plane: ClassVar[PlanePhantom] = "breast"
+    phantom_side_m: ClassVar[float] = SIDES_M["breast"]
+    phantom_name: ClassVar[str] = TITLES["breast"]
 
 
 class Noise:

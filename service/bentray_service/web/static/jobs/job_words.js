@@ -4,7 +4,7 @@ import { send } from "../parts/api.js";
 
 const KINDS = { reconstruction: "Reconstruction", simulation: "Simulated scan", refraction: "Turntable", "geometry-field": "Geometry field" };
 const METHODS = { sart: "SART", "gauss-newton": "Gauss–Newton" };
-const PHANTOMS = { table7: "3-D breast phantom", detailed: "Detailed 2-D breast phantom" };
+const PHANTOMS = { table7: "3-D breast phantom", detailed: "Detailed 2-D breast phantom", breast: "2-D breast with lesions" };
 
 // A word of the service as a label: a kind by its name on the page, another by itself.
 export function inWords(word) {

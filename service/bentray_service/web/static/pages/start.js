@@ -2,6 +2,7 @@
 import { go, keepQuery, pick } from "../parts/address.js";
 import { inTime } from "../parts/amounts.js";
 import { request, send } from "../parts/api.js";
+import { description } from "../parts/description.js";
 import { DropZone } from "../parts/drop_zone.js";
 import { Filters, ListPages, olderOf } from "../parts/lists.js";
 import { titleOf } from "../parts/titles.js";
@@ -11,12 +12,6 @@ import { Alert, Button, Choice, Facts, Field, Form, html, Section, useAct, useAs
 const PAGE_LENGTH = 25;
 const ACCEPT = ".h5,.hdf5,.mat,.npz,.zip,application/x-hdf5";
 const FORMATS = "HDF5 (uct-transmission, zea, openUSCT), MATLAB, NumPy, zip of k-Wave or KIT 3D USCT";
-
-// A scan that is simulated within seconds, with traces, so that both Fast and Best apply.
-const SAMPLE = {
-  kind: "simulation",
-  settings: { phantom: "table6", waveform: true, nodes: 64, elements: 64, emissions: 32, frequency_hz: 300000, side_m: 0.06, snr: 30 },
-};
 
 // What the form states about a file of another program.
 function metadataIn(form) {
@@ -55,11 +50,13 @@ function Sample() {
   const [error, act] = useAct();
   const shown = useShown();
   const simulate = () => act(async () => {
-    const job = await send("POST", "/v1/jobs", SAMPLE);
+    // The service describes it, as the example of a simulation.
+    const { examples } = (await description()).paths["/v1/jobs"].post.requestBody.content["application/json"];
+    const job = await send("POST", "/v1/jobs", examples.simulation.value);
     if (shown.current) go(`/jobs/${job.id}?then=scan`);
   });
   return html`<${Section} id="sample" title="No scan at hand?">
-    <p>Simulate a small scan of a 2-D breast phantom, with traces and the truth to compare with. It takes some seconds.</p>
+    <p>Simulate traces of a 2-D breast with skin, fat, glandular tissue and four lesions, and the truth to compare with.</p>
     <${Button} id="sample" quiet=${false} onClick=${simulate}>Simulate a sample scan</${Button}>
     <${Alert} id="sample-error" error=${error} />
   </${Section}>`;
