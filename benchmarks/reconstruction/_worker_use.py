@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+from distributed import Client
 
 SELF = Path("/proc/self")
 
@@ -32,3 +36,9 @@ def cpu_seconds() -> float:
     """CPU time of all threads, s."""
     used = os.times()
     return used.user + used.system
+
+
+def of_worker(client: Client, function: Callable[[], Any]) -> Any:
+    """The result of a function on the only worker."""
+    (result,) = client.run(function).values()
+    return result

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bentray_kernels.tomography import Settings
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
@@ -18,7 +18,7 @@ from bentray_workers.reconstruction.planning import plan
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
 from ..shared._synthetic_scan import made_up_scan
-from ._worker_use import cpu_seconds, forget_peak, peak_bytes
+from ._worker_use import cpu_seconds, forget_peak, of_worker, peak_bytes
 
 
 class Size(NamedTuple):
@@ -68,10 +68,10 @@ def measured(folder: Path, size: Size) -> Iterable[Row]:
     with open_cluster(workers=1, local_directory=folder) as cluster:
         small = made_up_scan(folder / "small.h5", SMALL.elements, SMALL.slices)
         reconstruct(cluster.client, small, settings_of(SMALL))
-        _of_worker(cluster.client.run(forget_peak))
-        warm, before = (_of_worker(cluster.client.run(figure)) for figure in (peak_bytes, cpu_seconds))
+        of_worker(cluster.client, forget_peak)
+        warm, before = (of_worker(cluster.client, figure) for figure in (peak_bytes, cpu_seconds))
         result = reconstruct(cluster.client, path, settings, work_dir=work, on_saved=saved)
-        peak, after = (_of_worker(cluster.client.run(figure)) for figure in (peak_bytes, cpu_seconds))
+        peak, after = (of_worker(cluster.client, figure) for figure in (peak_bytes, cpu_seconds))
     write_reconstruction(volume, result)
     planned = plan(summary_of(path, settings), settings, ())
     files = {"scan": path.stat().st_size, "checkpoints": stored, "volume": volume.stat().st_size}
@@ -108,9 +108,3 @@ def measured(folder: Path, size: Size) -> Iterable[Row]:
 def settings_of(size: Size) -> Settings:
     """The default settings of a method on a grid."""
     return Settings.from_values(method=size.method, nodes=size.nodes)
-
-
-def _of_worker(answers: dict[str, Any]) -> Any:
-    """The answer of the only worker."""
-    (answer,) = answers.values()
-    return answer

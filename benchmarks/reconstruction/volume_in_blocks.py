@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from distributed import Client
 
 from bentray_kernels import eikonal, rays
 from bentray_kernels.acquisition import Dataset
@@ -23,7 +22,7 @@ from bentray_workers.files.dataset.summary import summary_of
 from bentray_workers.reconstruction.planning import plan
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
-from ._worker_use import forget_peak, peak_bytes
+from ._worker_use import forget_peak, of_worker, peak_bytes
 
 WATER_MPS, RADIUS_M = 1500.0, 0.054
 # Four rings that receive each other; side of the medium, m.
@@ -114,12 +113,12 @@ def measured(folder: Path, path: Path, settings: Settings) -> Run:
     """Reconstruct in a worker process, which has loaded its compiled code before."""
     with open_cluster(workers=1, local_directory=folder) as cluster:
         reconstruct(cluster.client, path, settings.changed(nodes=24))
-        _of_worker(cluster.client, forget_peak)
-        warm = _of_worker(cluster.client, peak_bytes)
+        of_worker(cluster.client, forget_peak)
+        warm = of_worker(cluster.client, peak_bytes)
         started = time.perf_counter()
         result = reconstruct(cluster.client, path, settings)
         seconds = time.perf_counter() - started
-        return Run(result, _of_worker(cluster.client, peak_bytes) - warm, seconds)
+        return Run(result, of_worker(cluster.client, peak_bytes) - warm, seconds)
 
 
 def scan(elements: int, nodes: int) -> Dataset:
@@ -158,9 +157,3 @@ def error(result: Reconstruction, value: float | None = None) -> float:
     inside = x**2 + y**2 + z**2 < 0.03**2
     speed = result.speed if value is None else np.full(x.shape, value)
     return float(np.sqrt(np.mean((speed - truth(x, y, z))[inside] ** 2)))
-
-
-def _of_worker(client: Client, function: Callable[[], Any]) -> Any:
-    """The answer of the only worker."""
-    (answer,) = client.run(function).values()
-    return answer
