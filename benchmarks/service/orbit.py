@@ -65,8 +65,8 @@ VOLUMES = (
     Shown(
         "lit surface",
         {"mode": "shaded"},
-        {**VOLUME, "supersampling": "none"},
-        {**VOLUME, "supersampling": "real", "degree": 2},
+        {"supersampling": "none"},
+        {"supersampling": "real", "degree": 2},
     ),
     Shown(
         "glass",
@@ -119,7 +119,7 @@ def stored_volume(http: httpx.Client, nodes: int) -> dict[str, Any]:
     """Upload a volume of 8-bit integers; returns its record."""
     content = io.BytesIO()
     np.save(content, np.round(255.0 * sampled(TWO_HOLES, nodes)).astype(np.uint8))
-    return _sent(http, "/v1/volumes", content.getvalue())
+    return stored(http, "/v1/volumes", content.getvalue())
 
 
 def stored_field(http: httpx.Client, quick: bool) -> tuple[str, str]:
@@ -130,7 +130,7 @@ def stored_field(http: httpx.Client, quick: bool) -> tuple[str, str]:
     """
     ring = torus(*(QUICK_RING if quick else RING))
     content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
-    mesh = str(_sent(http, "/v1/meshes", content)["id"])
+    mesh = str(stored(http, "/v1/meshes", content)["id"])
     asked = {"kind": "geometry-field", "mesh": mesh, "settings": QUICK_FIELD if quick else {}}
     job = http.post("/v1/jobs", json=asked).raise_for_status().json()
     until = time.monotonic() + FIELD_S
@@ -162,7 +162,7 @@ def shares(before: dict[str, float], frames: int) -> str:
     )
 
 
-def _sent(http: httpx.Client, address: str, content: bytes) -> dict[str, Any]:
+def stored(http: httpx.Client, address: str, content: bytes) -> dict[str, Any]:
     headers = {"Content-Type": "application/octet-stream"}
     record: dict[str, Any] = http.post(address, content=content, headers=headers).raise_for_status().json()
     return record

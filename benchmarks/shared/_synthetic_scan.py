@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
@@ -68,5 +69,26 @@ def made_up_traces(path: Path, elements: int, samples: int, centre_hz: float) ->
         sampling_rate_hz=8.0 * centre_hz,
         t0_s=-4.0 / centre_hz,
     )
+    write_dataset(path, dataset)
+    return path
+
+
+def made_up_bursts(path: Path, emissions: int, elements: int) -> Path:
+    """Traces of 500 kHz bursts after the delays of ``made_up_scan``, without loss or scattering."""
+    transmitter, every = np.arange(0, elements, elements // emissions), np.arange(elements)
+    position = Ring(elements, RADIUS_M).positions()
+    distance = np.linalg.norm(position[transmitter][:, None] - position[None], axis=2)
+    rate = 5e6
+    time_s = np.arange(int((2 * RADIUS_M / 1500.0 + 2e-5) * rate)) / rate
+
+    def traces(arrival_s: NDArray[np.float64]) -> NDArray[np.int16]:
+        after = time_s - arrival_s[..., None] - 4e-6
+        burst = np.exp(-((after / 1.5e-6) ** 2)) * np.sin(2 * np.pi * 5e5 * after)
+        return np.round(8000.0 * burst).astype(np.int16)
+
+    water_s = distance / 1500.0
+    delayed_s = water_s - 1e-6 * (distance / (2 * RADIUS_M)) ** 2
+    waveform = Waveform(traces(delayed_s), traces(water_s))
+    dataset = Dataset(position, transmitter, every, 1500.0, waveform=waveform, sampling_rate_hz=rate)
     write_dataset(path, dataset)
     return path

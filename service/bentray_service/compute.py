@@ -116,11 +116,15 @@ class Compute:
 
     def plan_simulation(self, request: PhantomScan) -> dict[str, Any]:
         """Plan a simulation in the same way."""
-        return simulation_planning.plan_simulation(request, self._known(capacities_of)).to_dict()
+        return simulation_planning.plan_simulation(request, self.capacities()).to_dict()
 
     def plan_turntable(self, shape: Sequence[int], turntable: Turntable) -> dict[str, Any]:
         """Plan a turntable in the same way."""
-        return turntable_planning.plan_turntable(shape, turntable, self._known(capacities_of)).to_dict()
+        return turntable_planning.plan_turntable(shape, turntable, self.capacities()).to_dict()
+
+    def capacities(self) -> tuple[WorkerCapacity, ...]:
+        """Capacities of the connected workers; none without scheduler."""
+        return self._known(capacities_of)
 
     def _known(self, capacities: Callable[[Any], tuple[WorkerCapacity, ...]]) -> tuple[WorkerCapacity, ...]:
         """Capacities of the connected workers; none without scheduler, for which a job waits."""

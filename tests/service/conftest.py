@@ -81,6 +81,7 @@ class FakeCluster:
     def __init__(self) -> None:
         self.workers = 1
         self.memory_bytes = 0
+        self.lanes = {"recon": 1, "render": 1}
         self.closed = False
         self.submitted: list[dict[str, Any]] = []
 
@@ -107,7 +108,7 @@ class FakeCluster:
         """It was not started for us."""
 
     def scheduler_info(self, n_workers: int) -> dict[str, Any]:
-        one = {"memory_limit": self.memory_bytes, "resources": {"recon": 1, "render": 1}}
+        one = {"memory_limit": self.memory_bytes, "resources": self.lanes}
         return {"workers": {str(k): one for k in range(self.workers)}}
 
     scheduler = SimpleNamespace(run_function=None)

@@ -164,7 +164,7 @@ class RefractionKind(Kind[RefractionRequest]):
     """A turntable animation of one volume; it has no row of its own."""
 
     request, settings = RefractionRequest, TypeAdapter(Turntable)
-    table, lane, words = ResultVolumeRow, "render", "Turntable"
+    table, lane, words = ResultVolumeRow, "drawing", "Turntable"
     example: ClassVar[Example] = {
         "summary": "A turntable animation of a volume",
         "value": {"kind": "refraction", "volume": "vol-0123456789abcdef0123", "settings": {"format": "zip"}},
@@ -205,7 +205,7 @@ class GeometryFieldKind(Kind[GeometryFieldRequest]):
     """The geometry field of one mesh."""
 
     request, settings = GeometryFieldRequest, TypeAdapter(FieldSettings)
-    table, lane, words = FieldRow, "render", "Geometry field"
+    table, lane, words = FieldRow, "drawing", "Geometry field"
     example: ClassVar[Example] = {
         "summary": "The geometry field of a mesh",
         "value": {"kind": "geometry-field", "mesh": "mesh-0123456789abcdef0123"},

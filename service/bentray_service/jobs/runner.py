@@ -19,7 +19,6 @@ from distributed.scheduler import NoValidWorkerError, NoWorkerError
 from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.task_graph import Cancelled
-from bentray_workers.cluster.capacities import capacities_of
 from bentray_workers.cluster.fair_shares import Shares
 from bentray_workers.cluster.short_lane import SHORT_LANE, is_short
 from bentray_workers.cluster.task_pool import JobControl
@@ -68,7 +67,8 @@ FULL = (errno.ENOSPC, errno.EDQUOT)
 class Runner:
     """Runs up to ``at_once`` jobs at the same time, and one job of every further tenant up to ``tenants``.
 
-    The last job of more than one is always that of a further tenant, so that none holds all.
+    The last job of more than one is always that of a further tenant, so that none holds all. One job that is
+    planned to be short runs beside them: it has its own lane on the workers.
     A thread only controls its job; the cluster, shared by all jobs, does the computation. Jobs wait while
     less than ``min_free_bytes`` of disk space is free, or the store is unavailable.
 
@@ -101,6 +101,8 @@ class Runner:
         self._wake, self._leaving = threading.Event(), threading.Event()
         # The job of each thread. A released job may be claimed again before its thread has ended.
         self._running: dict[threading.Thread, str] = {}
+        # The short job that runs beside ``at_once`` others.
+        self._extra = ""
         self._threads = [
             threading.Thread(target=self._take, name="jobs", daemon=True),
             threading.Thread(target=self._keep_leases, name="leases", daemon=True),
@@ -175,10 +177,14 @@ class Runner:
 
     def _start_next(self) -> bool:
         """Start the next job, if any; returns whether one was started."""
-        running = len(self._running)
-        if running >= self._most or not self._has_free_space() or self._files.store.fault() is not None:
+        held = self._held()
+        if len(held) >= self._most or not self._has_free_space() or self._files.store.fault() is not None:
             return False
-        job = self.queue.claim(idle_only=running >= self._at_once)
+        full = len(held) - (self._extra in held) >= self._at_once
+        job = self.queue.claim(idle_only=full)
+        if job is None and full and self._extra not in held:
+            job = self.queue.claim(accepts=self._is_short)
+            self._extra = "" if job is None else job.id
         if job is None:
             return False
         thread = threading.Thread(target=self._run_to_end, args=(job,), name=job.id, daemon=True)
@@ -189,6 +195,9 @@ class Runner:
             del self._running[thread]
             raise
         return True
+
+    def _is_short(self, plan: Plain) -> bool:
+        return is_short(plan, _seconds(plan), self.compute.capacities())
 
     def _run_to_end(self, job: JobRow) -> None:
         try:
@@ -226,7 +235,7 @@ class Runner:
                 self._files.store.remove([target])
             client = self.compute.client
             plan, lane = job.plan or {}, kind.lane
-            if is_short(plan, _seconds(plan), capacities_of(client)):
+            if self._is_short(plan):
                 lane = SHORT_LANE
             with self._shares.of(self._accounts.of(job.tenant), lane, client) as share:
                 control = JobControl(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 from sqlalchemy import ColumnElement, and_, case, func, or_, select, update
@@ -19,6 +19,8 @@ from .job_states import RUNNING, change, turns_of
 from .tables import ENDED, JobRow, Plain, ResultRow, ResultVolumeRow
 
 MAX_ATTEMPTS = 3
+# Queued jobs of an account among which a short one is looked for.
+MAX_COMPARED = 50
 
 # Time after which a service that does not renew its lease is considered dead, s.
 LEASE_S = 30.0
@@ -89,7 +91,9 @@ class Queue(Repository):
         """The ids of all jobs that have not ended."""
         return set(self._database.rows(select(JobRow.id).where(JobRow.state.not_in(ENDED))))
 
-    def claim(self, *, idle_only: bool = False) -> JobRow | None:
+    def claim(
+        self, *, idle_only: bool = False, accepts: Callable[[Plain], bool] | None = None
+    ) -> JobRow | None:
         """Claim the next queued job and return it; None when no job is queued.
 
         The next account is the one with the fewest running jobs, then the one whose last job started first;
@@ -97,9 +101,11 @@ class Queue(Repository):
 
         Args:
             idle_only: only consider accounts without a running job.
+            accepts: called with the plans of the oldest jobs of an account, of which the first accepted one
+                is claimed; None: the oldest one.
         """
         with self._database.write() as session:
-            job_id = _next(session, idle_only=idle_only)
+            job_id = _next(session, idle_only=idle_only, accepts=accepts)
             if job_id is None:
                 return None
             now = time.time()
@@ -231,13 +237,15 @@ class Queue(Repository):
         return again
 
 
-def _next(session: Session, *, idle_only: bool) -> str | None:
+def _next(session: Session, *, idle_only: bool, accepts: Callable[[Plain], bool] | None) -> str | None:
     """The job to claim, locked; those that another service claims at this moment are skipped."""
     for turn in sorted(turns_of(session).values()):
         if idle_only and turn.running:
             return None
-        mine = select(JobRow.id).where(JobRow.tenant.in_(turn.tenants), JobRow.state == "queued")
-        oldest = mine.order_by(JobRow.number).limit(1).with_for_update(skip_locked=True)
-        if job_id := session.scalar(oldest):
-            return job_id
+        mine = select(JobRow.id, JobRow.plan).where(JobRow.tenant.in_(turn.tenants), JobRow.state == "queued")
+        limit = 1 if accepts is None else MAX_COMPARED
+        oldest = mine.order_by(JobRow.number).limit(limit).with_for_update(skip_locked=True)
+        for job_id, plan in session.execute(oldest):
+            if accepts is None or accepts(plan or {}):
+                return str(job_id)
     return None

@@ -87,8 +87,8 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
     with open_cluster(machine.address) as cluster:
         wait_for_workers(cluster, 1)
         (facts,) = cluster.client.scheduler_info(n_workers=-1)["workers"].values()
-        assert (facts["name"], facts["nthreads"], facts["memory_limit"]) == ("away", 3, 2 * 1024**3)
-        assert facts["resources"] == {"recon": 1, "render": 1, "short": 1}
+        assert (facts["name"], facts["nthreads"], facts["memory_limit"]) == ("away", 4, 2 * 1024**3)
+        assert facts["resources"] == {"recon": 1, "drawing": 1, "render": 1, "short": 1}
         there = reconstruct(cluster.client, scan_file, settings)
     np.testing.assert_array_equal(there.speed, reconstruct(None, scan_file, settings).speed)
 
@@ -115,7 +115,7 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
     assert json.loads(machine.worker.stdout.readline()) == {
         "scheduler": machine.address,
         "workers": 1,
-        "lanes": {"recon": 1, "render": 1, "short": 1},
+        "lanes": {"recon": 1, "drawing": 1, "render": 1, "short": 1},
         "pid": machine.worker.pid,
     }
     said = machine.log.read_text()
@@ -136,7 +136,7 @@ def test_the_lane_of_opencl_is_offered_where_a_device_passed(
         monkeypatch.setattr(opencl, "select_device", lambda found=result: opencl.DeviceSelection(found, ()))
         assert bentray("worker", "--scheduler", "tcp://head:8786", "--workers", 3).exit_code == 0
     assert [dict(request.resources) for request in asked] == [
-        {"recon": 1, "render": 1, "short": 1, "opencl": 1},
-        {"recon": 1, "render": 1, "short": 1},
+        {"recon": 1, "drawing": 1, "render": 1, "short": 1, "opencl": 1},
+        {"recon": 1, "drawing": 1, "render": 1, "short": 1},
     ]
     assert asked[0].workers == 3

@@ -31,6 +31,27 @@ def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
     assert [until(http, job_id)["state"] for job_id in made] == ["succeeded"] * 4
 
 
+def test_one_short_job_starts_beside_as_many_as_may(start, uploaded, submitted, until, work, cluster):
+    """Which is short, the plan says: of the same tenant, too, and whatever was submitted before it."""
+    http = start(jobs_at_once=2)
+    dataset = uploaded(http)
+    work.hold.clear()
+    long = {"nodes": 512, "iterations": 1000}
+    jobs = [submitted(http, dataset, **long)["id"] for _ in range(3)]
+    until_states(http, jobs, "running", "running", "queued")
+    jobs += [submitted(http, dataset)["id"] for _ in range(2)]
+    time.sleep(0.2)
+    # The workers have no lane for it.
+    until_states(http, jobs, "running", "running", "queued", "queued", "queued")
+    cluster.lanes = {"recon": 1, "render": 1, "short": 1}
+    http.app.state.background.runner.notify()
+    until_states(http, jobs, "running", "running", "queued", "running", "queued")
+    http.post(f"/v1/jobs/{jobs[0]}/cancel")
+    until_states(http, jobs, "cancelled", "running", "running", "running", "queued")
+    work.hold.set()
+    until_states(http, jobs, "cancelled", *["succeeded"] * 4)
+
+
 def states_of(http, jobs):
     return [http.app.state.background.runner.queue.state(job) for job in jobs]
 

@@ -11,7 +11,7 @@ import pytest
 from bentray_kernels.task_graph import Task
 from bentray_workers.cluster.capacities import WorkerCapacity
 from bentray_workers.cluster.fair_shares import Shares
-from bentray_workers.cluster.resources import OFFERED, RECONSTRUCTION, RENDER, SHORT
+from bentray_workers.cluster.resources import DRAWING, OFFERED, RECONSTRUCTION, SHORT
 from bentray_workers.cluster.short_lane import LEAVES_S, LONG_LANE, SHORT_LANE, is_short
 from bentray_workers.cluster.task_pool import run_job
 
@@ -45,7 +45,7 @@ class Graph:
         return [] if self._at_once else self._tasks[self.done : self.done + 1]
 
 
-@pytest.mark.parametrize("lane", [SHORT_LANE, "render"])
+@pytest.mark.parametrize("lane", [SHORT_LANE, "drawing"])
 def test_other_lanes_do_not_wait_for_tasks_that_hold_every_worker(
     cluster: Any, tmp_path: Path, lane: str
 ) -> None:
@@ -68,7 +68,7 @@ def test_other_lanes_do_not_wait_for_tasks_that_hold_every_worker(
         stop = threading.Timer(5.0, LEAVE.set)
         stop.start()
         with shares.of("small", lane, client) as share:
-            placement = {"resources": RENDER if lane == "render" else RECONSTRUCTION}
+            placement = {"resources": DRAWING if lane == "drawing" else RECONSTRUCTION}
             run_job(client, graph, tmp_path / "other", lane=lane, placement=lambda: placement, share=share)
         assert graph.done == 5
         assert not LEAVE.is_set(), "it waited for a long task"

@@ -1,5 +1,6 @@
 """Cancellation: long kernels end when their task is abandoned, and never outside a worker."""
 
+import os
 import threading
 import time
 
@@ -8,6 +9,7 @@ from distributed import Client, LocalCluster
 
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.refraction import Layers
+from bentray_workers.cluster.background import NICENESS, in_background
 from bentray_workers.cluster.dask_settings import NO_DASHBOARD
 from bentray_workers.cluster.task_cancellation import TaskCancelled, cancellation_check
 from bentray_workers.files.volume import Volume
@@ -31,7 +33,10 @@ def long_task():
     ENDED.append("late")
 
 
-def test_a_task_that_is_released_ends():
+@pytest.mark.parametrize("background", [False, True])
+def test_a_task_that_is_released_ends(background):
+    BEGUN.clear()
+    ENDED.clear()
     # Without our preload, which compiles every kernel first.
     with (
         LocalCluster(
@@ -42,7 +47,7 @@ def test_a_task_that_is_released_ends():
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
-        future = client.submit(long_task, pure=False)
+        future = client.submit(*([in_background] if background else []), long_task, pure=False)
         assert BEGUN.wait(PATIENCE_S)
         assert not ENDED
         future.release()
@@ -50,6 +55,19 @@ def test_a_task_that_is_released_ends():
         while not ENDED and time.monotonic() < until:
             time.sleep(0.01)
     assert ENDED == ["early"]
+
+
+def test_background_threads_alone_are_lowered():
+    def seen():
+        return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+
+    usual = seen()
+    # Whichever thread it is, it is lowered once.
+    for _ in range(20):
+        assert in_background(seen) == min(19, usual + NICENESS)
+    with pytest.raises(ZeroDivisionError):
+        in_background(lambda: 1 / 0)
+    assert seen() == usual
 
 
 def test_outside_of_a_worker_nothing_is_abandoned():

@@ -59,7 +59,7 @@ def test_tasks_that_only_waited_are_always_retried(made):
     future = made.submit(Task(print, (1,)))
     for _ in range(20):
         future, _ = made.result(future.killed(while_running=False))
-        assert future.work[2:] == (print, 1)
+        assert future.work[3:] == (print, 1)
 
 
 def test_tasks_that_killed_workers_are_abandoned(made):
@@ -75,7 +75,7 @@ def test_lost_result_is_recomputed(made):
     future = made.submit(Task(print, (1,)))
     future.killed(while_running=False).status = "finished"
     again, _ = made.result(future)
-    assert again.work[2:] == (print, 1)
+    assert again.work[3:] == (print, 1)
 
 
 def test_results_kept_on_workers_are_not_fetched(made):

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextvars import ContextVar
 
 from distributed import get_worker
+
+# The check of a task that continues in another thread.
+_CARRIED: ContextVar[Callable[[], None] | None] = ContextVar("cancellation check", default=None)
 
 
 class TaskCancelled(Exception):  # noqa: N818 - names a state, as ``task_graph.Cancelled``
@@ -17,6 +21,8 @@ def cancellation_check() -> Callable[[], None]:
     The check raises ``TaskCancelled`` once the task is cancelled; outside of a Dask worker it never does. It
     reads the record of the worker, not of the scheduler, and takes less than a microsecond.
     """
+    if carried := _CARRIED.get():
+        return carried
     try:
         worker = get_worker()
         key = worker.get_current_task()
@@ -29,3 +35,8 @@ def cancellation_check() -> Callable[[], None]:
             raise TaskCancelled(key)
 
     return check
+
+
+def carry_cancellation() -> None:
+    """Let ``cancellation_check`` of this context return the check of the task of this thread."""
+    _CARRIED.set(cancellation_check())

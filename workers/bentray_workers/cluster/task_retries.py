@@ -13,8 +13,9 @@ from opentelemetry import trace
 from bentray_kernels.opencl import with_cpu_retry
 from bentray_kernels.task_graph import Task
 
+from .background import in_background
 from .memory_cache import evict_for_job
-from .resources import RECONSTRUCTION
+from .resources import DRAWING, RECONSTRUCTION, SHORT
 
 # Deaths of workers while a task runs, after which it fails.
 MAX_DEATHS = 2
@@ -115,8 +116,9 @@ class Attempts:
     def _submit(self, attempt: _Attempt) -> Future:
         placement = self._placement()
         # Cached scenes are what tasks that draw work with; other tasks are planned for an empty cache.
-        evict = "render" not in placement["resources"]
-        work = attempt.marker, evict, attempt.task.function, *attempt.task.arguments
+        evict = not DRAWING.keys() & placement["resources"].keys()
+        where = () if SHORT.keys() & placement["resources"].keys() else (in_background,)
+        work = attempt.marker, evict, *where, attempt.task.function, *attempt.task.arguments
         future = self._client.submit(marked, *work, **placement, priority=attempt.priority, pure=False)
         self._attempts[future] = attempt
         return future

@@ -12,7 +12,7 @@ from distributed import Client
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 
-from ..cluster.resources import RENDER
+from ..cluster.resources import DRAWING
 from ..cluster.task_pool import JobControl, run_job
 from ..files.atomic import sync
 from ..files.geometry_field_folder import FieldFiles, read_json
@@ -110,8 +110,8 @@ def build_field(
     """
     if not target.exists():
         graph = GeometryFieldGraph(mesh_path, settings, work_dir)
-        where = {"resources": RENDER}
-        run_job(client, graph, work_dir, lane="render", placement=lambda: where, **control)
+        where = {"resources": DRAWING}
+        run_job(client, graph, work_dir, lane="drawing", placement=lambda: where, **control)
         _move(graph.folder, target)
     elif on_progress := control.get("on_progress"):
         on_progress(Progress(1, 1))

@@ -26,9 +26,10 @@ from .tiles import TASK_RAYS
 # Of one interactive picture, s; longer ones need a job.
 MAX_SECONDS = 60.0
 
-# Part of the memory of a worker for a picture beside a task of a job. Jobs are planned for 80 % of it less
-# that of a warm worker, which has a margin of MARGIN_BYTES, and Dask kills a worker at 95 %.
-BESIDE_PART = 0.05
+# Part of the memory of a worker for a picture beside a task of a job, and for a frame beside both. Jobs are
+# planned for 80 % of it less that of a warm worker, which has a margin of MARGIN_BYTES, a short one for 5 %
+# beside them, and Dask kills a worker at 95 %.
+BESIDE_PART = 0.04
 MARGIN_BYTES = 96 * MIB
 
 # Overhead of Python and Matplotlib.
@@ -240,19 +241,22 @@ def spare_bytes(capacity: WorkerCapacity) -> float:
     return MARGIN_BYTES + BESIDE_PART * capacity.memory_bytes if capacity.memory_bytes else math.inf
 
 
-def placed(size: int, workers: Mapping[str, WorkerCapacity]) -> dict[str, Any]:
+def placed(
+    size: int, workers: Mapping[str, WorkerCapacity], lane: Mapping[str, int] = RENDER
+) -> dict[str, Any]:
     """Placement of tasks by their memory, for ``Client.submit``.
 
     Args:
         size: of each task, bytes.
         workers: by address.
+        lane: resource of the tasks.
 
     Returns:
         Resources, and the addresses of able workers unless all are.
     """
     able = {address: capacity for address, capacity in workers.items() if capacity.task_bytes >= size}
     alone = any(size > spare_bytes(capacity) and "recon" in capacity.resources for capacity in able.values())
-    placement: dict[str, Any] = {"resources": {**RENDER, **RECONSTRUCTION} if alone else RENDER}
+    placement: dict[str, Any] = {"resources": {**lane, **RECONSTRUCTION} if alone else lane}
     return placement if len(able) in (0, len(workers)) else {**placement, "workers": list(able)}
 
 

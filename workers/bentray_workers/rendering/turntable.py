@@ -18,6 +18,7 @@ from bentray_kernels.requests.request_fields import setting
 from bentray_kernels.task_graph import Task
 
 from ..cluster.capacities import capacities_by_address
+from ..cluster.resources import DRAWING
 from ..cluster.task_pool import JobControl, Placement, run_job
 from ..files.atomic import atomic_replace, write_bytes
 from ..images.png import device_of, stated
@@ -148,10 +149,10 @@ def draw_turntable(
     size = refraction_bytes(stored_shape(path), turntable)
 
     def placement() -> Placement:
-        return placed(size, capacities_by_address(client))
+        return placed(size, capacities_by_address(client), DRAWING)
 
     graph = TurntableGraph(path, turntable, target, work_dir)
-    run_job(client, graph, work_dir, lane="render", placement=placement, **control)
+    run_job(client, graph, work_dir, lane="drawing", placement=placement, **control)
 
 
 def draw_frame_tile(path: Path, turntable: Turntable, number: int, first: int, last: int) -> Drawn:

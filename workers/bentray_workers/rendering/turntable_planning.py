@@ -35,7 +35,7 @@ class TurntablePlan:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, with the names of plans of reconstructions."""
         sizes = {"call_bytes": dict(self.call_bytes), "largest_bytes": max(self.call_bytes.values())}
-        return {**asdict(self), **sizes, "decomposition": "frames", "lane": "render", "speed_known": True}
+        return {**asdict(self), **sizes, "decomposition": "frames", "lane": "drawing", "speed_known": True}
 
 
 def plan_turntable(

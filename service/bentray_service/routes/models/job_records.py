@@ -88,7 +88,7 @@ class PlanRecord(BaseModel):
 
     decomposition: str = Field(description="Parallel slices, emitters or frames, or a volume.")
     lane: str = Field(
-        description="Worker resource of the tasks: recon, opencl for workers with a device, or render."
+        description="Worker resource of the tasks: recon, opencl for workers with a device, or drawing."
     )
     tasks: int = Field(description="Approximate number of tasks.")
     workers: int = Field(description="Number of workers with enough memory for each task.")
