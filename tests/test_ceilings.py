@@ -17,10 +17,10 @@ SOURCES = (".py", ".cl", ".js", ".css", ".html")
 # to which the ceilings are lowered as code is removed.
 LINES = {
     # folders: (ceiling, goal)
-    ("kernels", "workers", "service"): (95_100, 87_000),
-    ("service",): (33_000, 31_000),
+    ("kernels", "workers", "service"): (95_300, 87_000),
+    ("service",): (33_100, 31_000),
     ("tests",): (69_500, 58_000),
-    ("benchmarks",): (14_900, 13_000),
+    ("benchmarks",): (15_200, 13_000),
 }
 
 FILES = 28

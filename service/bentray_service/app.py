@@ -104,6 +104,7 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
             parts = await run_in_threadpool(_open, settings, cluster, stack, app.state.leaving)
             app.state.stores, app.state.background, app.state.access = parts
             app.state.metrics.watch(*parts)
+            app.state.background.pictures.open()
             yield
             await app.state.background.pictures.close()
         finally:
@@ -265,6 +266,7 @@ def _open(
     stack.callback(housekeeper.stop)
     pictures = Pictures(cluster, accounts, files)
     stack.callback(pictures.stop)
+    upload_ingest.on_stored = pictures.examine
     webhooks = Webhooks(database, settings, alone=settings.database_url is None)
     webhooks.start()
     stack.callback(webhooks.stop)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import hashlib
+import json
+import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
@@ -15,9 +18,11 @@ from typing import Any, TypeVar
 from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.requests.picker_names import DEFAULT_PICKER
 from bentray_workers.cluster.capacities import WorkerCapacity, capacities_by_address
 from bentray_workers.cluster.resources import PICTURE_PRIORITY
 from bentray_workers.files import volume_export
+from bentray_workers.files.atomic import write_bytes
 from bentray_workers.files.export.registry import FormatName
 from bentray_workers.images import drawing_tasks
 from bentray_workers.images.result_summary import result_summary
@@ -33,13 +38,14 @@ from bentray_workers.rendering.picture_cost import Cost, VolumeFile
 from bentray_workers.rendering.refraction_view import RefractionView
 from bentray_workers.rendering.tiles import PictureTasks
 
+from . import __version__
 from .compute import Cluster
 from .errors import Busy, StorageFull
 from .files.data_folder import Files
 from .picture_queue import LONG_S, PictureQueue
 from .rows.accounts import Account, Accounts
 from .rows.ids import Tenant
-from .rows.tables import DatasetRow, FieldRow, VolumeRow
+from .rows.tables import DatasetRow, FieldRow, MeshRow, VolumeRow
 
 # Time limit of an image, s.
 RENDER_SECONDS = 120.0
@@ -52,6 +58,11 @@ FULL = (errno.ENOSPC, errno.EDQUOT)
 MAX_HISTOGRAMS = 256
 # Maximum number of attempts when workers leave.
 MAX_TRIES = 2
+
+# Scans whose report takes longer are examined when they are stored, s.
+EXAMINED_S = 1.1
+
+log = logging.getLogger("bentray.pictures")
 
 Found = TypeVar("Found")
 # What is drawn or exported.
@@ -78,6 +89,36 @@ class Pictures:
         self._asking: asyncio.Future[dict[str, WorkerCapacity]] | None = None
         self._queue = PictureQueue(self._workers)
         self._histograms: dict[tuple[Any, ...], dict[str, Any]] = {}
+        self._reports: dict[Path, asyncio.Future[bytes]] = {}
+        self._examining, self._examinations = asyncio.Lock(), set[asyncio.Task[None]]()
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def open(self) -> None:
+        """Allow ``examine``, in the event loop that uses this object."""
+        self._loop = asyncio.get_running_loop()
+
+    def examine(self, dataset: Input | MeshRow) -> None:
+        """Make the quality report of a new dataset that takes long, from any thread; one at a time."""
+        if self._loop is None or not isinstance(dataset, DatasetRow):
+            return
+        if picture_cost.quality_cost(dataset.values()).seconds < EXAMINED_S:
+            return
+
+        async def work() -> None:
+            async with self._examining:
+                try:
+                    await self.quality(dataset, DEFAULT_PICKER)
+                except Exception as error:
+                    log.info("%s is examined when its report is requested: %s", dataset.id, error)
+
+        def begin() -> None:
+            task = asyncio.ensure_future(work())
+            self._examinations.add(task)
+            task.add_done_callback(self._examinations.discard)
+
+        # The event loop is closed after the service has stopped.
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(begin)
 
     async def slice_png(self, volume: VolumeRow, how: dict[str, Any]) -> bytes:
         """Render one slice of a volume as PNG.
@@ -122,14 +163,45 @@ class Pictures:
         return bytes(await self._one(field, cost, field_picture.map_png, {"quantity": which}))
 
     async def quality(self, dataset: DatasetRow, picker: str) -> dict[str, Any]:
-        """Create the quality report of a dataset, see ``bentray_workers.reconstruction.quality_report``."""
+        """The quality report of a dataset, see ``bentray_workers.reconstruction.quality_report``."""
+
+        async def make() -> bytes:
+            how = {"picker": picker, **_water(dataset)}
+            return json.dumps(await self._one(dataset, cost, quality_report, how)).encode()
+
         cost = picture_cost.quality_cost(dataset.values())
-        return dict(await self._one(dataset, cost, quality_report, {"picker": picker, **_water(dataset)}))
+        return dict(json.loads(await self._report(dataset, f"{picker}.json", make)))
 
     async def quality_png(self, dataset: DatasetRow, picker: str) -> bytes:
-        """Render the quality report of a dataset."""
+        """The quality report of a dataset as an image."""
+
+        async def make() -> bytes:
+            how = {"picker": picker, **_water(dataset)}
+            return bytes(await self._one(dataset, cost, quality_page, how))
+
         cost = picture_cost.quality_cost(dataset.values())
-        return bytes(await self._one(dataset, cost, quality_page, {"picker": picker, **_water(dataset)}))
+        return await self._report(dataset, f"{picker}.png", make)
+
+    async def _report(self, dataset: DatasetRow, kind: str, make: Callable[[], Awaitable[bytes]]) -> bytes:
+        """A kept report, or a new one, which all who request it share and which outlives their requests."""
+        stated = repr((__version__, dataset.water_temperature_c))
+        name = f"{hashlib.sha256(stated.encode()).hexdigest()[:16]}-{kind}"
+        path = self._files.of(dataset.tenant).report(dataset.id, name)
+        with suppress(FileNotFoundError):
+            return await self._in_thread(path.read_bytes)
+
+        async def keep() -> bytes:
+            try:
+                content = await make()
+                with suppress(OSError):
+                    await self._in_thread(lambda: write_bytes(path, content))
+                return content
+            finally:
+                del self._reports[path]
+
+        if path not in self._reports:
+            self._reports[path] = asyncio.ensure_future(keep())
+        return await asyncio.shield(self._reports[path])
 
     async def scan_geometry(self, dataset: DatasetRow) -> dict[str, Any]:
         """Read the geometry of a dataset, see ``bentray_workers.reconstruction.scan_views``."""
@@ -172,7 +244,12 @@ class Pictures:
         return self._queue.waiting().get(self._accounts.of(tenant), 0)
 
     async def close(self) -> None:
-        """Stop polling for workers, in the event loop that uses this object."""
+        """Stop polling for workers and examining, in the event loop that uses this object."""
+        self._loop = None
+        running: list[asyncio.Future[Any]] = [*self._examinations, *self._reports.values()]
+        for task in running:
+            task.cancel()
+        await asyncio.gather(*running, return_exceptions=True)
         await self._queue.close()
 
     def stop(self) -> None:

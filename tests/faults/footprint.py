@@ -24,7 +24,7 @@ TABLES = (
     "checksums",
 )
 # Files of the same; ``uploads`` go by their age.
-FOLDERS = ("incoming", "datasets", "volumes", "exports", "animations", "meshes", "fields", "work")
+FOLDERS = ("incoming", "datasets", "volumes", "exports", "animations", "meshes", "fields", "work", "reports")
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from pathlib import Path
 from .disk import bytes_in, remove_path
 from .tenant_files import KEPT, owner_of, stored_files
 
-# Exports are evicted together with their volume.
-MADE_OF_THEM = ("exports",)
+# Evicted together with their volume or dataset.
+MADE_OF_THEM = ("exports", "reports")
 # Items used within this time are not evicted, s; longer than rendering or the start of a download takes.
 RECENT_S = 300.0
 

@@ -18,8 +18,8 @@ from .tenant_files import KEPT, owner_of, stored_files
 
 log = logging.getLogger("bentray.storage")
 
-# Exports and resumable uploads.
-BESIDE = ("exports", "uploads")
+# Exports, resumable uploads and quality reports.
+BESIDE = ("exports", "uploads", "reports")
 # Minimum time for which a file must be orphaned while the service runs, s: new files wait for their row.
 SAFE_S = 3600.0
 

@@ -12,7 +12,10 @@ from .disk import bytes_in, remove_path
 from .store import Store
 
 # The folders of a tenant.
-KINDS = ("incoming", "uploads", "datasets", "volumes", "exports", "animations", "meshes", "fields", "work")
+KINDS = (
+    *("incoming", "uploads", "datasets", "volumes", "exports", "animations", "meshes", "fields", "work"),
+    "reports",
+)
 # Folders kept by a store; the others are temporary or can be regenerated.
 KEPT = ("datasets", "volumes", "animations", "meshes", "fields")
 # File extensions of turntables, as in bentray_workers.rendering.turntable, whose import is slow.
@@ -38,7 +41,7 @@ class TenantFiles:
 
     ``incoming/`` has unchecked uploads, ``uploads/`` resumable uploads, ``datasets/``, ``volumes/`` and
     ``meshes/`` canonical files, ``exports/`` volumes in other formats, ``animations/`` turntables,
-    ``fields/`` geometry fields, ``work/`` the checkpoints of unfinished jobs.
+    ``fields/`` geometry fields, ``work/`` the checkpoints of unfinished jobs, ``reports/`` quality reports.
 
     Items in ``KEPT`` may exist in the store only; ``Store.fetch`` makes them available at their path.
     """
@@ -58,7 +61,7 @@ class TenantFiles:
         """Delete incomplete files of a dead process."""
         for left in (self.root / "incoming").iterdir():
             remove_path(left)
-        for name in ("datasets", "volumes", "exports", "animations", "meshes", "uploads"):
+        for name in ("datasets", "volumes", "exports", "animations", "meshes", "uploads", "reports"):
             for left in (self.root / name).glob("*.partial"):
                 left.unlink()
 
@@ -93,6 +96,10 @@ class TenantFiles:
     def export(self, volume_id: str, extension: str) -> Path:
         """Path of a volume in another format."""
         return self.root / "exports" / f"{checked('volume', volume_id)}.{extension}"
+
+    def report(self, dataset_id: str, name: str) -> Path:
+        """Path of a quality report of a dataset."""
+        return self.root / "reports" / f"{checked('dataset', dataset_id)}.{name}"
 
     def animation(self, job_id: str, extension: str) -> Path:
         """Path of a turntable animation."""

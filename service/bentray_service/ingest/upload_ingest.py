@@ -9,7 +9,7 @@ import secrets
 import signal
 import threading
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
@@ -84,6 +84,8 @@ class UploadIngest:
         self._accounts = accounts
         self._quota = quota
         self._lock = threading.Lock()
+        # Called with each new row.
+        self.on_stored: Callable[[Any], None] = lambda row: None
         # Queued uploads, and the process ids of those being read.
         self.queued: dict[str, Account] = {}
         self._children: dict[str, int] = {}
@@ -217,7 +219,9 @@ class UploadIngest:
                 partial(self._quota.resize, tenant, row.result_id),
                 partial(self._started, row.id),
             )
-            store.add(tenant, row.result_id, size=row.length, sha256=digest_of(path).sha256, summary=summary)
+            digest = digest_of(path).sha256
+            stored = store.add(tenant, row.result_id, size=row.length, sha256=digest, summary=summary)
+            self.on_stored(stored)
         except (StorageUnavailable, StorageFull, SQLAlchemyError):
             raise
         except InvalidInput as error:

@@ -79,6 +79,7 @@ async def upload_dataset(
     """
     given = scan_metadata(map, unit, temperature_c, sound_speed_mps, frequency_hz)
     row = await receive_upload(request, stores, background, access, tenant, stores.datasets, given)
+    background.pictures.examine(row)
     record = dataset_record(row)
     response.headers["Location"] = record.links["self"]
     return record

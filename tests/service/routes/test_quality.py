@@ -1,5 +1,6 @@
 """/v1/datasets/{id}/quality: the report and the page, by a worker; and every way of being refused."""
 
+import time
 from typing import get_args
 
 import numpy as np
@@ -42,6 +43,37 @@ def test_report_and_page(start, cluster, faulty):
     assert again.status_code == 304
     assert http.get(f"{here}/quality.png").headers["etag"] != page.headers["etag"]
     assert http.head(f"{here}/quality.png").status_code == 200
+
+
+def test_a_report_is_kept_until_the_water_changes_or_the_scan_is_deleted(start, cluster, faulty):
+    http = start()
+    here = http.post("/v1/datasets", content=faulty, headers=HDF5).json()["links"]["self"]
+    first = http.get(f"{here}/quality").json()
+    count = len(cluster.submitted)
+    assert http.get(f"{here}/quality").json() == first
+    assert len(cluster.submitted) == count
+    for changes, more in (({"water_temperature_c": 31.0}, 1), ({"water_temperature_c": None}, 0)):
+        http.patch(here, json=changes)
+        count = len(cluster.submitted)
+        assert http.get(f"{here}/quality").status_code == 200
+        assert len(cluster.submitted) == count + more
+    reports = next(http.app.state.stores.files.root.glob("tenants/*/reports"))
+    assert len(list(reports.iterdir())) == 2
+    assert http.delete(here).status_code == 204
+    assert list(reports.iterdir()) == []
+
+
+def test_a_large_scan_is_examined_when_it_is_stored(start, cluster, faulty, monkeypatch):
+    monkeypatch.setattr("bentray_service.pictures.EXAMINED_S", 0.0)
+    http = start()
+    here = http.post("/v1/datasets", content=faulty, headers=HDF5).json()["links"]["self"]
+    until = time.monotonic() + 60.0
+    while not list(http.app.state.stores.files.root.glob("tenants/*/reports/*.json")):
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    count = len(cluster.submitted)
+    assert http.get(f"{here}/quality").json()["verdict"] == "usable"
+    assert len(cluster.submitted) == count
 
 
 def test_a_scan_with_times_alone(start, uploaded):
