@@ -1,6 +1,7 @@
 """Memory of the tasks of a reconstruction beyond that of a warm worker, from the arrays of the kernels.
 
-Compared with measured peaks in ``tests/workers/reconstruction/test_planning.py``.
+Compared with measured peaks in ``tests/workers/reconstruction/test_planning.py`` and ``bentray bench
+task_memory``. Formulas and no fitted coefficients: these missed volumes of other sizes, up or down.
 """
 
 from __future__ import annotations
