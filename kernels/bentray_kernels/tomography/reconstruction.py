@@ -148,6 +148,7 @@ def _speed_of(source: Source, chosen: Settled, run_graphs: Run, graph_of: GraphO
     decided = {
         "geometry": geometry_summary(dataset, settings, scan.problem(count // 2), chosen.reasons),
         "automatic": in_sentences(reasons),
+        "noise": f"{1e9 * travel_time_noise(dataset):.0f} ns",
     }
     rays = _assembled(dataset, settings, scan.problem(0), graphs, trials)
     said = {name: text for name, text in decided.items() if text}

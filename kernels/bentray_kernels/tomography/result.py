@@ -21,6 +21,20 @@ DOUBTFUL = "Doubtful result."
 CHECK = "Else check the scan (bentray quality): units, order of the elements, time zero, speed of the water."
 
 
+# Subjects of cautions by their codes.
+SUBJECTS = {
+    "bounds": "cut off by the speed bounds",
+    "residual": "does not explain the times",
+    "constant": "no better than one constant speed",
+    "noise": "times contradict each other",
+    "uncertainty": "deviations may be too small",
+    "settings": "settings without effect",
+}
+
+# Width at half height of a Gaussian, in standard deviations.
+HALF_HEIGHT = 2.0 * math.sqrt(2.0 * math.log(2.0))
+
+
 def residual_counts(residuals: NDArray[np.float64]) -> NDArray[np.int64]:
     """Histogram of residuals, s, over ``RESIDUAL_EDGES_S``; the outer bins include all beyond the ends."""
     within = np.clip(residuals, RESIDUAL_EDGES_S[0], RESIDUAL_EDGES_S[-1])
@@ -216,6 +230,32 @@ class Reconstruction:
         """Why the image is doubtful, in sentences; empty without a reason."""
         reasons = " ".join(caution.text for caution in self.cautions if caution.doubtful)
         return f"{DOUBTFUL} {reasons} {CHECK}" if reasons else ""
+
+    @property
+    def uncertainty_rms_mps(self) -> float | None:
+        """Root mean square of the standard deviations of nodes that may change, m/s; None without them."""
+        if self.uncertainty is None:
+            return None
+        # Exactly 0 at nodes that are kept as water.
+        inside = self.uncertainty[self.uncertainty != 0.0]
+        return float(np.sqrt((inside**2).mean())) if inside.size else 0.0
+
+    @property
+    def trust(self) -> str:
+        """How far to trust the image, in one line: standard deviation, detail, and cautions by their subject.
+
+        The detail is the width at half height of the Gaussian that smooths the truth like the image, of the
+        middle slice, at least the spacing of the nodes.
+        """
+        deviation = self.uncertainty_rms_mps
+        words = ["no standard deviations" if deviation is None else f"±{deviation:.2g} m/s (1 sd)"]
+        if self.resolution_width_m:
+            detail = HALF_HEIGHT * float(np.median(self.resolution_width_m))
+            words.append(f"detail down to {1e3 * max(detail, self.spacing_m[0]):.1f} mm")
+        subjects = ", ".join(SUBJECTS.get(caution.code, caution.code) for caution in self.cautions)
+        count = len(self.cautions)
+        words.append(f"{count} caution{'s' * (count > 1)}: {subjects}" if count else "no cautions")
+        return ", ".join(words)
 
     @property
     def residual_rms_s(self) -> float | None:

@@ -308,8 +308,25 @@ class Result:
         return f"{doubt}\n{shown}" if doubt else shown
 
     def __str__(self) -> str:
-        automatic = self.attributes.get("automatic")
-        return f"{self!r}\nDecided automatically: {automatic}" if automatic else repr(self)
+        image = self.image
+        if not isinstance(image, Reconstruction):
+            return repr(self)
+        from bentray_kernels.tomography.model_selection.selection import advice_of, image_label
+
+        rms, noise = image.residual_rms_s, self.attributes.get("noise", "not known")
+        lines = {
+            "Trust": image.trust,
+            "Method": "; ".join(text for text in (image_label(image), advice_of(image)) if text),
+            "Water": self.attributes.get("water", f"{image.water_speed_mps:.1f} m/s, as the scan states it"),
+            "Pairs": self.attributes.get("pairs", ""),
+            "Scan": self.attributes.get("quality", ""),
+            "Residual": "" if rms is None else f"{1e9 * rms:.0f} ns rms, noise {noise}",
+            "Time": f"{seconds} s" if (seconds := self.attributes.get("seconds")) else "",
+            "Decided automatically": self.attributes.get("automatic", ""),
+        }
+        cautions = [f"Caution: {caution.text}" for caution in image.cautions if not caution.doubtful]
+        told = [f"{name}: {text}" for name, text in lines.items() if text]
+        return "\n".join((repr(self), *told[:1], *cautions, *told[1:]))
 
     def _repr_html_(self) -> str:
         from bentray_workers.images.captions import facts

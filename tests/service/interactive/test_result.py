@@ -10,7 +10,7 @@ import pytest
 from matplotlib import pyplot as plt
 
 import bentray
-from bentray_kernels.tomography.result import Reflection
+from bentray_kernels.tomography.result import Caution, Reflection
 from bentray_service.interactive.result import Result, result_of
 from bentray_workers.files.export.registry import SUFFIXES
 from bentray_workers.files.volume import Volume
@@ -46,6 +46,24 @@ def test_arrays_have_places_and_units(result: Result) -> None:
     assert repr(result).startswith(
         "<bentray.Result of 12 x 12 nodes: speed, coverage, attenuation, recovery;"
     )
+
+
+def test_print_says_method_water_pairs_residual_cautions_and_time(result: Result) -> None:
+    cautions = (Caution("bounds", "Cut off.", doubtful=True), Caution("settings", "No effect."))
+    pairs = "9 of 12 pairs used, 3 left out"
+    told = {"pairs": pairs, "noise": "12 ns", "water": "20 °C", "seconds": "1.50"}
+    image = replace(made(nodes=12), cautions=cautions, uncertainty=np.full((12, 12), 4.0))
+    image = replace(image, resolution_width_m=(0.002,), provenance={**image.provenance, **told})
+    lines = str(result_of(image, {})).splitlines()
+    assert lines[0].startswith("Doubtful result. Cut off.")
+    subjects = "cut off by the speed bounds, settings without effect"
+    assert f"Trust: ±4 m/s (1 sd), detail down to 4.7 mm, 2 cautions: {subjects}" in lines
+    assert {"Caution: No effect.", "Water: 20 °C", f"Pairs: {pairs}", "Time: 1.50 s"} <= {*lines}
+    rms = image.residual_rms_s
+    assert rms is not None
+    assert f"Residual: {1e9 * rms:.0f} ns rms, noise 12 ns" in lines
+    assert any(line.startswith("Method: ") for line in lines)
+    assert "Trust: no standard deviations, no cautions" in str(result)
 
 
 def test_the_uncertainty_has_a_resolution_width(result: Result) -> None:

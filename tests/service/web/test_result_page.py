@@ -164,7 +164,7 @@ def test_the_uncertainty_fades_what_is_not_known(page, shared_service):
     cautions = (Caution("bounds", "Cut off at 1800 m/s.", doubtful=True), Caution("uncertainty", caution))
     job = finished(address, scan, work, monkeypatch, SPEED, uncertainty=spread, cautions=cautions)
     ready(page, f"{address}/#/jobs/{job}?window=1430,1570")
-    expect(page.locator("#result-facts")).to_contain_text("resolution width 2.5 mm")
+    expect(page.locator("#result-facts")).to_contain_text("m/s (1 sd), detail down to 5.9 mm, 2 cautions: ")
     expect(page.locator("#result-cautions p")).to_have_text(
         ["Doubtful result. Cut off at 1800 m/s.", caution]
     )

@@ -274,6 +274,24 @@ def test_the_numbers_of_the_page_are_those_of_the_service(page, traced):
     expect(drawing.locator(".receiver")).to_have_count(12)
 
 
+def test_a_water_that_is_only_reported_is_used_at_the_press_of_a_button(page, address, tmp_path):
+    """The stated speed is that of water 10 °C warmer than the traces say."""
+    dataset = trace_scan(blob_delay(16), elements=16, noise=0.01)
+    wrong = replace(dataset, water_speed_mps=dataset.water_speed_mps + 20.0)
+    write_dataset(tmp_path / "warm.h5", wrong)
+    scan = stored(address, tmp_path / "warm.h5")
+    page.goto(f"{address}/#/scans/{scan['id']}")
+    advice = page.locator("#quality li", has_text="water speed")
+    expect(advice).to_contain_text("Only reported: reconstructions use the data as they are.")
+    advice.get_by_role("button", name="Use water of").click()
+    expect(page.locator("#scan-facts")).to_contain_text("stated on this page")
+    now = httpx.get(f"{address}/v1/datasets/{scan['id']}", timeout=60.0).json()
+    assert speed_from_temperature(now["water_temperature_c"]) == pytest.approx(
+        dataset.water_speed_mps, abs=3.0
+    )
+    expect(page.locator("#quality li", has_text="water speed")).to_have_count(0)
+
+
 @pytest.mark.nightly
 def test_the_slider_changes_the_emission(page, traced):
     told = page.locator("#shot-facts")

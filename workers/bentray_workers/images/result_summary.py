@@ -21,6 +21,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
 
     Returns:
         ``quantities``: those in the file, and ``truth`` if the scan has one on comparable axes;
+        ``trust``: how far to trust the image, in one line;
         ``resolution_width_m``: of each slice, or one, m; empty without uncertainty;
         ``cautions``: what the reader must know, each with ``code``, ``text`` and whether it makes the image
         ``doubtful``;
@@ -65,6 +66,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
             }
     return {
         "quantities": quantities,
+        "trust": own.trust,
         "resolution_width_m": list(own.resolution_width_m),
         "cautions": [asdict(caution) for caution in own.cautions],
         "grids": {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.calibration import Calibration, calibrate, water_times
 from bentray_kernels.acquisition.quality import Examined, Finding, Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
+from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED
+from bentray_kernels.acquisition.water import temperature_from_speed
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import MAX_LEFT_OUT
 from bentray_kernels.requests.picker_names import DEFAULT_PICKER
@@ -126,7 +129,18 @@ def _examined(
         findings = (frequency, *examined.report.findings)
         examined = replace(examined, report=replace(examined.report, findings=findings))
     page = _drawn(path, whole, examined) if draw else b""
-    return Quality(examined.report.to_dict(), page, examined.picked, examined.report)
+    return Quality(_plain(examined.report), page, examined.picked, examined.report)
+
+
+def _plain(report: Report) -> dict[str, Any]:
+    """Plain values, with the temperature at which water has the speed that is only reported."""
+    record = report.to_dict()
+    for plain, finding in zip(record["findings"], report.findings, strict=True):
+        if finding.check == WATER_SPEED and finding.action == "reported":
+            # Of another medium there is none.
+            with suppress(InvalidInput):
+                plain["water_temperature_c"] = round(temperature_from_speed(finding.value), 2)
+    return record
 
 
 def _drawn(path: Path, whole: Dataset, examined: Examined) -> bytes:

@@ -29,6 +29,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         seconds: wall-clock time of the reconstruction, s.
 
     Returns:
+        ``trust``: how far to trust the image, in one line;
         settings, residual history, speed range, time and provenance; ``residual_within_s``: quantiles of the
         absolute residuals of the last iteration by percentage; ``recovery_mean``: mean of the resolution
         check inside the array; ``uncertainty_rms_mps``: root mean square of the standard deviations inside
@@ -38,6 +39,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         are None, missing doubts, cautions, widths, trials and reasons are empty.
     """
     return {
+        "trust": result.trust,
         "doubt": result.doubt,
         "cautions": [asdict(caution) for caution in result.cautions],
         "seconds": round(seconds, 3),
@@ -55,7 +57,7 @@ def figures(result: Reconstruction, dataset: Dataset, seconds: float) -> dict[st
         ),
         "history": [asdict(sweep) for sweep in result.history],
         "recovery_mean": _recovery_mean(result),
-        "uncertainty_rms_mps": _uncertainty_rms(result),
+        "uncertainty_rms_mps": result.uncertainty_rms_mps,
         "resolution_width_m": list(result.resolution_width_m),
         "reason": advice_of(result),
         "candidates": choice_table(result),
@@ -96,18 +98,11 @@ def _recovery_mean(result: Reconstruction) -> float | None:
     return float(result.recovery[inside].mean()) if inside.any() else 0.0
 
 
-def _uncertainty_rms(result: Reconstruction) -> float | None:
-    if result.uncertainty is None:
-        return None
-    # Exactly 0 at nodes that are kept as water.
-    inside = result.uncertainty[result.uncertainty != 0.0]
-    return float(np.sqrt((inside**2).mean())) if inside.size else 0.0
-
-
 def summary(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """Rows (name, value) of the summary table, from the result of ``figures``."""
     low, high = facts["speed_range_mps"]
     rows = [
+        ("trust", facts["trust"]),
         ("rays", "straight" if facts["settings"]["rays"] == "straight" else "bent"),
         ("method", facts["settings"]["method"]),
         ("image", " by ".join(map(str, facts["shape"])) + f" nodes of {facts['spacing_m'][0] * 1e3:.3g} mm"),
@@ -115,13 +110,9 @@ def summary(facts: dict[str, Any]) -> list[tuple[str, str]]:
         ("time", f"{facts['seconds']:.1f} s"),
     ]
     if facts["residual_rms_s"] is not None:
-        rows.insert(4, ("residual", f"{facts['residual_rms_s'] * 1e9:.0f} ns rms"))
+        rows.insert(5, ("residual", f"{facts['residual_rms_s'] * 1e9:.0f} ns rms"))
     if facts["recovery_mean"] is not None:
         rows.append(("resolution check", f"{100 * facts['recovery_mean']:.0f} % of a checkerboard recovered"))
-    if facts["uncertainty_rms_mps"] is not None:
-        width = 1e3 * float(np.median(facts["resolution_width_m"]))
-        text = f"{facts['uncertainty_rms_mps']:.1f} m/s rms, at a resolution width of {width:.1f} mm"
-        rows.append(("uncertainty", text))
     if "pulse" in facts["provenance"]:
         rows.append(("pulse", facts["provenance"]["pulse"]))
     if facts["provenance"].get("quality", NOTHING_FOUND) != NOTHING_FOUND:

@@ -17,7 +17,10 @@ class FindingRecord(ShownRecord):
     check: str = Field(description="Name of the check.")
     found: str
     accepted: str
-    action: Literal["left out", "corrected", "refused", "reported"] = Field(description="Action taken.")
+    action: Literal["left out", "corrected", "refused", "reported"] = Field(
+        description="Action taken, in a reconstruction too, unless its setting `examine` is false; "
+        "`reported`: the data are used as they are."
+    )
     slice: int
     elements: list[int] = Field(description="Faulty elements.")
     role: Literal["emission", "reception", ""] = Field(
@@ -25,6 +28,11 @@ class FindingRecord(ShownRecord):
     )
     value: float | None = Field(description="The value compared with the threshold.")
     unit: str
+    water_temperature_c: float | None = Field(
+        None,
+        description="Temperature at which water has the speed that the times say, where this is only "
+        "reported, °C; `PATCH /v1/datasets/{dataset_id}` with it uses it.",
+    )
     pair_count: int | None = Field(None, description="Number of affected pairs.")
     first_pairs: list[tuple[int, int]] = Field(
         [], description="First affected pairs, as (emission, reception)."

@@ -75,6 +75,7 @@ class SummaryRecord(BaseModel):
     quantities: list[Literal[QuantityName, "truth"]] = Field(
         description="Those that can be shown and downloaded."
     )
+    trust: str = Field(description="How far to trust the image: deviation, detail and cautions in one line.")
     resolution_width_m: list[float] = Field(
         description="Standard deviation, m, of the Gaussian that smooths the truth like the image: one for "
         "each slice, or one of a slice or volume; the uncertainty refers to it. Empty without uncertainty."

@@ -129,13 +129,15 @@ def test_summary_shows_the_uncertainty_inside_the_array() -> None:
     record = json.loads(json.dumps(figures(result, dataset(None), 1.0)))
     assert record["uncertainty_rms_mps"] == pytest.approx(6.0)
     assert record["resolution_width_m"] == [0.0016, 0.002, 0.0031]
-    assert dict(summary(record))["uncertainty"] == "6.0 m/s rms, at a resolution width of 2.0 mm"
-    assert "uncertainty" not in dict(summary(figures(image(speed), dataset(None), 1.0)))
+    assert dict(summary(record))["trust"] == "±6 m/s (1 sd), detail down to 4.7 mm, no cautions"
+    without = figures(image(speed), dataset(None), 1.0)
+    assert dict(summary(without))["trust"] == "no standard deviations, no cautions"
     assert (record["doubt"], record["cautions"]) == ("", [])
     cautious = replace(result, cautions=(Caution("uncertainty", "too small"),))
     listed = figures(cautious, dataset(None), 1.0)
     assert listed["cautions"] == [{"code": "uncertainty", "text": "too small", "doubtful": False}]
     assert listed["doubt"] == ""
+    assert listed["trust"].endswith(", 1 caution: deviations may be too small")
 
 
 def test_summary_shows_residuals_resolution_and_candidates() -> None:

@@ -95,12 +95,14 @@ function Run({ scan, from, changes, onStarted }) {
   </${Section}>`;
 }
 
-// element: the one that emits; openWater(): opens the form of the water.
-function About({ scan, geometry, geometryError, element, openWater }) {
+// element: the one that emits; openWater(): opens the form of the water; onChange(scan) gets the record after a change.
+function About({ scan, geometry, geometryError, element, openWater, onChange }) {
   const address = `/v1/datasets/${scan.id}/quality`;
   const water = scan.water_temperature_c ?? "";
   const [report, error] = useRead(() => request(address), undefined, water);
   const [opened, setOpened] = useState(false);
+  const [waterError, act] = useAct();
+  const useWater = (celsius) => act(async () => onChange(await send("PATCH", `/v1/datasets/${scan.id}`, { water_temperature_c: celsius })));
   return html`<${Section} id="about" title="Geometry and quality">
     <div class="about">
       <figure id="elements" class="figure">
@@ -118,10 +120,10 @@ function About({ scan, geometry, geometryError, element, openWater }) {
         <${Alert} id="geometry-error" error=${geometryError} />
         <h3>Quality</h3>
         <div id="quality">
-          ${report && html`<${Quality} report=${report} several=${scan.slices > 1} />`}
+          ${report && html`<${Quality} report=${report} several=${scan.slices > 1} useWater=${useWater} />`}
           ${!report && !error && html`<${Facts}>Checking the scan</${Facts}>`}
         </div>
-        <${Alert} id="quality-error" error=${error} />
+        <${Alert} id="quality-error" error=${error ?? waterError} />
       </div>
     </div>
     <details id="quality-more" onToggle=${({ target }) => setOpened(opened || target.open)}>
@@ -161,7 +163,7 @@ function Scan({ scan: first, from }) {
       <${JobList} refresh=${refresh} empty="Nothing has run yet. Press Fast or Best. The image appears here."
         filters=${{ kind: "reconstruction", text: scan.id }} onJobs=${onJobs} />
     </${Section}>
-    <${About} scan=${scan} geometry=${geometry} geometryError=${geometryError} element=${element} openWater=${() => openWater.current()} />
+    <${About} scan=${scan} geometry=${geometry} geometryError=${geometryError} element=${element} openWater=${() => openWater.current()} onChange=${setScan} />
     ${scan.has_traces && html`<${Shot} key=${water} scan=${scan} hasWater=${hasWater} onEmission=${setElement} />`}`;
 }
 

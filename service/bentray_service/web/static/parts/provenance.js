@@ -10,7 +10,7 @@ const SOFTWARE = { bentray: "Bentray", python: "Python", numpy: "NumPy", numba: 
 const SAID = {
   automatic: "Decided automatically",
   water: "Water", pulse: "Pulse", quality: "Quality of the scan", geometry: "Geometry", waveform: "Full waveform", attenuation: "Attenuation",
-  reflection: "Reflection", uncertainty: "Uncertainty",
+  reflection: "Reflection", uncertainty: "Uncertainty", pairs: "Pairs", noise: "Noise of the times",
   frequency_hz: "Centre frequency", amplitudes: "Amplitudes",
 };
 // What a parameter of no value means: the automatic decision, unless stated here.

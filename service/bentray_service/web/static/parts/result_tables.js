@@ -27,12 +27,11 @@ export function facts({ job, volume, summary }) {
   const size = volume.shape.join(" × ");
   const spacing = volume.spacing_m[0] === null ? "" : ` of ${Number((1e3 * volume.spacing_m[0]).toPrecision(3))} mm`;
   const residual = job.history.at(-1)?.residual_rms_s;
-  const { truth, resolution_width_m: widths } = summary;
+  const { truth, trust } = summary;
   return [
-    volume.provenance.made_by ?? job.title, `${size} nodes${spacing}`, `water ${volume.water_speed_mps.toFixed(1)} m/s`,
+    trust, volume.provenance.made_by ?? job.title, `${size} nodes${spacing}`, `water ${volume.water_speed_mps.toFixed(1)} m/s`,
     residual && `residual ${inNanoseconds(residual)}`,
     truth?.rmse_mps != null && `error ${truth.rmse_mps.toFixed(2)} m/s rms (${truth.region})`,
-    widths.length && `resolution width ${(1e3 * widths[Math.floor(widths.length / 2)]).toFixed(1)} mm`,
     job.seconds !== null && `took ${duration(job.seconds)}`,
   ].filter(Boolean).join(" · ");
 }

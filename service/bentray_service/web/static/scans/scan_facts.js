@@ -1,5 +1,5 @@
 // What is known about a scan, and what is wrong with it, in words.
-import { html } from "../parts/view.js";
+import { Button, html } from "../parts/view.js";
 
 const percent = (part, whole) => (whole ? `${((100 * part) / whole).toFixed(1)} %` : "none");
 
@@ -46,10 +46,18 @@ const VERDICTS = {
   refused: "Not usable for a reconstruction, see the findings.",
 };
 
+// What reconstructions do about a finding, unless their setting “Check the scan first” is off.
+const ACTIONS = {
+  "left out": "Left out, in reconstructions too.",
+  corrected: "Corrected, in reconstructions too.",
+  refused: "Refused, by reconstructions too.",
+  reported: "Only reported: reconstructions use the data as they are.",
+};
+
 function sentence({ check, elements, role, slice, found, accepted, action }, several) {
   const which = elements.length ? ` (${elements.length === 1 ? "element" : "elements"} ${listed(elements)}${role ? `, ${role}` : ""})` : "";
   const where = several ? `, slice ${slice}` : "";
-  return `${check}${which}${where}: ${found}; accepted: ${accepted}. ${action[0].toUpperCase()}${action.slice(1)}.`;
+  return `${check}${which}${where}: ${found}; accepted: ${accepted}. ${ACTIONS[action]}`;
 }
 
 function listed(elements) {
@@ -57,19 +65,24 @@ function listed(elements) {
   return elements.length > 12 ? `${shown} and ${elements.length - 12} more` : shown;
 }
 
-const Findings = ({ sentences }) => html`<ul class="findings">${sentences.map((words) => html`<li>${words}</li>`)}</ul>`;
+// A finding, with a button where the page can do what it advises.
+const Finding = ({ finding, several, useWater }) => html`<li>${sentence(finding, several)}
+  ${finding.water_temperature_c !== null && html` <${Button} onClick=${() => useWater(finding.water_temperature_c)}>
+    Use water of ${finding.water_temperature_c.toFixed(1)} °C</${Button}>`}</li>`;
 
-// report: of GET /v1/datasets/{id}/quality: verdict, share of usable pairs, findings. several: whether the scan has slices.
-export function Quality({ report, several }) {
+// report: of GET /v1/datasets/{id}/quality: verdict, share of usable pairs, findings. several: whether the scan has slices; useWater(°C):
+// states the temperature of its water.
+export function Quality({ report, several, useWater }) {
   const share = `${report.usable_pairs.toLocaleString("en")} of ${report.pairs.toLocaleString("en")} pairs`;
   const picker = report.picker ? `, arrivals by the picker ${report.picker}` : "";
   const skipped = Object.entries(report.not_checked);
   return html`
     <p class="verdict">${VERDICTS[report.verdict]}</p>
     <p class="usable">Usable: ${share} (${percent(report.usable_pairs, report.pairs)})${picker}.</p>
-    ${report.findings.length > 0 && html`<${Findings} sentences=${report.findings.map((finding) => sentence(finding, several))} />`}
+    ${report.findings.length > 0 && html`<ul class="findings">
+      ${report.findings.map((finding) => html`<${Finding} finding=${finding} several=${several} useWater=${useWater} />`)}</ul>`}
     ${skipped.length > 0 && html`<details>
       <summary>${skipped.length} checks do not apply</summary>
-      <${Findings} sentences=${skipped.map(([check, reason]) => `${check}: ${reason}`)} />
+      <ul class="findings">${skipped.map(([check, reason]) => html`<li>${check}: ${reason}</li>`)}</ul>
     </details>`}`;
 }
