@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -125,29 +126,35 @@ class _Page:
 
     @contextmanager
     def long_jobs(self) -> Iterator[None]:
-        """*Best*, and one geometry field after the other, within the block."""
-        best = self._started({"kind": "reconstruction", "dataset": self._scan, "settings": BEST})
+        """*Best* and a geometry field within the block; one that ends is followed by another."""
+        best = {"kind": "reconstruction", "dataset": self._scan, "settings": BEST}
+        # Another size of the image is another field.
+        fields = (
+            {"kind": "geometry-field", "mesh": self._mesh, "settings": {"image_size": size}}
+            for size in range(513, 33, -1)
+        )
         leave = threading.Event()
-        fields = threading.Thread(target=self._build_fields, args=(leave,))
-        fields.start()
+        threads = [threading.Thread(target=self._run, args=(jobs, leave)) for jobs in (repeat(best), fields)]
+        for thread in threads:
+            thread.start()
         time.sleep(SETTLE_S)
         try:
             yield
-            assert self._state(best) == "running"
+            assert all(thread.is_alive() for thread in threads), "a long job failed"
         finally:
             leave.set()
-            fields.join()
-            self._http.post(f"/v1/jobs/{best}/cancel")
+            for thread in threads:
+                thread.join()
 
-    def _build_fields(self, leave: threading.Event) -> None:
-        # Another size of the image is another field.
-        for size in range(513, 33, -1):
-            request = {"kind": "geometry-field", "mesh": self._mesh, "settings": {"image_size": size}}
-            field = self._started(request)
-            while self._state(field) not in ENDED:
+    def _run(self, requests: Iterator[dict[str, Any]], leave: threading.Event) -> None:
+        """Jobs one after the other, until one fails."""
+        for request in requests:
+            job = self._started(request)
+            while (state := self._state(job)) not in ENDED:
                 if leave.wait(0.5):
-                    self._http.post(f"/v1/jobs/{field}/cancel")
+                    self._http.post(f"/v1/jobs/{job}/cancel")
                     return
+            assert state == "succeeded", state
 
     def _state(self, job: str) -> str:
         return str(self._got(f"/v1/jobs/{job}").json()["state"])

@@ -259,6 +259,12 @@ def start(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., TestCl
 
 
 @pytest.fixture
+def http(start: Callable[..., TestClient]) -> TestClient:
+    """The application with its default settings."""
+    return start()
+
+
+@pytest.fixture
 def uploaded(scan: Callable[..., Path]) -> Callable[[TestClient], str]:
     """Upload the small scan; returns its id."""
 

@@ -16,8 +16,7 @@ from bentray_service.settings import ServiceSettings
 from bentray_workers.cluster.connection import open_cluster
 
 
-def test_dataset_in_image_out(start, uploaded, submitted, until, work):
-    http = start()
+def test_dataset_in_image_out(http, uploaded, submitted, until, work):
     job = submitted(http, uploaded(http), rays="straight")
     assert job["state"] in ("queued", "running")
     done = until(http, job["id"])
@@ -48,8 +47,7 @@ def test_whole_path_with_the_real_kernels(tmp_path, uploaded, submitted, until):
             assert http.get(done["links"]["image"]).content.startswith(b"\x89PNG")
 
 
-def test_an_injected_cluster_stays_open(start, cluster):
-    http = start()
+def test_an_injected_cluster_stays_open(http, cluster):
     assert http.get("/health/live").json() == {"status": "alive"}
     http.__exit__()
     assert not cluster.closed

@@ -14,12 +14,11 @@ from bentray_service.rows import usage
 from bentray_service.rows.ids import LOCAL, Tenant
 from bentray_service.rows.keys import ApiKey, Keys
 
+pytestmark = pytest.mark.usefixtures("work")
+
 NAME = re.compile(r"bentray_[a-z]+(_[a-z]+)*")
 
 
-@pytest.fixture
-def http(start, work):
-    return start()
 
 
 def read(http):

@@ -190,9 +190,8 @@ def test_a_picture_ends_with_its_client(tmp_path, held):
 @pytest.mark.parametrize(
     "what", ["refraction.png?iso=0.5", "slice.png", "data?format=npy", "data?format=nifti"]
 )
-def test_rejects_pictures_larger_than_worker_memory(start, cluster, what):
+def test_rejects_pictures_larger_than_worker_memory(http, cluster, what):
     """Workers of half a GiB, and a volume of 150 MiB."""
-    http = start()
     cluster.memory_bytes = 2**29 + 2**28
     shape = (340, 340, 340)
     here = put(http.app.state, Tenant("local"), sampled(ONE_HOLE, 12), shape)
@@ -207,8 +206,7 @@ def test_rejects_pictures_larger_than_worker_memory(start, cluster, what):
     assert (refused.status_code, refused.json()["field"]) == (422, "volume")
 
 
-def test_a_large_picture_has_its_worker_to_itself(start, cluster):
-    http = start()
+def test_a_large_picture_has_its_worker_to_itself(http, cluster):
     cluster.memory_bytes = 2**30
     here = put(http.app.state, Tenant("local"), sampled(ONE_HOLE, 12), (180, 180, 180))
     assert http.get(f"{here}/refraction.png", params=SMALL).status_code == 200

@@ -76,8 +76,7 @@ def test_reads_and_writes_are_audited_with_ids(key, scan, monkeypatch):
     assert token.shown() not in json.dumps(found)
 
 
-def test_at_an_open_door_too(start):
-    http = start()
+def test_at_an_open_door_too(http):
     http.get("/v1/volumes")
     http.get("/health/live")
     assert [(one["tenant"], one["how"], one["route"]) for one in told(http)] == [

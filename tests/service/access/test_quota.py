@@ -169,9 +169,8 @@ def test_reservations_of_a_killed_service_are_released_at_start(start):
     assert used(start(max_tenant_bytes=QUOTA_BYTES)) == (0, 0)
 
 
-def test_a_reservation_is_released_later_if_the_database_is_away(start, monkeypatch, caplog):
+def test_a_reservation_is_released_later_if_the_database_is_away(http, monkeypatch, caplog):
     """An expected state: one line in the log, without a traceback."""
-    http = start()
     quota = http.app.state.stores.quota
     with monkeypatch.context() as away:
 

@@ -33,14 +33,13 @@ def wider(root: Path) -> list[str]:
 
 
 def test_everything_that_a_service_writes_is_for_its_user_alone(
-    start: Callable[..., Any],
+    http,
     uploaded: Callable[..., str],
     submitted: Callable[..., dict[str, Any]],
     until: Callable[..., dict[str, Any]],
     work: Any,
     tmp_path: Path,
 ) -> None:
-    http = start()
     work.hold.clear()
     job = submitted(http, uploaded(http))
     # The job is running before its folder exists; both exist once the work has begun.

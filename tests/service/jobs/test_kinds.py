@@ -156,8 +156,7 @@ def test_worker_rejection_fails_the_job_with_a_message(serving, until, monkeypat
         ({"frames": 720, "width": 2048, "height": 2048}, "settings.frames"),
     ],
 )
-def test_wrong_settings(start, settings, field):
-    http = start()
+def test_wrong_settings(http, settings, field):
     answer = ask(http, put(http), **settings)
     body = answer.json()
     assert (answer.status_code, body["field"].removesuffix(".0")) == (422, field), body
@@ -165,8 +164,7 @@ def test_wrong_settings(start, settings, field):
     assert http.get("/v1/jobs").json()["jobs"] == []
 
 
-def test_other_refusals(start):
-    http = start()
+def test_other_refusals(http):
     volume = put(http)
     for asked, field in (
         ({"kind": "refraction"}, "volume"),
@@ -179,8 +177,7 @@ def test_other_refusals(start):
     assert ask(http, "vol-" + "0" * 20).status_code == 404
 
 
-def test_a_reconstruction_has_no_animation(start, work, uploaded, submitted, until):
-    http = start()
+def test_a_reconstruction_has_no_animation(http, work, uploaded, submitted, until):
     job = until(http, submitted(http, uploaded(http))["id"])
     assert http.get(f"/v1/jobs/{job['id']}/animation").json()["type"] == "/problems/no-animation"
 
@@ -250,8 +247,7 @@ def test_cancelled_fields_leave_no_files(start, kind):
     assert Checksums(state.stores.database).all() == []
 
 
-def test_other_refusals_of_a_field(start, monkeypatch):
-    http = start()
+def test_other_refusals_of_a_field(http, monkeypatch):
     assert ask_field(http, "mesh-" + "0" * 20).status_code == 404
     mesh = put_mesh(http)
     both = {"kind": "geometry-field", "mesh": mesh, "volume": "vol-1"}

@@ -103,8 +103,7 @@ def test_new_job_starts_at_once(start, uploaded, submitted, until, work, monkeyp
     assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded"
 
 
-def test_a_job_that_begins_while_the_service_stops_is_put_back(start, uploaded, submitted, work, monkeypatch):
-    http = start()
+def test_a_job_that_begins_while_the_service_stops_is_put_back(http, uploaded, submitted, work, monkeypatch):
     state, claimed, claim = http.app.state, threading.Event(), Queue.claim
 
     def late(self, *args, **kwargs):
@@ -125,8 +124,7 @@ def test_a_job_that_begins_while_the_service_stops_is_put_back(start, uploaded, 
     assert state.background.runner.queue.state(job["id"]) == "queued"
 
 
-def test_cancel_a_running_job(start, uploaded, submitted, until, work):
-    http = start()
+def test_cancel_a_running_job(http, uploaded, submitted, until, work):
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
@@ -138,8 +136,7 @@ def test_cancel_a_running_job(start, uploaded, submitted, until, work):
     assert not list((http.app.state.stores.files.of(LOCAL).root / "volumes").iterdir())
 
 
-def test_a_refused_job_says_why(start, uploaded, submitted, until, work):
-    http = start()
+def test_a_refused_job_says_why(http, uploaded, submitted, until, work):
     work.error = InvalidInput("traveltime", "every pair missing", "at least one pair")
     done = until(http, submitted(http, uploaded(http))["id"])
     assert (done["state"], done["error"]["field"]) == ("failed", "traveltime")
@@ -156,8 +153,7 @@ def test_the_next_job_runs_after_a_failure(start, uploaded, submitted, until, wo
     assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded"
 
 
-def test_the_end_is_stored_once_the_database_is_back(start, uploaded, submitted, until, work, monkeypatch):
-    http = start()
+def test_the_end_is_stored_once_the_database_is_back(http, uploaded, submitted, until, work, monkeypatch):
     queue, store = http.app.state.background.runner.queue, Queue.succeed
     tries = []
 
@@ -172,8 +168,7 @@ def test_the_end_is_stored_once_the_database_is_back(start, uploaded, submitted,
     assert len(tries) == 2
 
 
-def test_progress_is_seen_while_it_runs(start, uploaded, submitted, until, work):
-    http = start()
+def test_progress_is_seen_while_it_runs(http, uploaded, submitted, until, work):
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
@@ -233,8 +228,7 @@ def test_lost_scheduler_fails_no_job(start, uploaded, submitted, until, work, er
     assert "no answer from the workers; the job continues when available" in notes
 
 
-def test_finished_jobs_leave_no_temporary_files(start, uploaded, submitted, until, work):
-    http = start()
+def test_finished_jobs_leave_no_temporary_files(http, uploaded, submitted, until, work):
     folder = http.app.state.stores.files.of(LOCAL).root / "work"
     work.hold.clear()
     job = submitted(http, uploaded(http))
@@ -279,8 +273,7 @@ def test_unrecordable_result_fails_the_job(start, uploaded, submitted, until, wo
     assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded", "the slot is free again"
 
 
-def test_an_image_that_is_not_finite_is_rejected(start, uploaded, submitted, until, work):
-    http = start()
+def test_an_image_that_is_not_finite_is_rejected(http, uploaded, submitted, until, work):
     work.spoil = np.nan
     done = until(http, submitted(http, uploaded(http))["id"])
     assert (done["state"], done["error"]["field"]) == ("failed", "settings")

@@ -10,9 +10,6 @@ from bentray_service.rows.keys import ApiKey, Keys
 HDF5 = {"Content-Type": "application/x-hdf5"}
 
 
-@pytest.fixture
-def http(start):
-    return start()
 
 
 @pytest.fixture

@@ -28,8 +28,7 @@ def ended(http, batch, until):
     return http.get(batch["links"]["self"]).json()
 
 
-def test_many_scans_as_one(start, scans, work, until):
-    http = start()
+def test_many_scans_as_one(http, scans, work, until):
     datasets = scans(http)
     answer = http.post("/v1/batches", json={"datasets": datasets, "settings": SART, "name": "Ward 3"})
     assert answer.status_code == 202, answer.text
@@ -76,8 +75,7 @@ def test_cancel_ends_the_rest(start, scans, work, until):
     assert http.post(f"{batch['links']['self']}/cancel").status_code == 409
 
 
-def test_a_request_that_is_refused_starts_nothing(start, scans):
-    http = start()
+def test_a_request_that_is_refused_starts_nothing(http, scans):
     (scan,) = scans(http, 1)
     for change, field in (
         ({"datasets": []}, "datasets"),

@@ -5,12 +5,11 @@ import pytest
 from bentray_service.rows.ids import Tenant
 from bentray_service.rows.keys import ApiKey, Keys
 
+pytestmark = pytest.mark.usefixtures("work")
+
 HDF5 = {"Content-Type": "application/x-hdf5"}
 
 
-@pytest.fixture
-def http(start, work):
-    return start()
 
 
 def test_the_queue_of_others_is_a_number(http, work, scan, until):

@@ -13,9 +13,6 @@ from bentray_workers.rendering import coefficients
 from ..stored_volumes import store_volume
 
 
-@pytest.fixture
-def http(start):
-    return start()
 
 
 @pytest.mark.parametrize(

@@ -15,12 +15,11 @@ from bentray_service.rows.stored_tables import Datasets
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.files.dataset.units import POSITION_UNITS, TIME_UNITS
 
+pytestmark = pytest.mark.usefixtures("work")
+
 WRONG = {"times_in": "ms", "times_read_as": "us"}
 
 
-@pytest.fixture
-def http(start, work):
-    return start()
 
 
 def in_microseconds(file):

@@ -77,8 +77,7 @@ def test_a_download_goes_on_while_its_volume_is_deleted(serve):
         assert http.get(f"/v1/volumes/{volume}/data").status_code == 404
 
 
-def test_readers_during_a_deletion_get_410(start):
-    http = start()
+def test_readers_during_a_deletion_get_410(http):
     with ThreadPoolExecutor(6) as pool:
         for _ in range(8):
             volume = http.post("/v1/volumes", content=packed(), headers=STREAM).json()["id"]

@@ -45,8 +45,7 @@ def test_the_title_of_a_file_without_one_is_its_name(start, scan, disposition, t
         assert own.json()["title"] == "Sixteen elements"
 
 
-def test_upload_answers_with_the_record(start, scan):
-    http = start()
+def test_upload_answers_with_the_record(http, scan):
     content = scan().read_bytes()
     answer = upload(http, content)
     body = answer.json()
@@ -60,8 +59,7 @@ def test_upload_answers_with_the_record(start, scan):
     assert http.get("/v1/datasets").json() == {"datasets": [body], "next": None}
 
 
-def test_only_the_canonical_file_is_kept(start, scan):
-    http = start()
+def test_only_the_canonical_file_is_kept(http, scan):
     dataset = upload(http, scan().read_bytes()).json()
     root = http.app.state.stores.files.of(LOCAL).root
     assert [path.name for path in (root / "datasets").iterdir()] == [f"{dataset['id']}.h5"]
@@ -69,14 +67,12 @@ def test_only_the_canonical_file_is_kept(start, scan):
     assert h5py.is_hdf5(root / "datasets" / f"{dataset['id']}.h5")
 
 
-def test_octet_stream_is_taken_and_parameters_do_not_matter(start, scan):
-    http = start()
+def test_octet_stream_is_taken_and_parameters_do_not_matter(http, scan):
     headers = {"Content-Type": "Application/Octet-Stream; charset=binary"}
     assert upload(http, scan().read_bytes(), headers).status_code == 201
 
 
-def test_dataset_download_can_be_resumed(start, scan, tmp_path):
-    http = start()
+def test_dataset_download_can_be_resumed(http, scan, tmp_path):
     dataset = upload(http, scan().read_bytes()).json()
     here = dataset["links"]["file"]
     whole = http.get(here)
@@ -94,8 +90,7 @@ def test_dataset_download_can_be_resumed(start, scan, tmp_path):
     assert problem(http.get(here))["status"] == 404
 
 
-def test_newest_first(start, scan):
-    http = start()
+def test_newest_first(http, scan):
     made = [upload(http, scan().read_bytes()).json()["id"] for _ in range(3)]
     listed = http.get("/v1/datasets?limit=2").json()["datasets"]
     assert [one["id"] for one in listed] == [made[2], made[1]]
@@ -116,8 +111,7 @@ def negative_speed(file):
         (negative_speed, "sound_speed_mps"),
     ],
 )
-def test_bad_contents_are_named(start, scan, spoil, field):
-    http = start()
+def test_bad_contents_are_named(http, scan, spoil, field):
     answer = upload(http, scan(spoil).read_bytes())
     body = problem(answer)
     assert answer.status_code == 422
@@ -136,8 +130,7 @@ def test_not_hdf5(start):
     assert "HDF5" in body["detail"]
 
 
-def test_empty_body(start):
-    http = start()
+def test_empty_body(http):
     for content in (b"", iter([])):
         body = problem(upload(http, content))
         assert (body["status"], body["type"], body["field"]) == (422, "/problems/empty-body", "body")
@@ -191,8 +184,7 @@ def test_a_file_larger_than_a_batch_arrives_whole(start, scan):
     assert answer.json()["sha256"] == hashlib.sha256(content).hexdigest()
 
 
-def test_a_thousand_scans_are_searched_and_read_in_pages(start, uploaded):
-    http = start()
+def test_a_thousand_scans_are_searched_and_read_in_pages(http, uploaded):
     stored = http.app.state.stores.datasets
     first = uploaded(http)
     row = {name: value for name, value in stored.get(LOCAL, first).values().items() if name != "number"}

@@ -1,8 +1,7 @@
 """DELETE over HTTP: gone at once, and refused while a job needs it."""
 
 
-def test_a_scan_and_its_result_are_gone(start, uploaded, submitted, until, work):
-    http = start()
+def test_a_scan_and_its_result_are_gone(http, uploaded, submitted, until, work):
     dataset = uploaded(http)
     done = until(http, submitted(http, dataset)["id"])
     http.get(done["links"]["data"], params={"format": "npy"})
@@ -13,8 +12,7 @@ def test_a_scan_and_its_result_are_gone(start, uploaded, submitted, until, work)
     assert [path.name for path in root.glob("tenants/**/*") if path.is_file()] == []
 
 
-def test_while_a_job_needs_it_it_stays(start, uploaded, submitted, until, work):
-    http = start()
+def test_while_a_job_needs_it_it_stays(http, uploaded, submitted, until, work):
     dataset = uploaded(http)
     work.hold.clear()
     job = submitted(http, dataset)

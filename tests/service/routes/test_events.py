@@ -36,8 +36,7 @@ def once_watched(http, then, pause_s=0.0):
     threading.Thread(target=wait).start()
 
 
-def test_a_job_from_its_beginning_to_its_end(start, uploaded, submitted, until, work):
-    http = start()
+def test_a_job_from_its_beginning_to_its_end(http, uploaded, submitted, until, work):
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
@@ -60,8 +59,7 @@ def test_a_job_from_its_beginning_to_its_end(start, uploaded, submitted, until, 
     assert http.get(f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": str(states[2][0])}).text == ""
 
 
-def test_it_ends_when_the_service_leaves(start, uploaded, submitted, until, work):
-    http = start()
+def test_it_ends_when_the_service_leaves(http, uploaded, submitted, until, work):
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
@@ -86,15 +84,13 @@ def test_heartbeats_are_sent(serve, uploaded, submitted, until, work, monkeypatc
 
 
 @pytest.mark.parametrize("last", ["x", "-1", str(2**70)])
-def test_a_wrong_place_is_rejected(start, uploaded, submitted, work, last):
-    http = start()
+def test_a_wrong_place_is_rejected(http, uploaded, submitted, work, last):
     job = submitted(http, uploaded(http))
     answer = http.get(f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": last})
     assert (answer.status_code, answer.json()["field"]) == (422, "last-event-id")
 
 
-def test_event_streams_share_one_query(start, uploaded, submitted, until, work, monkeypatch):
-    http = start()
+def test_event_streams_share_one_query(http, uploaded, submitted, until, work, monkeypatch):
     state, looks, threads = http.app.state, [], set()
     news = state.stores.jobs.__class__.updates
 
@@ -160,8 +156,7 @@ def wait_until(happened):
         time.sleep(0.02)
 
 
-def test_unavailable_database_ends_no_stream(start, uploaded, submitted, until, work, monkeypatch):
-    http = start()
+def test_unavailable_database_ends_no_stream(http, uploaded, submitted, until, work, monkeypatch):
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
@@ -207,8 +202,7 @@ def all_events(http, monkeypatch):
         listener.join(60.0)
 
 
-def test_all_jobs_from_one_stream(start, uploaded, submitted, until, work, monkeypatch):
-    http = start()
+def test_all_jobs_from_one_stream(http, uploaded, submitted, until, work, monkeypatch):
     work.hold.clear()
     dataset = uploaded(http)
     first, second = (submitted(http, dataset)["id"] for _ in range(2))
@@ -247,8 +241,7 @@ def test_a_job_between_two_queries_is_not_missed(start, uploaded, submitted, unt
     assert changes_in(told["all"])[-1]["state"] == "succeeded"
 
 
-def test_jobs_of_another_tenant_are_not_in_the_stream(start, uploaded, submitted, work):
-    http = start()
+def test_jobs_of_another_tenant_are_not_in_the_stream(http, uploaded, submitted, work):
     work.hold.clear()
     job = submitted(http, uploaded(http))["id"]
     state = http.app.state

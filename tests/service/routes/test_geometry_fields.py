@@ -38,9 +38,6 @@ def made(tmp_path_factory):
     return folder / "field", figures
 
 
-@pytest.fixture
-def http(start):
-    return start()
 
 
 @pytest.fixture

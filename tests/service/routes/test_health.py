@@ -13,15 +13,13 @@ def faults(answer):
     return [one["field"] for one in answer.json()["errors"]]
 
 
-def test_all_well(start):
-    http = start()
+def test_all_well(http):
     assert http.get("/health/live").json() == {"status": "alive"}
     body = http.get("/health/ready").json()
     assert (body["status"], body["workers"]) == ("ready", 1)
 
 
-def test_no_workers(start, cluster):
-    http = start()
+def test_no_workers(http, cluster):
     cluster.workers = 0
     assert faults(http.get("/health/ready")) == ["workers"]
 
@@ -30,16 +28,14 @@ def test_disk_full(start):
     assert faults(start(min_free_bytes=2**62).get("/health/ready")) == ["disk"]
 
 
-def test_database_that_cannot_be_written(start):
-    http = start()
+def test_database_that_cannot_be_written(http):
     with http.app.state.stores.database.write() as connection:
         connection.execute(text("DROP TABLE about"))
     assert faults(http.get("/health/ready")) == ["database"]
     assert http.get("/health/live").status_code == 200
 
 
-def test_stalled_ingestion_is_reported(start):
-    http = start()
+def test_stalled_ingestion_is_reported(http):
     http.app.state.background.ingest.stop()
     assert faults(http.get("/health/ready")) == ["ingest"]
 

@@ -9,9 +9,6 @@ from bentray_service import pictures
 from ..stored_volumes import store_volume
 
 
-@pytest.fixture
-def http(start):
-    return start()
 
 
 def test_the_counts_are_those_of_numpy_and_computed_once(http, cluster):

@@ -10,10 +10,9 @@ from bentray_kernels.tomography.result import Candidate
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.rows.ids import LOCAL
 
+pytestmark = pytest.mark.usefixtures("work")
 
-@pytest.fixture
-def http(start, work):
-    return start()
+
 
 
 @pytest.fixture

@@ -20,9 +20,6 @@ STREAM = {"Content-Type": "application/octet-stream"}
 RING = torus(12, 8)
 
 
-@pytest.fixture
-def http(start):
-    return start()
 
 
 def off(mesh):

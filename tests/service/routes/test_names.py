@@ -6,10 +6,9 @@ import pytest
 
 from bentray_service.rows.keys import ApiKey
 
+pytestmark = pytest.mark.usefixtures("work")
 
-@pytest.fixture
-def http(start, work):
-    return start()
+
 
 
 @pytest.fixture

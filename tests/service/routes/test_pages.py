@@ -19,8 +19,7 @@ ASSETS = [
 ]
 
 
-def test_pages_load_only_own_files_and_keep_to_their_own_policy(start):
-    http = start()
+def test_pages_load_only_own_files_and_keep_to_their_own_policy(http):
     for path in (*PAGES, *ASSETS):
         answer = http.get(path)
         assert answer.status_code == 200, path

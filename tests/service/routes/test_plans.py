@@ -31,8 +31,7 @@ def done_in(http, job, seconds):
         connection.execute(text(f"UPDATE jobs SET finished = started + {seconds} WHERE id = '{job}'"))
 
 
-def test_nothing_is_started(start, uploaded, work):
-    http = start()
+def test_nothing_is_started(http, uploaded, work):
     found = planned(http, uploaded(http))
     assert found.status_code == 200
     record = found.json()
@@ -47,8 +46,7 @@ def test_nothing_is_started(start, uploaded, work):
     assert len(candidates.json()["plan"]["methods"]) > 2
 
 
-def test_finished_jobs_of_the_same_method_correct_the_estimate(start, uploaded, work, until):
-    http = start()
+def test_finished_jobs_of_the_same_method_correct_the_estimate(http, uploaded, work, until):
     dataset = uploaded(http)
     for seconds in (60.0, 60.0, 60.0):
         job = submit(http, dataset)
@@ -64,16 +62,14 @@ def test_finished_jobs_of_the_same_method_correct_the_estimate(start, uploaded, 
     assert (other["rough"], other["compared"]) == (True, 0)
 
 
-def test_no_number_without_a_sound_estimate(start, uploaded):
-    http = start()
+def test_no_number_without_a_sound_estimate(http, uploaded):
     dataset = uploaded(http)
     found = planned(http, dataset, {**ASKED, "decomposition": "volume"}).json()
     assert (found["minutes"], found["compared"]) == (None, 0)
     assert found["basis"].startswith("No estimate yet")
 
 
-def test_a_tenant_learns_nothing_of_the_jobs_of_another(start, scan, until, work):
-    http = start()
+def test_a_tenant_learns_nothing_of_the_jobs_of_another(http, scan, until, work):
     state = http.app.state
     auth = {}
     for name in ("acme", "other"):
@@ -148,8 +144,7 @@ def test_the_place_in_the_queue(start, uploaded):
         ("[]", "settings"),
     ],
 )
-def test_what_a_job_is_refused_for_a_plan_is_too(start, uploaded, settings, field):
-    http = start()
+def test_what_a_job_is_refused_for_a_plan_is_too(http, uploaded, settings, field):
     body = f'{{"kind": "reconstruction", "dataset": "{uploaded(http)}", "settings": {settings}}}'
     headers = {"Content-Type": "application/json"}
     plan, job = (http.post(f"/v1/{what}", content=body, headers=headers) for what in ("plans", "jobs"))

@@ -13,8 +13,7 @@ from bentray_workers.cluster.checkpoints import Checkpoints
 from bentray_workers.reconstruction import reconstruction_run
 
 
-def test_values_of_the_checkpoint_for_its_owner_alone(start, uploaded, submitted, until, work):
-    http = start()
+def test_values_of_the_checkpoint_for_its_owner_alone(http, uploaded, submitted, until, work):
     state, auth = http.app.state, {}
     for tenant in ("acme", "other"):
         token = ApiKey.new()

@@ -24,8 +24,7 @@ def faulty(tmp_path):
     return (tmp_path / "faulty.h5").read_bytes()
 
 
-def test_report_and_page(start, cluster, faulty):
-    http = start()
+def test_report_and_page(http, cluster, faulty):
     here = http.post("/v1/datasets", content=faulty, headers=HDF5).json()["links"]["self"]
     body = http.get(f"{here}/quality").json()
     assert body["verdict"] == "usable"
@@ -45,8 +44,7 @@ def test_report_and_page(start, cluster, faulty):
     assert http.head(f"{here}/quality.png").status_code == 200
 
 
-def test_a_report_is_kept_until_the_water_changes_or_the_scan_is_deleted(start, cluster, faulty):
-    http = start()
+def test_a_report_is_kept_until_the_water_changes_or_the_scan_is_deleted(http, cluster, faulty):
     here = http.post("/v1/datasets", content=faulty, headers=HDF5).json()["links"]["self"]
     first = http.get(f"{here}/quality").json()
     count = len(cluster.submitted)
@@ -76,8 +74,7 @@ def test_a_large_scan_is_examined_when_it_is_stored(start, cluster, faulty, monk
     assert len(cluster.submitted) == count
 
 
-def test_a_scan_with_times_alone(start, uploaded):
-    http = start()
+def test_a_scan_with_times_alone(http, uploaded):
     body = http.get(f"/v1/datasets/{uploaded(http)}/quality").json()
     assert "sampling rate" not in body["checked"]
     assert "outliers" in body["checked"]

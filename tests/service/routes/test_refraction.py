@@ -36,9 +36,6 @@ def put(http, values=None, spacing=(1e-3,) * 3):
     return http.get(f"/v1/volumes/{volume_id}").json()["links"]["refraction"]
 
 
-@pytest.fixture
-def http(start):
-    return start()
 
 
 def test_a_picture_is_cast_in_the_render_lane(http, cluster):

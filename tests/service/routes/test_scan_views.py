@@ -22,8 +22,7 @@ def traced(tmp_path):
     return made, lambda http: http.post("/v1/datasets", content=content, headers=HDF5).json()["links"]["self"]
 
 
-def test_geometry_of_a_scan_with_times(start, cluster, uploaded, scan):
-    http = start()
+def test_geometry_of_a_scan_with_times(http, cluster, uploaded, scan):
     body = http.get(f"/v1/datasets/{uploaded(http)}/geometry").json()
     with h5py.File(scan(name="same.h5")) as file:
         np.testing.assert_array_equal(body["position_m"], file["geometry/element_position_m"])
@@ -83,8 +82,7 @@ def test_traces_and_picks(start, cluster, traced):
         ("slice=1", "slice", "0 to 0"),
     ],
 )
-def test_names_the_wrong_parameter_and_what_is_accepted(start, traced, query, field, accepted):
-    http = start()
+def test_names_the_wrong_parameter_and_what_is_accepted(http, traced, query, field, accepted):
     answer = http.get(f"{traced[1](http)}/traces?{query}")
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
@@ -92,8 +90,7 @@ def test_names_the_wrong_parameter_and_what_is_accepted(start, traced, query, fi
     assert accepted in answer.json()["accepted"]
 
 
-def test_a_scan_without_traces_says_so(start, uploaded):
-    http = start()
+def test_a_scan_without_traces_says_so(http, uploaded):
     answer = http.get(f"/v1/datasets/{uploaded(http)}/traces")
     assert (answer.status_code, answer.json()["field"]) == (422, "quantity")
     assert "no traces" in answer.json()["found"]

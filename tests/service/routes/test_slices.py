@@ -9,9 +9,6 @@ from PIL import Image
 STREAM = {"Content-Type": "application/octet-stream"}
 
 
-@pytest.fixture
-def http(start):
-    return start()
 
 
 @pytest.fixture

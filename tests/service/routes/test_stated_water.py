@@ -4,10 +4,9 @@ import pytest
 
 from bentray_kernels.acquisition import speed_from_temperature
 
+pytestmark = pytest.mark.usefixtures("work")
 
-@pytest.fixture
-def http(start, work):
-    return start()
+
 
 
 @pytest.fixture

@@ -17,12 +17,11 @@ from bentray_workers.files.volume import Volume, write_volume
 
 from ..conftest import FakeCluster, FakeFuture
 
+pytestmark = pytest.mark.usefixtures("work")
+
 STREAM = {"Content-Type": "application/octet-stream"}
 
 
-@pytest.fixture
-def http(start, work):
-    return start()
 
 
 @pytest.fixture

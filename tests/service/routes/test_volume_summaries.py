@@ -11,9 +11,6 @@ STREAM = {"Content-Type": "application/octet-stream"}
 RAMP = 1500.0 + np.arange(60.0)[:, None] + np.zeros(60)
 
 
-@pytest.fixture
-def http(start):
-    return start()
 
 
 @pytest.fixture

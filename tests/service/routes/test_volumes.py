@@ -11,10 +11,9 @@ import pytest
 
 from bentray_service.rows.ids import LOCAL
 
+pytestmark = pytest.mark.usefixtures("work")
 
-@pytest.fixture
-def http(start, work):
-    return start()
+
 
 
 @pytest.fixture
@@ -91,8 +90,7 @@ def test_files(http, job, here):
         np.testing.assert_allclose(np.diag(image.affine)[:2], 1.0)
 
 
-def test_an_uploaded_volume_comes_back_as_nifti_and_goes_in_again(start):
-    http = start()
+def test_an_uploaded_volume_comes_back_as_nifti_and_goes_in_again(http):
     first = send(http, npy(RAMP), "?title=once&spacing_m=0.001,0.002,0.003").json()
     answer = http.get(f"{first['links']['data']}?format=nifti")
     assert answer.headers["content-disposition"].endswith(f'"{first["id"]}-values.nii"')
@@ -128,8 +126,7 @@ def send(http, content, query="", headers=STREAM):
     return http.post(f"/v1/volumes{query}", content=content, headers=headers)
 
 
-def test_an_uploaded_volume_is_stored(start):
-    http = start()
+def test_an_uploaded_volume_is_stored(http):
     answer = send(http, npy(RAMP), "?title=A%20head%00&spacing_m=0.001,0.002,0.003")
     body = answer.json()
     assert answer.status_code == 201, body
@@ -145,8 +142,7 @@ def test_an_uploaded_volume_is_stored(start):
     assert not list((root / "incoming").iterdir())
 
 
-def test_raw_bytes(start):
-    http = start()
+def test_raw_bytes(http):
     body = send(http, RAMP.tobytes(order="F"), "?shape=3,4,5&dtype=uint8").json()
     answer = http.get(f"{body['links']['data']}?format=npy")
     assert answer.headers["content-disposition"].endswith(f'"{body["id"]}-values.npy"')
@@ -155,8 +151,7 @@ def test_raw_bytes(start):
         np.testing.assert_array_equal(file["values"], RAMP)
 
 
-def test_a_downloaded_volume_can_be_uploaded_again(start):
-    http = start()
+def test_a_downloaded_volume_can_be_uploaded_again(http):
     first = send(http, npy(RAMP), "?title=once").json()
     again = send(http, http.get(first["links"]["data"]).content).json()
     assert [again[name] for name in ("title", "shape", "value_range")] == ["once", [3, 4, 5], [0.0, 59.0]]
@@ -172,8 +167,7 @@ def test_both_kinds_are_listed_newest_first(http, job):
     assert [one["id"] for one in http.get("/v1/volumes?limit=1").json()["volumes"]] == [made[1]]
 
 
-def test_slice_of_an_upload(start, cluster):
-    http = start()
+def test_slice_of_an_upload(http, cluster):
     body = send(http, npy(RAMP)).json()
     answer = http.get(body["links"]["image"], params={"index": 4, "quantity": "value", "high": 70})
     assert answer.content.startswith(b"\x89PNG")
@@ -186,8 +180,7 @@ def test_slice_of_an_upload(start, cluster):
         assert (refused.status_code, refused.json()["field"]) == (422, field)
 
 
-def test_rejected_volume_leaves_no_files(start):
-    http = start()
+def test_rejected_volume_leaves_no_files(http):
     for content, query, field in (
         (b"no volume", "", "file"),
         (npy(np.full((2, 2, 2), np.nan)), "", "values"),

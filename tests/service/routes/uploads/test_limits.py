@@ -69,8 +69,7 @@ def test_an_array_that_its_pairs_have_no_room_for_is_not_read(scan, tmp_path):
     }
 
 
-def test_a_job_is_planned_without_its_file(start, uploaded, submitted, work, monkeypatch):
-    http = start()
+def test_a_job_is_planned_without_its_file(http, uploaded, submitted, work, monkeypatch):
     dataset = uploaded(http)
 
     def opened(*_):

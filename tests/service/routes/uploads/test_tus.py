@@ -146,8 +146,7 @@ def test_chunk_offset_must_match(start, cuts, wrong):
 
 
 @pytest.mark.parametrize("algorithm", ["sha256", "sha1", "md5"])
-def test_checksums(start, algorithm):
-    http = start()
+def test_checksums(http, algorithm):
     location = begin(http, 100)
     digest = base64.b64encode(hashlib.new(algorithm, b"right").digest()).decode()
     header = {"Upload-Checksum": f"{algorithm} {digest}"}
@@ -159,14 +158,12 @@ def test_checksums(start, algorithm):
     assert offset(http, location) == 5
 
 
-def test_unknown_checksum(start):
-    http = start()
+def test_unknown_checksum(http):
     body = problem(piece(http, begin(http, 9), 0, b"x", **{"Upload-Checksum": "crc32 AAAA"}), 400)
     assert (body["field"], body["accepted"]) == ("Upload-Checksum", "sha256 or sha1 or md5")
 
 
-def test_protocol_version_header_is_required(start):
-    http = start()
+def test_protocol_version_header_is_required(http):
     location = begin(http, 10)
     for answer in (
         http.post("/v1/uploads", headers={"Tus-Resumable": "0.2.2", "Upload-Length": "9"}),
@@ -195,8 +192,7 @@ def test_oversize_is_rejected_at_creation(start, monkeypatch):
     assert "free" in body["accepted"]
 
 
-def test_chunk_beyond_the_length_is_rejected(start):
-    http = start()
+def test_chunk_beyond_the_length_is_rejected(http):
     location = begin(http, 10)
     assert piece(http, location, 0, b"1234").status_code == 204
     problem(piece(http, location, 4, b"5678901"), 413)
@@ -220,8 +216,7 @@ def test_wrong_metadata_is_named(start, said, field):
     assert problem(start().post("/v1/uploads", headers=headers), 422)["field"] == field
 
 
-def test_termination_removes_the_upload(start):
-    http = start()
+def test_termination_removes_the_upload(http):
     location = begin(http, 10)
     piece(http, location, 0, b"123")
     assert len(left_in(http)) == 1
@@ -236,8 +231,7 @@ def test_termination_removes_the_upload(start):
         assert answer.status_code == 404
 
 
-def test_termination_by_method_override(start):
-    http = start()
+def test_termination_by_method_override(http):
     location = begin(http, 10)
     assert http.post(location, headers={**TUS, "X-HTTP-Method-Override": "DELETE"}).status_code == 204
     assert http.get(location).status_code == 404
@@ -276,8 +270,7 @@ def test_expired_uploads_are_swept(start):
     assert len(left_in(http)) == 2
 
 
-def test_one_writer_at_a_time(start):
-    http = start()
+def test_one_writer_at_a_time(http):
     location = begin(http, 10)
     with http.app.state.background.ingest.locks(location.rpartition("/")[2]):
         assert problem(piece(http, location, 0, b"x"), 423)["type"] == "/problems/locked"
@@ -287,8 +280,7 @@ def test_one_writer_at_a_time(start):
 
 
 @pytest.mark.parametrize("upload", ["up-" + "0" * 20, "nonsense", "..%2f..%2fetc%2fpasswd", "ds-" + "0" * 20])
-def test_unknown_and_hostile_ids(start, upload):
-    http = start()
+def test_unknown_and_hostile_ids(http, upload):
     assert http.head(f"/v1/uploads/{upload}", headers=TUS).status_code == 404
     problem(http.get(f"/v1/uploads/{upload}"), 404)
     problem(piece(http, f"/v1/uploads/{upload}", 0, b"x"), 404)
@@ -357,8 +349,7 @@ def test_unverified_bytes_are_dropped_after_a_kill(start):
     assert left_in(http) == [stored.name]
 
 
-def test_uploads_are_begun_no_faster_than_allowed(start):
-    http = start()
+def test_uploads_are_begun_no_faster_than_allowed(http):
     http.app.state.background.ingest.upload_limits = UploadLimits(NoProjects(), begun_per_minute=2)
     answers = [http.post("/v1/uploads", headers={**TUS, "Upload-Length": "9"}) for _ in range(3)]
     assert [answer.status_code for answer in answers] == [201, 201, 429]

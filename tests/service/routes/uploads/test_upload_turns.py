@@ -50,8 +50,7 @@ def queue():
     made.stop()
 
 
-def test_an_upload_is_read_while_another_tenant_has_four_large_ones(start, uploaded):
-    http = start()
+def test_an_upload_is_read_while_another_tenant_has_four_large_ones(http, uploaded):
     blockers = Blockers(http.app.state.background.ingest.queue, 4)
     try:
         uploaded(http)
@@ -95,8 +94,7 @@ def test_long_wait_is_rejected_with_503(queue, monkeypatch):
     assert queue.waiting(LOCAL) == 0
 
 
-def test_too_many_uploads_get_retry_after(start, scan, uploaded):
-    http = start()
+def test_too_many_uploads_get_retry_after(http, scan, uploaded):
     limits = http.app.state.background.ingest.upload_limits
     with ExitStack() as stack:
         for _ in range(MAX_PER_ACCOUNT):
