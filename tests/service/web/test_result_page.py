@@ -10,6 +10,7 @@ import httpx
 import numpy as np
 import pytest
 from matplotlib import colormaps
+from matplotlib.path import Path as Outline
 from playwright.sync_api import expect
 from scipy.ndimage import map_coordinates
 
@@ -229,6 +230,7 @@ def table_of(download):
 @pytest.mark.nightly
 def test_a_profile_is_the_linear_interpolation_of_the_array(page, result):
     ready(page, result)
+    page.get_by_label("Profile", exact=True).check()
     ends = (-8.0, -15.5, 9.25, 4.0)
     for name, value in zip(("x from", "y from", "x to", "y to"), ends, strict=True):
         page.get_by_label(f"Profile: {name}, mm").fill(str(value))
@@ -280,7 +282,7 @@ def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result,
     assert float(said["contrast"]) == pytest.approx(contrast, rel=1e-9)
     cells = page.locator(".statistics td").all_text_contents()
     assert cells[0] == f"{values.mean():.2f}"
-    assert cells[2] == f"{contrast:.2f}"
+    assert cells[3] == f"{contrast:.2f}"
 
 
 @pytest.mark.nightly
@@ -360,6 +362,45 @@ def test_a_region_has_the_contrast_of_the_truth_beside_its_own(page, shared_serv
     # Of the speed alone.
     page.get_by_role("button", name="Coverage").click()
     expect(table.locator("td").first).to_have_text("1.0000")
+
+
+def test_distance_angle_and_area_are_those_of_their_points(page, volume):
+    values = known((8, 6, 5))
+    ready(page, volume(values))
+
+    def click(*shares):
+        points = []
+        for share in shares:
+            points.append(node_below(page, *share)[2])
+            page.mouse.down()
+            page.mouse.up()
+        return np.array(points)
+
+    page.get_by_label("Distance", exact=True).check()
+    first = click((0.4, 0.3))
+    page.get_by_label("Slice across z").press("ArrowRight")
+    (across,) = click((0.6, 0.5)) - first
+    page.get_by_label("Angle", exact=True).check()
+    one, vertex, other = click((0.45, 0.2), (0.5, 0.5), (0.6, 0.3))
+    page.get_by_label("Area", exact=True).check()
+    *outline, _ = click((0.4, 0.2), (0.6, 0.25), (0.55, 0.8), (0.42, 0.7), (0.4, 0.2))
+    with page.expect_download() as download:
+        page.locator(".measure.list").get_by_role("button", name="Save as CSV").click()
+    head, *rows = table_of(download)
+    length, angle, area = (dict(zip(head, row, strict=True)) for row in rows)
+    # The second point lies in another slice.
+    assert float(length["value"]) == pytest.approx(np.hypot(np.linalg.norm(across), 1e3 * SPACING_M[2]))
+    arms = [complex(*(end - vertex)) for end in (one, other)]
+    assert float(angle["value"]) == pytest.approx(abs(np.angle(arms[0] / arms[1], deg=True)))
+    x, y = np.transpose(outline)
+    assert float(area["value"]) == pytest.approx(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+    nodes = [(X0 + DX * a, Y0 + DY * b) for a in range(8) for b in range(6)]
+    inside = values[..., 3].ravel()[Outline(outline).contains_points(nodes)]
+    assert int(area["nodes"]) == inside.size > 5
+    assert float(area["mean"]) == pytest.approx(inside.mean())
+    assert float(area["standard_error"]) == pytest.approx(inside.std() / np.sqrt(inside.size))
+    page.get_by_role("button", name="Remove measure 2").click()
+    page.wait_for_url(lambda url: "measures=distance" in url and "angle" not in url)
 
 
 @pytest.mark.nightly

@@ -70,6 +70,7 @@ function Result({ result: first, query }) {
   const [error, act] = useAct();
   const result = { ...first, job };
   const { volume, summary, values } = result;
+  const width = summary.resolution_width_m[Math.floor(summary.resolution_width_m.length / 2)];
   const name = nameOf(result);
   useEffect(() => {
     document.title = `${name} – Bentray`;
@@ -109,7 +110,7 @@ function Result({ result: first, query }) {
     </div>
     ${renaming && html`<${Rename} job=${job} onRename=${rename} />`}
     <${Alert} id="result-error" error=${error} />
-    <${Viewer} panes=${[{ title: name, values, stored: summary.quantities }]} state=${state} keep=${keepQuery} id="result-viewer" aria-label="Image" />
+    <${Viewer} panes=${[{ title: name, values, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keepQuery} id="result-viewer" aria-label="Image" />
   </div>
   <div class="wide">
     <div id="result-tables" class="result-tables">

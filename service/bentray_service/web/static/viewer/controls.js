@@ -93,7 +93,8 @@ export function Keys() {
       <dt>[ ]</dt><dd>narrower and wider window</dd>
       <dt>A</dt><dd>automatic window</dd>
       <dt>Page up, Page down</dt><dd>next and previous slice</dd>
-      <dt>Enter</dt><dd>begin and end a profile or region at the cursor</dd>
+      <dt>Enter</dt><dd>set a point at the cursor: of a distance, an angle, an area, a profile or a region</dd>
+      <dt>Escape</dt><dd>drop the points that are set</dd>
     </dl>
     <p>Mouse: the wheel zooms, dragging does what the tool says, a click sets the cursor. Touch: two fingers zoom.</p>
   </details>`;

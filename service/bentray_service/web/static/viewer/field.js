@@ -134,6 +134,12 @@ export class Planes {
     return this.planeOf(this.fields[number], number, axis, cursor);
   }
 
+  // A plane of the first field, wherever the cursor is.
+  sliceAt(axis, position) {
+    const index = this.main.nearest(axis, position);
+    return this.once(`slice ${axis} ${index}`, [this.main], () => this.main.plane(axis, index));
+  }
+
   // The plane of a tile: that of its pane, minus that of the first one where the tile says so.
   shown({ number, axis, minus }, cursor) {
     const plane = this.plane(number, axis, cursor);

@@ -1,4 +1,4 @@
-// One plane on a canvas: colours, zoom and pan in mm, scale bar, cursor, line and region.
+// One plane on a canvas: colours, zoom and pan in mm, scale bar, cursor, and what is measured.
 import { coloursOf } from "./colormaps.js";
 import { extent } from "./field.js";
 
@@ -141,7 +141,7 @@ export class ImageView {
   }
 
   drawMarks(pen) {
-    const { cursor, profile, region } = this.look.marks;
+    const { cursor, profile, region, measures = [] } = this.look.marks;
     if (cursor) {
       const [x, y] = this.toCanvas(...cursor);
       this.stroke(pen, () => {
@@ -157,6 +157,7 @@ export class ImageView {
       // The end where the profile begins.
       this.stroke(pen, () => pen.arc(...from, 4, 0, 2 * Math.PI));
     }
+    for (const measure of measures) this.drawMeasure(pen, measure);
     if (region) {
       const [x0, y0] = this.toCanvas(region.place[0], region.place[1]);
       const [x1, y1] = this.toCanvas(region.place[2], region.place[3]);
@@ -167,15 +168,31 @@ export class ImageView {
     }
   }
 
+  // points: in the plane, mm; words: beside the last one.
+  drawMeasure(pen, { kind, points, words }) {
+    const path = points.map((point) => this.toCanvas(...point));
+    this.stroke(pen, () => {
+      path.forEach((point, k) => (k ? pen.lineTo(...point) : pen.moveTo(...point)));
+      if (kind === "area") pen.closePath();
+    });
+    for (const point of kind === "area" ? [] : path) this.stroke(pen, () => pen.arc(...point, 2, 0, 2 * Math.PI));
+    const [x, y] = path.at(-1);
+    this.drawWords(pen, words, x + 8, y - 8);
+  }
+
+  drawWords(pen, words, x, y) {
+    pen.font = "600 13px system-ui, sans-serif";
+    pen.lineWidth = 3;
+    pen.strokeStyle = "#101010";
+    pen.strokeText(words, x, y);
+    pen.fillStyle = "#ffffff";
+    pen.fillText(words, x, y);
+  }
+
   drawScaleBar(pen, width, height) {
     const length = roundLength((BAR_SHARE * width) / this.scale);
     const [left, base] = [14, height - 14];
     this.stroke(pen, () => [pen.moveTo(left, base), pen.lineTo(left + length * this.scale, base)], 3);
-    pen.font = "600 13px system-ui, sans-serif";
-    pen.lineWidth = 3;
-    pen.strokeStyle = "#101010";
-    pen.strokeText(`${Number(length.toPrecision(3))} mm`, left, base - 8);
-    pen.fillStyle = "#ffffff";
-    pen.fillText(`${Number(length.toPrecision(3))} mm`, left, base - 8);
+    this.drawWords(pen, `${Number(length.toPrecision(3))} mm`, left, base - 8);
   }
 }

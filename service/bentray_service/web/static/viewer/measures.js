@@ -18,18 +18,38 @@ const OUTER = 2;
 
 const meanOf = (values) => values.reduce((sum, one) => sum + one, 0) / values.length;
 
-// Nodes in a rectangle, or the ellipse in it: count, area (mm²), mean, standard deviation, minimum, maximum, and
-// contrast: mean minus that of the surroundings, NaN without any.
-export function regionOf(plane, shape, [x0, y0, x1, y1]) {
+// Whether a point is inside an outline of points.
+function isInside(outline, x, y) {
+  let inside = false;
+  outline.forEach(([x0, y0], k) => {
+    const [x1, y1] = outline[(k + 1) % outline.length];
+    if (y0 > y !== y1 > y && x < x0 + ((y - y0) * (x1 - x0)) / (y1 - y0)) inside = !inside;
+  });
+  return inside;
+}
+
+// Nodes in an outline: see regionOf.
+export function outlineOf(plane, outline, detail) {
+  const [xs, ys] = [0, 1].map((k) => outline.map((point) => point[k]));
+  const box = [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+  return regionOf(plane, "outline", box, detail, (x, y) => (isInside(outline, x, y) ? 0 : Infinity));
+}
+
+// Nodes in a rectangle, or the ellipse in it: count, area (mm²), mean, standard deviation, standard error of the mean, minimum, maximum, and
+// contrast: mean minus that of the surroundings, NaN without any. detail: the resolution width, mm, of whose cells each counts as one
+// measurement; without it each node does. distance(x, y): of another shape, at most 1 inside.
+export function regionOf(plane, shape, [x0, y0, x1, y1], detail = null, distance = null) {
   const [cx, cy, rx, ry] = [(x0 + x1) / 2, (y0 + y1) / 2, Math.abs(x1 - x0) / 2, Math.abs(y1 - y0) / 2];
   const inside = [];
   const beside = [];
   for (let a = 0; a < plane.na; a += 1) {
-    const u = (plane.origin[0] + a * plane.spacing[0] - cx) / rx;
+    const x = plane.origin[0] + a * plane.spacing[0];
+    const u = (x - cx) / rx;
     if (!(Math.abs(u) <= OUTER)) continue;
     for (let b = 0; b < plane.nb; b += 1) {
-      const v = (plane.origin[1] + b * plane.spacing[1] - cy) / ry;
-      const away = shape === "ellipse" ? Math.hypot(u, v) : Math.max(Math.abs(u), Math.abs(v));
+      const y = plane.origin[1] + b * plane.spacing[1];
+      const v = (y - cy) / ry;
+      const away = distance ? distance(x, y) : shape === "ellipse" ? Math.hypot(u, v) : Math.max(Math.abs(u), Math.abs(v));
       const value = plane.values[a * plane.nb + b];
       if (!Number.isFinite(value)) continue;
       if (away <= 1) inside.push(value);
@@ -39,8 +59,10 @@ export function regionOf(plane, shape, [x0, y0, x1, y1]) {
   const nodes = inside.length;
   const mean = meanOf(inside);
   const deviation = Math.sqrt(inside.reduce((sum, one) => sum + (one - mean) ** 2, 0) / nodes);
+  const area = nodes * plane.spacing[0] * plane.spacing[1];
+  const cells = detail ? Math.min(nodes, Math.max(1, area / ((Math.PI / 4) * detail ** 2))) : nodes;
   return {
-    nodes, area: nodes * plane.spacing[0] * plane.spacing[1], mean, deviation, contrast: mean - meanOf(beside),
+    nodes, area, mean, deviation, standardError: deviation / Math.sqrt(cells), contrast: mean - meanOf(beside),
     minimum: inside.reduce((least, one) => Math.min(least, one), Infinity),
     maximum: inside.reduce((most, one) => Math.max(most, one), -Infinity),
   };

@@ -1,5 +1,6 @@
 // Mouse, pen, touch and keys on the canvas of a plane, as actions on the state of the view.
 import { watchPointers } from "../parts/pointers.js";
+import { MEASURES } from "./measuring.js";
 import { clampZoom } from "./state.js";
 
 const WHEEL = 1.0015;
@@ -12,11 +13,11 @@ const [DRAG_SHARE, KEY_SHARE] = [1 / 300, 0.05];
 const draws = ({ tool }) => !["pan", "window"].includes(tool);
 
 // act: { current } with state, view ({ centre, zoom }), window ([low, high]), cursor, setView(centre, zoom), setWindow(low, high),
-// hover(point or null), setCursor(x, y), moveCursor(da, db), moveSlice(by), draw(place), automatic(), reset().
+// hover(point or null), setCursor(x, y), moveCursor(da, db), moveSlice(by), mark(point), drag(from, to, ended), cancel(), automatic(), reset().
 export class Pointing {
   constructor(canvas, image, act) {
-    // drag: a press and what was shown then; anchor: where a profile or region was begun by a key.
-    Object.assign(this, { canvas, image, newest: act, drag: null, anchor: null });
+    // drag: a press and what was shown then.
+    Object.assign(this, { canvas, image, newest: act, drag: null });
     watchPointers(canvas, {
       press: (point) => {
         this.drag = point && { point, moved: false, at: image.toPlane(...point), centre: image.centre, window: this.act.window };
@@ -67,7 +68,7 @@ export class Pointing {
     this.act.setWindow(level - half, level + half);
   }
 
-  dragTo([px, py]) {
+  dragTo([px, py], ended = false) {
     const { act, drag } = this;
     if (!drag) return;
     const [dx, dy] = [px - drag.point[0], py - drag.point[1]];
@@ -75,27 +76,23 @@ export class Pointing {
     if (!drag.moved) return;
     if (act.state.tool === "pan") this.pan(drag.centre, -dx, dy);
     else if (act.state.tool === "window") this.shift(drag.window, -dy * DRAG_SHARE, Math.exp(dx * DRAG_SHARE * 2));
-    else act.draw([...drag.at, ...this.image.toPlane(px, py)]);
+    else act.drag(drag.at, this.image.toPlane(px, py), ended);
   }
 
   release(point) {
-    if (this.drag && !this.drag.moved) this.act.setCursor(...this.drag.at);
-    else if (draws(this.act.state)) this.dragTo(point);
+    const { act, drag } = this;
+    if (drag && !drag.moved) {
+      act.setCursor(...drag.at);
+      if (act.state.tool in MEASURES) act.mark(drag.at);
+    } else if (draws(act.state)) this.dragTo(point, true);
     this.drag = null;
   }
 
-  // A step of the cursor, with what is drawn to it; of the image with Shift.
+  // A step of the cursor; of the image with Shift.
   step(da, db, shifted) {
     const { act, canvas, image } = this;
-    if (shifted) return this.pan(image.centre, 0.1 * da * canvas.clientWidth, 0.1 * db * canvas.clientHeight);
-    act.moveCursor(da, db);
-    if (this.anchor && draws(act.state)) act.draw([...this.anchor, ...act.cursor]);
-  }
-
-  // Begin a profile or region at the cursor, or end it there.
-  mark() {
-    if (this.anchor) this.act.draw([...this.anchor, ...this.act.cursor]);
-    this.anchor = this.anchor ? null : this.act.cursor;
+    if (shifted) this.pan(image.centre, 0.1 * da * canvas.clientWidth, 0.1 * db * canvas.clientHeight);
+    else act.moveCursor(da, db);
   }
 
   // What a key does, nothing for others.
@@ -118,10 +115,8 @@ export class Pointing {
       "]": () => this.shift(act.window, 0, 1 + 2 * KEY_SHARE),
       PageUp: () => act.moveSlice(1),
       PageDown: () => act.moveSlice(-1),
-      Enter: draws(act.state) && (() => this.mark()),
-      Escape: this.anchor && (() => {
-        this.anchor = null;
-      }),
+      Enter: draws(act.state) && (() => act.mark(act.cursor)),
+      Escape: act.state.draft && act.cancel,
     }[key];
   }
 }

@@ -1,11 +1,16 @@
 // The state of a view, and its form in the address.
 import { NAMES } from "./colormaps.js";
 import { AXES } from "./field.js";
+import { MEASURES } from "./measuring.js";
 import { QUANTITIES } from "./quantities.js";
 
-export const TOOLS = { pan: "Move", window: "Window", profile: "Profile", rectangle: "Rectangle", ellipse: "Ellipse" };
+export const TOOLS = {
+  pan: "Move", window: "Window", ...Object.fromEntries(Object.entries(MEASURES).map(([name, { title }]) => [name, title])), profile: "Profile", rectangle: "Rectangle",
+  ellipse: "Ellipse",
+};
 export const MODES = { side: "Side by side", difference: "Difference", swipe: "Swipe" };
 const MOST_ZOOM = 64;
+const NOTHING = [];
 
 const short = (value) => String(Number(value.toPrecision(8)));
 
@@ -26,6 +31,21 @@ const number = (accepts) => {
   return { read: (text) => read(text)?.[0], words: short };
 };
 
+// As distance,z,x,y,z,x,y,z;angle,…
+const measured = {
+  read(text) {
+    const measures = text.split(";").map((entry) => {
+      const [kind, axis, ...rest] = entry.split(",");
+      const values = rest.map(Number);
+      const points = Array.from({ length: values.length / 3 }, (_, k) => values.slice(3 * k, 3 * k + 3));
+      const known = kind in MEASURES && AXES.includes(axis) && values.length % 3 === 0 && values.every(Number.isFinite);
+      return known && points.length >= Math.min(3, MEASURES[kind].points) ? { kind, axis, points } : null;
+    });
+    return measures.includes(null) ? undefined : measures;
+  },
+  words: (measures) => measures.map(({ kind, axis, points }) => [kind, axis, ...points.flat().map(short)].join(",")).join(";"),
+};
+
 // Of the state: the parameter of the address, the default, and the kind of the value.
 const FIELDS = {
   quantity: ["q", "speed", oneOf(Object.keys(QUANTITIES))],
@@ -37,6 +57,7 @@ const FIELDS = {
   cursor: ["at", null, listOf(3)],
   tool: ["tool", "pan", oneOf(Object.keys(TOOLS))],
   profile: ["profile", null, listOf(4)],
+  measures: ["measures", NOTHING, measured],
   mode: ["mode", "side", oneOf(Object.keys(MODES))],
   other: ["other", 1, number((value) => [1, 2, 3].includes(value))],
   swipe: ["swipe", 0.5, number((value) => value >= 0 && value <= 1)],
@@ -46,7 +67,7 @@ const VIEW = listOf(3);
 
 // The state that an address asks for; what is wrong in it is left at its default.
 export function stateOf(query) {
-  const state = { views: {}, region: null };
+  const state = { views: {}, region: null, draft: null };
   for (const [field, [name, usual, { read }]] of Object.entries(FIELDS)) state[field] = (query.has(name) ? read(query.get(name)) : undefined) ?? usual;
   for (const axis of AXES) {
     const view = VIEW.read(query.get(`view-${axis}`) ?? "");
@@ -61,7 +82,7 @@ export function stateOf(query) {
 
 export function queryOfState(state) {
   const query = new URLSearchParams();
-  for (const [field, [name, usual, { words }]] of Object.entries(FIELDS)) if (state[field] !== usual) query.set(name, words(state[field]));
+  for (const [field, [name, usual, { words }]] of Object.entries(FIELDS)) if (state[field] !== usual && state[field]?.length !== 0) query.set(name, words(state[field]));
   for (const [axis, { centre, zoom }] of Object.entries(state.views)) query.set(`view-${axis}`, VIEW.words([...centre, zoom]));
   if (state.region) query.set(state.region.shape, PLACE.words(state.region.place));
   return query;

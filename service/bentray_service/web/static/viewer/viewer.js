@@ -5,14 +5,16 @@ import { ChoiceBar, Keys, Slices, Swipe, Tools, Window } from "./controls.js";
 import { AXES, Planes } from "./field.js";
 import { Measures } from "./measures_panel.js";
 import { robustLimits } from "./measures.js";
+import { flat, inPlane, MEASURES, valueOf, withDrag, withPoint } from "./measuring.js";
 import { FADED, QUANTITIES, shownOf } from "./quantities.js";
 import { Readout } from "./readout.js";
 import { MODES, queryOfState } from "./state.js";
 import { Tile } from "./tile.js";
 
 const SAVE_MS = 250;
+// Within as many pixels of the page a point is the same one.
+const SAME_PX = 7;
 
-const inPlane = (axis) => [0, 1, 2].filter((other) => other !== AXES.indexOf(axis));
 const fades = (panes, quantity) => panes.length === 1 && panes[0].stored.includes("uncertainty") && FADED.includes(quantity);
 
 // The names of the quantities that all panes have.
@@ -57,6 +59,7 @@ function usePlanes(panes, state) {
       if (!newest) return;
       const planes = new Planes(quantity, fields, spread);
       const { main } = planes;
+      state.counted = main.uneven;
       state.cursor ??= [0, 1, 2].map((k) => (k < main.dimension ? main.position(AXES[k], Math.floor(main.shape[k] / 2)) : 0));
       if (!main.axes.includes(state.axis)) state.axis = "z";
       if (panes.length > 1 || main.axes.length === 1) state.planes = false;
@@ -91,6 +94,8 @@ function actionsOf({ axis, key }, view, { main, state, window, change, setWindow
     for (const [k, place] of places) state.cursor[k] = main.position(AXES[k], main.nearest(AXES[k], place));
     change({});
   };
+  // A point of the plane at the cursor, [x, y, z].
+  const inSpace = ([a, b]) => state.cursor.map((place, k) => (k === first ? a : k === second ? b : place));
   return {
     state,
     window,
@@ -117,7 +122,9 @@ function actionsOf({ axis, key }, view, { main, state, window, change, setWindow
       if (index >= 0 && index < main.count(axis)) state.cursor[k] = main.position(axis, index);
       change({});
     },
-    draw: (place) => change({ axis, ...(state.tool === "profile" ? { profile: place } : { region: { shape: state.tool, place } }) }),
+    mark: (point) => change(withPoint(state, axis, inSpace(point), SAME_PX / view.scale)),
+    drag: (from, to, ended) => change(withDrag(state, axis, inSpace(from), inSpace(to), SAME_PX / view.scale, ended)),
+    cancel: () => change({ draft: null }),
     automatic: () => change({ window: null }),
     reset() {
       const { [axis]: _, ...views } = state.views;
@@ -145,12 +152,31 @@ function Body({ planes, panes, state, change, redraw }) {
     if (Number.isFinite(from) && Number.isFinite(to) && to - from > 1e-9 * Math.max(Math.abs(from), Math.abs(to), 1e-30)) change({ window: [from, to] });
   }
 
+  // Measures that have a point in the slice of a tile, and the one that is being set, to the pointer or the cursor.
+  function marksOf({ axis, key }) {
+    const k = AXES.indexOf(axis);
+    const slice = main.nearest(axis, cursor[k]);
+    const { draft, measures } = state;
+    const tip = [...cursor];
+    if (hover?.key === key) inPlane(axis).forEach((of, n) => (tip[of] = hover.place[n]));
+    const missing = draft && draft.points.length < (MEASURES[draft.tool]?.points ?? 2);
+    const begun = draft ? [{ kind: draft.tool, axis: draft.axis, points: missing ? [...draft.points, tip] : draft.points }] : [];
+    return [...measures, ...begun].filter((measure) => (
+      (measure.kind !== "area" || measure.axis === axis) && measure.points.some((point) => main.nearest(axis, point[k]) === slice)
+    )).map((measure) => {
+      const whole = measure.points.length >= Math.min(3, MEASURES[measure.kind]?.points ?? Infinity);
+      const words = whole ? `${valueOf(measure).toFixed(measure.kind === "angle" ? 1 : 2)} ${MEASURES[measure.kind].unit}` : "";
+      return { kind: measure.kind, points: flat(measure.points, axis), words };
+    });
+  }
+
   function imageOf(tile) {
     const { axis } = tile;
     const linked = hover && hover.key !== tile.key && hover.axis === axis ? hover.place : null;
     const marks = {
       cursor: linked ?? inPlane(axis).map((k) => cursor[k]),
       ...(axis === state.axis && { profile: state.profile, region: state.region }),
+      measures: marksOf(tile),
     };
     const other = tile.other ? planes.plane(tile.other, axis, cursor) : null;
     const look = state.views[axis] ?? { centre: null, zoom: 1 };
@@ -188,13 +214,14 @@ function Body({ planes, panes, state, change, redraw }) {
       <${Window} low=${low} high=${high} map=${map} fade=${state.fade} planes=${state.planes} fades=${fades(panes, planes.quantity)}
         sliced=${panes.length === 1 && main.axes.length > 1} setWindow=${setWindow} change=${change} />
       <${Measures} curves=${curves} state=${state} quantity=${quantity} beside=${truth ? [{ title: QUANTITIES.truth.title, plane: truth }] : []}
-        deviations=${beside("uncertainty")} change=${change} />
+        deviations=${beside("uncertainty")} detail=${panes[0].detail} change=${change}
+        planeOf=${(axis, point) => planes.sliceAt(axis, point[AXES.indexOf(axis)])} />
       <${Keys} />
     </div>
   </div>`;
 }
 
-// panes: [{ title, values, stored }], with Values and the names of the stored quantities. state: of the view, which is changed in place;
+// panes: [{ title, values, stored, detail }], with Values, the names of the stored quantities, and the resolution width, mm, if it is known. state: of the view, which is changed in place;
 // keep(query): called when the view changes.
 export function Viewer({ panes, state, keep, ...more }) {
   const names = useMemo(() => commonOf(panes), []);
