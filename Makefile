@@ -112,20 +112,28 @@ compiled: install
 	@$(BIN)/python -m bentray_workers.compilation.precompile
 
 # A lock file is complete, so pip resolves nothing; Python compiles the modules that it imports, not all.
-PINNED = $(BIN)/pip install -qq --no-deps --no-compile --require-hashes
+PINNED = $(BIN)/pip install -q --no-deps --no-compile --require-hashes
+
+# Install a lock file, with a line every two seconds: pip itself is silent for a minute.
+define installed
+@$(PINNED) -r $(1) & pip=$$!; \
+  while sleep 2; kill -0 $$pip 2> /dev/null; do \
+    echo "  $$(find .venv/lib -maxdepth 3 -name '*.dist-info' | wc -l) of $$(grep -c == $(1)) packages, $$SECONDS s"; \
+  done; wait $$pip
+endef
 
 .venv/.installed: requirements.lock pyproject.toml | .venv/bin/python
 	@echo "Installing the packages of requirements.lock (about a minute the first time)"
-	@$(PINNED) -r requirements.lock
+	$(call installed,requirements.lock)
 	@$(BIN)/pip install -qq --no-deps --no-build-isolation -e .
 	@touch $@
 
 .venv/.installed-dev: requirements-dev.lock .venv/.installed
 	@echo "Installing the tools for tests and checks"
-	@$(PINNED) -r requirements-dev.lock
+	$(call installed,requirements-dev.lock)
 	@touch $@
 
 .venv/.installed-docs: requirements-docs.lock .venv/.installed
 	@echo "Installing the tools for the documentation"
-	@$(PINNED) -r requirements-docs.lock
+	$(call installed,requirements-docs.lock)
 	@touch $@

@@ -17,9 +17,9 @@ SOURCES = (".py", ".cl", ".js", ".css", ".html")
 # to which the ceilings are lowered as code is removed.
 LINES = {
     # folders: (ceiling, goal)
-    ("kernels", "workers", "service"): (95_530, 87_000),
-    ("service",): (33_340, 31_000),
-    ("tests",): (69_650, 58_000),
+    ("kernels", "workers", "service"): (95_950, 87_000),
+    ("service",): (33_450, 31_000),
+    ("tests",): (69_700, 58_000),
     ("benchmarks",): (15_200, 13_000),
 }
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 from collections.abc import Callable
 from functools import cached_property, wraps
@@ -20,6 +19,8 @@ use_writable_kernel_cache(ROOT)
 from numba import config, njit, types  # noqa: E402
 from numba.core import event  # noqa: E402
 from numba.extending import models, register_model, typeof_impl  # noqa: E402
+
+from .compile_events import KIND, CompiledMeanwhile, CompileEvents, needed  # noqa: E402
 
 # Another package may have imported numba earlier.
 config.reload_config()
@@ -89,6 +90,8 @@ class Kernel:
     def __call__(self, *arguments: Any) -> Any:
         try:
             return self._called(*arguments)
+        except CompiledMeanwhile:
+            return self(*arguments)
         except OSError:
             # A full disk, or a folder that has become read-only, stores nothing; the function is compiled.
             return self._called(*arguments)
@@ -123,27 +126,26 @@ def _type_of_kernel(value: Kernel, _context: Any) -> KernelType:
     return KernelType(value.dispatcher)
 
 
-class _CollectorPause(event.Listener):  # type: ignore[misc]
-    """Pauses the search for cyclic garbage while numba compiles, of whose time it takes a tenth."""
-
-    def __init__(self) -> None:
-        # Of calls that compile; numba lets one thread compile at a time.
-        self._depth = 0
-        self._enabled = False
-
-    def on_start(self, event: Any) -> None:
-        if self._depth == 0:
-            self._enabled = gc.isenabled()
-            gc.disable()
-        self._depth += 1
-
-    def on_end(self, event: Any) -> None:
-        self._depth -= 1
-        if self._depth == 0 and self._enabled:
-            gc.enable()
+def _missing(function: Callable[..., Any]) -> int:
+    return 1 + sum(
+        not kernel.dispatcher.signatures and kernel.py_func is not function
+        for kernel in needed(function, Kernel)
+    )
 
 
-event.register("numba:compile", _CollectorPause())
+def _name(function: Callable[..., Any]) -> str | None:
+    locator = _locators.get(function)
+    return None if locator is None else f"{locator.get_cache_path()} {locator.get_disambiguator()}"
+
+
+_events = CompileEvents(_missing, _name)
+event.register(KIND, _events)
+# How many kernels this process has compiled, of those that it needs.
+compilation = _events.now
+
+
+# Of cached kernels, by their functions.
+_locators: dict[Callable[..., Any], CacheLocator] = {}
 
 
 class CacheLocator:
@@ -171,7 +173,8 @@ class CacheLocator:
         )
         if not Path(file).is_file() or fault_of(folder):
             return None
-        return cls(function, folder)
+        locator = _locators[function] = cls(function, folder)
+        return locator
 
     def get_cache_path(self) -> str:
         """The folder."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,25 +48,24 @@ def demo(
     """
     folder = output_folder(output)
 
-    from bentray_workers.compilation.cache_misses import announce
-    from bentray_workers.files.dataset import write_dataset
-    from bentray_workers.images.comparison import comparison_png
-    from bentray_workers.simulation.plane import SimulationSettings
-    from bentray_workers.simulation.simulation_run import simulate
-
-    from ..client import Client
-    from .output.figures import figures
-
-    settings = SimulationSettings(nodes=nodes, elements=elements, coupling_mps=coupling)
     started = time.perf_counter()
-    with (
-        tempfile.TemporaryDirectory(prefix="bentray-demo-") as data,
-        running_service(Path(data), folder / "service.log") as url,
-        client_errors(),
-        Client(url) as client,
-    ):
+    with ExitStack() as running:
+        with progress_bar("Starting a service"):
+            data = running.enter_context(tempfile.TemporaryDirectory(prefix="bentray-demo-"))
+            url = running.enter_context(running_service(Path(data), folder / "service.log"))
+
+            from bentray_workers.files.dataset import write_dataset
+            from bentray_workers.images.comparison import comparison_png
+            from bentray_workers.simulation.plane import SimulationSettings
+            from bentray_workers.simulation.simulation_run import simulate
+
+            from ..client import Client
+            from .output.figures import figures
+
+        running.enter_context(client_errors())
+        client = running.enter_context(Client(url))
+        settings = SimulationSettings(nodes=nodes, elements=elements, coupling_mps=coupling)
         remark(f"The service runs at {url}. Simulating a scan: {elements} transducers, {nodes}² nodes.")
-        announce()
         with progress_bar("Simulating") as step:
             dataset = simulate(settings, lambda progress: step(progress.done, progress.total, "emitters"))
         scan = folder / "phantom.h5"

@@ -12,7 +12,7 @@ import typer
 
 from .options.field_options import FieldOptions, with_field_options
 from .options.paths import input_file, output_folder
-from .output.terminal import AsJson, Step, print_json, print_lines, print_table, progress_bar
+from .output.terminal import AsJson, Step, phase_note, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
     from bentray_kernels.tomography import Progress
@@ -40,26 +40,26 @@ def geometry_field(
     settings, view = options.settings(), options.view()
     view.check_samples(settings.samples)
 
-    from bentray_service.rows.ids import field_of
-    from bentray_workers.files.geometry_field_folder import write_json
-    from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
-    from bentray_workers.files.mesh_formats import read_mesh
-    from bentray_workers.rendering.field_settings import check_faces
-    from bentray_workers.rendering.geometry_field import build_field
-
-    read: ReadMesh = read_mesh(source.read_bytes())
-    check_faces(len(read.surface.mesh.faces))
-    stored = StoredMesh(read.surface.mesh, read.colours)
-    summary = summary_of(stored, read.surface, read.format)
-    name = field_of(settings.content(summary["content"]))
-    target, work = folder / name, folder / f"{name}-unfinished"
-    work.mkdir(exist_ok=True)
-    write_mesh(work / "mesh.h5", stored)
-    started = time.perf_counter()
     with progress_bar("Building the field") as step:
+        from bentray_service.rows.ids import field_of
+        from bentray_workers.files.geometry_field_folder import write_json
+        from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
+        from bentray_workers.files.mesh_formats import read_mesh
+        from bentray_workers.rendering.field_settings import check_faces
+        from bentray_workers.rendering.geometry_field import build_field
+
+        read: ReadMesh = read_mesh(source.read_bytes())
+        check_faces(len(read.surface.mesh.faces))
+        stored = StoredMesh(read.surface.mesh, read.colours)
+        summary = summary_of(stored, read.surface, read.format)
+        name = field_of(settings.content(summary["content"]))
+        target, work = folder / name, folder / f"{name}-unfinished"
+        work.mkdir(exist_ok=True)
+        write_mesh(work / "mesh.h5", stored)
+        started = time.perf_counter()
 
         def show(progress: Progress) -> None:
-            step(progress.done, progress.total, "" if progress.total else "parameterising the mesh")
+            step(progress.done, progress.total, phase_note(progress.phase))
 
         figures = build_field(None, work / "mesh.h5", settings, target, work, on_progress=show)
     shutil.rmtree(work)

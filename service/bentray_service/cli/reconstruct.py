@@ -15,7 +15,7 @@ from .options.scan_options import ScanOptions, dataset_file, input_scan, with_sc
 from .options.settings_options import SettingsOptions, settings_from, with_settings_options
 from .output.exit_codes import AcceptDoubtful, end_doubtful
 from .output.results import show_results, write_results
-from .output.terminal import AsJson, progress_bar, residual_note
+from .output.terminal import AsJson, phase_note, progress_bar
 
 if TYPE_CHECKING:
     from bentray_kernels.acquisition import Dataset
@@ -51,18 +51,19 @@ def reconstruct(
     source, folder = input_scan(file), output_folder(output)
     settings, given = settings_from(options), scan_options.metadata()
 
-    from bentray_kernels.tomography.requirements import check_scan
-    from bentray_workers.files.dataset import read_dataset
-    from bentray_workers.files.dataset.traces import trace_samples
-
     started = time.perf_counter()
-    with dataset_file(source, given, folder) as scan, progress_bar("Reconstructing") as step:
+    with progress_bar("Reconstructing") as step, dataset_file(source, given, folder) as scan:
+        # Loading kernels takes seconds.
+        from bentray_kernels.tomography.requirements import check_scan
+        from bentray_workers.files.dataset import read_dataset
+        from bentray_workers.files.dataset.traces import trace_samples
+
         dataset = read_dataset(scan, traces=False)
         check_scan(dataset, settings, trace_samples(scan))
 
         def show(progress: Progress) -> None:
             rms = progress.history[-1].residual_rms_s if progress.history else None
-            step(progress.done, progress.total, residual_note(rms) or progress.phase)
+            step(progress.done, progress.total, phase_note(progress.phase, rms))
 
         result = run(scan, dataset, settings, workers, show)
     found = write_results(folder, result, dataset, time.perf_counter() - started, file=str(source))

@@ -9,7 +9,7 @@ import typer
 
 from .options.paths import input_file
 from .output.exit_codes import WorkFailed
-from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar, residual_note
+from .output.terminal import AsJson, phase_note, print_json, print_lines, print_table, progress_bar
 from .reconstruct import run
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def reproduce(
 
         def show(progress: Progress) -> None:
             rms = progress.history[-1].residual_rms_s if progress.history else None
-            step(progress.done, progress.total, residual_note(rms) or progress.phase)
+            step(progress.done, progress.total, phase_note(progress.phase, rms))
 
         after = run(source, dataset, before.settings, workers, show)
     differences = compared(before, after)

@@ -7,7 +7,7 @@ import logging
 import os
 import socket
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from threading import Thread
 from types import FrameType
@@ -18,7 +18,7 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .output.exit_codes import WorkFailed
-from .output.terminal import print_lines, remark
+from .output.terminal import print_lines, progress_bar, remark
 
 if TYPE_CHECKING:
     from ..settings import ServiceSettings
@@ -104,7 +104,9 @@ def serve(
     listening = listen(settings.host, settings.port)
     try:
         _check_exposure(settings, listening.getsockname()[0])
-        _run(settings, listening, unused, as_json)
+        with ExitStack() as starting:
+            starting.enter_context(progress_bar("Starting the service", shown=settings.log_format != "json"))
+            _run(settings, listening, unused, as_json, starting)
     finally:
         listening.close()
 
@@ -125,7 +127,14 @@ def _check_exposure(settings: ServiceSettings, address: str) -> None:
     _announce(settings, BARE, logging.WARNING)
 
 
-def _run(settings: ServiceSettings, listening: socket.socket, unused: list[str], as_json: bool) -> None:
+def _run(
+    settings: ServiceSettings,
+    listening: socket.socket,
+    unused: list[str],
+    as_json: bool,
+    starting: ExitStack,
+) -> None:
+    """Run the service; ``starting`` is closed once it answers."""
     import uvicorn
 
     from .. import logs
@@ -140,6 +149,7 @@ def _run(settings: ServiceSettings, listening: socket.socket, unused: list[str],
 
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
+            starting.close()
             if self.started and as_json:
                 here = {"url": url, "pid": os.getpid(), "data": str(settings.data_dir.resolve())}
                 print_lines([json.dumps(here)])

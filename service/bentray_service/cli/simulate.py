@@ -43,17 +43,15 @@ def simulate(
     """
     path = output_file(output, force=force)
 
-    from bentray_workers.compilation.cache_misses import announce
-    from bentray_workers.files.dataset import read_dataset
-    from bentray_workers.simulation.simulation_run import simulate_to_file
-    from bentray_workers.simulation.waves import WaveSimulationSettings
-
     if noise_ns is not None:
         options["noise_s"] = noise_ns * 1e-9
     settings = PhantomScan(**options).chosen()
-    announce()
     started = time.perf_counter()
     with progress_bar("Simulating") as step:
+        from bentray_workers.files.dataset import read_dataset
+        from bentray_workers.simulation.simulation_run import simulate_to_file
+        from bentray_workers.simulation.waves import WaveSimulationSettings
+
         simulate_to_file(None, settings, path, on_progress=lambda now: step(now.done, now.total, "tasks"))
     seconds = time.perf_counter() - started
     dataset = read_dataset(path, traces=False)

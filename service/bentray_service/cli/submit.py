@@ -15,7 +15,7 @@ from .options.scan_options import ScanOptions, dataset_file, input_scan, with_sc
 from .options.settings_options import SettingsOptions, settings_from, with_settings_options
 from .output.exit_codes import AcceptDoubtful, client_errors, end_doubtful
 from .output.results import show_results, write_results
-from .output.terminal import AsJson, Step, print_json, print_lines, progress_bar, remark, residual_note
+from .output.terminal import AsJson, Step, phase_note, print_json, print_lines, progress_bar, remark
 from .worker import Tls
 
 if TYPE_CHECKING:
@@ -179,8 +179,8 @@ def _submit(
 def show_job(record: JobRecord, step: Step) -> None:
     """Show the progress of a job on a progress bar."""
     progress, history = record.progress, record.history
-    note = residual_note(history[-1].residual_rms_s if history else None)
-    step(progress.done, progress.total, note or progress.phase or record.state)
+    note = phase_note(progress.phase, history[-1].residual_rms_s if history else None)
+    step(progress.done, progress.total, note or record.state)
 
 
 def _report(source: Path, scan: Path, folder: Path, volume: Path, job: JobRecord, as_json: bool) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
 from bentray_workers.files.export.registry import FormatName
 
-from ..interactive.progress_bar import progress_bar
+from ..interactive.progress_bar import phase_note, progress_bar
 from ..interactive.result import Result, result_of
 from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from ..routes.models.name_changes import LengthUnit, TimeUnit
@@ -235,7 +235,8 @@ def wait(
     with progress_bar(words, shown=progress) as step:
 
         def show(record: JobRecord) -> None:
-            step(record.progress.done, record.progress.total, record.progress.phase or record.state)
+            now = record.progress
+            step(now.done, now.total, phase_note(now.phase) or record.state)
             if on_progress is not None:
                 on_progress(record)
 

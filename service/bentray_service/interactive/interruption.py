@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -12,8 +13,8 @@ from bentray_kernels.tomography.result import Progress
 
 T = TypeVar("T")
 
-# Between two looks at the progress, s.
-LOOK_S = 0.1
+# Between two looks at the progress, and between two calls of ``show`` without a new one, s.
+LOOK_S, SHOW_S = 0.1, 1.0
 
 OnProgress = Callable[[Progress], None]
 Stop = Callable[[], bool]
@@ -25,7 +26,8 @@ def run_interruptibly(work: Callable[[OnProgress, Stop], T], show: OnProgress) -
     Args:
         work: called with a function that reports progress, and one that it polls several times a second;
             once this is true it raises ``Cancelled``.
-        show: called with the latest progress in the calling thread, where notebooks expect output.
+        show: called with the latest progress in the calling thread, where notebooks expect output; at least
+            once a second, so that a clock moves.
 
     Returns:
         The result of ``work``.
@@ -45,12 +47,13 @@ def run_interruptibly(work: Callable[[OnProgress, Stop], T], show: OnProgress) -
     # Of a daemon nobody waits for the end, unlike of the threads of an executor.
     running = threading.Thread(target=run, name="bentray", daemon=True)
     running.start()
-    shown: Progress | None = None
+    shown, at = Progress(0, 0), time.monotonic()
     try:
         while running.is_alive():
             running.join(LOOK_S)
-            if reported and reported[-1] is not shown:
-                shown = reported[-1]
+            newest = reported[-1] if reported else shown
+            if newest is not shown or (running.is_alive() and time.monotonic() - at >= SHOW_S):
+                shown, at = newest, time.monotonic()
                 show(shown)
     except KeyboardInterrupt:
         stop.set()

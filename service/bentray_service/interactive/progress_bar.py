@@ -1,19 +1,32 @@
-"""A progress bar on a terminal or in a notebook; nothing where nobody watches."""
+"""A progress bar on a terminal or in a notebook, and lines in a log: no wait is silent."""
 
 from __future__ import annotations
 
 import html
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
 
 # Shortest time between two drawings in a notebook, s: each is a message to the browser.
 REDRAW_S = 0.2
+# Time to the first line of a log and between two lines, s; shorter work has none.
+FIRST_LINE_S, LINE_S = 1.5, 2.5
 
 
 class Step(Protocol):
@@ -24,7 +37,9 @@ class Step(Protocol):
 
 @contextmanager
 def progress_bar(description: str, *, shown: bool = True) -> Iterator[Step]:
-    """Show a progress bar, in the cell of a notebook or on stderr if it is a terminal.
+    """Show a progress bar in the cell of a notebook or on a terminal, else lines; both are on stderr.
+
+    While this process compiles kernels, their count takes the place of that of the work.
 
     Args:
         description: beside the bar.
@@ -34,33 +49,108 @@ def progress_bar(description: str, *, shown: bool = True) -> Iterator[Step]:
         a function to update it.
     """
     notebook = _notebook() if shown else None
+    console = Console(stderr=True)
     if not shown:
         yield lambda done, total, note="": None
-    elif notebook is None:
-        with _on_terminal(description) as step:
-            yield step
-    else:
+    elif notebook is not None:
         with _in_notebook(description, notebook) as step:
             yield step
+    elif console.is_terminal:
+        with _on_terminal(description, console) as step:
+            yield step
+    else:
+        with _in_lines(description) as step:
+            yield step
+
+
+def phase_note(phase: str, rms_s: float | None = None) -> str:
+    """What is done, beside a bar: the phase of a job, or the residual of its last iteration, s."""
+    if rms_s is not None and phase in ("", "reconstructing"):
+        return f"residual {rms_s * 1e9:.0f} ns"
+    return "compiling kernels" if phase == "compiling" else phase
+
+
+def compilation_note() -> str:
+    """The kernels that this process compiles now; empty where it compiles none."""
+    # Commands without kernels do not load them.
+    compiled = sys.modules.get("bentray_kernels.compilation.compiled")
+    counts = getattr(compiled, "compilation", None)
+    now = counts and counts()
+    return f"compiling kernels {now.done} of {now.total}" if now and now.active else ""
+
+
+class _Note(ProgressColumn):
+    """What is done now, drawn anew several times a second."""
+
+    max_refresh = None
+
+    def render(self, task: Task) -> Text:
+        return Text(compilation_note() or task.fields["remark"])
+
+
+class _TimeLeft(TimeRemainingColumn):
+    """The time left, while no kernels are compiled."""
+
+    def render(self, task: Task) -> Text:
+        return Text("") if compilation_note() or task.speed is None else super().render(task)
 
 
 @contextmanager
-def _on_terminal(description: str) -> Iterator[Step]:
-    console = Console(stderr=True)
+def _on_terminal(description: str, console: Console) -> Iterator[Step]:
     columns: list[Any] = [
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[remark]}"),
+        TimeElapsedColumn(),
+        _TimeLeft(compact=True),
+        _Note(),
     ]
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(description, total=None, remark="")
+        last = 0, 0
 
         def step(done: int, total: int, note: str = "") -> None:
-            bar.update(task, completed=done, total=total, remark=note)
+            nonlocal last
+            if total != last[1] or done < last[0]:
+                # Another stage has its own speed.
+                begun = bar.tasks[0].start_time
+                bar.reset(task, completed=done)
+                bar.tasks[0].total, bar.tasks[0].start_time = total or None, begun
+            last = done, total
+            bar.update(task, completed=done, remark=note)
 
         yield step
+
+
+@contextmanager
+def _in_lines(description: str) -> Iterator[Step]:
+    begun, ended, latest = time.monotonic(), threading.Event(), (0, 0, "")
+
+    def step(done: int, total: int, note: str = "") -> None:
+        nonlocal latest
+        latest = done, total, note
+
+    def write() -> None:
+        wait = FIRST_LINE_S
+        while not ended.wait(wait):
+            wait = LINE_S
+            sys.stderr.write(line(description, *latest, time.monotonic() - begun) + "\n")
+            sys.stderr.flush()
+
+    writing = threading.Thread(target=write, name="progress", daemon=True)
+    writing.start()
+    try:
+        yield step
+    finally:
+        ended.set()
+        writing.join()
+
+
+def line(description: str, done: int, total: int, note: str, seconds: float) -> str:
+    """A line of a log, as ``Reconstructing: 3 of 8, residual 80 ns, 12 s``."""
+    count = f"{done} of {total}" if total else ""
+    words = [compilation_note()] if compilation_note() else [word for word in (count, note) if word]
+    return f"{description}: {', '.join([*words, f'{seconds:.0f} s'])}"
 
 
 def _notebook() -> Any | None:
@@ -85,7 +175,9 @@ def _in_notebook(description: str, display: Any) -> Iterator[Step]:
         now = time.perf_counter()
         if now - drawn >= REDRAW_S:
             drawn = now
-            handle.update(display.HTML(bar_html(description, done, total, note)))
+            handle.update(
+                display.HTML(bar_html(description, done, total, compilation_note() or note, now - begun))
+            )
 
     ended = "stopped"
     try:
@@ -96,9 +188,9 @@ def _in_notebook(description: str, display: Any) -> Iterator[Step]:
         handle.update(display.HTML(f"{html.escape(description)}: {ended} after {seconds:.1f} s"))
 
 
-def bar_html(description: str, done: int, total: int, note: str = "") -> str:
-    """The bar in HTML; it moves without a value while the total is unknown."""
+def bar_html(description: str, done: int, total: int, note: str = "", seconds: float = 0.0) -> str:
+    """The bar in HTML with the seconds since its begin; it moves without a value while the total is 0."""
     value = f' value="{done}" max="{total}"' if total else ""
     count = f"{done}/{total}" if total else ""
-    words = " ".join(html.escape(word) for word in (count, note) if word)
+    words = " ".join(html.escape(word) for word in (count, note, f"{seconds:.0f} s") if word)
     return f"{html.escape(description)} <progress{value}></progress> {words}"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Unpack
 from bentray_kernels.tomography.result import Progress, Reconstruction
 
 from .interruption import OnProgress, Stop, run_interruptibly
-from .progress_bar import progress_bar
+from .progress_bar import phase_note, progress_bar
 from .result import Result, result_of
 from .scan import Scan, read
 
@@ -78,7 +78,7 @@ def reconstruct(
 
         def show(now: Progress) -> None:
             rms = now.history[-1].residual_rms_s if now.history else None
-            step(now.done, now.total, now.phase if rms is None else f"residual {1e9 * rms:.0f} ns")
+            step(now.done, now.total, phase_note(now.phase, rms))
 
         image = run_interruptibly(work, show)
     if image.doubt:

@@ -37,8 +37,8 @@ STATES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled")
 ENDED = ("succeeded", "failed", "cancelled")
 UNFINISHED = ("queued", "running", "cancelling")
 
-# The phase of a reconstruction that counts as progress; the others are short and count by themselves.
-COUNTED = (None, "", "reconstructing")
+# Phases that count as progress of a job; the others count by themselves.
+COUNTED = (None, "", "reconstructing", "sampling")
 
 Plain = dict[str, Any]
 

@@ -8,6 +8,7 @@ from typer.testing import CliRunner, Result
 
 from bentray_kernels.acquisition import Dataset
 from bentray_service.cli import app
+from bentray_service.interactive import progress_bar
 from bentray_workers.simulation.plane import SimulationSettings
 from bentray_workers.simulation.simulation_run import simulate
 
@@ -15,8 +16,10 @@ Run = Callable[..., Result]
 
 
 @pytest.fixture
-def bentray() -> Run:
+def bentray(monkeypatch: pytest.MonkeyPatch) -> Run:
     """Run the command line in this process: ``bentray("simulate", "-o", path)``."""
+    # A slow machine would print lines of progress.
+    monkeypatch.setattr(progress_bar, "FIRST_LINE_S", 3600.0)
 
     def run(*words: object) -> Result:
         return CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)

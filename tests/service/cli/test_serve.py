@@ -78,7 +78,7 @@ def test_an_option_wins_over_the_environment(monkeypatch: pytest.MonkeyPatch, tm
     monkeypatch.setenv("BENTRAY_WORKERS", "7")
     monkeypatch.setenv("BENTRAY_JOBS_AT_ONCE", "3")
     seen = []
-    monkeypatch.setattr(module, "_run", lambda settings, listening, unused, as_json: seen.append(settings))
+    monkeypatch.setattr(module, "_run", lambda settings, *_: seen.append(settings))
     module.serve(port=0, data=tmp_path, workers=2)
     assert (seen[0].workers, seen[0].jobs_at_once, seen[0].data_dir) == (2, 3, tmp_path)
 

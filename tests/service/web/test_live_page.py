@@ -33,11 +33,8 @@ def tab_to(page, text):
 
 
 def test_it_sharpens_until_the_result_is_shown(page, address, scan, turns):
-    compiling = {"workers": [{"compiling": True}]}
-    page.route("**/v1/cluster", lambda route: route.fulfill(json=compiling))
     page.goto(f"{address}/#/jobs/{started(address, scan)['id']}")
     page.get_by_text("The image appears after the first iteration").wait_for()
-    page.get_by_text("The workers compile their kernels for this processor.").wait_for()
     page.get_by_text("0 % of this step").wait_for()
     page.get_by_role("heading", level=1, name="Bent rays, SART").wait_for()
     picture, curve = page.locator("canvas.preview"), page.locator(".misfit svg")

@@ -60,7 +60,7 @@ def test_slurm_workers_have_resources_warm_kernels_and_no_dashboard(managers: li
     words = made.asked["worker_extra_args"]
     assert {
         "--resources=recon=1,render=1,short=1",
-        "--preload=bentray_workers.compilation.warmup",
+        "--preload=bentray_workers.compilation.preload",
         "--no-dashboard",
     } <= set(words)
     assert made.asked["scheduler_options"]["dashboard_address"] == "127.0.0.1:0"

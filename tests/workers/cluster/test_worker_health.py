@@ -42,7 +42,7 @@ def test_the_scheduler_reports_its_load(cluster):
 
 def test_a_worker_in_full():
     metrics = {"memory": 5, "cpu": 180.0, "task_counts": {"executing": 2, "ready": 7}}
-    metrics["compiling"] = True
+    metrics["compiling"] = [3, 8, True]
     worker = {"nthreads": 2, "memory_limit": 9, "resources": {"opencl": 1.0}, "metrics": metrics}
     (first,) = of(here={**worker, "status": "paused"})
     assert asdict(first) == {

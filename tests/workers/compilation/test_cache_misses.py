@@ -1,40 +1,22 @@
-"""Compilation of kernels is noticed while it lasts, also of kernels that others call."""
+"""Lines of a log about kernels that are compiled."""
 
-from numba import njit
-from numba.core import event
+import logging
 
+from bentray_kernels.compilation.compile_events import Compilation
 from bentray_workers.compilation import cache_misses
 
 
-class Witness(event.Listener):
-    """Listener that a function calls whenever a compilation starts or has ended."""
-
-    def __init__(self, ask):
-        self._ask, self.at_starts, self.at_ends = ask, [], []
-
-    def on_start(self, event):
-        self.at_starts.append(self._ask())
-
-    def on_end(self, event):
-        self.at_ends.append(self._ask())
-
-
-def test_compiling_from_the_first_start_to_the_last_end():
-    compiling = cache_misses.announce()
-    assert not compiling()
-
-    @njit
-    def inner(x):
-        return x + 1
-
-    @njit
-    def outer(x):
-        return 2 * inner(x)
-
-    with event.install_listener(cache_misses.KIND, Witness(compiling)) as witness:
-        assert outer(3) == 8
-    assert witness.at_starts == [True, True]
-    # The kernel that is called ends first, while the other is still being compiled.
-    assert witness.at_ends == [True, False]
-    assert not compiling()
-    assert cache_misses.announce() is compiling
+def test_a_log_has_the_first_kernel_and_the_counts(monkeypatch, caplog):
+    counts = Compilation(31, 120, active=True)
+    monkeypatch.setattr(cache_misses, "compilation", lambda: counts)
+    monkeypatch.setattr(cache_misses, "LINE_S", 0.0)
+    caplog.set_level(logging.WARNING, "bentray.compiling")
+    with_bar, of_worker = (cache_misses.Announcer(counts=counts) for counts in (False, True))
+    for announcer in (with_bar, of_worker):
+        announcer.on_start(None)
+        announcer.on_end(None)
+        announcer.on_start(None)
+    first, alone, line = (record.getMessage() for record in caplog.records)
+    assert first == alone
+    assert first.startswith("Compiling kernels for this processor (")
+    assert line == "Compiling kernels: 31 of 120"

@@ -23,7 +23,7 @@ from .resources import CORES, OFFERED, THREADS
 from .supervision import SupervisedCluster
 from .tls import own_security, security_of
 
-PRELOAD = "bentray_workers.compilation.warmup"
+PRELOAD = "bentray_workers.compilation.preload"
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from bentray_kernels.tomography.result import Progress
 
 from .capacities import capacities_of
 from .fair_shares import Share, exclusive_share
+from .job_progress import job_progress
 from .resources import RECONSTRUCTION
 from .task_retries import Attempts
 
@@ -24,7 +25,8 @@ class JobControl(TypedDict, total=False):
     """Keyword arguments that every job takes.
 
     Attributes:
-        on_progress: called at the start and after each task; the total is 0 while it is unknown.
+        on_progress: called at the start, after each task and while workers compile; the total is 0 while it
+            is unknown.
         on_saved: called after each task.
         stop: polled several times a second; true raises ``Cancelled``, without waiting for tasks on workers.
         share: of the workers; None: all of them.
@@ -107,6 +109,7 @@ def run_job(
     *,
     lane: str = "recon",
     placement: Callable[[], Placement] = lambda: {"resources": RECONSTRUCTION},
+    current: Callable[[], Progress] | None = None,
     **control: Unpack[JobControl],
 ) -> None:
     """Run a task graph whose finished tasks leave files, from which a later run resumes.
@@ -114,26 +117,24 @@ def run_job(
     Args:
         client, folder, lane, placement: see ``open_pool``.
         graph: to run.
+        current: the progress now, looked at while tasks run; None: that of the graph.
         control: see ``JobControl``.
 
     Raises:
         Cancelled: when ``stop`` returned true.
         KilledWorker: for a task that kills its workers.
     """
-    on_progress, on_saved = control.get("on_progress"), control.get("on_saved")
+    now = current or (lambda: Progress(graph.done, graph.total))
+    progress, on_saved = job_progress(client, control.get("on_progress"), now), control.get("on_saved")
     pool = open_pool(client, folder, control.get("share"), lane=lane, placement=placement)
-
-    def report() -> None:
-        if on_progress is not None:
-            on_progress(Progress(graph.done, graph.total))
 
     def save(_name: str) -> None:
         if on_saved is not None:
             on_saved()
-        report()
+        progress.report(now())
 
-    report()
-    run({"job": graph}, pool, save, control.get("stop"))
+    progress.report(now())
+    run({"job": graph}, pool, save, progress.watching(control.get("stop")))
 
 
 def finished(client: Client, running: list[Future]) -> list[Future]:

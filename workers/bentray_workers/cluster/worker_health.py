@@ -7,9 +7,11 @@ from typing import Any
 
 from distributed import Client
 
+from bentray_kernels.compilation.compile_events import Compilation
+
 from .connected import connected_workers
 
-# Metric of workers.
+# Metric of workers: the fields of ``Compilation``.
 COMPILING = "compiling"
 
 
@@ -25,7 +27,7 @@ class WorkerHealth:
         running_tasks: tasks of all tenants that it runs now.
         paused: whether it accepts no tasks, because its memory is nearly used up.
         opencl: whether an OpenCL device of it passed the self-test.
-        compiling: whether it compiles kernels; see ``compilation.warmup``.
+        compiling: whether it compiles kernels; see ``compilation.preload``.
     """
 
     threads: int | None
@@ -59,5 +61,10 @@ def _health(worker: dict[str, Any]) -> WorkerHealth:
         running_tasks=int(metrics.get("task_counts", {}).get("executing", 0)),
         paused=worker.get("status") == "paused",
         opencl=worker.get("resources", {}).get("opencl", 0) > 0,
-        compiling=bool(metrics.get(COMPILING, False)),
+        compiling=compilation_of(worker).active,
     )
+
+
+def compilation_of(worker: dict[str, Any]) -> Compilation:
+    """The kernels that a worker compiles, by the record of the scheduler about it."""
+    return Compilation(*worker.get("metrics", {}).get(COMPILING, ()))

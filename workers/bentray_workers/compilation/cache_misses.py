@@ -1,10 +1,10 @@
-"""Detection of kernels that numba compiles because they are not in its cache."""
+"""Detection of kernels that numba compiles because they are not in its cache: log lines, and their names."""
 
 from __future__ import annotations
 
 import logging
-import threading
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -12,9 +12,13 @@ from typing import Any
 from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
 from numba.core import event
 
+from bentray_kernels.compilation.compile_events import KIND
+from bentray_kernels.compilation.compiled import compilation
+
 log = logging.getLogger("bentray.compiling")
 
-KIND = "numba:compile"
+# Between two lines of a log, s.
+LINE_S = 2.0
 
 
 class _Listener(event.Listener):  # type: ignore[misc]
@@ -31,35 +35,36 @@ class _Listener(event.Listener):  # type: ignore[misc]
         return
 
 
-class _Announcer(_Listener):
-    """Also counts the compilations in progress; those of called kernels are nested."""
+class Announcer(event.Listener):  # type: ignore[misc]
+    """Logs that kernels are compiled, and the counts every few seconds.
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._lock = threading.Lock()
-        self.in_progress = 0
+    Args:
+        counts: whether to log the counts, where no progress bar has them.
+    """
+
+    def __init__(self, *, counts: bool) -> None:
+        self._counts = counts
+        self._said: float | None = None
 
     def on_start(self, event: Any) -> None:
-        with self._lock:
-            self.in_progress += 1
-        if not self.kernels:
+        if self._said is None:
             log.warning(
                 "Compiling kernels for this processor (%s), which are not in the cache: minutes, once.",
                 get_host_cpu_name(),
             )
-        super().on_start(event)
+            self._said = time.monotonic()
 
     def on_end(self, event: Any) -> None:
-        with self._lock:
-            self.in_progress -= 1
+        now = compilation()
+        if self._counts and self._said is not None and time.monotonic() - self._said >= LINE_S:
+            self._said = time.monotonic()
+            log.warning("Compiling kernels: %d of %d", now.done, now.total)
 
 
 @cache
-def announce() -> Callable[[], bool]:
-    """Log the first kernel that this process compiles; returns a function that tells if it compiles now."""
-    announcer = _Announcer()
-    event.register(KIND, announcer)
-    return lambda: announcer.in_progress > 0
+def announce(*, counts: bool = False) -> None:
+    """Log the first kernel that this process compiles; with ``counts`` the progress, too."""
+    event.register(KIND, Announcer(counts=counts))
 
 
 @contextmanager

@@ -1,8 +1,8 @@
 """Ahead-of-time compilation of the kernels of all kinds of jobs, for an image and before tests.
 
 Run it as ``python -m bentray_workers.compilation.precompile``. Numba compiles at the first call, so each
-kind of job runs once on the smallest scan that has all it needs. A worker's own start (``warmup``) does less:
-what is compiled here is loaded when it is first called. A second run for the same sources ends at once.
+kind of job runs once on the smallest scan that has all it needs. What is compiled here is loaded when it is
+first called. A second run for the same sources ends at once.
 """
 
 from __future__ import annotations
@@ -25,11 +25,21 @@ import numpy as np
 from llvmlite import binding  # type: ignore[import-untyped]
 
 from bentray_kernels.acquisition import PICKERS, Dataset, Waveform
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.compilation.sources import ROOT, digest
-from bentray_kernels.meshes.example_surfaces import bumpy_ball
+from bentray_kernels.eikonal import methods
+from bentray_kernels.geometry_field.tables.inner_field import build_inner_rows, inner_field, spread_points
+from bentray_kernels.geometry_field.tables.outer_field import build_rows, outer_field
+from bentray_kernels.geometry_field.tracing.packed_scene import world_of
+from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, trace
+from bentray_kernels.geometry_field.tracing.scene import Shape
+from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere
+from bentray_kernels.meshes.mesh import Chart
+from bentray_kernels.meshes.surface import surface_of
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.splines import FILTERS
 from bentray_kernels.tomography import Settings
+from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_kernels.tomography.gauss_newton.penalties import PENALTIES
 
 from ..files.dataset import write_dataset
@@ -38,6 +48,7 @@ from ..files.volume import Volume
 from ..reconstruction import quality_report as quality
 from ..reconstruction.reconstruction_run import reconstruct
 from ..rendering import field_picture, geometry_field
+from ..rendering.field_scenes import camera_of, scene_of
 from ..rendering.field_settings import FieldSettings
 from ..rendering.field_view import FieldView
 from ..rendering.refraction import draw_tile
@@ -48,7 +59,6 @@ from ..simulation.simulation_run import simulate
 from ..simulation.volume import VolumeSimulationSettings
 from ..simulation.volume_waves import VolumeWaveSettings
 from ..simulation.waves import WaveSimulationSettings, simulate_emission
-from . import warmup
 from .cache_misses import compiled_kernels
 
 # Along a side of every image.
@@ -98,9 +108,44 @@ def digitised(scan: Dataset) -> Dataset:
     return replace(scan, waveform=Waveform(both[0], both[1], scale=step))
 
 
+def warm_up() -> None:
+    """Reconstruct eight elements in water with every solver but OpenCL and with both kinds of ray.
+
+    OpenCL devices are tested on demand.
+    """
+    elements = np.arange(8)
+    water = Dataset(Ring(8, 0.01).positions(), elements, elements, 1500.0, delta_tof_s=np.zeros((8, 8)))
+    for method in methods():
+        if "opencl" not in method:
+            reconstruct_here(
+                water, Settings.from_values(method="sart", eikonal=method, nodes=16, iterations=1)
+            )
+    reconstruct_here(water, Settings(method="sart", rays="straight", nodes=16, iterations=1))
+
+
+def warm_up_rendering() -> None:
+    """Draw a small ball with the default filter, refracted and shaded; other filters compile on demand."""
+    filtered = filter_volume(Volume.from_values(sampled(ONE_HOLE, 8), (1e-3,) * 3), RefractionView())
+    for mode in ("refract", "shaded"):
+        view = RefractionView(iso=(0.5,), mode=mode, width=4, height=4)
+        draw_tile(build_scene(filtered, view.layers()), view, 0, 4)
+
+
+def warm_up_tracing() -> None:
+    """Trace a ball with a geometry field; the layout of meshes compiles on demand."""
+    mesh = sphere(4, 5).in_unit_cube()
+    surface = surface_of(Chart(mesh, mesh.corners[..., :2]))
+    points, starts = spread_points(surface, 2)
+    outer = outer_field(4, [build_rows(surface, 4, 0, 96)])
+    inner = inner_field(4, starts, [build_inner_rows(surface, 4, points)])
+    view = FieldView(scene="mirror-ball", width=4, height=4)
+    scene = scene_of(Shape(surface, outer, inner), None, view)
+    trace(world_of(scene), camera_of(view), TraceSettings(view.height, view.width))
+
+
 def compile_rays(folder: Path) -> None:
     """Reconstruct from travel times and amplitudes; ``folder`` is for files."""
-    warmup.warm_up()
+    warm_up()
     for number, (scan, settings) in enumerate(
         (
             (simulate(TIMES), time_settings()),
@@ -126,7 +171,7 @@ def compile_waves(_folder: Path) -> None:
 
 def compile_field(folder: Path) -> None:
     """Compute a geometry field of a mesh, and trace rays through it."""
-    warmup.warm_up_tracing()
+    warm_up_tracing()
     mesh, work = folder / "mesh.h5", folder / "field-work"
     write_mesh(mesh, StoredMesh(bumpy_ball(320)))
     work.mkdir()
@@ -137,7 +182,7 @@ def compile_field(folder: Path) -> None:
 
 def compile_filter(name: str, _folder: Path) -> None:
     """Render a ball with a filter, refracted and shaded, with all kinds of supersampling."""
-    warmup.warm_up_rendering()
+    warm_up_rendering()
     volume = Volume.from_values(sampled(ONE_HOLE, 12), (1e-3,) * 3)
     filtered = filter_volume(volume, RefractionView(filter=name))
     for view in (

@@ -23,6 +23,7 @@ class FieldFiles:
 
     Attributes:
         layout, figures: written when all files have their sizes, and when all are filled.
+        stage: of the layout, while it is computed.
         outer: faces and fractions, (6n², 6n²) by entry and exit.
         inner: faces, (points, 6n²) by point and exit.
     """
@@ -30,6 +31,7 @@ class FieldFiles:
     def __init__(self, folder: Path) -> None:
         self.chart, self.image = folder / "chart.h5", folder / "geometry-image.h5"
         self.layout, self.figures = folder / "layout.json", folder / "figures.json"
+        self.stage = folder / "stage.json"
         self.points, self.starts = folder / "inner-points.npy", folder / "inner-starts.npy"
         self.outer = folder / "outer-faces.npy", folder / "outer-fractions.npy"
         self.inner = folder / "inner-faces.npy"

@@ -25,6 +25,7 @@ from bentray_kernels.tomography.settled import settled
 
 from ..cluster.checkpoints import Checkpoints
 from ..cluster.fair_shares import Share
+from ..cluster.job_progress import job_progress
 from ..cluster.task_pool import open_pool
 from ..files.dataset.read import check_readable
 from ..files.dataset.scan import ScanHeader
@@ -66,7 +67,7 @@ def reconstruct(
         client: of a cluster; None: threads of this process. The bits do not depend on it.
         dataset_path: a file in the upload format, readable by every worker.
         settings: see ``Settings``.
-        on_progress: called after each batch.
+        on_progress: called after each batch, and while workers compile.
         stop: polled several times a second; true raises ``Cancelled``.
         work_dir: a folder for picked travel times and checkpoints, which every worker can read and write; an
             unfinished run of the same dataset and settings is resumed from it, to the same bits. None: a
@@ -86,11 +87,12 @@ def reconstruct(
         machine.place(settings)
         pool = open_pool(client, folder, share, placement=lambda: machine.placement, threads=threads)
         checkpoints = Checkpoints(folder / CHECKPOINTS, on_saved or (lambda: None))
-        job = _Job(pool, stop, dataset_path, stamp, folder, checkpoints, count(), machine)
+        progress = job_progress(client, on_progress)
+        job = _Job(pool, progress.watching(stop), dataset_path, stamp, folder, checkpoints, count(), machine)
 
-        def show(progress: Progress) -> None:
-            if on_progress is not None and progress.total:
-                on_progress(progress)
+        def show(now: Progress) -> None:
+            if now.total:
+                progress.report(now)
 
         path, findings = _pick(job, settings, show)
         result = _reconstruct_picked(job, path, settings, show)
@@ -145,7 +147,7 @@ class _Job(NamedTuple):
     """State of a reconstruction; ``runs`` numbers the groups of graphs that are run."""
 
     pool: Pool
-    stop: Callable[[], bool] | None
+    stop: Callable[[], bool]
     scan: Path
     stamp: int
     folder: Path

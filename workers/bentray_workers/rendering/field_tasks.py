@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,8 @@ from .field_settings import FieldSettings, check_faces
 
 # Entries of the inner table, 4 bytes each.
 MAX_INNER = 2**28
+# Stage after those of ``parameterise``: points of the image and rays of the tables.
+SAMPLING = "sampling"
 # Rays of one task: a second or two.
 TASK_RAYS = 2**21
 
@@ -59,8 +62,9 @@ def parameterise_mesh(mesh_path: Path, settings: FieldSettings, folder: Path) ->
         return
     stored = load_mesh(mesh_path)
     check_faces(len(stored.mesh.faces))
-    layout = parameterise(stored.mesh)
+    layout = parameterise(stored.mesh, partial(_write_stage, files))
     laid_out = time.perf_counter()
+    _write_stage(files, SAMPLING, 0, 0)
     image, error = _image(layout.chart, settings)
     maps = GeometryMaps.from_geometry_image(image, stored.colours)
     sampled = time.perf_counter()
@@ -95,6 +99,11 @@ def parameterise_mesh(mesh_path: Path, settings: FieldSettings, folder: Path) ->
         "error_seconds": time.perf_counter() - sampled,
     }
     write_json(files.layout, figures)
+
+
+def _write_stage(files: FieldFiles, phase: str, done: int, total: int) -> None:
+    """Record the stage of the layout for the job, which reads it while this task runs."""
+    write_json(files.stage, {"phase": phase, "done": done, "total": total})
 
 
 def _image(chart: Chart, settings: FieldSettings) -> tuple[GeometryImage, GeometricError | None]:
@@ -147,8 +156,8 @@ def finish(folder: Path, settings: FieldSettings, done: Path) -> dict[str, Any]:
     figures["border_seconds"] = marked - started
     figures["outer_bytes"] = sum(path.stat().st_size for path in files.outer)
     figures["inner_bytes"] = files.inner.stat().st_size
-    for torn in folder.glob("*.partial"):
-        torn.unlink()
+    for left in (*folder.glob("*.partial"), files.stage):
+        left.unlink(missing_ok=True)
     write_json(files.figures, figures)
     return figures
 

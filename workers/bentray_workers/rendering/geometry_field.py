@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -17,7 +18,7 @@ from ..cluster.task_pool import JobControl, run_job
 from ..files.atomic import sync
 from ..files.geometry_field_folder import FieldFiles, read_json
 from .field_settings import FieldSettings
-from .field_tasks import TASK_RAYS, finish, inner_rows, outer_rows, parameterise_mesh
+from .field_tasks import SAMPLING, TASK_RAYS, finish, inner_rows, outer_rows, parameterise_mesh
 
 
 class GeometryFieldGraph:
@@ -41,6 +42,14 @@ class GeometryFieldGraph:
         self._files = FieldFiles(self.folder)
         self.done = self.total = 0
         self._first = self._remaining()
+
+    def progress(self) -> Progress:
+        """The stage with its count: those of the layout are read from the file of its task."""
+        if self.total:
+            return Progress(self.done, self.total, phase=SAMPLING)
+        with suppress(OSError, ValueError):
+            return Progress(**read_json(self._files.stage))
+        return Progress(0, 0)
 
     def first(self) -> list[Task]:
         return self._first
@@ -110,8 +119,8 @@ def build_field(
     """
     if not target.exists():
         graph = GeometryFieldGraph(mesh_path, settings, work_dir)
-        where = {"resources": DRAWING}
-        run_job(client, graph, work_dir, lane="drawing", placement=lambda: where, **control)
+        where, now = {"resources": DRAWING}, graph.progress
+        run_job(client, graph, work_dir, lane="drawing", placement=lambda: where, current=now, **control)
         _move(graph.folder, target)
     elif on_progress := control.get("on_progress"):
         on_progress(Progress(1, 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 
@@ -25,6 +25,9 @@ from .framing import in_unit_square
 SHRUNK = 3.0
 MAX_ENDS = 64
 ENOUGH = 0.95
+
+# Stages.
+CUTTING, PARAMETERISING = "cutting", "parameterising"
 
 # Between the boundary that keeps its lengths, 0, and a circle, 1.
 ROUNDINGS = (0.03, 0.1, 0.25, 0.5, 1.0)
@@ -50,11 +53,14 @@ class Parameterisation:
     quasi_conformal: Floats
 
 
+# Called with the stage, how many of its layouts are done, and the most that there may be.
+OnStage = Callable[[str, int, int], None]
+
 # Longest side of a face that counts beside the unit cube: tables keep places in float32.
 MIN_SIDE = 1e-8
 
 
-def parameterise(mesh: TriangleMesh) -> Parameterisation:
+def parameterise(mesh: TriangleMesh, on_stage: OnStage = lambda *_: None) -> Parameterisation:
     """Cut a surface to a disk and lay it out on the unit square, conformally and without folds.
 
     The cut goes through all handles and boundaries, and out to where a flat layout shrinks the surface most,
@@ -63,6 +69,7 @@ def parameterise(mesh: TriangleMesh) -> Parameterisation:
 
     Args:
         mesh: one connected oriented surface, with boundaries or handles or without.
+        on_stage: called before each layout of the stages ``cutting`` and ``parameterising``.
 
     Raises:
         InvalidInput: for several pieces, for fans that touch in a vertex alone, for edges of three faces, for
@@ -70,7 +77,7 @@ def parameterise(mesh: TriangleMesh) -> Parameterisation:
             layout.
     """
     try:
-        layout = _parameterised(mesh.in_unit_cube())
+        layout = _parameterised(mesh.in_unit_cube(), on_stage)
     except RuntimeError as error:
         # SuperLU says so of the matrix of angles that are all 0 or π.
         if "singular" not in str(error):
@@ -86,7 +93,7 @@ def _too_thin() -> InvalidInput:
     return InvalidInput("mesh", "triangles too thin to be laid out", accepted)
 
 
-def _parameterised(mesh: TriangleMesh) -> Parameterisation:
+def _parameterised(mesh: TriangleMesh, on_stage: OnStage) -> Parameterisation:
     topology = _checked(mesh)
     cutter = Cutter(mesh, topology)
     cut = cutter.first()
@@ -94,6 +101,7 @@ def _parameterised(mesh: TriangleMesh) -> Parameterisation:
     best: tuple[Flags, Disk] | None = None
     due, least = 0, math.inf
     for number, end in enumerate(chain(cutter.far_ends(cut), [None])):
+        on_stage(CUTTING, number, MAX_ENDS)
         small_enough = end is None or end.scale <= SHRUNK
         if small_enough and number >= due and _opens(topology, cut.edges):
             disk = Disk.from_mesh(mesh.vertices, cut_open(topology, cut.edges))
@@ -110,7 +118,7 @@ def _parameterised(mesh: TriangleMesh) -> Parameterisation:
         cut = cutter.grown(cut, end.vertex)
     if best is None:
         raise _too_thin()
-    return _laid_out(mesh, areas, *best)
+    return _laid_out(mesh, areas, *best, on_stage)
 
 
 def _opens(topology: Topology, cut: Flags) -> bool:
@@ -138,9 +146,13 @@ def _checked(mesh: TriangleMesh) -> Topology:
     return topology
 
 
-def _laid_out(mesh: TriangleMesh, areas: Floats, cut: Flags, disk: Disk) -> Parameterisation:
+def _laid_out(
+    mesh: TriangleMesh, areas: Floats, cut: Flags, disk: Disk, on_stage: OnStage
+) -> Parameterisation:
     best, least, conformal = None, math.inf, True
-    for plane in _layouts(disk):
+    on_stage(PARAMETERISING, 0, 1 + len(ROUNDINGS))
+    for number, plane in enumerate(_layouts(disk), 1):
+        on_stage(PARAMETERISING, number, 1 + len(ROUNDINGS))
         stretch = area_stretch(areas, signed_areas(plane[disk.faces]))
         if best is not None and stretch >= least:
             break

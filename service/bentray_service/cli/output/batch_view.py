@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .exit_codes import WorkFailed
-from .terminal import print_json, print_lines, print_table, remark, residual_note
+from .terminal import phase_note, print_json, print_lines, print_table, remark
 
 if TYPE_CHECKING:
     from bentray_workers.reconstruction.batch import Entry
@@ -65,7 +65,7 @@ def cells(entry: Entry) -> tuple[str, ...]:
     """One row of the table."""
     percent = 100 * entry.done // entry.total if entry.total else 0
     progress = f"{percent} %" if entry.state in ("running", "failed") else ""
-    misfit = residual_note(entry.residual_rms_s).removeprefix("residual ")
+    misfit = phase_note("", entry.residual_rms_s).removeprefix("residual ")
     seconds = "" if entry.state == "waiting" else f"{entry.seconds:.1f}"
     state = f"{entry.state}, doubtful" if entry.doubt else entry.state
     return entry.name, state, progress, misfit, seconds

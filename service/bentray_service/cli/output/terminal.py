@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...interactive.progress_bar import Step as Step
+from ...interactive.progress_bar import phase_note as phase_note
 from ...interactive.progress_bar import progress_bar as progress_bar
 
 # Width of tables in files and pipes.
@@ -88,8 +89,3 @@ def print_lines(lines: Iterable[str]) -> None:
     """Print lines to stdout without wrapping, so that paths can be copied."""
     sys.stdout.writelines(line + "\n" for line in lines)
     sys.stdout.flush()
-
-
-def residual_note(rms_s: float | None) -> str:
-    """The residual for a progress bar; empty before the end of the first iteration."""
-    return "" if rms_s is None else f"residual {rms_s * 1e9:.0f} ns"

@@ -60,8 +60,9 @@ class ProgressRecord(BaseModel):
     done: int
     total: int
     phase: str = Field(
-        description="Current phase of a reconstruction: examining, picking or reconstructing, each counted "
-        "separately; else empty."
+        description="Current phase, each counted separately: examining, picking or reconstructing a scan; "
+        "cutting, parameterising or sampling a mesh; compiling, while workers compile kernels for this "
+        "processor; else empty."
     )
 
 

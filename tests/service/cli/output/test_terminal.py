@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_service.cli.output.terminal import (
+    phase_note,
     print_json,
     print_lines,
     print_table,
     progress_bar,
     remark,
-    residual_note,
     without_nan,
 )
 
@@ -44,7 +44,7 @@ def test_stdout_contains_only_json(capsys: pytest.CaptureFixture[str]) -> None:
     print_json({"error": math.nan})
     said = capsys.readouterr()
     assert json.loads(said.out) == {"error": None}
-    assert said.err == "working\n", "no bar is drawn where nobody watches"
+    assert said.err == "working\n", "short work has no line"
 
 
 def test_paths_are_printed_whole(capsys: pytest.CaptureFixture[str]) -> None:
@@ -62,5 +62,6 @@ def test_a_table_shows_its_cells_as_they_are(capsys: pytest.CaptureFixture[str])
 
 
 def test_the_residual_is_shown_in_nanoseconds() -> None:
-    assert residual_note(1.234e-7) == "residual 123 ns"
-    assert residual_note(None) == ""
+    assert phase_note("reconstructing", 1.234e-7) == "residual 123 ns"
+    assert phase_note("reconstructing") == "reconstructing"
+    assert phase_note("compiling", 1e-7) == "compiling kernels"

@@ -10,13 +10,18 @@ import { PreviewPicture } from "./preview_picture.js";
 import { ProgressEstimate } from "./progress_estimate.js";
 
 const TICK_MS = 500;
-// Between two images, and between two questions to the workers while nothing is done yet.
+// Between two images.
 const PREVIEW_MS = 1000;
-const WORKERS_MS = 3000;
 const HISTORY_MS = 1000;
 
-const PHASES = { examining: "Examining the scan", picking: "Picking first arrivals in the traces" };
-const COMPILING = "The workers compile their kernels for this processor. That happens once and takes up to some minutes.";
+const PHASES = {
+  examining: "Examining the scan",
+  picking: "Picking first arrivals in the traces",
+  cutting: "Cutting the surface to a disk",
+  parameterising: "Laying the surface out on a square",
+  sampling: "Sampling the image and the rays of the tables",
+};
+const COMPILING = "compiling";
 const STATES = { cancelling: "Cancelling: running tasks come to an end", cancelled: "Cancelled", failed: "Failed", succeeded: "Finished" };
 
 // The iteration in words, from the last record of the history.
@@ -31,11 +36,11 @@ function iterationOf({ history, settings }) {
 }
 
 // What happens now, in a line.
-function happening(job, compiling) {
-  const { done, phase } = job.progress;
+function happening(job) {
+  const { done, total, phase } = job.progress;
   if (job.state === "queued") return job.ahead === null ? "Waiting in the queue" : placeInQueue(job.ahead);
   if (STATES[job.state]) return STATES[job.state];
-  if (compiling && !done) return COMPILING;
+  if (phase === COMPILING) return `Compiling kernels for this processor, once: ${done} of ${total}`;
   if (PHASES[phase]) return PHASES[phase];
   if (job.kind !== "reconstruction") return done ? "Running" : "Starting";
   return phase === "reconstructing" && (done || job.history.length) ? iterationOf(job) : "Starting: the scan is read and the first rays are traced";
@@ -69,8 +74,7 @@ function Progress({ job, estimate, elapsed }) {
   const now = performance.now() / 1e3;
   const running = job.state === "running";
   const share = running && job.progress.total ? estimate.share(now) : null;
-  const planMinutes = job.plan?.minutes;
-  const left = estimate.left(now) ?? (planMinutes ? Math.max(0, 60 * planMinutes - elapsed) : null);
+  const left = job.progress.phase === COMPILING ? null : estimate.left(now);
   const words = [
     share !== null && `${Math.floor(100 * share)} % of this step`,
     job.seconds !== null && (job.finished ? `took ${duration(elapsed)}` : `${duration(elapsed)} so far`),
@@ -97,13 +101,6 @@ function usePreview(job) {
     return last.current.record;
   }, () => PREVIEW_MS);
   return record;
-}
-
-// Whether the workers compile, while a job waits for them.
-function useCompiling(waits) {
-  const read = async () => waits && (await request("/v1/cluster")).workers.some((worker) => worker.compiling);
-  const [compiling] = useRead(read, () => (waits ? WORKERS_MS : null), waits);
-  return compiling;
 }
 
 function Links({ job, change }) {
@@ -147,7 +144,6 @@ export function LiveJob({ first, onSuccess }) {
   const job = jobs?.[0] ?? first;
   const preview = usePreview(job);
   const running = job.state === "running";
-  const compiling = useCompiling(running && !job.progress.done);
   const seen = useRef(false);
   seen.current ||= running && job.kind === "reconstruction";
   useTicks();
@@ -159,7 +155,7 @@ export function LiveJob({ first, onSuccess }) {
     <h1>${job.title}</h1>
     <p class="facts live-facts">${jobs && titleOfJob(job)} · ${settingsOf(job)}</p>
     <section class="panel" aria-label="State">
-      <p class="live-what" role="status">${happening(job, compiling)}</p>
+      <p class="live-what" role="status">${happening(job)}</p>
       <${Progress} job=${job} estimate=${estimate} elapsed=${elapsedOf(job)} />
       <div class="live-plan">${job.plan && html`<${Plan} plan=${job.plan} />`}</div>
       <${Alert} className="live-error" error=${problem} />
