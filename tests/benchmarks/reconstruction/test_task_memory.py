@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from benchmarks.reconstruction.task_memory import JOBS, Job, measured
+from benchmarks.memory.task_memory import JOBS, Job, measured
 
 RECORDED = Path(__file__).resolve().parents[3] / "benchmarks" / "results" / "task_memory.json"
 

@@ -10,8 +10,8 @@ from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.cluster.capacities import MIB
 from bentray_workers.cluster.connection import open_cluster
 
+from ..reconstruction._worker_use import forget_peak, of_worker, peak_bytes
 from ._measured_tasks import JOBS, QUICK, Job
-from ._worker_use import forget_peak, of_worker, peak_bytes
 
 # A plan is at most this much above the peak. A warm worker has about 60 MiB of freed memory left from loading
 # its compiled code, which tasks take first; so what they take below that is not seen.
