@@ -12,6 +12,7 @@ from bentray_kernels.tomography.reflection import reflection_plan
 from bentray_kernels.tomography.reflection.echoes import (
     Pulse,
     echo_window,
+    high_pass,
     measure_pulse,
     without_water_shot,
 )
@@ -224,6 +225,16 @@ def test_the_window_rises_and_falls_by_raised_cosines_of_a_period():
     rise = np.sin(np.pi / 16.0 * np.arange(9)) ** 2
     # The pulse of 5 µs is over at 12 µs, the record at 40 µs.
     np.testing.assert_allclose(window, [*np.zeros(12), *rise, *np.ones(11), *rise[::-1]], atol=1e-12)
+
+
+@pytest.mark.parametrize(("relative", "part"), [(0.25, 0.0), (0.45, 0.5), (0.7, 1.0), (1.0, 1.0)])
+def test_the_high_pass_keeps_the_phases_of_what_it_passes(relative, part):
+    at = np.arange(1600) / RATE_HZ
+    wave = np.sin(2.0 * np.pi * relative * CENTRE_HZ * at) * np.hanning(1600)
+    passed = high_pass(wave[None], RATE_HZ, CENTRE_HZ)[0]
+    np.testing.assert_allclose(passed, part * wave, atol=0.02)
+    later = high_pass(wave[None], RATE_HZ, CENTRE_HZ, np.array([8.0 / RATE_HZ]))[0]
+    np.testing.assert_allclose(later[8:], passed[:-8], atol=1e-3)
 
 
 def test_a_scan_of_zeros_has_no_pulse():

@@ -189,3 +189,24 @@ def test_times_are_no_better_than_pairs_measured_both_ways_agree(weights, noise_
     """An image that follows the noise has a smaller misfit than its data have errors."""
     ray_uncertainty(*row_sums(1e-8 * np.where(np.arange(16) % 2, 1.0, -1.0), noise_s))
     np.testing.assert_allclose(weights, expected_s**-2)
+
+
+def test_expected_squares_are_those_of_the_smoothed_truth():
+    """Of samples of ±2 m/s about a mean that is 3 m/s off; a chequered sample does not outlive smoothing."""
+    chequers = np.where(np.add.outer(range(24), range(24)) % 2, 2.0, -2.0)
+    speed, mean = np.full((24, 24), WATER), np.full((24, 24), 3.0)
+    for width, expected in ((0.0, 2.0**2 + 3.0**2), (1.5, 3.0**2)):
+        squares, kept = module._squares(speed, mean, [chequers, -chequers], width)
+        assert kept == width
+        np.testing.assert_allclose(squares[4:-4, 4:-4], expected, rtol=0.01)
+    # What smoothing takes from the image itself is an error too.
+    squares, _ = module._squares(WATER + chequers, 0.0 * mean, [0.0 * mean], 1.5)
+    np.testing.assert_allclose(squares[4:-4, 4:-4], 2.0**2, rtol=0.01)
+
+
+@pytest.mark.parametrize(("contrast_mps", "least_mps"), [(40.0, 0.15 * 40.0), (4.0, 2.0), (0.0, 2.0)])
+def test_the_prior_follows_the_contrast_down_to_a_floor(contrast_mps, least_mps):
+    """Of a uniform contrast; the speed and its time differ by the square of the slowness."""
+    problem, _, slowness, _ = row_sums(np.zeros(80))
+    prior_s = module._prior(problem, slowness - contrast_mps / WATER**2)[40, 40]
+    assert prior_s * WATER**2 / problem.spacing == pytest.approx(1.5 * np.hypot(contrast_mps, least_mps))
