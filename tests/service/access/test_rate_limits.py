@@ -6,12 +6,7 @@ from hypothesis import strategies as st
 from bentray_service.access import rate_limits
 from bentray_service.access.rate_limits import RateLimits
 
-
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
+from ...clock import Clock
 
 
 @given(st.integers(1, 50), st.lists(st.floats(0.0, 40.0), max_size=120))

@@ -12,14 +12,8 @@ from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.stored_tables import Datasets
 from bentray_service.rows.uploads import Uploads
 
+from ...clock import Clock
 from ..rows.conftest import SUMMARY
-
-
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
 
 
 @pytest.fixture

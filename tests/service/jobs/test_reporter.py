@@ -7,6 +7,8 @@ from sqlalchemy.exc import OperationalError
 from bentray_kernels.tomography.result import Iteration, Progress
 from bentray_service.jobs.reporter import MEASURE_SECONDS, Reporter
 
+from ...clock import Clock
+
 
 class FakeJobs:
     def __init__(self):
@@ -36,13 +38,6 @@ class FakeJobs:
     def held_state(self, job_id):
         self.check()
         self.asked += 1
-        return self.now
-
-
-class Clock:
-    now = 0.0
-
-    def __call__(self):
         return self.now
 
 

@@ -9,12 +9,7 @@ from bentray_service.errors import DatabaseUnavailable
 from bentray_service.rows import database as admission
 from bentray_service.rows.database import MAX_CONCURRENT, MAX_CONCURRENT_WHEN_SLOW, Admission
 
-
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
+from ...clock import Clock
 
 
 def test_many_at_once_while_it_is_quick():

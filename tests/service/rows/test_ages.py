@@ -4,12 +4,7 @@ import pytest
 
 from bentray_service.rows.ages import ObservedTime
 
-
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
+from ...clock import Clock
 
 
 def test_observed_time_continues_after_restart(database):

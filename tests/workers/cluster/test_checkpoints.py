@@ -12,12 +12,7 @@ from bentray_kernels.tomography.sart import sart_step
 from bentray_workers.cluster import checkpoints
 from bentray_workers.cluster.checkpoints import INTERVAL_S, Checkpoints
 
-
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
+from ...clock import Clock
 
 
 def checkpoint(sweep, emitter=0, seed=0):
