@@ -3,14 +3,12 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_workers.files.dataset import write_dataset
 
+from ..table6 import table6_scan
 from .machine import Machine
 
 ELEMENTS = 32
@@ -19,9 +17,7 @@ ELEMENTS = 32
 @pytest.fixture(scope="session")
 def scan() -> Dataset:
     """A phantom in water, with noise-free times."""
-    ring, emitters = Ring(ELEMENTS, 0.08), np.arange(ELEMENTS)
-    delta = TravelTimeScan(table6(1500.0), ring, TABLE6_SIDE_M, nodes=64).delta_tof(emitters)
-    return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta)
+    return table6_scan(ELEMENTS, 64, 0.08, 1500.0)
 
 
 @pytest.fixture(scope="session")

@@ -9,18 +9,17 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import httpx
-import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
-from bentray_kernels.phantoms import ONE_HOLE, TABLE6_SIDE_M, sampled, table6
+from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography import reconstruct
 from bentray_kernels.tomography.stored_settings import from_stored
 from bentray_workers.files.dataset import write_dataset
 
 from ..edge import edge
 from ..service.ingest.hostile_volumes import npy
+from ..table6 import table6_scan
 from .footprint import Footprint, measured, oldest_upload, rise
 from .honest_traffic import PLAN, HonestTenant
 from .hostile_traffic import HostileTraffic, cube
@@ -115,9 +114,7 @@ def service(tmp_path):
 @pytest.fixture
 def soak_scan() -> Dataset:
     """Small, for there are many."""
-    ring, emitters = Ring(16, 0.08), np.arange(16)
-    delta = TravelTimeScan(table6(1500.0), ring, TABLE6_SIDE_M, nodes=32).delta_tof(emitters)
-    return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta)
+    return table6_scan(16, 32, 0.08, 1500.0)
 
 
 def test_honest_jobs_finish_and_resources_stay_bounded(service, soak_scan, tmp_path, caplog):

@@ -6,7 +6,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,6 +28,7 @@ from bentray_service.rows.accounts import Account, Accounts
 from bentray_service.rows.ids import Tenant
 from bentray_service.settings import ServiceSettings
 from bentray_service.web.server import configuration, listen
+from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.fair_shares import Share
 from bentray_workers.reconstruction import reconstruction_run
 
@@ -320,6 +321,26 @@ def serve(tmp_path: Path, cluster: FakeCluster) -> Iterator[Callable[..., str]]:
             return stack.enter_context(serving(given, cluster))
 
         yield go
+
+
+@pytest.fixture(scope="module")
+def workers() -> Iterator[Cluster]:
+    """A cluster in this process, of one worker."""
+    with open_cluster(workers=1, processes=False) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def on_workers(tmp_path: Path, workers: Cluster) -> Callable[..., AbstractContextManager[TestClient]]:
+    """Start the application on the workers; again on the same folder when it is called again."""
+
+    @contextmanager
+    def go(**settings: Any) -> Iterator[TestClient]:
+        app = create_app(ServiceSettings(data_dir=tmp_path / "data", **settings), workers)
+        with TestClient(app, base_url="http://localhost", raise_server_exceptions=False) as http:
+            yield http
+
+    return go
 
 
 @contextmanager

@@ -13,7 +13,6 @@ from bentray_service.app import create_app
 from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.tables import JobRow
 from bentray_service.settings import ServiceSettings
-from bentray_workers.cluster.connection import open_cluster
 
 
 def test_dataset_in_image_out(http, uploaded, submitted, until, work):
@@ -32,19 +31,17 @@ def test_dataset_in_image_out(http, uploaded, submitted, until, work):
     assert (speed.min(), speed.max()) == tuple(volume["speed_range_mps"]) == (1500.0, 1540.0)
 
 
-def test_whole_path_with_the_real_kernels(tmp_path, uploaded, submitted, until):
-    with open_cluster(workers=1, processes=False) as cluster:
-        app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
-        with TestClient(app, base_url="http://localhost") as http:
-            job = submitted(http, uploaded(http), rays="straight", nodes=24, iterations=3)
-            done = until(http, job["id"])
-            assert done["state"] == "succeeded", done["error"]
-            residuals = [sweep["residual_rms_s"] for sweep in done["history"]]
-            assert residuals[-1] < residuals[0]
-            volume = http.get(done["links"]["volume"]).json()
-            # Every pair came 2 % too early, so the object is 2 % faster than water.
-            assert 1510 < volume["speed_range_mps"][1] < 1600
-            assert http.get(done["links"]["image"]).content.startswith(b"\x89PNG")
+def test_whole_path_with_the_real_kernels(on_workers, uploaded, submitted, until):
+    with on_workers() as http:
+        job = submitted(http, uploaded(http), rays="straight", nodes=24, iterations=3)
+        done = until(http, job["id"])
+        assert done["state"] == "succeeded", done["error"]
+        residuals = [sweep["residual_rms_s"] for sweep in done["history"]]
+        assert residuals[-1] < residuals[0]
+        volume = http.get(done["links"]["volume"]).json()
+        # Every pair came 2 % too early, so the object is 2 % faster than water.
+        assert 1510 < volume["speed_range_mps"][1] < 1600
+        assert http.get(done["links"]["image"]).content.startswith(b"\x89PNG")
 
 
 def test_an_injected_cluster_stays_open(http, cluster):

@@ -71,3 +71,8 @@ def bunny():
     numbers = np.array(words[4:], np.float64)
     points, rows = numbers[: 3 * vertices], numbers[3 * vertices :]
     return mesh(points.reshape(-1, 3), rows.reshape(faces, 4)[:, 1:])
+
+
+def volume_of(surface):
+    first, second, third = np.moveaxis(surface.corners, 1, 0)
+    return (first * np.cross(second, third)).sum() / 6.0

@@ -11,12 +11,7 @@ from bentray_kernels.meshes.example_surfaces import sphere, torus
 from bentray_kernels.meshes.mesh import TriangleMesh
 from bentray_kernels.meshes.topology import topology_of
 
-from .examples import ball_with_holes, flat_patch, tetrahedron, two_handles
-
-
-def volume_of(surface):
-    first, second, third = np.moveaxis(surface.corners, 1, 0)
-    return (first * np.cross(second, third)).sum() / 6.0
+from .examples import ball_with_holes, flat_patch, tetrahedron, two_handles, volume_of
 
 
 @pytest.mark.parametrize(

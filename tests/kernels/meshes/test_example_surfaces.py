@@ -9,10 +9,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.defects import sound
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere, torus
 
-
-def volume_of(surface):
-    first, second, third = np.moveaxis(surface.corners, 1, 0)
-    return (first * np.cross(second, third)).sum() / 6.0
+from .examples import volume_of
 
 
 def test_the_counts_of_table_5():

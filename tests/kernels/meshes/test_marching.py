@@ -12,13 +12,9 @@ from bentray_kernels.meshes.pieces import pieces_of
 from bentray_kernels.meshes.topology import topology_of
 
 from ...effort import effort
+from .examples import volume_of
 
 UNIT = np.ones(3)
-
-
-def volume_of(surface):
-    first, second, third = np.moveaxis(surface.corners, 1, 0)
-    return (first * np.cross(second, third)).sum() / 6.0
 
 
 def grid(number):

@@ -3,6 +3,19 @@
 import numpy as np
 
 from bentray_kernels.arrays import Floats
+from bentray_kernels.refraction import Layers, Scene, backdrop_of, checkerboard, orthographic
+from bentray_kernels.splines import Spline
+
+# A ball in the unit cube, seen along z before a chequered plane.
+RADIUS = 0.3
+CAMERA = orthographic((0.0, 0.0, -2.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), 1.0)
+BACKDROP = backdrop_of([checkerboard((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 10)])
+
+
+def glass_ball(nodes: int = 20, sign: float = 1.0) -> Scene:
+    """A ball of index 1.5; of index 1 in glass if the sign is negative."""
+    layers = Layers((sign * -(RADIUS**2),), (1.0, 1.5))
+    return Scene.build(Spline(-sign * squared(nodes), prefilter=False), layers, 1.0 / (nodes - 1))
 
 
 def squared(n: int) -> Floats:

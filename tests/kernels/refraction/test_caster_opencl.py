@@ -13,9 +13,7 @@ from bentray_kernels.refraction import (
     Picture,
     RenderSettings,
     Scene,
-    backdrop_of,
     caster_opencl,
-    checkerboard,
     orthographic,
     perspective,
     render,
@@ -26,13 +24,12 @@ from bentray_kernels.splines import Spline
 
 from ...effort import effort
 from . import test_caster
-from .solids import distance, squared, through_ball
+from .solids import BACKDROP, distance, squared, through_ball
 from .test_caster import *  # noqa: F403 - every case of the compiled caster, cast by the fixture below
 
 pytestmark = pytest.mark.opencl
 
 RADIUS = 0.31
-BACKDROP = backdrop_of([checkerboard((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 10)])
 CAMERAS = {
     "orthographic": orthographic((0.0, 0.0, -2.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), 1.0),
     "perspective": perspective((0.3, -0.4, -1.9), (0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 35.0),

@@ -5,29 +5,21 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.refraction import (
-    Layers,
     Picture,
     RenderSettings,
     Scene,
     backdrop_of,
     checkerboard,
-    orthographic,
     render,
 )
 from bentray_kernels.refraction.caster import LOST, REFRACTED
-from bentray_kernels.splines import Spline
 
-from .solids import squared, through_ball
-
-RADIUS = 0.3
-CAMERA = orthographic((0.0, 0.0, -2.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), 1.0)
-BACKDROP = backdrop_of([checkerboard((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 10)])
+from .solids import BACKDROP, CAMERA, RADIUS, glass_ball, through_ball
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    layers = Layers((-(RADIUS**2),), (1.0, 1.5))
-    return Scene.build(Spline(-squared(20), prefilter=False), layers, 1.0 / 19)
+    return glass_ball()
 
 
 def picture(scene: Scene, **options) -> Picture:

@@ -4,23 +4,16 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.refraction import Layers, Light, Scene, orthographic, shade
-from bentray_kernels.splines import Spline
+from bentray_kernels.refraction import Light, orthographic, shade
 
-from .solids import squared
-
-RADIUS = 0.3
-CAMERA = orthographic((0.0, 0.0, -2.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0), 1.0)
-
-
-def ball(sign: float) -> Scene:
-    layers = Layers((sign * -(RADIUS**2),), (1.0, 1.5))
-    return Scene.build(Spline(-sign * squared(24), prefilter=False), layers, 1.0 / 23)
+from .solids import CAMERA, RADIUS, glass_ball
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_ball_is_seen_where_it_is(sign):
-    shaded = shade(ball(sign), CAMERA, Light((0.0, 0.0, -1.0), 0.0, 1.0, 0.0, colour=(200, 100, 50)), 41, 41)
+    shaded = shade(
+        glass_ball(24, sign), CAMERA, Light((0.0, 0.0, -1.0), 0.0, 1.0, 0.0, colour=(200, 100, 50)), 41, 41
+    )
     position = (np.arange(41) + 0.5) / 41 - 0.5
     radius = np.hypot(position[:, None], position)
     seen = radius < RADIUS
@@ -36,7 +29,7 @@ def test_a_ball_is_seen_where_it_is(sign):
 def test_the_highlight_lies_where_the_light_is_mirrored():
     towards = (np.sin(0.8), 0.0, -np.cos(0.8))
     light = Light(towards, 0.0, 0.0, 1.0, 200.0, background=(1, 2, 3))
-    shaded = shade(ball(1.0), CAMERA, light, 81, 81)
+    shaded = shade(glass_ball(24, 1.0), CAMERA, light, 81, 81)
     row, column = np.unravel_index(shaded.image[..., 0].argmax(), (81, 81))
     assert row == 40
     # Half way between the camera and the light.
@@ -51,7 +44,7 @@ def test_an_oblique_view_is_shaded_by_phongs_model(sign):
     ahead, towards = ahead / np.linalg.norm(ahead), towards / np.linalg.norm(towards)
     light = Light(tuple(towards), 0.1, 0.4, 0.45, 3.0, colour=(200, 100, 50))
     camera = orthographic(tuple(-2.0 * ahead), tuple(ahead), (0.0, -1.0, 0.0), 0.9)
-    shaded = shade(ball(sign), camera, light, 31, 31)
+    shaded = shade(glass_ball(24, sign), camera, light, 31, 31)
     seen = np.isfinite(shaded.distance_m)
     normal = shaded.normal[seen]
     normal *= -np.sign(normal @ ahead)[:, None]
@@ -65,14 +58,14 @@ def test_an_oblique_view_is_shaded_by_phongs_model(sign):
 
 def test_no_pixels_are_rejected():
     with pytest.raises(InvalidInput, match="rows, columns"):
-        shade(ball(1.0), CAMERA, Light((0.0, 0.0, -1.0)), 0, 4)
+        shade(glass_ball(24, 1.0), CAMERA, Light((0.0, 0.0, -1.0)), 0, 4)
 
 
 def test_threads_shade_the_same_picture_and_are_paused():
     light = Light((0.0, 0.6, -0.8))
-    whole = shade(ball(1.0), CAMERA, light, 41, 37)
+    whole = shade(glass_ball(24, 1.0), CAMERA, light, 41, 37)
     pauses = []
-    threaded = shade(ball(1.0), CAMERA, light, 41, 37, threads=3, pause=lambda: pauses.append(1))
+    threaded = shade(glass_ball(24, 1.0), CAMERA, light, 41, 37, threads=3, pause=lambda: pauses.append(1))
     np.testing.assert_array_equal(threaded.image, whole.image)
     np.testing.assert_array_equal(threaded.normal, whole.normal)
     np.testing.assert_array_equal(threaded.distance_m, whole.distance_m)

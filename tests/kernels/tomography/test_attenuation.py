@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
 from bentray_kernels.tomography.attenuation import trace_rays
 from bentray_kernels.tomography.focusing import focusing
+
+from ...table6 import table6_scan
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
 PHANTOM = table6(WATER)
@@ -21,18 +22,7 @@ RING = Ring(64, 0.09)
 
 @pytest.fixture(scope="module")
 def scan():
-    travel = TravelTimeScan(PHANTOM, RING, SIDE, nodes=NODES)
-    everyone = np.arange(RING.elements)
-    delta, ratio = travel.medium(attenuation=True).arrivals(travel.elements(), everyone)
-    return Dataset(
-        RING.positions(),
-        everyone,
-        everyone,
-        WATER,
-        delta_tof_s=delta,
-        log_ratio_np=ratio,
-        water_attenuation_np_m=0.0,
-    )
+    return replace(table6_scan(RING.elements, NODES, attenuation=True), water_attenuation_np_m=0.0)
 
 
 def plan(method="gauss-newton", **changes):

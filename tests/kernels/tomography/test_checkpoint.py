@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.phantoms import TABLE6_SIDE_M
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.model_selection.candidates import CandidateGraph
@@ -24,6 +22,7 @@ from bentray_kernels.tomography.sart.sart_step import begin
 from bentray_kernels.tomography.scan import MemorySource, Scan
 
 from ...effort import effort
+from ...table6 import table6_scan
 from .graph_runs import run, stored
 
 PLANS = {
@@ -40,10 +39,7 @@ PLANS = {
 
 @pytest.fixture(scope="module")
 def dataset():
-    ring, emitters = Ring(16, 0.08), np.arange(16)
-    scan = TravelTimeScan(table6(1500.0), ring, TABLE6_SIDE_M, nodes=32)
-    delta, ratio = scan.medium(attenuation=True).arrivals(scan.elements(), emitters)
-    return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta, log_ratio_np=ratio)
+    return table6_scan(16, 32, 0.08, 1500.0, attenuation=True)
 
 
 @pytest.mark.parametrize("name", PLANS)

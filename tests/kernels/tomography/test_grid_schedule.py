@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Problem, Settings, reconstruct
 from bentray_kernels.tomography.grid_schedule import initial_slowness, stages
+
+from ...table6 import table6_scan
 
 WATER = 1375.0
 RING = Ring(32, 0.09)
@@ -18,9 +19,7 @@ PLAN = Settings(method="sart", nodes=48, iterations=2)
 
 @pytest.fixture(scope="module")
 def scan():
-    data = TravelTimeScan(table6(WATER), RING, TABLE6_SIDE_M, nodes=48)
-    everyone = np.arange(RING.elements)
-    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data.delta_tof(everyone))
+    return table6_scan(RING.elements, 48)
 
 
 def test_default_has_one_stage(scan):

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, mean_absolute_error, reconstruct, rmse
+
+from ...table6 import table6_scan
 
 METHODS = ("sart", "gauss-newton")
 METHODS = ("sart", "gauss-newton")
@@ -20,9 +21,7 @@ RING = Ring(64, 0.09)
 
 @pytest.fixture(scope="module")
 def scan():
-    data = TravelTimeScan(PHANTOM, RING, SIDE, nodes=NODES)
-    everyone = np.arange(RING.elements)
-    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data.delta_tof(everyone))
+    return table6_scan(RING.elements, NODES)
 
 
 @pytest.fixture(params=METHODS)

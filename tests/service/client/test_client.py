@@ -11,12 +11,6 @@ from bentray_workers.files.dataset import read_dataset
 
 
 @pytest.fixture
-def client(serve, work):
-    with Client(serve(), poll_s=0.02) as client:
-        yield client
-
-
-@pytest.fixture
 def dataset(client, scan):
     return client.upload(scan()).id
 

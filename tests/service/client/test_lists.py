@@ -14,12 +14,6 @@ from bentray_service.html_tables import RecordList
 from bentray_service.jobs.kinds import KINDS
 
 
-@pytest.fixture
-def client(serve, work):
-    with Client(serve(), poll_s=0.02) as client:
-        yield client
-
-
 def test_everything_stored_is_listed_newest_first(client, scan, tmp_path):
     first, second = client.upload(scan()), client.upload(scan())
     # One after the other: of jobs that run at once, the result of either may be the older one.

@@ -3,10 +3,8 @@
 import io
 import time
 import zipfile
-from contextlib import contextmanager
 
 import pytest
-from fastapi.testclient import TestClient
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
@@ -15,13 +13,10 @@ from bentray_kernels.meshes.example_surfaces import torus
 from bentray_kernels.phantoms import TWO_HOLES, sampled
 from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography import Progress
-from bentray_service.app import create_app
 from bentray_service.jobs import kinds
 from bentray_service.rows.checksums import Checksums
 from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.tables import JobRow
-from bentray_service.settings import ServiceSettings
-from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
 from bentray_workers.rendering import field_settings, geometry_field
 
@@ -29,25 +24,6 @@ from ..conftest import PATIENCE_S
 from ..stored_volumes import store_volume
 
 SMALL = {"width": 24, "height": 16, "iso": [0.5], "frames": 3}
-
-
-@pytest.fixture(scope="module")
-def workers():
-    with open_cluster(workers=1, processes=False) as cluster:
-        yield cluster
-
-
-@pytest.fixture
-def serving(tmp_path, workers):
-    """Start the service on the real cluster; again on the same folder when it is called again."""
-
-    @contextmanager
-    def go():
-        app = create_app(ServiceSettings(data_dir=tmp_path / "data"), workers)
-        with TestClient(app, base_url="http://localhost", raise_server_exceptions=False) as http:
-            yield http
-
-    return go
 
 
 def put(http, spacing=(1e-3,) * 3):
@@ -60,8 +36,8 @@ def ask(http, volume, **settings):
 
 
 @pytest.mark.parametrize(("form", "media"), [("zip", "application/zip"), ("apng", "image/apng")])
-def test_three_pictures(serving, until, form, media):
-    with serving() as http:
+def test_three_pictures(on_workers, until, form, media):
+    with on_workers() as http:
         volume = put(http)
         answer = ask(http, volume, format=form, turn_deg=90)
         job = answer.json()
@@ -89,13 +65,13 @@ def test_three_pictures(serving, until, form, media):
 
 
 def test_without_an_iso_value_the_middle_of_the_range_once_the_smoothing_is_known(
-    serving, until, monkeypatch
+    on_workers, until, monkeypatch
 ):
     """Smoothing changes the range; the worker, which knows the type of the values, decides on it."""
     asked = []
     draw = lambda *given, **control: asked.append(given) or given[3].write_bytes(b"")  # noqa: E731
     monkeypatch.setattr(kinds, "draw_turntable", draw)
-    with serving() as http:
+    with on_workers() as http:
         volume = put(http)
         for settings in ({"smoothing": 0.0}, {}):
             started = {"kind": "refraction", "volume": volume, "settings": settings}
@@ -105,8 +81,8 @@ def test_without_an_iso_value_the_middle_of_the_range_once_the_smoothing_is_know
     assert [one[2].frames for one in asked] == [36, 36]
 
 
-def test_cancel_between_pictures(serving, until):
-    with serving() as http:
+def test_cancel_between_pictures(on_workers, until):
+    with on_workers() as http:
         job = ask(http, put(http), frames=720, width=256, height=256).json()
         until(http, job["id"], "running")
         assert http.post(job["links"]["cancel"]).status_code == 202
@@ -118,7 +94,7 @@ def test_cancel_between_pictures(serving, until):
         assert (answer.status_code, answer.json()["type"]) == (409, "/problems/no-animation")
 
 
-def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch):
+def test_a_stopped_job_runs_again_at_the_next_start(on_workers, until, monkeypatch):
     def hold(client, path, turntable, target, work_dir, on_progress, on_saved, stop, share):
         on_progress(Progress(1, 3))
         while not stop():
@@ -126,11 +102,11 @@ def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch)
         raise Cancelled
 
     monkeypatch.setattr(kinds, "draw_turntable", hold)
-    with serving() as http:
+    with on_workers() as http:
         job = ask(http, put(http)).json()
         until(http, job["id"], "running")
     monkeypatch.undo()
-    with serving() as http:
+    with on_workers() as http:
         assert until(http, job["id"])["state"] == "succeeded"
         states = [event.state for event in http.app.state.stores.jobs.events(LOCAL, job["id"])]
     # On a loaded machine the workers of the second service may connect late; the job then waits again.
@@ -138,12 +114,12 @@ def test_a_stopped_job_runs_again_at_the_next_start(serving, until, monkeypatch)
     assert states[-1] == "succeeded"
 
 
-def test_worker_rejection_fails_the_job_with_a_message(serving, until, monkeypatch):
+def test_worker_rejection_fails_the_job_with_a_message(on_workers, until, monkeypatch):
     def refuse(*given, **control):
         raise InvalidInput("iso", "0.5", "what the filter leaves")
 
     monkeypatch.setattr(kinds, "draw_turntable", refuse)
-    with serving() as http:
+    with on_workers() as http:
         done = until(http, ask(http, put(http)).json()["id"])
     assert (done["state"], done["error"]["field"]) == ("failed", "iso")
 
@@ -208,14 +184,14 @@ def wait_until_empty(folder):
         time.sleep(0.02)
 
 
-def test_a_cancelled_field_leaves_nothing(serving, until, monkeypatch):
+def test_a_cancelled_field_leaves_nothing(on_workers, until, monkeypatch):
     def hold(*given, stop, **control):
         while not stop():
             pass
         raise Cancelled
 
     monkeypatch.setattr(geometry_field, "build_field", hold)
-    with serving() as http:
+    with on_workers() as http:
         job = ask_field(http, put_mesh(http)).json()
         until(http, job["id"], "running")
         assert http.post(job["links"]["cancel"]).status_code == 202
@@ -271,7 +247,7 @@ def test_a_title_says_what_made_the_image(settings, made_by, title):
     assert kinds.KINDS["reconstruction"].title(row) == title
 
 
-def test_task_rejection_fails_the_field_with_a_message(serving, until):
-    with serving() as http:
+def test_task_rejection_fails_the_field_with_a_message(on_workers, until):
+    with on_workers() as http:
         done = until(http, ask_field(http, put_mesh(http), image_threshold=1e-12).json()["id"])
     assert (done["state"], done["error"]["field"]) == ("failed", "threshold")

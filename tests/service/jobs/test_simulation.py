@@ -3,42 +3,18 @@
 import hashlib
 import threading
 import time
-from contextlib import contextmanager
 
 import pytest
-from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
-from bentray_service.app import create_app
 from bentray_service.cli import app as command_line
 from bentray_service.rows.ids import LOCAL
-from bentray_service.settings import ServiceSettings
-from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.simulation import parts
 
 from ..conftest import PATIENCE_S
 
 SMALL = {"nodes": 16, "elements": 16, "noise_s": 2e-8, "seed": 7}
 WAVES = {"waveform": True, "nodes": 32, "elements": 16, "frequency_hz": 2e5, "side_m": 0.03, "emissions": 4}
-
-
-@pytest.fixture(scope="module")
-def workers():
-    with open_cluster(workers=1, processes=False) as cluster:
-        yield cluster
-
-
-@pytest.fixture
-def serving(tmp_path, workers):
-    """Start the service on the real cluster; again on the same folder when it is called again."""
-
-    @contextmanager
-    def go(**settings):
-        app = create_app(ServiceSettings(data_dir=tmp_path / "data", **settings), workers)
-        with TestClient(app, base_url="http://localhost", raise_server_exceptions=False) as http:
-            yield http
-
-    return go
 
 
 def ask(http, **settings):
@@ -70,8 +46,8 @@ def wait_until(so):
         time.sleep(0.02)
 
 
-def test_from_settings_to_an_image(serving, until, tmp_path):
-    with serving() as http:
+def test_from_settings_to_an_image(on_workers, until, tmp_path):
+    with on_workers() as http:
         answer = ask(http, **SMALL)
         job = answer.json()
         assert answer.status_code == 202, job
@@ -121,8 +97,8 @@ def test_from_settings_to_an_image(serving, until, tmp_path):
         assert not list((files.root / "work").iterdir())
 
 
-def test_wave_simulation_and_deletion_of_its_job(serving, until):
-    with serving() as http:
+def test_wave_simulation_and_deletion_of_its_job(on_workers, until):
+    with on_workers() as http:
         done = until(http, ask(http, **WAVES).json()["id"])
         assert (done["state"], done["progress"]["total"]) == ("succeeded", 5), done["error"]
         made = http.get(done["links"]["dataset"]).json()
@@ -133,8 +109,8 @@ def test_wave_simulation_and_deletion_of_its_job(serving, until):
         assert not list((http.app.state.stores.files.of(LOCAL).root / "datasets").iterdir())
 
 
-def test_cancel_while_a_task_is_at_work(serving, until, held):
-    with serving() as http:
+def test_cancel_while_a_task_is_at_work(on_workers, until, held):
+    with on_workers() as http:
         job = ask(http, **WAVES).json()
         until(http, job["id"], "running")
         wait_until(lambda: len(held.begun) == 2)
@@ -146,18 +122,18 @@ def test_cancel_while_a_task_is_at_work(serving, until, held):
         files = http.app.state.stores.files.of(LOCAL)
         assert not list((files.root / "datasets").iterdir())
     # What was still at work has found no folder to leave anything in.
-    with serving() as http:
+    with on_workers() as http:
         assert not list((files.root / "work").iterdir())
 
 
-def test_stopped_service_resumes(serving, until, held):
-    with serving() as http:
+def test_stopped_service_resumes(on_workers, until, held):
+    with on_workers() as http:
         job = ask(http, **WAVES).json()["id"]
         until(http, job, "running")
         work = http.app.state.stores.files.of(LOCAL).work(job)
         wait_until(lambda: list(work.rglob("*.npz")))
     held.set()
-    with serving() as http:
+    with on_workers() as http:
         done = until(http, job)
         assert done["state"] == "succeeded", done["error"]
         assert done["progress"] == {"done": 5, "total": 5, "phase": ""}

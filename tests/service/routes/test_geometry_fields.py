@@ -1,22 +1,17 @@
 """/v1/geometry-fields: from an upload to pictures on a real cluster, and every refusal."""
 
 import io
-from contextlib import contextmanager
 from dataclasses import fields
 
 import pytest
 import trimesh
-from fastapi.testclient import TestClient
 from PIL import Image
 from sqlalchemy import insert
 
 from bentray_kernels.meshes.example_surfaces import torus
-from bentray_service.app import create_app
 from bentray_service.rows.ids import LOCAL, field_of, new_id
 from bentray_service.rows.jobs import NewJob
 from bentray_service.rows.tables import FieldRow
-from bentray_service.settings import ServiceSettings
-from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.mesh import StoredMesh, write_mesh
 from bentray_workers.rendering import field_view
 from bentray_workers.rendering.field_settings import FieldSettings
@@ -56,18 +51,10 @@ def here(http, made):
     return f"/v1/geometry-fields/{field}"
 
 
-@contextmanager
-def serving(folder):
-    with open_cluster(workers=1, processes=False) as cluster:
-        app = create_app(ServiceSettings(data_dir=folder), cluster)
-        with TestClient(app, base_url="http://localhost", raise_server_exceptions=False) as http:
-            yield http
-
-
-def test_from_an_upload_to_a_picture(tmp_path, until):
+def test_from_an_upload_to_a_picture(on_workers, tmp_path, until):
     ring = torus(16, 10)
     content = trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(file_type="ply")
-    with serving(tmp_path) as http:
+    with on_workers() as http:
         sent = http.post("/v1/meshes", content=content, headers={"Content-Type": "application/octet-stream"})
         mesh = sent.json()["id"]
         asked = {"kind": "geometry-field", "mesh": mesh, "settings": COARSE}
@@ -97,7 +84,7 @@ def test_from_an_upload_to_a_picture(tmp_path, until):
         assert (done["state"], done["field"]) == ("succeeded", field["id"])
         assert done["progress"] == {"done": 1, "total": 1, "phase": ""}
         assert http.get("/v1/geometry-fields").json() == {"geometry_fields": [field]}
-        assert not list((tmp_path / "tenants/local/work").iterdir())
+        assert not list((tmp_path / "data/tenants/local/work").iterdir())
 
 
 OTHER = {

@@ -5,17 +5,13 @@ import threading
 
 import numpy as np
 import pytest
-from fastapi.testclient import TestClient
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_kernels.tomography.result import Reconstruction
 from bentray_service import pictures
-from bentray_service.app import create_app
 from bentray_service.routes import pictures as routes_of_pictures
-from bentray_service.settings import ServiceSettings
-from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.cluster.resources import RECONSTRUCTION
 from bentray_workers.rendering import refraction, scene_cache, tiles
 from bentray_workers.rendering.refraction_view import RefractionView
@@ -236,36 +232,30 @@ def test_a_reconstruction_as_glass(http, uploaded, submitted, until, work, monke
     assert "even spacing" in answer.json()["accepted"]
 
 
-def test_picture_during_reconstructions(tmp_path):
+def test_picture_during_reconstructions(on_workers, workers):
     """On a real cluster: the lane is free although every other one is busy."""
-    with open_cluster(workers=1, processes=False) as cluster:
-        app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
-        with TestClient(app, base_url="http://localhost") as http:
-            here = put(http)
-            http.get(here, params=SMALL)
-            GO_ON.clear()
-            busy = [
-                cluster.client.submit(wait_to_go_on, pure=False, resources=RECONSTRUCTION) for _ in range(3)
-            ]
-            try:
-                assert http.get(here, params={**SMALL, "index": 1.1}).status_code == 200
-                assert not any(future.done() for future in busy)
-            finally:
-                GO_ON.set()
-
-
-def test_a_picture_that_no_worker_takes_is_503(tmp_path, monkeypatch):
-    monkeypatch.setattr(pictures, "RENDER_SECONDS", 0.3)
-    with open_cluster(workers=1, processes=False) as cluster:
-        app = create_app(ServiceSettings(data_dir=tmp_path / "data"), cluster)
-        with TestClient(app, base_url="http://localhost") as http:
-            here = put(http)
-            GO_ON.clear()
-            busy = cluster.client.submit(wait_to_go_on, pure=False, resources={"render": 1})
-            answer = http.get(here, params=SMALL)
-            assert (answer.status_code, answer.json()["type"]) == (503, "/problems/busy")
-            assert not busy.done()
+    with on_workers() as http:
+        here = put(http)
+        http.get(here, params=SMALL)
+        GO_ON.clear()
+        busy = [workers.client.submit(wait_to_go_on, pure=False, resources=RECONSTRUCTION) for _ in range(3)]
+        try:
+            assert http.get(here, params={**SMALL, "index": 1.1}).status_code == 200
+            assert not any(future.done() for future in busy)
+        finally:
             GO_ON.set()
+
+
+def test_a_picture_that_no_worker_takes_is_503(on_workers, workers, monkeypatch):
+    monkeypatch.setattr(pictures, "RENDER_SECONDS", 0.3)
+    with on_workers() as http:
+        here = put(http)
+        GO_ON.clear()
+        busy = workers.client.submit(wait_to_go_on, pure=False, resources={"render": 1})
+        answer = http.get(here, params=SMALL)
+        assert (answer.status_code, answer.json()["type"]) == (503, "/problems/busy")
+        assert not busy.done()
+        GO_ON.set()
 
 
 def test_previews_count_less_in_the_rate_limit(http, monkeypatch):

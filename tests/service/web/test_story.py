@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_workers.files.dataset import write_dataset
 
 from ...faults.live_service import LiveService
 from ...faults.machine import wait_until
+from ...table6 import table6_scan
 from .conftest import PATIENCE_MS
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -44,9 +42,7 @@ def service(tmp_path_factory):
 @pytest.fixture(scope="module")
 def breast():
     """Travel times of a ring about the 2-D breast phantom."""
-    ring, emitters = Ring(ELEMENTS, 0.08), np.arange(ELEMENTS)
-    delta = TravelTimeScan(table6(1500.0), ring, TABLE6_SIDE_M, nodes=32).delta_tof(emitters)
-    return Dataset(ring.positions(), emitters, emitters, 1500.0, delta_tof_s=delta)
+    return table6_scan(ELEMENTS, 32, 0.08, 1500.0)
 
 
 def enter(page, service, tenant):

@@ -20,13 +20,6 @@ from .local_receiver import Receiver
 LOOPBACK = (ip_network("127.0.0.0/8"),)
 
 
-@pytest.fixture
-def receiver():
-    made = Receiver()
-    yield made
-    made.close()
-
-
 @pytest.mark.parametrize(
     "url",
     [

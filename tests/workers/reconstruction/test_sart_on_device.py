@@ -1,11 +1,10 @@
 """SART of a file on a device: all slices in one task of a worker, resumed and repeated to the same bits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.task_graph import ThreadPool, run
 from bentray_kernels.tomography import Settings, stage_graphs
 from bentray_kernels.tomography import reconstruct as reconstruct_here
@@ -13,6 +12,8 @@ from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction.memory.ray_memory import call_bytes
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
+
+from ...table6 import table6_scan
 
 pytestmark = pytest.mark.opencl
 
@@ -23,16 +24,9 @@ SETTINGS = Settings.from_values(method="sart", nodes=32, iterations=2, device="o
 @pytest.fixture(scope="module")
 def stack():
     """Slices of a ring at several heights."""
-    ring, everyone = Ring(ELEMENTS, 0.09), np.arange(ELEMENTS)
-    times = TravelTimeScan(table6(WATER), ring, TABLE6_SIDE_M, nodes=32).delta_tof(everyone)
-    return Dataset(
-        ring.positions(),
-        everyone,
-        everyone,
-        WATER,
-        delta_tof_s=np.stack([times * part for part in np.linspace(0.5, 1.0, SLICES)]),
-        slice_z_m=1e-3 * np.arange(SLICES),
-    )
+    scan = table6_scan(ELEMENTS, 32)
+    times = np.stack([scan.delta_tof_s * part for part in np.linspace(0.5, 1.0, SLICES)])
+    return replace(scan, delta_tof_s=times, slice_z_m=1e-3 * np.arange(SLICES))
 
 
 @pytest.fixture

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
 from bentray_kernels.tomography.gauss_newton import gauss_newton_step
 from bentray_kernels.tomography.gauss_newton.linearisation import Rows
 from bentray_kernels.tomography.grid_schedule import initial_slowness
+
+from ....table6 import table6_scan
 
 WATER = 1500.0
 PLAN = Settings(method="gauss-newton", nodes=24, iterations=9)
@@ -147,11 +149,7 @@ def test_one_image_without_improvement_does_not_stop_the_search():
 
 
 def test_flat_parts_come_back_sharper_when_edges_are_cheap():
-    side, phantom = TABLE6_SIDE_M, table6(1375.0)
-    ring = Ring(48, 0.09)
-    everyone = np.arange(48)
-    delta = TravelTimeScan(phantom, ring, side, nodes=48).delta_tof(everyone)
-    scan = Dataset(ring.positions(), everyone, everyone, 1375.0, delta_tof_s=delta)
+    side, phantom, scan = TABLE6_SIDE_M, table6(1375.0), table6_scan(48, 48)
     truth, inside = phantom.speed(48, side), phantom.inside(48, side)
     plan = replace(PLAN, nodes=48, side_m=side, iterations=8)
     plain, sharp = (

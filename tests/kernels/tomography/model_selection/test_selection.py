@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.noise import with_noise
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Candidate, Iteration, Reconstruction, Settings, reconstruct
@@ -29,6 +28,8 @@ from bentray_kernels.tomography.model_selection.selection import (
 from bentray_kernels.tomography.scan import MemorySource, Scan
 from bentray_kernels.tomography.stopping import stop_at_noise, travel_time_noise
 
+from ....table6 import table6_scan
+
 WATER = 1375.0
 RING = Ring(48, 0.09)
 PLAN = Settings(method="auto", nodes=48)
@@ -36,9 +37,7 @@ PLAN = Settings(method="auto", nodes=48)
 
 @pytest.fixture(scope="module")
 def scan():
-    data = TravelTimeScan(table6(WATER), RING, TABLE6_SIDE_M, nodes=48)
-    everyone = np.arange(RING.elements)
-    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data.delta_tof(everyone))
+    return table6_scan(RING.elements, 48)
 
 
 def test_the_parts_are_the_whole_and_share_no_pair(scan):

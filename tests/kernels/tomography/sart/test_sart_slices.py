@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.opencl import Session, device_selection
-from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
+from bentray_kernels.phantoms import TABLE6_SIDE_M
 from bentray_kernels.tomography import Problem, Settings, reconstruct
 from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart.device_slices import SliceSize, ring_bytes, slices_in_flight
 from bentray_kernels.tomography.sart.sart_slices import SliceCall, advance_slices
 from bentray_kernels.tomography.sart.sart_step import begin
 from bentray_kernels.tomography.stage_graphs import update_sart_slices
+
+from ....table6 import table6_scan
 
 pytestmark = pytest.mark.opencl
 
@@ -29,12 +29,11 @@ RMS_MPS, LARGEST_MPS = 0.05, 2.0
 @pytest.fixture(scope="module")
 def rings():
     """A scan of three slices with gaps in the data, and an emitter without any."""
-    ring, everyone = Ring(ELEMENTS, 0.09), np.arange(ELEMENTS)
-    times = TravelTimeScan(table6(WATER), ring, TABLE6_SIDE_M, nodes=NODES).delta_tof(everyone)
-    delta = np.stack([times, 0.5 * times, 1.1 * times])
+    scan = table6_scan(ELEMENTS, NODES)
+    delta = np.stack([part * scan.delta_tof_s for part in (1.0, 0.5, 1.1)])
     delta[np.random.default_rng(0).random(delta.shape) < 0.1] = np.nan
     delta[1, 3] = np.nan
-    return [Dataset(ring.positions(), everyone, everyone, WATER, delta_tof_s=part) for part in delta]
+    return [replace(scan, delta_tof_s=times) for times in delta]
 
 
 def plan(**changes):

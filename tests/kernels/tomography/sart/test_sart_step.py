@@ -6,11 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct
 from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart.sart_step import advance, begin, emitter_order
+
+from ....table6 import table6_scan
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
 PHANTOM = table6(WATER)
@@ -19,9 +21,7 @@ RING = Ring(64, 0.09)
 
 @pytest.fixture(scope="module")
 def scan():
-    data = TravelTimeScan(PHANTOM, RING, SIDE, nodes=NODES)
-    everyone = np.arange(RING.elements)
-    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data.delta_tof(everyone))
+    return table6_scan(RING.elements, NODES)
 
 
 def plan(**changes):

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
 from bentray_kernels.tomography.grid_schedule import initial_slowness
 from bentray_kernels.tomography.sart.sart_step import advance, begin
 from bentray_kernels.tomography.sart.sart_update import propagation_speed, update_for
+
+from ....table6 import table6_scan
 
 NODES, WATER = 64, 1375.0
 PHANTOM = table6(WATER)
@@ -20,9 +21,7 @@ RING = Ring(64, 0.09)
 
 @pytest.fixture(scope="module")
 def scan():
-    everyone = np.arange(RING.elements)
-    data = TravelTimeScan(PHANTOM, RING, TABLE6_SIDE_M, nodes=NODES).delta_tof(everyone)
-    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=data)
+    return table6_scan(RING.elements, NODES)
 
 
 def plan(**changes):
