@@ -1,7 +1,5 @@
 """Figure of full-waveform inversion: a gather with picks, and all images with errors and times."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Ideal travel times: Eikonal solutions through the true image."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, zoom

@@ -1,7 +1,5 @@
 """Simulated ring scan of the 2-D breast phantom (Table 6) with absorption."""
 
-from __future__ import annotations
-
 import os
 from concurrent.futures import ThreadPoolExecutor
 

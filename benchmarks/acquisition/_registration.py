@@ -1,7 +1,5 @@
 """Registration: error of an image whose truth is shifted and possibly transposed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

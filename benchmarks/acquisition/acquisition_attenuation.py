@@ -1,7 +1,5 @@
 """R8 on wave-equation data: attenuation by full-waveform inversion and from amplitudes along rays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial

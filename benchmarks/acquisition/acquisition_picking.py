@@ -1,7 +1,5 @@
 """Errors of every picker on simulated wave scans, against travel times through the true image."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path

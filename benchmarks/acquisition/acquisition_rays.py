@@ -1,7 +1,5 @@
 """R4 and R7: bent against straight rays on the same picks; the default settings against straight rays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path

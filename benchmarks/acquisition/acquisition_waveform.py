@@ -1,7 +1,5 @@
 """R10 and W1: full-waveform inversion against rays, and against its own earlier time and error."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from dataclasses import replace

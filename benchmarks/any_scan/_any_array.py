@@ -1,7 +1,5 @@
 """A3: arrays of other shapes than a ring by default settings, beside straight rays and constants."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple

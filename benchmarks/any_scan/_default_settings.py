@@ -1,7 +1,5 @@
 """A2: travel times through a detailed breast by the default settings, beside former ones and constants."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from functools import partial

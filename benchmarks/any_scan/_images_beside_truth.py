@@ -1,7 +1,5 @@
 """Picture of scans: the truth and its images by several settings, a row for each scan."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from bentray_kernels.acquisition import Dataset

@@ -1,7 +1,5 @@
 """Waves by k-Wave through the detailed breast without a water shot: straight rays, bent, auto, waveform."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from typing import Any

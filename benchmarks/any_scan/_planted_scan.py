@@ -1,7 +1,5 @@
 """Faults of a real scan, planted in a simulated or foreign one: gains, dead elements, and time zero."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

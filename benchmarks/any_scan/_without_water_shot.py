@@ -1,7 +1,5 @@
 """A1: a scan with its water shot and without, beside constants and straight rays."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Any scan with default settings: targets A1 to A3, one file for each, and a scan by k-Wave."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from bentray_service.cli.output.benchmark_context import BenchmarkContext

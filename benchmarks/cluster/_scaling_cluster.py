@@ -1,7 +1,5 @@
 """A local scheduler with worker processes, and the cost of sleeping tasks."""
 
-from __future__ import annotations
-
 import os
 import socket
 import subprocess

@@ -1,7 +1,5 @@
 """Figure of scaling: measured and ideal rates, and the utilisation of one scheduler with many workers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A sleeping task in place of a kernel: same bytes and time, no CPU time."""
 
-from __future__ import annotations
-
 import time
 
 

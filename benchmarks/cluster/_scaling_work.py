@@ -1,7 +1,5 @@
 """Measured tasks of one slice: number, CPU time and bytes."""
 
-from __future__ import annotations
-
 import pickle
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """Cluster benchmark: scaling to two workers, task overhead, rendering under load, resuming."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import tempfile

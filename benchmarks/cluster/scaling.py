@@ -1,7 +1,5 @@
 """Scaling of one scheduler: sleeping tasks on 1 to 8 workers, extrapolated to 1,000."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One fast-sweeping solve on several cores: sub-domains on workers (Table 8, cluster), and threads in 3-D."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Callable, Iterable

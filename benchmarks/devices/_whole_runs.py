@@ -1,7 +1,5 @@
 """Whole reconstructions on an OpenCL device beside the times of the dissertation's graphics card."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Each engine on the OpenCL device beside compiled code, and whole reconstructions on it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from bentray_kernels.device_engines import ENGINES_COMPARED, Comparison, compare

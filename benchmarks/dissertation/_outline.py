@@ -1,7 +1,5 @@
 """Tables and figures of chapters 3 to 7 of the dissertation: published values, and the rows beside them."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The report as a page in HTML without outside requests: pictures are embedded as data URIs."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Callable, Mapping
 from functools import cache

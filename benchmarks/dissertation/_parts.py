@@ -1,7 +1,5 @@
 """Parts of a report, rows and pictures of one benchmark each, kept in files so that a run can continue."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """A part measured in a process of its own, so that a crash or the memory of a benchmark stays there."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """Parts of the report from the recorded rows, each benchmark as it was last measured."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

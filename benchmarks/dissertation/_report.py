@@ -1,7 +1,5 @@
 """The report as data: each table and figure with its published values, rows, pictures and state."""
 
-from __future__ import annotations
-
 import os
 import platform
 from collections import Counter

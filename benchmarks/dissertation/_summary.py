@@ -1,7 +1,5 @@
 """Table of chapters 6 and 7: published, best peer, constant, straight rays, ours by default and tuned."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Every table and figure of chapters 3 to 7 of the dissertation beside ours, in one report."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable, Iterable, Sequence

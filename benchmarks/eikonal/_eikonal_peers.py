@@ -1,7 +1,5 @@
 """Adapters of other Eikonal solvers; packages that are not installed are omitted."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 from collections.abc import Callable

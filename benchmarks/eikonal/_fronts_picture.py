@@ -1,7 +1,5 @@
 """Figure of wave fronts and of errors in log colour, one column per method."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ code that no solver shares. Times of second order lie between a part of its solu
 the edges of the grid.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra

@@ -1,7 +1,5 @@
 """Goals E1 to E11: Eikonal solvers and rays against other packages."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Errors of every Eikonal method on two problems, with a figure of wave fronts and errors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Complexity: growth of time and memory with the grid, for every CPU method in 2-D and 3-D."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Meshes, fields and rays of the geometry field's benchmark."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 

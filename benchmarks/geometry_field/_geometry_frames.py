@@ -1,7 +1,5 @@
 """Frame rates of a scene with geometry fields on CPU and OpenCL, and differences from exact intersection."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Iterable

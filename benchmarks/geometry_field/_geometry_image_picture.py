@@ -1,7 +1,5 @@
 """Figure of geometry images: positions, normals, reconstructed surface and stretch."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

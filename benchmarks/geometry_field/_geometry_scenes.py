@@ -1,7 +1,5 @@
 """Scenes of chapter 5: mirrors, glass and self-reflection, before a procedural landscape."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Rays that leave the surface: the published inner field and ours against exact intersection."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 

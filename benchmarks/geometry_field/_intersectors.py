@@ -1,7 +1,5 @@
 """Exact ray-mesh intersectors, one thread each: Embree through three packages, and ours."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -4,8 +4,6 @@ The 16 entries about a ray are averaged where they agree; (u, v) and the normal 
 Other rays are intersected with the plane of the face of their nearest entry.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

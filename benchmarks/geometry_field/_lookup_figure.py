@@ -1,7 +1,5 @@
 """Figure 25: a body rendered by the published lookups and by ours."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bentray_kernels.geometry_field.image.geometry_image import geometry_image

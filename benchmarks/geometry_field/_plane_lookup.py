@@ -4,8 +4,6 @@ An entry holds the plane of the face that it meets: a normal in two numbers of 1
 floating-point normal vectors, 2010, octahedral) and its distance from the cube's corner 0.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reference lookups of the dissertation for many rays: (u, v) of the nearest entry, or 4-D linear."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bentray_kernels.arrays import Float32s, Ints

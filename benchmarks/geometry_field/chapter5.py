@@ -1,7 +1,5 @@
 """Figures 25 to 27 of the dissertation on our meshes, and the pixels changed by fields."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Goals G1 to G4 and G6: geometry fields against the fastest exact intersectors."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 

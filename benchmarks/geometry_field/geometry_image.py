@@ -1,7 +1,5 @@
 """Parameterisation and geometry images: G5, the first part of G1, and the first columns of Table 5."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Table 5 of the dissertation, whole: seconds of each step of a geometry field, theirs beside ours."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """Images of Table 6 by the published solvers and by ours, each beside its baselines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from bentray_service.cli.output.benchmark_row import Row

@@ -1,7 +1,5 @@
 """Pictures by the published lookups and before warped backdrops, beside ours."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from dataclasses import replace

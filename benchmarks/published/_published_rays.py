@@ -1,7 +1,5 @@
 """Rays by B-spline gradients and first-order fronts in a speed of 1 + 4x, where both are known exactly."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Readings of the data-driven speed update (Li 2008, 6.3, equation 6), from several initial images."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from unittest.mock import patch
 

@@ -1,7 +1,5 @@
 """Systems of the dissertation beside ours: rays, wave fronts, images, lookups, backdrops."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from bentray_service.cli.output.benchmark_context import BenchmarkContext

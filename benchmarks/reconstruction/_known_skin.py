@@ -1,7 +1,5 @@
 """Bent rays that know the skin of the 3-D breast phantom (Li 2008, Table 7): SART from its skin alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

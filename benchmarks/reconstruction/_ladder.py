@@ -1,7 +1,5 @@
 """The ladder of chapter 6: straight rays, then what each way to propagate in the image gains."""
 
-from __future__ import annotations
-
 from ._phantom_scan import PhantomScan, ReconstructionError
 
 FAT_MPS, WATER_MPS = 1375.0, 1500.0

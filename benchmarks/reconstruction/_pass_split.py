@@ -1,7 +1,5 @@
 """Where one emitter's pass of SART over a slice spends its time: wave front, rays, update."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A sheet of images that share one scale of speed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """CGLS, SIRT and SART along straight rays, in plain NumPy and SciPy as a laboratory writes them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors of images of Table 7 slices on the 128² nodes of the phantom, and the contrast of its lesions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

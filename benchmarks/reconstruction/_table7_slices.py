@@ -1,7 +1,5 @@
 """Slices of the 3-D breast phantom (Li 2008, Table 7): its skin varied, and scanned by waves in the plane."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Others that reconstruct speed from travel times, behind one call each; a missing one is left out."""
 
-from __future__ import annotations
-
 import importlib
 import logging
 from collections.abc import Callable

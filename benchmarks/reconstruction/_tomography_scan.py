@@ -1,7 +1,5 @@
 """A scan of a breast that no method here was tuned on, its travel times made by another package's solver."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Twelve scans that chose no setting: exact times, noise, an arc, facing lines, and picks from waves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple

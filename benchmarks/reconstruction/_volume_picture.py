@@ -1,7 +1,5 @@
 """The picture of a volume: three sections of the truth and of each reconstruction."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

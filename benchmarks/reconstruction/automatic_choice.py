@@ -1,7 +1,5 @@
 """N1: the error of the automatic choice over the better of straight and bent SART, also with noise."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 

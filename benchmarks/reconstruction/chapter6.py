@@ -1,7 +1,5 @@
 """Figure 31 of the dissertation and its errors, compared with ours."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from bentray_kernels.phantoms import TABLE6_SIDE_M

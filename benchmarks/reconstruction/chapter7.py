@@ -1,7 +1,5 @@
 """Figures 32 and 33 of the dissertation and their errors, compared with ours, with SNR 10."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from bentray_kernels.phantoms import TABLE7_SIDE_M

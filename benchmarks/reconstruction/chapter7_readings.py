@@ -1,7 +1,5 @@
 """Readings of the published errors of chapter 7: skin, coupling, data, region and norm, side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace

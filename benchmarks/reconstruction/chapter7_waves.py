@@ -1,7 +1,5 @@
 """M1: slices of the 3-D breast phantom (Li 2008, Table 7) scanned by waves; full-waveform inversion."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

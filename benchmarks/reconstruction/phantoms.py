@@ -1,7 +1,5 @@
 """Tables 6 and 7 of the dissertation beside the phantoms here, and pictures of slices, fronts and rays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Goals R1 to R3 and R8: the 2-D breast phantom (Li 2008, Table 6) by exact times and amplitudes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import pairwise
 

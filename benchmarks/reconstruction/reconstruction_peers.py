@@ -1,7 +1,5 @@
 """R6: other reconstruction methods on the travel times of an untuned slice: errors and times."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """R5 and rows 3 and 4 of Table 8: time of whole volumes slice by slice, its parts and its growth."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """R9: the 3-D breast phantom (Table 7) scanned in 3-D, reconstructed slice by slice and in 3-D."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Table 8 of the dissertation, the two rows of one projection: their times and ours."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

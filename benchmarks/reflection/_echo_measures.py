@@ -1,7 +1,5 @@
 """Measures of reflection images: where the brightest echo is, how wide it is, and the contrast of a cyst."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Weak points, a thin line and a cyst in speckle, behind thick fat and in water alone, scanned by waves."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Picture of the reflection benchmark: reconstructed speed, and images with delays in it and in water."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

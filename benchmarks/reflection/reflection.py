@@ -1,7 +1,5 @@
 """F1: reflection through bent rays: place, width and contrast of targets behind fat, and time."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Iterable, Iterator

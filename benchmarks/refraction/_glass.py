@@ -1,7 +1,5 @@
 """The volumes of chapters 3 and 4 as glass before a backdrop, for their figures."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import replace

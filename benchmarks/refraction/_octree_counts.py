@@ -1,7 +1,5 @@
 """Operations per ray of the ray casters: evaluations of the spline, and nodes of the octree or cells."""
 
-from __future__ import annotations
-
 import importlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator

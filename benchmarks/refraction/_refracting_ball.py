@@ -1,7 +1,5 @@
 """The refracting ball of all renderers: exact end points of its rays, and errors."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bentray_kernels.refraction import (

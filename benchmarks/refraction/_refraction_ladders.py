@@ -1,7 +1,5 @@
 """Tables 2, 3 and 4 of the dissertation: candidate cells and frame times, theirs and ours."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Mitsuba 3's ``sdfgrid`` before a checkerboard: its frames, and where its rays end."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

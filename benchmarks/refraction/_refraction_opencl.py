@@ -1,7 +1,5 @@
 """Frame rates of the refracting ball with OpenCL and with the compiled caster in the same run."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """Chapter 4's pictures of glass balls: without, after and with real supersampling."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

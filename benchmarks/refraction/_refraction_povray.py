@@ -1,7 +1,5 @@
 """POV-Ray's ``df3`` volume as an iso-surface of glass: its frames, and where its rays end."""
 
-from __future__ import annotations
-
 import shutil
 import struct
 import subprocess

@@ -4,8 +4,6 @@ They have the published sizes, 8 bits and noise, and thin parts, holes and layer
 measured on them is not what was published.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.ndimage import gaussian_filter
 

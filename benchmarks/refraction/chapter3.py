@@ -1,7 +1,5 @@
 """Figures 7 to 9 of the dissertation on our volumes, and the cost of supersampling."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from bentray_service.cli.output.benchmark_context import BenchmarkContext

@@ -1,7 +1,5 @@
 """Figures 17 to 22 of the dissertation on our volumes, and Tables 1 to 3 where volumes made here stand in."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace

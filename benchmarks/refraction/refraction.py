@@ -1,7 +1,5 @@
 """Goals V2 to V6: refraction against other volume renderers, and the tables of Li 2008, chapter 4."""
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Callable, Iterable

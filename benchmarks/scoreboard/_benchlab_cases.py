@@ -12,8 +12,6 @@ and water. It emits 1 MHz (OpenBreastUS) or 250 kHz and inverts 300 to 800 kHz b
 here has a frequency that two cores can follow.
 """
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Scans of breasts of four densities in water, with noise; no setting was chosen with them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """HTTP load over loopback: a number of client threads, each with one connection, for a fixed time."""
 
-from __future__ import annotations
-
 import http.client
 import threading
 import time

@@ -1,7 +1,5 @@
 """Upload of a scan of many gigabytes by tus, and peak memory of the service and of the reading process."""
 
-from __future__ import annotations
-
 import http.client
 import shutil
 import threading

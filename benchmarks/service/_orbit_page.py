@@ -1,7 +1,5 @@
 """Turning a view in the web page with Chromium: previews a second on the canvas, and the wait at rest."""
 
-from __future__ import annotations
-
 import importlib
 import shutil
 import time

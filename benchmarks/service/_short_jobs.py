@@ -1,7 +1,5 @@
 """Duration of a short job beside long jobs of another tenant, from its submission to its end."""
 
-from __future__ import annotations
-
 import json
 import os
 import time

@@ -1,7 +1,5 @@
 """Slow clients: connections that send one byte per second of a large body, in one thread."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 import threading

@@ -1,7 +1,5 @@
 """The web page in Chromium: time to its first paint, and to each slice while a volume is scrubbed."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """The service under load: large uploads, slow clients, requests during a job, short jobs beside long ones."""
 
-from __future__ import annotations
-
 import http.client
 import os
 import tempfile

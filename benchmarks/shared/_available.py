@@ -1,7 +1,5 @@
 """Installed peer packages, and the reasons for missing ones."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable, Mapping
 from typing import TypeVar

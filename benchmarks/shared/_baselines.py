@@ -1,7 +1,5 @@
 """Baselines of an image error: best constant, water alone, straight rays likewise, and default settings."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

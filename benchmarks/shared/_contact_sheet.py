@@ -3,8 +3,6 @@
 For renderings alone: a picture with a colour bar is drawn in full colour, by ``_small_png``.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass

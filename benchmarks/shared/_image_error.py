@@ -1,7 +1,5 @@
 """Error of reconstructed images of one quantity against the truth, in one region and norm."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal

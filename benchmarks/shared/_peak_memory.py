@@ -6,8 +6,6 @@ one that only makes the speed and one that solves too, and the kernel's peaks of
 The difference holds the working arrays and the result, not the speed; a page counts once it is touched.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -1,7 +1,5 @@
 """Reconstruction by worker processes from a file, as in the service, with its error and time."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 

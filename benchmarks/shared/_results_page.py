@@ -3,8 +3,6 @@
 ``python -m benchmarks.shared._results_page`` writes the list anew.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Scans of a ring around objects in water, by k-Wave or by our simulator on a finer grid of another order."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Small PNG files in full colour: a palette would falsify colour bars."""
 
-from __future__ import annotations
-
 import io
 
 from matplotlib.figure import Figure

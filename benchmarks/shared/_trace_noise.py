@@ -1,7 +1,5 @@
 """White noise of one strength, added to the recorded traces of a scan and of its water shot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figure 1: frequency response of the filters, for values and slopes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

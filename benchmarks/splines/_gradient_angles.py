@@ -1,7 +1,5 @@
 """Figures 5 and 6: the angle between a filter's gradient and the true one along a circle."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Adapters of other cubic B-spline packages; packages that are not installed are omitted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

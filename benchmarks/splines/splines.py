@@ -1,7 +1,5 @@
 """Goals V1 and V7: splines against other packages, and the gradient angles of Li 2008, chapter 3."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Scans of breasts of which no two are alike: anatomy, water, elements and noise are drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

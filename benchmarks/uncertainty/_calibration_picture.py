@@ -1,7 +1,5 @@
 """Picture of the uncertainty: calibration curve, parts of each scan, and one image with its deviations."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An image with its uncertainty beside the truth: which part of the nodes lies within how many deviations."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

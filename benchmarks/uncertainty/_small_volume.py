@@ -1,7 +1,5 @@
 """Standard deviations of a small volume, reconstructed in 3-D, beside the truth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """U1: the standard deviations of nodes hold on simulated scans, and their time."""
 
-from __future__ import annotations
-
 import math
 import os
 import time

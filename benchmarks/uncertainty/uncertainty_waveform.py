@@ -1,7 +1,5 @@
 """U1: standard deviations of full-waveform images hold on breasts that chose no parameter, and their time."""
 
-from __future__ import annotations
-
 import math
 import os
 import time

@@ -1,7 +1,5 @@
 """Adapter of k-Wave in Python: traces of a point source as from our simulator."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import sys

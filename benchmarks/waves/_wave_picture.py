@@ -1,7 +1,5 @@
 """Figure of the wave simulator and k-Wave: traces, differences, delays."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

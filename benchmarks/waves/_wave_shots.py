@@ -1,7 +1,5 @@
 """One emission through water or a breast by two simulators, and the differences of their traces."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """The wave simulator against k-Wave: dispersion, remaining differences, time."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterable
