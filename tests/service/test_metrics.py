@@ -19,8 +19,6 @@ pytestmark = pytest.mark.usefixtures("work")
 NAME = re.compile(r"bentray_[a-z]+(_[a-z]+)*")
 
 
-
-
 def read(http):
     answer = http.get("/metrics")
     assert answer.headers["content-type"].startswith("text/plain")

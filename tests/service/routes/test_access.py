@@ -10,8 +10,6 @@ from bentray_service.rows.keys import ApiKey, Keys
 HDF5 = {"Content-Type": "application/x-hdf5"}
 
 
-
-
 @pytest.fixture
 def tenants(http):
     """Headers by tenant, and the keys."""

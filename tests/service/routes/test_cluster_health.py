@@ -10,8 +10,6 @@ pytestmark = pytest.mark.usefixtures("work")
 HDF5 = {"Content-Type": "application/x-hdf5"}
 
 
-
-
 def test_the_queue_of_others_is_a_number(http, work, scan, until):
     """Three queued jobs of one tenant behind a running one, seen by that tenant and by another."""
     store, auth = Keys(http.app.state.stores.database), {}

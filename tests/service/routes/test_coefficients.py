@@ -13,8 +13,6 @@ from bentray_workers.rendering import coefficients
 from ..stored_volumes import store_volume
 
 
-
-
 @pytest.mark.parametrize(
     ("query", "name", "smoothing"),
     [

@@ -20,8 +20,6 @@ pytestmark = pytest.mark.usefixtures("work")
 WRONG = {"times_in": "ms", "times_read_as": "us"}
 
 
-
-
 def in_microseconds(file):
     """The times of the small scan, a thousandth of what they are."""
     file["traveltime/delta_tof_s"][...] *= 1e-3

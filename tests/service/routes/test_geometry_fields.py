@@ -33,8 +33,6 @@ def made(tmp_path_factory):
     return folder / "field", figures
 
 
-
-
 @pytest.fixture
 def here(http, made):
     """The address of a field in a service, as a job leaves it."""

@@ -9,8 +9,6 @@ from bentray_service import pictures
 from ..stored_volumes import store_volume
 
 
-
-
 def test_the_counts_are_those_of_numpy_and_computed_once(http, cluster):
     values = np.round(200.0 * sampled(ONE_HOLE, 14)).astype(np.uint8)
     here = f"/v1/volumes/{store_volume(http, values)}"

@@ -13,8 +13,6 @@ from bentray_service.rows.ids import LOCAL
 pytestmark = pytest.mark.usefixtures("work")
 
 
-
-
 @pytest.fixture
 def dataset(http, uploaded):
     return uploaded(http)

@@ -20,8 +20,6 @@ STREAM = {"Content-Type": "application/octet-stream"}
 RING = torus(12, 8)
 
 
-
-
 def off(mesh):
     """As an OFF file, which can hold any nonsense."""
     lines = ["OFF", f"{len(mesh.vertices)} {len(mesh.faces)} 0"]

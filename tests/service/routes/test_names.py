@@ -9,8 +9,6 @@ from bentray_service.rows.keys import ApiKey
 pytestmark = pytest.mark.usefixtures("work")
 
 
-
-
 @pytest.fixture
 def dataset(http, uploaded):
     return uploaded(http)

@@ -32,8 +32,6 @@ def put(http, values=None, spacing=(1e-3,) * 3):
     return http.get(f"/v1/volumes/{volume_id}").json()["links"]["refraction"]
 
 
-
-
 def test_a_picture_is_cast_in_the_render_lane(http, cluster):
     answer = http.get(put(http), params={**SMALL, "backdrop": "picture", "index": 1.3})
     assert answer.headers["content-type"] == "image/png"

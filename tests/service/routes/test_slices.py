@@ -9,8 +9,6 @@ from PIL import Image
 STREAM = {"Content-Type": "application/octet-stream"}
 
 
-
-
 @pytest.fixture
 def here(http):
     """The picture of an uploaded volume."""

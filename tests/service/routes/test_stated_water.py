@@ -7,8 +7,6 @@ from bentray_kernels.acquisition import speed_from_temperature
 pytestmark = pytest.mark.usefixtures("work")
 
 
-
-
 @pytest.fixture
 def here(http, uploaded):
     return f"/v1/datasets/{uploaded(http)}"

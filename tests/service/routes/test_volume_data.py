@@ -22,8 +22,6 @@ pytestmark = pytest.mark.usefixtures("work")
 STREAM = {"Content-Type": "application/octet-stream"}
 
 
-
-
 @pytest.fixture
 def result(http, uploaded, submitted, until):
     """The data of a reconstruction."""

@@ -11,8 +11,6 @@ STREAM = {"Content-Type": "application/octet-stream"}
 RAMP = 1500.0 + np.arange(60.0)[:, None] + np.zeros(60)
 
 
-
-
 @pytest.fixture
 def result(http, scan, work, submitted, until):
     """The volume of a reconstruction of a scan with a truth, whose nodes 0 to 9 mm are those of the image."""

@@ -14,8 +14,6 @@ from bentray_service.rows.ids import LOCAL
 pytestmark = pytest.mark.usefixtures("work")
 
 
-
-
 @pytest.fixture
 def job(http, uploaded, submitted, until):
     return until(http, submitted(http, uploaded(http))["id"])
