@@ -28,7 +28,9 @@ SHAPE, SPACING_M, ORIGIN_M = (48, 36), 1e-3, (-0.02, -0.01)
 SPIKE_MPS = 1700.0
 
 
-def in_turns(work: FakeWork, monkeypatch: pytest.MonkeyPatch) -> queue.Queue[None]:
+def in_turns(
+    work: FakeWork, monkeypatch: pytest.MonkeyPatch, band_hz: tuple[float, float] | None = None
+) -> queue.Queue[None]:
     """A queue; for each of its items a reconstruction makes one iteration and saves its image."""
     waiting: queue.Queue[None] = queue.Queue()
 
@@ -58,7 +60,7 @@ def in_turns(work: FakeWork, monkeypatch: pytest.MonkeyPatch) -> queue.Queue[Non
                 speed[20, 15] = SPIKE_MPS
             state = replace(sart_step.begin(1.0 / speed), iteration=sweep)
             kept.save("0-00000", ReconstructionCheckpoint(0, 0, (), state, (), SPACING_M, ORIGIN_M))
-            history += (Iteration(0, sweep, 2e-6 / sweep, 8),)
+            history += (Iteration(0, sweep, 2e-6 / sweep, 8, band_hz=band_hz),)
             on_progress(Progress(8 * sweep, 8 * ITERATIONS, history, "reconstructing"))
         return work(client, path, settings, on_progress, stop, work_dir, on_saved, share)
 

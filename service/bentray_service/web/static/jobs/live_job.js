@@ -103,22 +103,23 @@ function usePreview(job) {
   return record;
 }
 
-function Links({ job, change }) {
+function Links({ job, change, words }) {
   const cancel = ({ currentTarget: button }) => {
     button.disabled = true;
     change(job.links.cancel, "POST");
   };
   const ended = job.kind === "reconstruction" && ["failed", "cancelled"].includes(job.state);
   return html`<div class="links live-links">
-    ${job.links.cancel && html`<${Button} onClick=${cancel}>Cancel</${Button}>`}
+    ${job.links.cancel && html`<${Button} onClick=${cancel}>${words}</${Button}>`}
     ${ended && html`
       <a class="button quiet" href=${`#/scans/${job.dataset}?from=${job.id}`}>Run again with changes</a>
       <a class="button quiet" href=${`#/scans/${job.dataset}`}>Examine the scan</a>`}
   </div>`;
 }
 
-// Shows a job until it has succeeded, then calls onSuccess(job).
-export function LiveJob({ first, onSuccess }) {
+// Shows a job until it has succeeded, then calls onSuccess(job). before: an image that full waveforms of this job replace, band by
+// band, and that is shown again after a stop; without it the job has the page to itself.
+export function LiveJob({ first, before, onSuccess }) {
   const [estimate] = useState(() => new ProgressEstimate());
   const over = useRef(false);
   // When the running time of the job was received.
@@ -148,20 +149,22 @@ export function LiveJob({ first, onSuccess }) {
   seen.current ||= running && job.kind === "reconstruction";
   useTicks();
   const problem = job.error ? `${inWords(job.error)}${advice(job)}` : error;
+  const keeps = before && !(running && job.history.some(({ band_hz: band }) => band));
   return html`
-    <p class="crumb"><a href="#/jobs">Jobs</a>
+    ${!before && html`<p class="crumb"><a href="#/jobs">Jobs</a>
       ${job.dataset && job.kind === "reconstruction" && html`<span class="live-scan"> · <a href=${`#/scans/${job.dataset}`}>Scan</a></span>`}
     </p>
     <h1>${job.title}</h1>
-    <p class="facts live-facts">${jobs && titleOfJob(job)} · ${settingsOf(job)}</p>
+    <p class="facts live-facts">${jobs && titleOfJob(job)} · ${settingsOf(job)}</p>`}
     <section class="panel" aria-label="State">
       <p class="live-what" role="status">${happening(job)}</p>
       <${Progress} job=${job} estimate=${estimate} elapsed=${elapsedOf(job)} />
       <div class="live-plan">${job.plan && html`<${Plan} plan=${job.plan} />`}</div>
       <${Alert} className="live-error" error=${problem} />
-      <${Links} job=${job} change=${change} />
+      <${Links} job=${job} change=${change} words=${before ? "Stop" : "Cancel"} />
     </section>
-    ${seen.current && html`<section class="live-views" aria-label="Image and misfit so far">
+    ${keeps && before}
+    ${seen.current && !keeps && html`<section class="live-views" aria-label="Image and misfit so far">
       <${PreviewPicture} record=${preview} what=${comparesModels(job.history) ? "candidate method" : "slice"} />
       <${MisfitCurve} history=${job.history} />
     </section>`}`;

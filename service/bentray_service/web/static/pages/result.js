@@ -1,5 +1,6 @@
 // The result of a reconstruction: image to measure in, how it was made, and what can be done with it.
-import { go, keepQuery } from "../parts/address.js";
+import { go, keepQuery, parse } from "../parts/address.js";
+import { Onward, onwardIn } from "../jobs/onward.js";
 import { inTime } from "../parts/amounts.js";
 import { kept, request, send } from "../parts/api.js";
 import { CopyButton } from "../parts/copying.js";
@@ -84,6 +85,8 @@ function Result({ result: first, query }) {
     await request(volume.links.self, { method: "DELETE" });
     go("/jobs");
   });
+  // The view beside the job that goes on from this one.
+  const keep = (view) => keepQuery(new URLSearchParams([...view, ...onwardIn(parse(location.hash).query)]));
   const stored = () => QUANTITIES[state.quantity].reads[0];
   return html`<div class="wide screen">
     <div class="head">
@@ -110,7 +113,9 @@ function Result({ result: first, query }) {
     </div>
     ${renaming && html`<${Rename} job=${job} onRename=${rename} />`}
     <${Alert} id="result-error" error=${error} />
-    <${Viewer} panes=${[{ title: name, values, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keepQuery} id="result-viewer" aria-label="Image" />
+    <${Onward} job=${job} summary=${summary} query=${query}>
+      <${Viewer} panes=${[{ title: name, values, stored: summary.quantities, detail: width && 1e3 * width }]} state=${state} keep=${keepQuery} id="result-viewer" aria-label="Image" />
+    </${Onward}>
   </div>
   <div class="wide">
     <div id="result-tables" class="result-tables">

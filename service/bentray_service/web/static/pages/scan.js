@@ -1,5 +1,7 @@
 // One scan: its geometry, facts, quality and traces, the reconstruction to start, and the reconstructions of it.
 import { JobList } from "../jobs/job_cards.js";
+import { PRESETS } from "../jobs/onward.js";
+import { go } from "../parts/address.js";
 import { request, send } from "../parts/api.js";
 import { KeyLink, Picture } from "../parts/key.js";
 import { planInWords, planOf, waitInWords } from "../jobs/job_words.js";
@@ -11,8 +13,6 @@ import { ScanEditor } from "../scans/scan_edit.js";
 import { factRows, Quality } from "../scans/scan_facts.js";
 import { Shot } from "../scans/shot.js";
 
-// Settings of the two buttons. Best may take half an hour of one processor core for full waveforms.
-const PRESETS = { fast: { method: "auto" }, best: { method: "auto", minutes: 30 } };
 const PLAN_MS = 400;
 
 function factsOf(scan) {
@@ -64,11 +64,11 @@ function Run({ scan, from, changes, onStarted }) {
   }, [earlier]);
 
   function start({ submitter }) {
-    const own = submitter?.value === "own";
-    const settings = own ? form.changed(true) : PRESETS[submitter?.value ?? "fast"];
+    const [own, onward] = ["own", "onward"].map((value) => submitter?.value === value);
+    const settings = own ? form.changed(true) : PRESETS[submitter?.value] ?? PRESETS.fast;
     if (settings) act(async () => {
       const started = send("POST", "/v1/jobs", { kind: "reconstruction", dataset: scan.id, settings });
-      await started.then(onStarted, (problem) => {
+      await started.then(({ id }) => (onward ? go(`/jobs/${id}?then=best`) : onStarted()), (problem) => {
         if (!own || !form.refuse(problem.problem ?? {}, true)) throw problem;
       });
     });
@@ -77,6 +77,8 @@ function Run({ scan, from, changes, onStarted }) {
   const best = scan.has_traces ? "then full waveform, where it predicts unused traces better" : "the same here: full waveforms need traces, and the file has none";
   return html`<${Section} id="run" title="Reconstruction">
     <${Form} id="run" novalidate onSubmit=${start}>
+      <p class="links"><button id="reconstruct" type="submit" value="onward">Reconstruct</button>
+        <small>Fast is drawn first; where it is not enough, Best follows in its place.</small></p>
       <div class="presets">
         <${Preset} id="start" name="fast" title="Fast" words="rays and method chosen automatically" scan=${scan} changes=${changes} />
         <${Preset} id="best" name="best" title="Best" words=${best} scan=${scan} changes=${changes} />
