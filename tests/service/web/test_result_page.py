@@ -262,7 +262,7 @@ def test_the_statistics_of_a_dragged_region_are_those_of_its_nodes(page, result,
     page.mouse.down()
     page.mouse.move(box["x"] + 0.61 * box["width"], box["y"] + 0.67 * box["height"], steps=3)
     page.mouse.up()
-    page.get_by_text("Standard deviation").wait_for()
+    page.get_by_text("Standard deviation (m/s)").wait_for()
     with page.expect_download() as download:
         page.locator(".measure.region").get_by_role("button", name="Save as CSV").click()
     head, row = table_of(download)
@@ -587,7 +587,7 @@ def test_provenance_is_told_in_words_and_copied_as_json(page, result):
     assert (rows["Job"], rows["Scan"], rows["Speed in water"]) == (job["id"], job["dataset"], "1500.0 m/s")
     image = (rows["Method"], rows["Side of the image"], rows["Region of interest only"])
     assert image == ("SART", "the array and a margin", "no")
-    assert (rows["Speed bounds"], rows["SART: Relaxation factor λ"]) == ("1300 to 1800 m/s", "0.1")
+    assert rows["Speed bounds"] == "1300 to 1800 m/s", rows
     assert "{" not in box.inner_text()
     box.get_by_text("Those of the rays before full waveforms").click()
     expect(box.get_by_role("row", name="Width of rays")).to_have_text("Width of rays0.0026 m")
