@@ -51,9 +51,6 @@ def demo(
     started = time.perf_counter()
     with ExitStack() as running:
         with progress_bar("Starting a service"):
-            data = running.enter_context(tempfile.TemporaryDirectory(prefix="bentray-demo-"))
-            url = running.enter_context(running_service(Path(data), folder / "service.log"))
-
             from bentray_workers.files.dataset import write_dataset
             from bentray_workers.images.comparison import comparison_png
             from bentray_workers.simulation.plane import SimulationSettings
@@ -62,9 +59,11 @@ def demo(
             from ..client import Client
             from .output.figures import figures
 
+            settings = SimulationSettings(nodes=nodes, elements=elements, coupling_mps=coupling)
+            data = running.enter_context(tempfile.TemporaryDirectory(prefix="bentray-demo-"))
+            url = running.enter_context(running_service(Path(data), folder / "service.log"))
         running.enter_context(client_errors())
         client = running.enter_context(Client(url))
-        settings = SimulationSettings(nodes=nodes, elements=elements, coupling_mps=coupling)
         remark(f"The service runs at {url}. Simulating a scan: {elements} transducers, {nodes}² nodes.")
         with progress_bar("Simulating") as step:
             dataset = simulate(settings, lambda progress: step(progress.done, progress.total, "emitters"))

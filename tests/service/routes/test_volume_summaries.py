@@ -80,6 +80,7 @@ def test_a_scan_without_truth_has_none(http, uploaded, work, submitted, until):
     assert http.get(f"{here}/summary").json() == {
         "quantities": ["speed", "coverage"],
         "resolution_width_m": [],
+        "trust": "no standard deviations, no cautions",
         "cautions": [],
         "grids": {},
         "candidates": [],

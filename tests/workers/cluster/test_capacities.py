@@ -36,7 +36,7 @@ def test_memory_and_resources_are_reported(cluster):
 def test_devices_are_tested_only_on_request(fresh, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: pytest.fail("tried"))
     assert capacities.resources_for(fresh, Settings(method="sart")) == {"recon": 1}
-    assert lanes(fresh) == {"recon", "render", "short"}
+    assert lanes(fresh) == {"recon", "render", "short", "drawing"}
 
 
 def test_without_a_device_one_is_rejected(fresh, monkeypatch):
@@ -67,7 +67,7 @@ def test_external_cluster_is_not_queried(fresh, monkeypatch):
 def test_the_memory_of_a_device_is_known_to_plans(fresh, opencl_session):
     capacities.resources_for(fresh, WITH_DEVICE)
     (workers,) = capacities.capacities_of(fresh)
-    assert set(workers.resources) == {*OPENCL, "recon", "render", "short"}
+    assert set(workers.resources) == {*OPENCL, "recon", "render", "short", "drawing"}
     assert workers.device_bytes == opencl_session.device.memory_bytes // MIB * MIB > 0
 
 

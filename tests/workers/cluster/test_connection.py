@@ -25,8 +25,8 @@ def test_embedded_cluster_has_all_lanes(cluster):
     facts = cluster.describe()
     assert facts["embedded"] is True
     assert facts["workers"] == 2
-    assert facts["threads"] == 6
-    assert facts["lanes"] == {"recon": 2.0, "render": 2.0, "short": 2.0}
+    assert facts["threads"] == 8
+    assert facts["lanes"] == {"recon": 2.0, "render": 2.0, "short": 2.0, "drawing": 2.0}
 
 
 def test_given_scheduler_is_joined_and_survives_leaving(cluster):

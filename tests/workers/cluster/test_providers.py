@@ -59,7 +59,7 @@ def test_slurm_workers_have_resources_warm_kernels_and_no_dashboard(managers: li
     assert {"memory", "walltime", "queue"} <= set(made.asked), "from the template"
     words = made.asked["worker_extra_args"]
     assert {
-        "--resources=recon=1,render=1,short=1",
+        "--resources=recon=1,drawing=1,render=1,short=1",
         "--preload=bentray_workers.compilation.preload",
         "--no-dashboard",
     } <= set(words)

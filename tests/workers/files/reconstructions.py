@@ -34,7 +34,7 @@ def made(
         spacing_m=(SPACING_M, SPACING_M) if slices is None else (SPACING_M, SPACING_M, float("nan")),
         origin_m=(-side, -side) if slices is None else (-side, -side, 0.01),
         water_speed_mps=WATER_MPS,
-        settings=Settings.from_values(method="sart", rays="straight", speed_range_mps=(1400.0, 1600.0)),
+        settings=Settings.from_values(method="sart", rays="straight", speed_bounds_mps=(1400.0, 1600.0)),
         history=tuple(Iteration(k, n, 1e-7 / n / 3, 64) for n in (1, 2, 3) for k in range(slices or 1)),
         recovery=random.uniform(0.0, 1.0, shape),
         residuals=residual_counts(random.normal(0.0, 1e-7, 4000)),

@@ -93,7 +93,7 @@ def test_plan_rejects_more_pixels_than_a_worker_holds(scan):
     worker = WorkerCapacity(int((0.9 * planned + WARM_BYTES) / USABLE), ("recon",))
     with pytest.raises(InvalidInput) as refused:
         plan(summary, fine, [worker])
-    assert refused.value.field == "reflection.pixel_m"
+    assert refused.value.field == "reflection"
     assert "summing echoes" in str(refused.value)
 
 

@@ -193,8 +193,8 @@ def test_delays_in_water_move_the_image():
     [
         ({"waveform": None}, {}, "reflection"),
         ({"center_frequency_hz": None}, {}, "acquisition@center_frequency_hz"),
-        ({}, {"pixel_m": 1e-6}, "reflection.pixel_m"),
-        ({}, {"pixel_m": 0.5}, "reflection.pixel_m"),
+        ({}, {"pixel_m": 1e-6}, "pixel_m"),
+        ({}, {"pixel_m": 0.5}, "pixel_m"),
     ],
 )
 def test_what_is_impossible_is_named(changes, settings, field):
