@@ -97,7 +97,7 @@ endef
 .venv/bin/python:
 	@for python in python3.14 python3.13 python3.12 python3.11 python3; do \
 	  if $$python -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
-	    echo "Creating .venv with $$($$python --version)"; exec $$python -m venv .venv; \
+	    echo "Creating .venv with $$($$python --version), a few seconds"; exec $$python -m venv .venv; \
 	  fi; \
 	done; \
 	echo "Bentray requires Python 3.11 or newer with the venv module; none was found on the PATH." >&2; \
@@ -125,7 +125,7 @@ endef
 .venv/.installed: requirements.lock pyproject.toml | .venv/bin/python
 	@echo "Installing the packages of requirements.lock (about a minute the first time)"
 	$(call installed,requirements.lock)
-	@$(BIN)/pip install -qq --no-deps --no-build-isolation -e .
+	@echo "Installing Bentray itself"; $(BIN)/pip install -qq --no-deps --no-build-isolation -e .
 	@touch $@
 
 .venv/.installed-dev: requirements-dev.lock .venv/.installed

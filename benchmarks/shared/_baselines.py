@@ -83,7 +83,7 @@ class Images:
         if settings.rays == "straight":
             return image
         plain = Settings()
-        fronts = {"eikonal": plain.numerics.eikonal, "speed_range_mps": plain.numerics.speed_range_mps}
+        fronts = {"eikonal": plain.eikonal, "speed_range_mps": plain.numerics.speed_range_mps}
         return self.made(settings.changed(rays="straight", **fronts)).result
 
     def compared(

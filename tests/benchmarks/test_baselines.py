@@ -60,7 +60,7 @@ def test_straight_rays_have_the_method_penalty_and_width_of_the_image() -> None:
     )
     images.straight(bent.result)
     straight = spy.asked[-1]
-    assert (straight.rays, straight.method, straight.numerics.eikonal) == (
+    assert (straight.rays, straight.method, straight.eikonal) == (
         "straight",
         "gauss-newton",
         "deviation",

@@ -125,4 +125,4 @@ def test_every_operation_has_an_example_by_curl():
 
 def test_settings_of_a_job_are_described():
     settings = json.loads(description())["components"]["schemas"]["Settings"]["properties"]
-    assert {"rays", "nodes", "iterations"} <= set(settings)
+    assert {"rays", "eikonal", "nodes", "iterations"} <= set(settings)

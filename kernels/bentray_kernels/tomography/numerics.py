@@ -10,11 +10,8 @@ from ..requests.limits import check_speeds
 from ..requests.ranges import SEED, Range, ranged
 from ..requests.ray_gradient_names import RayGradient
 from ..requests.request_fields import check
-from ..requests.solver_names import SolverName
 
 BANDS = 4
-# The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
-DEVIATION = "deviation"
 
 
 @dataclass(frozen=True)
@@ -22,8 +19,6 @@ class Numerics:
     """Parameters that no user sets. The defaults are the automatic decision, None one that needs the scan.
 
     Attributes:
-        eikonal: method of wave fronts of bent rays; deviation is for SART on slices, elsewhere accurate
-            replaces it, and in blocks fsm.
         relaxation: factor λ of an update of SART (Li 2008, chapter 6, equation 1).
         speed_range_mps: of SART, lowest and highest speed known in the object, m/s, to which the image is
             stretched before the wave front is tracked (data-driven speed, Li 2008, chapter 6, equation 6);
@@ -61,7 +56,6 @@ class Numerics:
         InvalidInput: naming the parameter.
     """
 
-    eikonal: SolverName = "deviation"
     relaxation: float = ranged(0.1, Range(0.0, 2.0, above=True, below=True))
     speed_range_mps: tuple[float, float] | None = None
     pixel_m: float | None = ranged(None, Range(1e-6, 1.0, unit="m"))

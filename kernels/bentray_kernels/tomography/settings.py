@@ -10,7 +10,11 @@ from ..requests.limits import LEFT_OUT, MAX_LEFT_OUT, SPEED_MPS, WATER_C, check_
 from ..requests.picker_names import DEFAULT_PICKER, PickerName
 from ..requests.ranges import Range
 from ..requests.request_fields import ABOVE_ZERO, Uses, check, declared, setting
-from .numerics import DEVIATION, Numerics
+from ..requests.solver_names import SolverName
+from .numerics import Numerics
+
+# The wave front of the compiled pass over a slice; see ``eikonal.deviation``.
+DEVIATION = "deviation"
 
 MIN_NODES = 16
 # What a speed may be, as JSON Schema says it.
@@ -22,8 +26,10 @@ GAUSS_NEWTON = ("gauss-newton", "auto", "waveform")
 LOSSES = {"attenuation": (True,), "scan_amplitudes": (True,)}
 ECHOES: Uses = ({"reflection": (True,)},)
 # The compiled pass of SART over a slice exists for devices, full waveforms and reflection.
+_SLICES = {"method": ("sart", "auto"), "decomposition": (None, "slices")}
 ON_DEVICES: Uses = (
-    {"method": ("sart", "auto"), "decomposition": (None, "slices")},
+    {**_SLICES, "eikonal": (DEVIATION,)},
+    {**_SLICES, "rays": ("straight",)},
     {"method": ("waveform",)},
     {"method": ("auto",), "minutes": ABOVE_ZERO},
     *ECHOES,
@@ -166,6 +172,12 @@ class Settings:
         label="Rays",
         basic=True,
         words={"curved": "Bent", "straight": "Straight"},
+    )
+    eikonal: SolverName = setting(  # noqa: RUF009 - a string, by its alias
+        DEVIATION,
+        "Eikonal solver for bent rays. deviation is for SART on slices; elsewhere accurate replaces it.",
+        label="Eikonal solver",
+        used_when=({"rays": ("curved",)}, {"uncertainty": (True,)}),
     )
     decomposition: Literal["slices", "volume"] | None = setting(
         None,
@@ -352,8 +364,8 @@ class Settings:
 
         In blocks times are computed by fast sweeping: no other method has them.
         """
-        if self.numerics.eikonal != DEVIATION:
-            return self.numerics.eikonal
+        if self.eikonal != DEVIATION:
+            return self.eikonal
         return "accurate" if self.numerics.blocks == 1 else "fsm"
 
     def to_dict(self) -> dict[str, Any]:

@@ -124,9 +124,9 @@ def reasons_of_model(settings: Settings, requested: Settings, choice: str) -> di
     """
     reasons = {"model": choice} if choice else {}
     solver = solver_of(settings, 3 if settings.decomposition == "volume" else 2)
-    if solver.eikonal not in (None, requested.numerics.eikonal):
+    if solver.eikonal not in (None, requested.eikonal):
         why = "it alone works in blocks" if settings.numerics.blocks > 1 else "rays are traced one by one"
-        reasons["eikonal"] = f"{solver.eikonal} in place of {requested.numerics.eikonal}, since {why}"
+        reasons["eikonal"] = f"{solver.eikonal} in place of {requested.eikonal}, since {why}"
     return reasons
 
 

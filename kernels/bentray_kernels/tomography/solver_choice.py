@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from ..eikonal import METHODS
 from ..wave.emissions import Engine
-from .numerics import DEVIATION
-from .settings import Settings
+from .settings import DEVIATION, Settings
 
 
 class Solver(NamedTuple):
@@ -30,8 +30,8 @@ def solver_of(settings: Settings, dimensions: int) -> Solver:
         dimensions: of an image, 2 or 3.
     """
     straight = settings.rays == "straight"
-    numerics = settings.numerics
-    supported = straight or (numerics.eikonal == DEVIATION and numerics.ray_gradient == "differences")
+    differences = settings.numerics.ray_gradient == "differences"
+    supported = straight or (settings.eikonal == DEVIATION and differences)
     if settings.method == "sart" and dimensions == 2 and supported:
         return Solver(True, None if straight else DEVIATION)
     return Solver(False, None if straight else settings.ray_eikonal)
@@ -55,8 +55,8 @@ def undivided_reason(settings: Settings, *, amplitudes: bool) -> str:
     reasons = {
         f"decomposition {settings.decomposition}": settings.decomposition != "volume",
         f"method {settings.method}": settings.method != "sart",
-        f"eikonal {numerics.eikonal}": settings.rays == "curved"
-        and numerics.eikonal not in (DEVIATION, "fsm"),
+        f"eikonal {settings.eikonal}": settings.rays == "curved"
+        and settings.eikonal not in (DEVIATION, "fsm"),
         "speed_range_mps": numerics.speed_range_mps is not None,
         "coarser grids": numerics.coarser_grids > 0,
         "other gradients": numerics.ray_gradient != "differences",
@@ -81,4 +81,11 @@ def needs_device(settings: Settings) -> bool:
     """Whether a call of the reconstruction computes on an OpenCL device."""
     dimensions = 3 if settings.decomposition == "volume" else 2
     engines = wave_engine(settings), echo_engine(settings), sart_engine(settings, dimensions)
-    return "opencl" in engines
+    return tracks_on_device(settings) or "opencl" in engines
+
+
+def tracks_on_device(settings: Settings) -> bool:
+    """Whether wave fronts are tracked on an OpenCL device."""
+    # Candidate models have curved rays whatever the setting.
+    straight = settings.rays == "straight" and not settings.selects_model
+    return not straight and METHODS[settings.ray_eikonal].on_device

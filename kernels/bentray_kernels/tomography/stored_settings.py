@@ -27,7 +27,6 @@ WITHDRAWN = MappingProxyType(
         "sweeps": "iterations, which replaces it",
         "wave_minutes": "minutes, which replaces it",
         "speed_update": "no such setting: the wave front is tracked in the image as it is",
-        "eikonal": "no such setting: the solver follows from method and decomposition",
         "relaxation": "no such setting: updates of SART are relaxed by 0.1; choose iterations",
         "speed_range_mps": "no such setting: choose speed_bounds_mps, which the image stays within",
         "sart": "no such record: its settings are automatic; choose iterations and speed_bounds_mps",

@@ -77,9 +77,10 @@ def demo(
                 client, sent.id, name, {**options, "nodes": nodes}, folder
             )
     assert dataset.truth is not None
-    record = {name: figures(result, dataset, seconds[name]) for name, result in results.items()}
     picture = folder / "comparison.png"
-    write_bytes(picture, comparison_png(dataset.truth, results, dataset.roi))
+    with progress_bar("Comparing and drawing"):
+        record = {name: figures(result, dataset, seconds[name]) for name, result in results.items()}
+        write_bytes(picture, comparison_png(dataset.truth, results, dataset.roi))
     _show(record, picture, time.perf_counter() - started, as_json)
     straight, bent = (record[name]["truth"]["mean_absolute_error_of_range"] for name in JOBS)
     if not bent < straight:

@@ -18,6 +18,7 @@ from typing import Literal, TypedDict
 
 from bentray_kernels.requests.device_request import DeviceRequest
 from bentray_kernels.requests.picker_names import PickerName
+from bentray_kernels.requests.solver_names import SolverName
 '''
 
 

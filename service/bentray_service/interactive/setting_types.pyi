@@ -4,12 +4,14 @@ from typing import Literal, TypedDict
 
 from bentray_kernels.requests.device_request import DeviceRequest
 from bentray_kernels.requests.picker_names import PickerName
+from bentray_kernels.requests.solver_names import SolverName
 
 Method = Literal["sart", "gauss-newton", "auto", "waveform"]
 PhantomName = Literal["table6", "table6-vertical", "detailed", "breast", "table7"]
 
 class ReconstructionSettings(TypedDict, total=False):
     rays: Literal["curved", "straight"]
+    eikonal: SolverName
     decomposition: Literal["slices", "volume"] | None
     opening_angle_deg: float | None
     water_temperature_c: float | None

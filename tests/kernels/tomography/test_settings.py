@@ -16,8 +16,8 @@ from bentray_kernels.tomography import (
     Settings,
 )
 from bentray_kernels.tomography.gauss_newton.penalties import PENALTIES
-from bentray_kernels.tomography.numerics import DEVIATION, Numerics
-from bentray_kernels.tomography.settings import PLACES, FixedSettings
+from bentray_kernels.tomography.numerics import Numerics
+from bentray_kernels.tomography.settings import DEVIATION, PLACES, FixedSettings
 
 
 def test_settings_accept_field_names_or_records():
@@ -57,7 +57,7 @@ def test_every_setting_has_a_description_a_default_and_a_place():
 
 
 def test_choices_are_those_of_the_code():
-    assert set(choices_of(Numerics)["eikonal"]) == {DEVIATION, *methods()}
+    assert set(choices_of(Settings)["eikonal"]) == {DEVIATION, *methods()}
     assert choices_of(PickingSettings)["picker"] == tuple(PICKERS)
     assert choices_of(Numerics)["penalty"] == PENALTIES
 

@@ -16,7 +16,7 @@ from bentray_kernels.tomography.device_choice import ScanSize, device_work
 
 # Another value of each setting. A new setting must have one here.
 SAMPLES: Mapping[str, Any] = {
-    "rays": "straight", "opening_angle_deg": 60.0, "water_temperature_c": 30.0,
+    "rays": "straight", "eikonal": "fmm", "opening_angle_deg": 60.0, "water_temperature_c": 30.0,
     "nodes": 26, "side_m": 0.09, "iterations": 1, "speed_bounds_mps": (1490.0, 1520.0), "roi": True,
     "resolution_check": True, "uncertainty": True, "minutes": 1.0, "penalty_strength": 0.05,
     "picker": "threshold", "attenuation": False, "amplitudes": "ratio", "reflection": True,
@@ -101,8 +101,11 @@ def test_a_device_is_refused_where_nothing_is_computed_on_it() -> None:
     size = ScanSize(1, 12, 12, 192)
     cases = [one | {"minutes": None} for one in CASES.values()]
     cases += [{"method": method} for method in ("auto", "waveform")]
-    cases += [{"method": "sart", "decomposition": "volume"}, {"method": "auto", "decomposition": "volume"}]
-    cases += [{"method": "auto", "minutes": 3.0}]
+    cases += [{"method": "sart", "eikonal": "fmm"}, {"method": "sart", "decomposition": "volume"}]
+    cases += [
+        {"method": "auto", "decomposition": "volume"},
+        {"method": "auto", "minutes": 3.0, "eikonal": "fmm"},
+    ]
     for case in cases:
         settings = Settings.from_values(nodes=20).changed(**case)
         used = device_work(size, settings) is not None

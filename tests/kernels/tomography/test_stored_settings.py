@@ -27,7 +27,7 @@ def test_those_of_earlier_versions_are_computed_to_the_same_bits():
     fixed = {"eikonal": "fmm", "relaxation": 0.2, "speed_range_mps": (1400.0, 1600.0)}
     assert from_stored(before) == Settings.from_values(**fixed)
     stored = json.loads(recorded(Settings.from_values(**fixed).numerics)["numerics"])
-    assert from_stored(Settings().to_dict(), stored) == Settings.from_values(**fixed)
+    assert from_stored(Settings(eikonal="fmm").to_dict(), stored) == Settings.from_values(**fixed)
     assert from_stored({"reflection": {"enabled": True}}, dict(FIXED)) == Settings.from_values(
         reflection=True
     )

@@ -75,8 +75,12 @@ def test_a_task_that_no_worker_can_hold_is_rejected_before_it_is_stored(http, da
 
 
 def test_a_device_that_no_worker_offers_is_rejected(http, dataset):
-    body = problem(ask(http, dataset, {"method": "sart", "device": "opencl"}))
-    assert (body["status"], body["field"]) == (422, "device")
+    for settings, field in (
+        ({"eikonal": "fim-opencl"}, "eikonal"),
+        ({"method": "sart", "device": "opencl"}, "device"),
+    ):
+        body = problem(ask(http, dataset, settings))
+        assert (body["status"], body["field"]) == (422, field)
 
 
 def test_jobs_are_taken_while_no_worker_is_connected(http, dataset, cluster):

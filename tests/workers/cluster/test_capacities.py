@@ -41,6 +41,8 @@ def test_devices_are_tested_only_on_request(fresh, monkeypatch):
 
 def test_without_a_device_one_is_rejected(fresh, monkeypatch):
     monkeypatch.setattr(capacities, "_has_device", lambda: False)
+    with pytest.raises(InvalidInput, match="eikonal: found 'fim-opencl', which no connected worker has"):
+        capacities.resources_for(fresh, Settings(method="sart", eikonal="fim-opencl"))
     for settings in (WITH_DEVICE, Settings(method="waveform", device="opencl")):
         with pytest.raises(InvalidInput, match="device: found 'opencl', which no connected worker has"):
             capacities.resources_for(fresh, settings)

@@ -133,6 +133,10 @@ def test_device_tasks_need_a_worker_with_a_device():
     assert (found.lane, found.workers) == ("opencl", 1)
     assert "OpenCL" in found.why
     assert plan(RING, replace(asked, device="cpu"), [LARGE]).lane == "recon"
+    tracked = Settings(method="sart", eikonal="fim-opencl")
+    with pytest.raises(InvalidInput, match="eikonal"):
+        plan(RING, tracked, [LARGE])
+    assert plan(RING, replace(tracked, rays="straight"), [LARGE]).lane == "recon"
 
 
 def test_array_in_space_that_is_no_ring_is_planned_as_a_volume():

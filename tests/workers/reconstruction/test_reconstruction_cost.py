@@ -71,6 +71,7 @@ def test_classes_keep_apart_what_differs_in_speed():
         name(rays="straight"),
         name(method="gauss-newton"),
         name(method="auto"),
+        name(eikonal="fsm"),
         name(decomposition="volume"),
         name(traced, method="auto", minutes=30.0),
         name(replace(traced, traces_bytes=1)),
@@ -83,7 +84,8 @@ def test_classes_keep_apart_what_differs_in_speed():
     assert name(method="auto", minutes=30.0) == name(method="auto")
 
 
-def test_the_speed_of_volumes_was_not_measured():
+@pytest.mark.parametrize("asked", [{"decomposition": "volume"}, {"eikonal": "fim"}])
+def test_speeds_that_nobody_measured_are_not_known(asked):
     settings = Settings.from_values(method="sart", nodes=64, decomposition="slices")
     assert reconstruction_cost(RING, settings, 1).speed_known
-    assert not reconstruction_cost(RING, settings.changed(decomposition="volume"), 1).speed_known
+    assert not reconstruction_cost(RING, settings.changed(**asked), 1).speed_known

@@ -5,12 +5,13 @@ from itertools import product
 import pytest
 
 from bentray_kernels.eikonal import methods
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Problem, Settings
 from bentray_kernels.tomography.grid_schedule import initial_slowness
-from bentray_kernels.tomography.numerics import DEVIATION
 from bentray_kernels.tomography.sart import sart_update
 from bentray_kernels.tomography.sart.sart_step import advance, begin
-from bentray_kernels.tomography.solver_choice import sart_engine, solver_of, wave_engine
+from bentray_kernels.tomography.settings import DEVIATION
+from bentray_kernels.tomography.solver_choice import needs_device, sart_engine, solver_of, wave_engine
 from bentray_workers.cluster.capacities import MIB, resource_of
 from bentray_workers.files.dataset.counts import Summary
 from bentray_workers.reconstruction.memory.ray_memory import call_bytes
@@ -35,9 +36,7 @@ def scans():
 def test_executed_solver_equals_the_planned_one(scans, monkeypatch, rays, cut, eikonal):
     if eikonal in ON_DEVICE:
         pytest.skip("its fallback on the CPU is tested with the device")
-    settings = Settings.from_values(
-        method="sart", nodes=16, iterations=1, rays=rays, decomposition=cut, eikonal=eikonal
-    )
+    settings = Settings(method="sart", nodes=16, iterations=1, rays=rays, decomposition=cut, eikonal=eikonal)
     problem = Problem.from_dataset(scans[cut], settings, 0)
     chosen = solver_of(settings, problem.region.ndim)
     solved, passed = [], []
@@ -65,15 +64,28 @@ def test_executed_solver_equals_the_planned_one(scans, monkeypatch, rays, cut, e
 @pytest.mark.parametrize(("rays", "eikonal"), list(product(RAYS, SOLVERS)))
 def test_the_plan_counts_the_arrays_of_what_runs(rays, eikonal):
     scan = Summary(1024, 1024, 1024**2, 1, False, 0.0, 0.2, 0, False)
-    settings = Settings.from_values(method="sart", nodes=1024, rays=rays, eikonal=eikonal)
     size = {
-        name: call_bytes(scan, settings.changed(eikonal=name))["update_sart"] for name in (eikonal, DEVIATION)
+        name: call_bytes(scan, Settings(method="sart", nodes=1024, rays=rays, eikonal=name))["update_sart"]
+        for name in (eikonal, DEVIATION)
     }
+    settings = Settings(method="sart", nodes=1024, rays=rays, eikonal=eikonal)
     if solver_of(settings, 2).compiled:
         # Whatever the wave front would be tracked by: it is the same compiled call.
         assert size[eikonal] == size[DEVIATION]
     elif rays == "curved":
         assert abs(size[eikonal] - size[DEVIATION]) > MIB
+
+
+@pytest.mark.parametrize("method", ["sart", "gauss-newton", "auto"])
+@pytest.mark.parametrize(("rays", "eikonal"), list(product(("curved", "straight"), SOLVERS)))
+def test_device_resource_is_requested_where_a_device_is_used(method, rays, eikonal):
+    try:
+        settings = Settings(method=method, rays=rays, eikonal=eikonal)
+    except InvalidInput:
+        pytest.skip("refused")
+    used = eikonal in ON_DEVICE and (rays == "curved" or method == "auto")
+    assert needs_device(settings) is used
+    assert resource_of(settings) == ("opencl" if used else "recon")
 
 
 @pytest.mark.parametrize("device", ["auto", "cpu", "opencl"])

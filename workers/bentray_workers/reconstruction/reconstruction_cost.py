@@ -17,7 +17,7 @@ from bentray_kernels.tomography.model_selection.selection import (
     candidate_settings,
     final_settings,
 )
-from bentray_kernels.tomography.settings import Settings
+from bentray_kernels.tomography.settings import DEVIATION, Settings
 
 from ..files.dataset.counts import Summary
 from .memory.ray_memory import emitters_of, shape_of
@@ -74,13 +74,11 @@ def reconstruction_cost(scan: Summary, settings: Settings, workers: int) -> Reco
     at_once = max(1, min(workers, problems) if sequential else workers)
     parallel = picking + waves + reflection_seconds(scan, settings)
     seconds = OVERHEAD_S + rays / at_once + parallel / max(1, workers)
-    return ReconstructionCost(
-        _class(scan, settings, waves > 0.0), seconds, settings.decomposition != "volume"
-    )
+    return ReconstructionCost(_class(scan, settings, waves > 0.0), seconds, _speed_known(settings))
 
 
 def _class(scan: Summary, settings: Settings, waves: bool) -> str:
-    parts: list[str] = [settings.method, settings.rays, settings.decomposition or "slices"]
+    parts: list[str] = [settings.method, settings.rays, settings.decomposition or "slices", settings.eikonal]
     if scan.traces_bytes:
         parts.append(settings.picking.picker)
     if waves:
@@ -92,6 +90,10 @@ def _class(scan: Summary, settings: Settings, waves: bool) -> str:
     if settings.numerics.blocks > 1:
         parts.append("blocks")
     return " ".join(parts)
+
+
+def _speed_known(settings: Settings) -> bool:
+    return settings.decomposition != "volume" and settings.eikonal == DEVIATION
 
 
 def _rays_seconds(scan: Summary, settings: Settings) -> float:
