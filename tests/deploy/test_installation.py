@@ -1,10 +1,8 @@
 """The installation of docker-compose.yml, as processes: it works, and again after any part was killed."""
 
 import subprocess
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +18,7 @@ from bentray_workers.simulation.simulation_run import simulate
 
 from .. import postgresql
 from ..listening import beyond_loopback, listening, pages
+from ..waiting import wait_until
 from . import compose
 from .installation import PARTS, Installation
 
@@ -110,11 +109,3 @@ def test_parts_accept_only_tls_with_certificates(tmp_path: Path, scan: Path) -> 
             assert client.wait(job.id).state == "succeeded", secured.log("service")
     finally:
         secured.close()
-
-
-def wait_until(so: Callable[[], Any]) -> None:
-    """Asks until it is so, for a while."""
-    deadline = time.monotonic() + 60.0
-    while not so():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)

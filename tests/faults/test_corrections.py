@@ -9,7 +9,8 @@ import pytest
 
 from bentray_workers.files.dataset import read_dataset
 
-from .test_uploads import PATIENCE_S, Service, a_scan, wait_for
+from .machine import wait_until
+from .test_uploads import PATIENCE_S, Service, a_scan
 
 pytestmark = pytest.mark.nightly
 
@@ -82,7 +83,7 @@ def killed_while_it_writes(service, here, folder):
     """Kill the service once a part of the copy is on the disk."""
     with ThreadPoolExecutor(1) as pool:
         asked = pool.submit(corrected, service, here)
-        wait_for(lambda: [one for one in folder.glob("incoming/*.reading/*.partial") if one.stat().st_size])
+        wait_until(lambda: [one for one in folder.glob("incoming/*.reading/*.partial") if one.stat().st_size])
         service.kill()
         with pytest.raises(httpx.TransportError):
             asked.result()

@@ -16,6 +16,7 @@ import pytest
 from bentray_service.client import Client
 
 from ..free_ports import free_port
+from .machine import wait_until
 
 PATIENCE_S = 60.0
 TUS = {"Tus-Resumable": "1.0.0"}
@@ -29,18 +30,6 @@ PROGRAM = (
 )
 
 
-def wait_for(happened):
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
-        try:
-            if result := happened():
-                return result
-        except httpx.TransportError:
-            pass
-        time.sleep(0.05)
-    raise AssertionError("it did not happen")
-
-
 class Service:
     """A service of its own process on a folder and a port that stay."""
 
@@ -52,7 +41,7 @@ class Service:
     def start(self, prelude=""):
         command = [sys.executable, "-c", prelude + PROGRAM, str(self._port)]
         self._process = subprocess.Popen(command, env=self._environment)
-        wait_for(lambda: httpx.get(f"{self.url}/health/live").is_success)
+        wait_until(lambda: httpx.get(f"{self.url}/health/live").is_success)
 
     def kill(self):
         self._process.send_signal(signal.SIGKILL)
@@ -99,7 +88,7 @@ def test_upload_survives_a_service_kill(tmp_path):
 
         sender = threading.Thread(target=send)
         sender.start()
-        wait_for(lambda: stored.exists() and stored.stat().st_size > 10_000_000)
+        wait_until(lambda: stored.exists() and stored.stat().st_size > 10_000_000)
         service.kill()
         sender.join()
         on_disk = stored.stat().st_size
@@ -115,7 +104,7 @@ def test_upload_survives_a_service_kill(tmp_path):
         )
         assert sent.status_code == 204
         incoming = tmp_path / "data" / "tenants" / "local" / "incoming"
-        wait_for(lambda: list(incoming.glob("*.reading/*.partial")))
+        wait_until(lambda: list(incoming.glob("*.reading/*.partial")))
         assert httpx.get(service.url + location).json()["state"] == "reading"
         service.kill()
         assert stored.stat().st_size == len(content)

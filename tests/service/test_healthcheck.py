@@ -23,13 +23,7 @@ from bentray_service.healthcheck import (
 )
 from bentray_workers.cluster import heartbeat
 
-
-def wait_for(heard):
-    deadline = time.monotonic() + 60.0
-    while not heard:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    return heard
+from ..waiting import wait_until
 
 
 def test_a_service_without_workers_is_alive_and_not_ready(serve, cluster):
@@ -128,7 +122,7 @@ def test_a_scheduler_answers_and_logs_no_broken_connection(greeting):
     address, heard = greeting(words)
     assert check_scheduler(address) is None
     # Dask takes its own greeting for that of a peer; without one it logs a connection that broke off.
-    assert wait_for(heard) == [words]
+    assert wait_until(lambda: heard) == [words]
 
 
 def test_rejects_hosts_that_are_no_scheduler(greeting):

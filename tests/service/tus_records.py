@@ -1,16 +1,10 @@
 """Records of resumable uploads, waited for."""
 
-import time
+from ..waiting import wait_until
 
-PATIENCE_S = 60.0
+ENDED = ("done", "refused")
 
 
 def settled(http, location):
     """The record of an upload once its file is read or refused."""
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
-        record = http.get(location).json()
-        if record["state"] in ("done", "refused"):
-            return record
-        time.sleep(0.02)
-    raise AssertionError(record)
+    return wait_until(lambda: (record := http.get(location).json())["state"] in ENDED and record)

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
 from ...free_ports import free_port
 from ...listening import beyond_loopback, listening, pages
+from ...waiting import wait_until
 
 PATIENCE_S = 240.0
 Process = subprocess.Popen[str]
@@ -34,15 +34,8 @@ def start_scheduler(port: int) -> Process:
     )
 
 
-def wait_until(so: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while not so():
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
-
-
 def wait_for_workers(cluster: Cluster, count: int) -> None:
-    wait_until(lambda: cluster.describe()["workers"] == count)
+    wait_until(lambda: cluster.describe()["workers"] == count, PATIENCE_S)
 
 
 class Machine:
@@ -92,7 +85,7 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
         there = reconstruct(cluster.client, scan_file, settings)
     np.testing.assert_array_equal(there.speed, reconstruct(None, scan_file, settings).speed)
 
-    wait_until(lambda: check_worker(machine.address) is None)
+    wait_until(lambda: check_worker(machine.address) is None, PATIENCE_S)
     sockets = listening(machine.worker.pid)
     assert (beyond_loopback(sockets), pages(sockets)) == (set(), [])
 
@@ -103,7 +96,7 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
         wait_for_workers(cluster, 1)
         assert cluster.client.submit(sum, [1, 2]).result(timeout=60) == 3
 
-    wait_until(lambda: machine.log.read_text().count(f"1 workers joined {machine.address}") == 2)
+    wait_until(lambda: machine.log.read_text().count(f"1 workers joined {machine.address}") == 2, PATIENCE_S)
     family = psutil.Process(machine.worker.pid).children(recursive=True)
     assert family
     machine.worker.send_signal(signal.SIGTERM)

@@ -1,13 +1,13 @@
 """The whole service with its files in a bucket: outages, an emptied data folder, a second service."""
 
 import shutil
-import time
 
 import pytest
 
 from bentray_service.files.bucket import Bucket
 from bentray_service.jobs import runner
 
+from ...waiting import wait_until
 from ..conftest import HDF5
 
 
@@ -28,14 +28,6 @@ def told(answer):
 AWAY = (503, "/problems/storage-away", "10")
 
 
-def wait(happened):
-    """Until something has happened."""
-    deadline = time.monotonic() + 60.0
-    while not happened():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
 @pytest.fixture
 def begun(work, submitted):
     """Begin a job that is held in the middle; returns its id."""
@@ -43,7 +35,7 @@ def begun(work, submitted):
     def go(http, dataset):
         work.hold.clear()
         job = submitted(http, dataset)["id"]
-        wait(lambda: work.calls)
+        wait_until(lambda: work.calls)
         return job
 
     return go
@@ -103,7 +95,7 @@ def test_a_result_waits_for_the_bucket_and_is_not_lost(service, work, uploaded, 
     s3_server.away.set()
     s3_server.asked.clear()
     work.hold.set()
-    wait(lambda: any("/volumes/" in path for _, path in list(s3_server.asked)))
+    wait_until(lambda: any("/volumes/" in path for _, path in list(s3_server.asked)))
     assert http.get(f"/v1/jobs/{job}").json()["state"] == "running"
     s3_server.away.clear()
     done = until(http, job)
@@ -118,7 +110,7 @@ def test_a_job_can_be_cancelled_while_its_result_waits(service, work, uploaded, 
     s3_server.away.set()
     s3_server.asked.clear()
     work.hold.set()
-    wait(lambda: any("/volumes/" in path for _, path in list(s3_server.asked)))
+    wait_until(lambda: any("/volumes/" in path for _, path in list(s3_server.asked)))
     assert http.post(f"/v1/jobs/{job}/cancel").status_code == 202
     assert until(http, job)["state"] == "cancelled"
     assert http.get("/v1/volumes").json()["volumes"] == []
@@ -145,10 +137,10 @@ def test_an_upload_in_pieces_waits_too(service, scan, s3_server, monkeypatch):
     s3_server.asked.clear()
     piece = {**tus, "Upload-Offset": "0", "Content-Type": "application/offset+octet-stream"}
     assert http.patch(location, content=content, headers=piece).status_code == 204
-    wait(lambda: any("/datasets/" in path for _, path in list(s3_server.asked)))
+    wait_until(lambda: any("/datasets/" in path for _, path in list(s3_server.asked)))
     assert http.get(location).json()["state"] == "reading"
     s3_server.away.clear()
-    wait(lambda: http.get(location).json()["state"] != "reading")
+    wait_until(lambda: http.get(location).json()["state"] != "reading")
     assert http.get(location).json()["state"] == "done"
 
 
@@ -157,7 +149,7 @@ def test_a_folder_from_before_there_was_a_bucket_is_put_into_it(start, uploaded,
     dataset = uploaded(http)
     http.__exit__(None, None, None)
     http = start("data", storage_url=bucket_url)
-    wait(lambda: [item.key for item in Bucket(bucket_url).listed("tenants/")])
+    wait_until(lambda: [item.key for item in Bucket(bucket_url).listed("tenants/")])
     assert [item.key for item in Bucket(bucket_url).listed("tenants/")] == [
         f"tenants/local/datasets/{dataset}.h5"
     ]

@@ -1,7 +1,6 @@
 """/v1/direct-uploads: straight to the bucket by presigned addresses, with the checks of every upload."""
 
 import hashlib
-import time
 
 import httpx
 import numpy as np
@@ -11,6 +10,8 @@ from bentray_service.client import Client
 from bentray_service.errors import StorageUnavailable
 from bentray_service.files import direct_uploads
 from bentray_service.files.bucket import Bucket
+
+from ..tus_records import settled
 
 PLACE = "/v1/direct-uploads"
 
@@ -45,11 +46,7 @@ def send(http, upload, data, numbers=None):
 
 
 def ended(http, upload):
-    deadline = time.monotonic() + 60.0
-    while (record := http.get(upload["links"]["self"]).json())["state"] in ("receiving", "reading"):
-        assert time.monotonic() < deadline, record
-        time.sleep(0.02)
-    return record
+    return settled(http, upload["links"]["self"])
 
 
 def test_parts_are_assembled_and_read_as_any_upload(service, scan, objects):

@@ -1,7 +1,6 @@
 """Ingestion of chunked uploads: in order, on a full disk, and after errors."""
 
 import threading
-import time
 
 import pytest
 
@@ -17,6 +16,8 @@ from bentray_service.rows.accounts import Accounts
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
+
+from ...waiting import wait_until
 
 PATIENCE_S = 60.0
 
@@ -75,13 +76,11 @@ class Bench:
         return row
 
     def settled(self, row):
-        deadline = time.monotonic() + PATIENCE_S
-        while time.monotonic() < deadline:
-            now = self.uploads.get(Tenant(row.tenant), row.id)
-            if now.state in ("done", "refused"):
-                return now
-            time.sleep(0.01)
-        raise AssertionError(now)
+        def ended():
+            found = self.uploads.get(Tenant(row.tenant), row.id)
+            return found.state in ("done", "refused") and found
+
+        return wait_until(ended)
 
 
 def test_the_oldest_is_read_first(bench):

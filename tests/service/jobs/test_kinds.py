@@ -1,7 +1,6 @@
 """Kinds of jobs: turntables and geometry fields; cancelled, refused, and taken up again after a death."""
 
 import io
-import time
 import zipfile
 
 import pytest
@@ -20,7 +19,7 @@ from bentray_service.rows.tables import JobRow
 from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
 from bentray_workers.rendering import field_settings, geometry_field
 
-from ..conftest import PATIENCE_S
+from ...waiting import wait_until
 from ..stored_volumes import store_volume
 
 SMALL = {"width": 24, "height": 16, "iso": [0.5], "frames": 3}
@@ -178,10 +177,7 @@ def ask_field(http, mesh, **settings):
 
 def wait_until_empty(folder):
     """What a job made on its way goes right after its end is stored."""
-    deadline = time.monotonic() + PATIENCE_S
-    while list(folder.iterdir()):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: not list(folder.iterdir()))
 
 
 def test_a_cancelled_field_leaves_nothing(on_workers, until, monkeypatch):

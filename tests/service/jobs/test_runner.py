@@ -17,6 +17,8 @@ from bentray_service.rows.ids import LOCAL, Tenant
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import NewJob
 
+from ...waiting import wait_until
+
 
 def test_at_most_so_many_at_a_time(start, uploaded, submitted, until, work):
     http = start(jobs_at_once=2)
@@ -57,10 +59,7 @@ def states_of(http, jobs):
 
 
 def until_states(http, jobs, *wanted):
-    deadline = time.monotonic() + 60.0
-    while tuple(found := states_of(http, jobs)) != wanted:
-        assert time.monotonic() < deadline, found
-        time.sleep(0.02)
+    wait_until(lambda: tuple(states_of(http, jobs)) == wanted)
 
 
 def test_job_of_another_tenant_starts_during_long_jobs(start, uploaded, work):
@@ -172,10 +171,7 @@ def test_progress_is_seen_while_it_runs(http, uploaded, submitted, until, work):
     work.hold.clear()
     job = submitted(http, uploaded(http))
     until(http, job["id"], "running")
-    deadline = time.monotonic() + 60.0
-    while http.get(f"/v1/jobs/{job['id']}").json()["progress"]["total"] == 0:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: http.get(f"/v1/jobs/{job['id']}").json()["progress"]["total"])
     work.hold.set()
     assert until(http, job["id"])["progress"]["done"] == 24
 
@@ -197,11 +193,7 @@ def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monk
     until(http, job["id"], "running")
     room[0] = False
     # A look at the disk that began before it was full may still lead to a claim.
-    deadline = time.monotonic() + 60.0
-    while answers[-1]:
-        assert time.monotonic() < deadline
-        runner.notify()
-        time.sleep(0.02)
+    wait_until(lambda: not answers[-1] or runner.notify())
     work.hold.set()
     until(http, job["id"], "queued")
     time.sleep(0.1)
@@ -232,18 +224,12 @@ def test_finished_jobs_leave_no_temporary_files(http, uploaded, submitted, until
     folder = http.app.state.stores.files.of(LOCAL).root / "work"
     work.hold.clear()
     job = submitted(http, uploaded(http))
-    deadline = time.monotonic() + 60.0
     # It is running a moment before its folder is there.
-    while not work.calls:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_until(lambda: work.calls)
     assert [left.name for left in folder.iterdir()] == [job["id"]]
     work.hold.set()
     until(http, job["id"])
-    deadline = time.monotonic() + 60.0
-    while list(folder.iterdir()):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_until(lambda: not list(folder.iterdir()))
 
 
 def test_a_full_queue_is_a_429(start, uploaded, submitted, until, work):

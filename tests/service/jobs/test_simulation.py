@@ -2,7 +2,6 @@
 
 import hashlib
 import threading
-import time
 
 import pytest
 from typer.testing import CliRunner
@@ -11,7 +10,7 @@ from bentray_service.cli import app as command_line
 from bentray_service.rows.ids import LOCAL
 from bentray_workers.simulation import parts
 
-from ..conftest import PATIENCE_S
+from ...waiting import wait_until
 
 SMALL = {"nodes": 16, "elements": 16, "noise_s": 2e-8, "seed": 7}
 WAVES = {"waveform": True, "nodes": 32, "elements": 16, "frequency_hz": 2e5, "side_m": 0.03, "emissions": 4}
@@ -37,13 +36,6 @@ def held(monkeypatch):
     go_on.begun = begun
     yield go_on
     go_on.set()
-
-
-def wait_until(so):
-    deadline = time.monotonic() + PATIENCE_S
-    while not so():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def test_from_settings_to_an_image(on_workers, until, tmp_path):

@@ -13,6 +13,8 @@ from bentray_service.jobs import feed
 from bentray_service.routes import events
 from bentray_service.rows.ids import LOCAL, Tenant
 
+from ...waiting import wait_until
+
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
@@ -147,13 +149,6 @@ def test_streams_are_bounded_for_a_tenant_and_in_all(serve, monkeypatch, uploade
 def opens(http, place):
     with http.stream("GET", place) as answer:
         return answer.status_code == 200
-
-
-def wait_until(happened):
-    deadline = time.monotonic() + 60.0
-    while not happened():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def test_unavailable_database_ends_no_stream(http, uploaded, submitted, until, work, monkeypatch):

@@ -6,7 +6,6 @@ import re
 import socket
 import ssl
 import threading
-import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from types import SimpleNamespace
@@ -22,6 +21,7 @@ from bentray_service.web.server import configuration, listen
 
 from ...edge import CONFIGURATION, SKIPPED, edge, program
 from ...raw_http import exchange
+from ...waiting import wait_until
 from ..conftest import FakeCluster
 
 pytestmark = pytest.mark.skipif(program() is None, reason=SKIPPED)
@@ -97,7 +97,7 @@ def behind(tmp, **changed):
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
     thread.start()
     try:
-        until(lambda: server.started)
+        wait_until(lambda: server.started)
         with (
             edge(tmp / "edge", listening.getsockname()[1], **changed) as found,
             httpx.Client(base_url=found.url, timeout=PATIENCE_S) as http,
@@ -120,14 +120,6 @@ def front(shared):
     shared.service.go.clear()
     yield shared
     shared.service.go.set()
-
-
-def until(so):
-    deadline = time.monotonic() + PATIENCE_S
-    while not (value := so()):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    return value
 
 
 def connected(front):
@@ -208,10 +200,10 @@ def test_slow_bodies_end_and_free_what_they_held(front):
     for statuses, answer in answers:
         assert set(statuses) <= {408}
         assert not statuses or problem_in(answer)[1]["type"] == "/problems/too-slow"
-    until(lambda: not list(front.data.glob("tenants/*/incoming/*")))
+    wait_until(lambda: not list(front.data.glob("tenants/*/incoming/*")))
     # What came is kept, and the upload is free for whoever goes on with it.
     # Until nginx has let go of the other bodies, an answer may be an error without an offset.
-    until(lambda: front.http.head(location, headers=TUS).headers.get("upload-offset") == "1")
+    wait_until(lambda: front.http.head(location, headers=TUS).headers.get("upload-offset") == "1")
     more = front.http.patch(location, headers={**PIECE, "Upload-Offset": "1"}, content=b"more")
     assert more.headers["upload-offset"] == "5", more.text
 
@@ -254,7 +246,7 @@ def test_requests_of_one_address_are_limited_and_health_is_answered(front):
         assert refused.json()["type"] == "/problems/too-many-connections"
         assert front.http.get("/health/live").is_success
         front.service.go.set()
-    until(lambda: front.http.get("/v1/jobs").is_success)
+    wait_until(lambda: front.http.get("/v1/jobs").is_success)
 
 
 def test_idle_connections_make_room(front):

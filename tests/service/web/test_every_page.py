@@ -1,7 +1,6 @@
 """Every page: axe finds nothing serious, nothing scrolls sideways, no request leaves the service."""
 
 import io
-import time
 
 import httpx
 import numpy as np
@@ -14,6 +13,7 @@ from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_workers.files.dataset import write_dataset
 
 from ...kernels.acquisition.traces import scan as trace_scan
+from ...waiting import wait_until
 from ..conftest import PATIENCE_S
 from .finished_results import finished, known
 from .live_results import in_turns, started
@@ -79,10 +79,7 @@ def places(shared_service):
 
 def until(address, job, reached):
     """Wait until the record of a job is as it should be."""
-    deadline = time.monotonic() + PATIENCE_S
-    while not reached(httpx.get(f"{address}/v1/jobs/{job['id']}").json()):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: reached(httpx.get(f"{address}/v1/jobs/{job['id']}").json()), PATIENCE_S)
 
 
 def resized(page, size):

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import chain, repeat
 
+from ...waiting import wait_until
+
 Message = tuple[dict[str, str], bytes]
 
 
@@ -74,7 +76,4 @@ class Receiver:
 
     @staticmethod
     def until(condition: Callable[[], object], patience_s: float = 60.0) -> None:
-        deadline = time.monotonic() + patience_s
-        while not condition():
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        wait_until(condition, patience_s)

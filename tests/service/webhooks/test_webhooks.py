@@ -18,6 +18,7 @@ from bentray_service.rows.tables import DeliveryRow
 from bentray_service.settings import ServiceSettings
 from bentray_service.webhooks import sender
 
+from ...waiting import wait_until
 from ..cli.conftest import bentray as command
 from .local_receiver import Receiver
 
@@ -252,10 +253,8 @@ def test_slow_receivers_of_one_tenant_delay_no_other(called, receiver):
     slow.wait(2)
     time.sleep(0.2)
     assert len(slow.messages) == 2
-    deadline = time.monotonic() + 60.0
-    while not (left := [row for row in Deliveries(database).newest(None, "waiting", 9) if not row.attempts]):
-        assert time.monotonic() < deadline, "the other jobs have not ended"
-        time.sleep(0.02)
+    waiting = Deliveries(database).newest
+    left = wait_until(lambda: [row for row in waiting(None, "waiting", 9) if not row.attempts])
     with database.write() as connection:
         # One of the waiting messages is of another tenant.
         other = update(DeliveryRow).where(DeliveryRow.id == left[0].id)
