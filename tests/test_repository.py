@@ -67,6 +67,15 @@ def test_no_file_names_a_package_index() -> None:
     assert result == []
 
 
+def test_no_test_moves_the_clock_of_all_threads() -> None:
+    # The event loops of other tests' clusters would wait until the true time has caught up.
+    moved = re.compile(
+        r"""setattr\(\s*(?:[\w.]*\btime,\s*|["'][\w.]*\btime\.)["']?(?:time|monotonic|sleep)\b"""
+    )
+    assert moved.search("monkeypatch.setattr(module." + 'time, "time", later)')
+    assert [name for name, text in committed_texts() if name.endswith(".py") and moved.search(text)] == []
+
+
 @pytest.mark.parametrize("folder", ["root", "work", "opt", "home/ann", "Users"])
 @pytest.mark.parametrize("line", ["see /{}/x", "'/{}/x'", "(/{}/x)", "path=/{}/x"])
 def test_the_search_for_machine_folders_finds_them(line: str, folder: str) -> None:

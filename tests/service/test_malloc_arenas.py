@@ -44,9 +44,9 @@ with tempfile.TemporaryFile() as file:
 def arenas(how: str) -> int:
     """How many there are in a process that limits them or does not."""
     # Workers that an earlier test started leave their own limit in this process's environment.
-    clean = {name: value for name, value in os.environ.items() if not name.startswith(("MALLOC_", "GLIBC_TUNABLES"))}
-    done = subprocess.run([sys.executable, "-c", PROGRAM, how], capture_output=True, text=True, check=True, env=clean)
-    return int(done.stdout)
+    clean = {name: value for name, value in os.environ.items() if not name.startswith(("MALLOC_", "GLIBC_"))}
+    command = [sys.executable, "-c", PROGRAM, how]
+    return int(subprocess.run(command, capture_output=True, text=True, check=True, env=clean).stdout)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc alone has arenas")

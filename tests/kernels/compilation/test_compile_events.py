@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -100,7 +101,7 @@ def test_a_kernel_that_another_process_compiles_is_waited_for(monkeypatch):
             if other.poll() is None:
                 other.communicate()
 
-        monkeypatch.setattr(compile_events.time, "sleep", release)
+        monkeypatch.setattr(compile_events, "time", SimpleNamespace(sleep=release, monotonic=time.monotonic))
         with pytest.raises(CompiledMeanwhile):
             events.on_start(_of(first.py_func))
         events.on_end(_of(first.py_func))

@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import tenacity
 import uvicorn
 from tenacity import Retrying
 
@@ -44,7 +46,9 @@ class Walk:
         self, monkeypatch: pytest.MonkeyPatch, told: list[str] | None = None, first: Any = "first"
     ) -> None:
         self.now, self.pauses, self.told = 1000.0, [], [] if told is None else told
-        monkeypatch.setattr(time, "monotonic", lambda: self.now)
+        clock = SimpleNamespace(monotonic=lambda: self.now)
+        for module in (connection, tenacity):
+            monkeypatch.setattr(module, "time", clock)
         self._retries = Retries(300.0, self.told.append)
         self.ask(LOOK, first)
 

@@ -5,6 +5,7 @@ import secrets
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 
@@ -177,8 +178,10 @@ class TestBucketStore(StoreSuite):
         files.store.tidy(lambda: False)
         assert files.store.fetch(orphan).exists()
         assert forgotten.exists()
-        now = time.time()
-        monkeypatch.setattr(bucket_store.time, "time", lambda: now + max(FORGOTTEN_S, LEFT_S) + 60.0)
+        later = time.time() + max(FORGOTTEN_S, LEFT_S) + 60.0
+        monkeypatch.setattr(
+            bucket_store, "time", SimpleNamespace(time=lambda: later, monotonic=time.monotonic)
+        )
         files.store.tidy(lambda: False)
         left = {one.key.rpartition("/")[2] for one in bucket.listed("tenants/")}
         assert left == {kept.name, alone.name}

@@ -1,6 +1,7 @@
 """Messages to webhooks: stored with the end of a job, claimed once, taken over, and in turn by tenant."""
 
 import time
+from types import SimpleNamespace
 
 import pytest
 from sqlalchemy import update
@@ -48,7 +49,7 @@ def test_claimed_once_and_again_when_its_sender_died(database, ended, monkeypatc
     second = found.claim()
     assert (second.id, second.attempts) == (first.id, 2)
     later = time.time() + module.LEASE_S + 1
-    monkeypatch.setattr(time, "time", lambda: later)
+    monkeypatch.setattr(module, "time", SimpleNamespace(time=lambda: later))
     assert found.claim().attempts == 3
 
 
@@ -86,5 +87,5 @@ def test_secrets_of_a_tenant(database, monkeypatch):
     assert secrets.of(LOCAL) == [new, old]
     assert secrets.of(LAB) == [other]
     later = time.time() + module.OVERLAP_S + 1
-    monkeypatch.setattr(time, "time", lambda: later)
+    monkeypatch.setattr(module, "time", SimpleNamespace(time=lambda: later))
     assert secrets.of(LOCAL) == [new]

@@ -3,6 +3,7 @@
 import math
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -154,10 +155,12 @@ def test_second_service_claims_only_expired_jobs(database, jobs, queue, dataset,
     other.claim()
     assert queue.recover(PROBLEM) == 0
     later = time.time() + LEASE_S + 1.0
-    monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later)
+    monkeypatch.setattr("bentray_service.rows.job_queue.time", SimpleNamespace(time=lambda: later))
     other.renew([job.id])
     assert queue.recover(PROBLEM) == 0
-    monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later + LEASE_S + 1.0)
+    monkeypatch.setattr(
+        "bentray_service.rows.job_queue.time", SimpleNamespace(time=lambda: later + LEASE_S + 1.0)
+    )
     assert other.recover(PROBLEM, held=[job.id]) == 0, "its own job is at work"
     assert queue.recover(PROBLEM) == 1
     assert queue.claim().id == job.id
@@ -178,7 +181,7 @@ def test_lost_claim_is_reclaimed(jobs, queue, dataset, monkeypatch):
     queue.renew([])
     assert queue.recover(PROBLEM) == 0, "it may be on its way"
     later = time.time() + LEASE_S + 1.0
-    monkeypatch.setattr("bentray_service.rows.job_queue.time.time", lambda: later)
+    monkeypatch.setattr("bentray_service.rows.job_queue.time", SimpleNamespace(time=lambda: later))
     assert queue.recover(PROBLEM) == 1
     assert queue.claim().id == job.id
 

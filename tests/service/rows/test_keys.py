@@ -1,6 +1,7 @@
 """The rows of keys: a digest in place of the secret, and an end that holds at once."""
 
 import time
+from types import SimpleNamespace
 
 import pytest
 from sqlalchemy import select
@@ -45,11 +46,11 @@ def test_it_ends_when_it_expires_or_is_revoked(keys, monkeypatch):
     keys.add(never, LOCAL, "never", ("read",))
     assert [row.name for row in keys.all()] == ["soon", "never"]
     assert [row.name for row in keys.all(LOCAL)] == ["never"]
-    monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda: now + 101.0)
+    monkeypatch.setattr("bentray_service.rows.keys.time", SimpleNamespace(time=lambda: now + 101.0))
     assert keys.owner(soon) is None
     assert keys.owner(never) is not None
     first = keys.revoke(never.id).revoked
-    monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda: now + 200.0)
+    monkeypatch.setattr("bentray_service.rows.keys.time", SimpleNamespace(time=lambda: now + 200.0))
     assert keys.revoke(never.id).revoked == first
     assert keys.owner(never) is None
     with pytest.raises(InvalidInput, match="bentray keys list"):
@@ -60,6 +61,6 @@ def test_its_last_use_is_known_to_the_minute(keys, monkeypatch):
     token, now = ApiKey.new(), time.time()
     keys.add(token, ACME, "one", ("read",))
     for later, expected in ((0.0, 0.0), (USED_S - 1.0, 0.0), (USED_S + 1.0, USED_S + 1.0)):
-        monkeypatch.setattr("bentray_service.rows.keys.time.time", lambda at=now + later: at)
+        monkeypatch.setattr("bentray_service.rows.keys.time", SimpleNamespace(time=lambda at=now + later: at))
         keys.owner(token)
         assert keys.all()[0].used == pytest.approx(now + expected, abs=1e-3)
