@@ -106,8 +106,6 @@ def tab_to(page, goal):
     raise AssertionError(f"{goal} has not been reached")
 
 
-# Its image did not come within a minute since settings are folded: to be mended, then run by make test again.
-@pytest.mark.nightly
 def test_the_whole_story_by_keyboard_alone(page, service, breast, tmp_path):
     def press(goal, key="Enter"):
         tab_to(page, goal)
@@ -129,7 +127,7 @@ def test_the_whole_story_by_keyboard_alone(page, service, breast, tmp_path):
             press(page.get_by_text("Advanced"))
         tab_to(page, page.get_by_label(name, exact=True))
         page.keyboard.type(text)
-    press(page.get_by_role("button", name="Start"))
+    page.keyboard.press("Enter")
     press(page.locator(".job h2 a"))
     page.locator(".readout").filter(has_text="mm").wait_for()
     http = httpx.Client(headers={"Authorization": f"Bearer {service.keys['south']}"}, timeout=60.0)
@@ -147,7 +145,6 @@ def test_the_whole_story_by_keyboard_alone(page, service, breast, tmp_path):
     assert float(page.locator(".readout").get_attribute("data-value")) == values[17, 16]
     page.locator("#page").focus()
     press(page.get_by_role("main").get_by_role("link", name="Scan", exact=True))
-    press(page.locator("#result-actions").get_by_text("More", exact=True))
     press(page.get_by_role("button", name="Delete"))
     page.get_by_text("No scan yet").wait_for()
     assert http.get(f"{service.url}{job['links']['self']}").status_code == 404

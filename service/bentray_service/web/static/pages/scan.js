@@ -64,8 +64,10 @@ function Run({ scan, from, changes, onStarted }) {
   }, [earlier]);
 
   function start({ submitter }) {
-    const [own, onward] = ["own", "onward"].map((value) => submitter?.value === value);
-    const settings = own ? form.changed(true) : PRESETS[submitter?.value] ?? PRESETS.fast;
+    // Enter in a setting starts with it, though the browser names the first button of the form.
+    const choice = document.activeElement?.closest("#run-settings") ? "own" : submitter?.value;
+    const [own, onward] = ["own", "onward"].map((value) => choice === value);
+    const settings = own ? form.changed(true) : PRESETS[choice] ?? PRESETS.fast;
     if (settings) act(async () => {
       const started = send("POST", "/v1/jobs", { kind: "reconstruction", dataset: scan.id, settings });
       await started.then(({ id }) => (onward ? go(`/jobs/${id}?then=best`) : onStarted()), (problem) => {
