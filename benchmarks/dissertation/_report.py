@@ -9,14 +9,13 @@ from typing import Any
 
 from ._outline import CHAPTERS, Chapter, Item, benchmarks_of
 from ._parts import Part
-from ._summary import lines
+from ._summary import BETTER, NOT_REACHED, REPRODUCED, VERDICTS, lines, verdict
 
-# States of an item; the first four have rows.
-REPRODUCED, PARTLY, MISSED = "reproduced", "partly reproduced", "not reproduced"
+# States of an item without a verdict.
 NO_VALUES = "no values"
 DRAWN, REPLACED = "drawn", "drawn from a replacement"
 SKETCH, NOT_MEASURED = "sketch", "not measured"
-STATES = (REPRODUCED, PARTLY, MISSED, NO_VALUES, DRAWN, REPLACED, SKETCH, NOT_MEASURED)
+STATES = (REPRODUCED, BETTER, NOT_REACHED, NO_VALUES, DRAWN, REPLACED, SKETCH, NOT_MEASURED)
 
 
 def report_of(
@@ -37,8 +36,9 @@ def report_of(
         for chapter in chapters
     ]
     items = [item for chapter in described for item in chapter["items"]]
-    rows = {id(row): row for item in items for row in item["rows"]}.values()
+    rows = {(row["target"], row["detail"]): row for item in items for row in item["rows"]}.values()
     states = Counter(item["state"] for item in items)
+    verdicts = Counter(row["verdict"] for row in rows)
     dates = sorted({part.measured for part in parts.values()})
     by_label = {name: {row["target"]: row for row in part.rows} for name, part in parts.items()}
     wanted = benchmarks_of(tuple(item for chapter in chapters for item in chapter.items))
@@ -53,11 +53,8 @@ def report_of(
         "cluster": cluster,
         "seconds": sum(part.seconds or 0.0 for part in parts.values()),
         "items": {state: states[state] for state in STATES if states[state]},
-        "rows": {
-            "met": sum(row["met"] for row in rows),
-            "missed": sum(not row["met"] and row["value"] is not None for row in rows),
-            "without a value": sum(row["value"] is None for row in rows),
-        },
+        "rows": {name: verdicts[name] for name in (REPRODUCED, BETTER, NOT_REACHED)}
+        | {"without a value": verdicts[""]},
         "summary": list(lines(by_label)),
         "chapters": described,
         "parts": [described_part(name, parts.get(name)) for name in wanted],
@@ -71,7 +68,8 @@ def described_item(item: Item, parts: Mapping[str, Part], *, quick: bool) -> dic
         part = parts.get(source.benchmark)
         if part is None:
             continue
-        rows += [row for row in part.rows if row["target"].startswith(source.targets)]
+        beside = [row for row in part.rows if row["target"].startswith(source.targets)]
+        rows += [{**row, "verdict": verdict(row["value"], row["goal"], row["met"])} for row in beside]
         pictures += [
             {"benchmark": part.benchmark, "file": name} for name in item.pictures if name in part.pictures
         ]
@@ -93,14 +91,12 @@ def described_item(item: Item, parts: Mapping[str, Part], *, quick: bool) -> dic
 
 
 def state_of(item: Item, rows: Sequence[Mapping[str, Any]], pictures: Sequence[object]) -> str:
-    """One of ``STATES``."""
+    """One of ``STATES``: the worst verdict of the rows, if they have one."""
     if item.sketch:
         return SKETCH
-    valued = [row for row in rows if row["value"] is not None]
-    if valued:
-        met = sum(row["met"] for row in valued)
-        whole = met == len(valued) and not item.unreached
-        return REPRODUCED if whole else PARTLY if met else MISSED
+    verdicts = {row["verdict"] for row in rows} - {""}
+    if verdicts:
+        return NOT_REACHED if item.unreached else min(verdicts, key=VERDICTS.index)
     if rows:
         return NO_VALUES
     if pictures:
@@ -114,13 +110,13 @@ def sentence(item: Item, state: str, rows: Sequence[Mapping[str, Any]], *, quick
         return "A sketch of the method, which has no result to reproduce."
     if state == NOT_MEASURED:
         return "Not measured in this run."
-    if state not in (PARTLY, MISSED):
+    if state != NOT_REACHED:
         return ""
-    missed = sum(not row["met"] and row["value"] is not None for row in rows)
-    counted = f"{missed} of {len(rows)} rows miss their goal"
-    if quick and missed:
-        return f"{counted} on the small problems of a quick run. {item.why}".strip()
-    return item.why or f"{counted}."
+    missed = sum(row["verdict"] == NOT_REACHED for row in rows)
+    if not missed:
+        return item.why
+    small = " on the small problems of a quick run" if quick else ""
+    return f"{missed} of {len(rows)} rows are not reached{small}. {item.why}".strip()
 
 
 def described_part(name: str, part: Part | None) -> dict[str, Any]:

@@ -2,10 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any
 
 # Rows in the form of ``Row.to_dict``: benchmark, label, row.
 AllRows = Mapping[str, Mapping[str, Mapping[str, Any]]]
+
+# From the worst.
+VERDICTS = NOT_REACHED, REPRODUCED, BETTER = "not reached", "reproduced", "better"
 
 
 @dataclass(frozen=True)
@@ -110,6 +114,17 @@ CASES = (
 )
 
 
+def verdict(value: float | None, goal: float, met: bool) -> str:
+    """Verdict on a value beside a published one: reproduced where it rounds to it; empty without a value."""
+    if value is None:
+        return ""
+    published = Decimal(str(goal))
+    last_digit = Decimal(1).scaleb(min(int(published.as_tuple().exponent), 0))
+    if abs(Decimal(value) - published) <= last_digit / 2:
+        return REPRODUCED
+    return BETTER if met else NOT_REACHED
+
+
 def lines(rows: AllRows, cases: tuple[Case, ...] = CASES) -> Iterator[dict[str, Any]]:
     """The lines whose rows were measured; a figure is None where there is none."""
     for case in cases:
@@ -130,6 +145,10 @@ def lines(rows: AllRows, cases: tuple[Case, ...] = CASES) -> Iterator[dict[str, 
             "straight": baselines.get("straight rays"),
             "default": default,
             "tuned": tuned.get("error", tuned.get("value")),
+            # Errors and times: less is better.
+            "verdict": ""
+            if case.published is None
+            else verdict(default, case.published, default <= case.published),
         }
 
 

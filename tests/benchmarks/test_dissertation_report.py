@@ -9,7 +9,7 @@ import pytest
 from benchmarks.dissertation._outline import CHAPTERS, items
 from benchmarks.dissertation._recorded import RECORDED, recorded_parts
 from benchmarks.dissertation._report import report_of
-from benchmarks.dissertation._summary import CASES
+from benchmarks.dissertation._summary import BETTER, CASES, NOT_REACHED, REPRODUCED, VERDICTS, verdict
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -48,6 +48,38 @@ def test_labels_of_the_outline_and_of_the_summary_are_labels_of_recorded_rows():
                 assert any(label.startswith(stem) for label in labels), case.name
 
 
+@pytest.mark.parametrize(
+    ("value", "goal", "met", "expected"),
+    [
+        (8.7, 25.0, True, BETTER),
+        (0.0364, 0.036, False, REPRODUCED),
+        (0.0356, 0.036, True, REPRODUCED),
+        (0.0354, 0.036, True, BETTER),
+        (0.0366, 0.036, False, NOT_REACHED),
+        (0.48, 0.0, True, BETTER),
+        (0, 0, True, REPRODUCED),
+        (119.4, 119, True, REPRODUCED),
+        (21.4, 44.0, False, NOT_REACHED),
+        (None, 44.0, False, ""),
+    ],
+)
+def test_reproduced_is_what_rounds_to_the_published_value(value, goal, met, expected):
+    assert verdict(value, goal, met) == expected
+
+
+def test_an_item_has_the_worst_verdict_of_its_rows():
+    made = report_of(
+        recorded_parts(ROOT / "benchmarks/results"), quick=False, cluster=RECORDED, recorded=True
+    )
+    unreached = {item.name for item in items() if item.unreached}
+    described = [item for chapter in made["chapters"] for item in chapter["items"] if item["rows"]]
+    for item in described:
+        verdicts = {row["verdict"] for row in item["rows"]} - {""}
+        worst = NOT_REACHED if item["name"] in unreached else min(verdicts, key=VERDICTS.index)
+        assert item["state"] == worst, item["name"]
+    assert {item["state"] for item in described} == set(VERDICTS)
+
+
 def test_the_page_of_the_documentation_shows_every_item_by_its_recorded_rows(
     monkeypatch: pytest.MonkeyPatch,
 ):
@@ -58,8 +90,9 @@ def test_the_page_of_the_documentation_shows_every_item_by_its_recorded_rows(
     (shown,) = [
         item["rows"] for one in made["chapters"] for item in one["items"] if item["name"] == "Table 5"
     ]
-    assert shown == [row for row in rows.values() if row in shown]
-    assert shown
+    plain = [{key: value for key, value in row.items() if key != "verdict"} for row in shown]
+    assert plain == [row for row in rows.values() if row in plain]
+    assert plain
     assert "<!-- from the code: dissertation -->" in (ROOT / "docs/explanation/how-good-is-it.md").read_text()
     monkeypatch.syspath_prepend(str(ROOT / "docs"))
     text = import_module("from_code.dissertation").dissertation()
