@@ -85,6 +85,7 @@ def test_a_scan_without_truth_has_none(http, uploaded, work, submitted, until):
         "grids": {},
         "candidates": [],
         "criterion": "",
+        "misfit_over_noise": None,
         "reason": "",
         "automatic": "",
         "truth": None,

@@ -29,8 +29,8 @@ def turns(work, monkeypatch):
         if settings.minutes:
             return by_waves(client, path, settings, **control)
         made = work(client, path, settings, **control)
-        said = advice(Validation(misfit=0.32, water=0.02), RAYS, 1e-8, 1.0)
-        return replace(made, trials=(RAYS,), provenance={**made.provenance, "waveform": said})
+        advised = advice(Validation(misfit=0.32, water=0.02), RAYS, 1e-8, 1.0)
+        return replace(made, trials=(RAYS,), provenance={**made.provenance, **advised})
 
     monkeypatch.setattr(reconstruction_run, "reconstruct", reconstruct)
     return queue

@@ -27,8 +27,9 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         ``doubtful``;
         ``grids``: shape, spacing and origin of quantities whose grid is not that of the speed;
         ``candidates``: rows of ``choice_table``; ``criterion``: the name of the misfit that decided;
-        ``reason``: of this choice; all empty without candidates; ``automatic``: what was decided
-        automatically, and why, empty in older files; ``truth``: None without a truth, else ``region``,
+        ``reason``: of this choice; all empty without candidates; ``misfit_over_noise``: of held-out data,
+        where full waveforms are advised, else None; ``automatic``: what was decided automatically, and why,
+        empty in older files; ``truth``: None without a truth, else ``region``,
         ``nodes``, errors, similarities (None if they do not exist), mean and spread of image and truth there;
         or ``region`` with the reason why it is not compared, and ``nodes``.
 
@@ -38,6 +39,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
     # Loaded only where it runs.
     from bentray_kernels.tomography.comparison import NotComparable, compare
     from bentray_kernels.tomography.model_selection.selection import advice_of, choice_table, criterion
+    from bentray_kernels.tomography.result import EXCESS
 
     own, dataset = read_reconstruction(volume), read_dataset(scan, traces=False)
     held = {name: image for name in QUANTITIES if (image := own.image(name)) is not None}
@@ -82,6 +84,7 @@ def result_summary(volume: Path, *, scan: Path) -> dict[str, Any]:
         "automatic": own.provenance.get("automatic", ""),
         "candidates": choice_table(own),
         "criterion": criterion(own.trials),
+        "misfit_over_noise": float(own.provenance[EXCESS]) if EXCESS in own.provenance else None,
         "truth": errors,
     }
 

@@ -116,7 +116,7 @@ class Refinement:
         return evaluations(self._plan)
 
     def advised(self, rays: Reconstruction, noise_s: float, run_graphs: Run, before: int) -> Reconstruction:
-        """The reconstruction with a sentence whether full-waveform refinement is advised.
+        """The reconstruction with the advice whether to refine it by full waveforms, in its provenance.
 
         Args:
             rays: the reconstruction, with its trials; the middle one of several slices is validated.
@@ -129,8 +129,8 @@ class Refinement:
         scan = WaveScan(self._source, validation_settings(self._plan), index)
         graph = ValidationGraph(scan, images[index], rays.history)
         run_graphs([graph], before, 0)
-        sentence = advice(graph.validation, rays.trials[0], noise_s, self._whole_minutes)
-        return replace(rays, provenance={**rays.provenance, "waveform": sentence})
+        advised = advice(graph.validation, rays.trials[0], noise_s, self._whole_minutes)
+        return replace(rays, provenance={**rays.provenance, **advised})
 
     def _result(self, rays: Reconstruction, graphs: Sequence[RefinementGraph]) -> Reconstruction:
         """The result of finished graphs, on the finest of their grids."""

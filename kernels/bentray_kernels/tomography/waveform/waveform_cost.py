@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..result import Candidate
+from ..result import EXCESS, Candidate
 from .band_grid import Extent
 from .validation import Validation
 from .waveform_settings import Band, WaveSettings
@@ -18,6 +18,9 @@ MUCH = 3.0
 
 # Without simulated waves: a misfit of rays above this multiple of the noise is not due to noise.
 MUCH_OF_NOISE = 1.5
+
+# Larger ones, as of a scan that claims no noise, are stored as this one.
+LARGEST_EXCESS = 1000.0
 
 
 def core_seconds(plan: Sequence[Band], width_m: float, record_s: float, fastest_mps: float) -> float:
@@ -36,23 +39,29 @@ def core_seconds(plan: Sequence[Band], width_m: float, record_s: float, fastest_
     return seconds
 
 
-def advice(validation: Validation, rays: Candidate, noise_s: float, minutes: float) -> str:
-    """One sentence: whether full-waveform refinement is advised, and its CPU time.
+def advice(validation: Validation, rays: Candidate, noise_s: float, minutes: float) -> dict[str, str]:
+    """Entries of the provenance: whether full-waveform refinement is advised.
 
     Args:
         validation: of the image from rays.
         rays: the best candidate, used where the validation has no result.
         noise_s: standard deviation of the travel times, s.
         minutes: CPU time of the refinement, minutes.
+
+    Returns:
+        ``waveform``: one sentence with the CPU time; ``EXCESS``: a number, only where it is advised.
     """
     if validation.misfit is not None and validation.water is not None:
-        gain = validation.misfit > MUCH * validation.water
+        misfit, noise, much = validation.misfit, validation.water, MUCH
         reason = f"waves through the image of rays miss held-out emitters by {validation.misfit:.2g}"
         reason += f", those in water by {validation.water:.2g}"
     else:
-        gain = rays.held_out_rms_s > MUCH_OF_NOISE * noise_s
+        misfit, noise, much = rays.held_out_rms_s, noise_s, MUCH_OF_NOISE
         reason = f"rays miss held-out times by {1e9 * rays.held_out_rms_s:.0f} ns"
         reason += f", whose noise is {1e9 * noise_s:.0f} ns"
     takes = "a minute" if minutes < 1.5 else f"{minutes:.0f} minutes"
+    gain = misfit > much * noise
     advice = "is advised" if gain else "would gain little"
-    return f"method waveform {advice}, for {reason}; it takes about {takes} of a core"
+    excess = min(misfit, LARGEST_EXCESS * noise) / noise if noise else LARGEST_EXCESS
+    sentence = f"method waveform {advice}, for {reason}; it takes about {takes} of a core"
+    return {"waveform": sentence, **({EXCESS: f"{excess:.3g}"} if gain else {})}

@@ -92,6 +92,10 @@ class SummaryRecord(BaseModel):
     criterion: Literal["held_out_rms_s", "held_out_mean_s", ""] = Field(
         description="The misfit of the candidates that decided; empty without candidates."
     )
+    misfit_over_noise: float | None = Field(
+        description="Where full waveforms are advised, how many times the noise the misfit of held-out data "
+        "is; else null."
+    )
     reason: str = Field(description="Reason of this choice; empty without candidates.")
     automatic: str = Field(
         description="What was decided automatically, and why; empty for results of earlier versions."

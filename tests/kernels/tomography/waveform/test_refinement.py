@@ -67,19 +67,28 @@ def test_waves_are_advised_where_the_image_explains_less_than_water_does(rays):
     """The image of rays leaves four times what is left in water; beside noise that is nothing."""
     advised = rays.provenance["waveform"]
     assert advised.startswith("method waveform is advised, for waves through the image of rays miss")
+    assert float(rays.provenance["misfit_over_noise"]) > 3.0
     noisy = reconstruct(heard(0.05), replace(PLAN, minutes=0.0))
     assert noisy.provenance["waveform"].startswith("method waveform would gain little, for waves through")
+    assert "misfit_over_noise" not in noisy.provenance
 
 
 def test_advice_without_waveform_inversion_uses_times():
     missed = Candidate({}, held_out_rms_s=100e-9, shown_rms_s=50e-9)
-    assert advice(Validation(), missed, 10e-9, 3.4) == (
-        "method waveform is advised, for rays miss held-out times by 100 ns, whose noise is 10 ns; "
-        "it takes about 3 minutes of a core"
-    )
-    assert advice(Validation(), missed, 80e-9, 0.2).startswith(
-        "method waveform would gain little, for rays miss"
-    )
+    assert advice(Validation(), missed, 10e-9, 3.4) == {
+        "waveform": "method waveform is advised, for rays miss held-out times by 100 ns, "
+        "whose noise is 10 ns; it takes about 3 minutes of a core",
+        "misfit_over_noise": "10",
+    }
+    declined = advice(Validation(), missed, 80e-9, 0.2)
+    assert declined["waveform"].startswith("method waveform would gain little, for rays miss")
+    assert list(declined) == ["waveform"]
+
+
+def test_advice_for_a_scan_that_claims_no_noise_has_a_finite_number():
+    missed = Candidate({}, held_out_rms_s=100e-9, shown_rms_s=50e-9)
+    assert advice(Validation(), missed, 0.0, 1.0)["misfit_over_noise"] == "1e+03"
+    assert advice(Validation(0.3, 0.02), missed, 0.0, 1.0)["misfit_over_noise"] == "15"
 
 
 @pytest.mark.nightly

@@ -9,15 +9,6 @@ import { LiveJob } from "./live_job.js";
 // Best may take half an hour of one processor core for full waveforms.
 export const PRESETS = { fast: { method: "auto" }, best: { method: "auto", minutes: 30 } };
 
-// The reason for full waveforms, as the service words it, with the two misfits that it compares.
-const ADVICE = /is advised, for .* by ([\d.e+-]+)(?: ns)?, (?:those in water by|whose noise is) ([\d.e+-]+)/;
-
-// How many times the noise the misfit of held-out data is, where full waveforms are advised; else null.
-export function adviceIn({ candidates }) {
-  const match = candidates.map(({ outcome }) => ADVICE.exec(outcome)).find(Boolean);
-  return match ? match[1] / match[2] : null;
-}
-
 function Offer({ times, job, onStart }) {
   const [estimate] = useRead(() => planOf(job));
   const takes = estimate && estimate.minutes !== null ? ` Best takes ${waitInWords(estimate)}.` : "";
@@ -29,7 +20,7 @@ function Offer({ times, job, onStart }) {
 
 // children: the image of the job. query: then=best starts the second job at once; best: the id of one that runs.
 export function Onward({ job, summary, query, children }) {
-  const times = adviceIn(summary);
+  const times = summary.misfit_over_noise;
   const [best, setBest] = useState(null);
   const [error, act] = useAct();
   const begun = useRef(false);
