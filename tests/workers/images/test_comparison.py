@@ -29,9 +29,11 @@ def test_titles_show_the_errors_of_compare(undrawn):
     for given in (None, roi):
         comparison_png(true_image, two(), given)
         for name, result in two().items():
-            assert f"{name.capitalize()}: {compare(result, true_image, given).caption()}" in undrawn.words()
-        choice = compare(made(), true_image, given).region_choice
-        assert f"Errors in: {choice}" in undrawn.words()
+            assert f"{name.capitalize()}\n{compare(result, true_image, given).caption()}" in undrawn.words()
+        compared = compare(made(), true_image, given)
+        assert f"Errors in: {compared.region_choice}" in undrawn.words()
+        constant = float(compared.other[compared.region].std())
+        assert f"Phantom\nbest constant: {constant:.1f} m/s rms" in undrawn.words()
 
 
 def test_speeds_share_one_bar_and_differences_another(undrawn):

@@ -29,7 +29,8 @@ PANEL_IN = (4.3, 3.9)
 def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Bools | None = None) -> bytes:
     """The phantom beside each reconstruction, their differences on one scale, and the convergence of all.
 
-    The errors in the titles are those of ``compare``; its region is outlined.
+    The errors in the titles are those of ``compare``; its region is outlined. The title of the phantom has
+    that of the best constant speed.
 
     Args:
         truth: on axes x, y[, z].
@@ -44,22 +45,23 @@ def comparison_png(truth: Truth, results: Mapping[str, Reconstruction], roi: Boo
     comparisons = {name: _compare(name, result, truth, roi) for name, result in results.items()}
     limits = robust_limits([compared.other[compared.region] for compared in comparisons.values()])
     spread = symmetric_limits([compared.difference[compared.region] for compared in comparisons.values()])
-    first, compared = next(iter(results.values())), next(iter(comparisons.values()))
+    finest = max(results, key=lambda name: results[name].speed.size)
+    first, compared = results[finest], comparisons[finest]
     with drawing():
         columns = 1 + len(results)
         figure = new_figure(PANEL_IN[0] * columns + 0.6, 2.0 * PANEL_IN[1] + 0.6)
-        water = f"Rays through a phantom in water of {first.water_speed_mps:.0f} m/s"
+        water = f"Images of a phantom in water of {first.water_speed_mps:.0f} m/s"
         figure.suptitle(water + slice_caption(first, slice_index(first)))
         figure.supxlabel(f"Errors in: {compared.region_choice}", fontsize=8, color="#666666")
         top, bottom = figure.subplots(2, columns)
-        phantom = _panel(top[0], first, compared, compared.other, limits, SPEED, "Phantom")
+        title = f"Phantom\nbest constant: {compared.statistics()[1].spread:.1f} m/s rms"
+        phantom = _panel(top[0], first, compared, compared.other, limits, SPEED, title)
         speeds, differences = [phantom], []
         draw_history(bottom[0], {name: result.history for name, result in results.items()})
         for upper, lower, (name, result) in zip(top[1:], bottom[1:], results.items(), strict=True):
             errors, shown = comparisons[name], name.capitalize()
-            speeds.append(
-                _panel(upper, result, errors, result.speed, limits, SPEED, f"{shown}: {errors.caption()}")
-            )
+            title = f"{shown}\n{errors.caption()}"
+            speeds.append(_panel(upper, result, errors, result.speed, limits, SPEED, title))
             differences.append(
                 _panel(lower, result, errors, errors.difference, spread, DIFFERENCE, f"{shown} minus phantom")
             )

@@ -59,7 +59,7 @@ def test_table_and_pictures_show_the_same_errors(undrawn: Any, wide: bool) -> No
     shown = f"{rows['mean absolute error'].removesuffix(' the range')} range, {rows['rms error']} rms"
     assert scan.truth is not None
     comparison_png(scan.truth, {"bent": image(speed)}, scan.roi)
-    assert f"Bent: {shown}" in undrawn.words()
+    assert f"Bent\n{shown}" in undrawn.words()
     assert f"Errors in: {rows['error region']}" in undrawn.words()
     report_png(image(speed), scan.truth, scan.roi)
     assert f"Difference: {shown}" in undrawn.words()
