@@ -24,7 +24,7 @@ install: .venv/.installed ## create .venv and install Bentray into it, once
 install-dev: .venv/.installed-dev ## the same with the tools for tests and checks
 install-docs: .venv/.installed-docs ## the same with the tools for the documentation
 
-demo: install ## simulate a scan, submit it to a service, compare straight and bent rays (three minutes the first time)
+demo: install ## simulate a scan, reconstruct it on a service by rays and full waveforms (two minutes the first time)
 	@$(BIN)/bentray demo
 
 serve: install ## start the service; HOST=127.0.0.1 PORT=8000
@@ -97,7 +97,9 @@ endef
 .venv/bin/python:
 	@for python in python3.14 python3.13 python3.12 python3.11 python3; do \
 	  if $$python -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
-	    echo "Creating .venv with $$($$python --version), a few seconds"; exec $$python -m venv .venv; \
+	    echo "Creating .venv with $$($$python --version), a few seconds"; \
+	    $$python -m venv .venv & venv=$$!; \
+	    while sleep 2; kill -0 $$venv 2> /dev/null; do echo "  $$SECONDS s"; done; wait $$venv; exit; \
 	  fi; \
 	done; \
 	echo "Bentray requires Python 3.11 or newer with the venv module; none was found on the PATH." >&2; \

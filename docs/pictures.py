@@ -1,6 +1,6 @@
 """Generate the pictures of the documentation: `.venv/bin/python docs/pictures.py [NAME …]`, a few minutes.
 
-`make demo` makes `demo.png`. The pictures of the web page need Debian's Chromium.
+The pictures of the web page need Debian's Chromium.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_kernels.tomography.comparison import compare
 from bentray_service.cli.service_process import running_service
 from bentray_service.client import Client
-from bentray_workers.files.dataset import write_dataset
+from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.reconstruction import read_reconstruction
 from bentray_workers.files.volume_axes import LPS, Grid
 from bentray_workers.images.canvas import drawing, new_figure, to_png
@@ -64,6 +64,8 @@ ENDS: dict[str, dict[str, Any]] = {
 }
 BENTRAY = [sys.executable, "-m", "bentray_service.cli"]
 MM = 1e3
+# Colours of the sample scan.
+SAMPLE_MPS = 1430.0, 1580.0
 
 
 def fronts() -> Image.Image:
@@ -279,27 +281,44 @@ def draw_quantities(figure: Figure, made: Reconstruction) -> None:
 
 
 def overview() -> Image.Image:
-    """The web page beside the truth and the images by straight and bent rays."""
-    scan = simulate(SimulationSettings(nodes=128, elements=256, coupling_mps=1375.0), lambda _: None)
-    assert scan.truth is not None
-    ways = (Settings(method="sart", rays=rays, nodes=128) for rays in ("straight", "curved"))
-    straight, bent = (reconstruct(scan, settings) for settings in ways)
-    panels = [("Phantom", scan.truth.sound_speed_mps)]
-    panels += [
-        (f"{name}: {compare(made, scan.truth, scan.roi).rms:.1f} m/s rms", made.speed)
-        for name, made in (("Straight rays", straight), ("Bent rays", bent))
-    ]
+    """The page of the image by full waveforms of the sample, beside truth and straight rays."""
+    with _service() as service, browser((900, 968)) as page:
+        client, folder = service.client, service.folder
+        scan = client.wait(client.simulate(SAMPLE).id).dataset
+        jobs = {
+            name: client.wait(client.submit(scan, settings).id)
+            for name, settings in (
+                ("Straight rays", {"method": "sart", "rays": "straight"}),
+                ("Full waveform", {"method": "waveform"}),
+            )
+        }
+        results = {
+            name: read_reconstruction(client.download(job.volume, "hdf5", folder / f"{job.id}.h5"))
+            for name, job in jobs.items()
+        }
+        sample = read_dataset(client.download_dataset(scan, folder / "scan.h5"), traces=False)
+        page.goto(f"{service.url}/#/jobs/{jobs['Full waveform'].id}?profile=-45,8,45,8")
+        page.locator(".readout").filter(has_text="m/s").wait_for()
+        shown = _shot(page)
+    assert sample.truth is not None
+    made = {name: compare(result, sample.truth, sample.roi) for name, result in results.items()}
+    finest = made["Full waveform"]
+    panels = [("Truth", finest.other, finest)]
+    panels += [(f"{name}: {one.rms:.1f} m/s rms", one.image, one) for name, one in made.items()]
     figure, axes = plt.subplots(3, 1, figsize=(4.4, 8.8), layout="constrained", sharex=True)
-    half = TABLE6_SIDE_M / 2 * MM
-    for ax, (name, image) in zip(axes, panels, strict=True):
-        shown = ax.imshow(image.T, origin="lower", extent=(-half, half) * 2, vmin=1375, vmax=1560)
-        ax.set_title(name)
-    figure.supylabel("y (mm)", fontsize="medium")
-    axes[-1].set_xlabel("x (mm)")
-    figure.colorbar(shown, ax=axes, label="sound speed (m/s)", shrink=0.5)
-    images = _drawn(figure).convert("RGB")
-    page = viewer(scan, {"method": "sart", "nodes": 128}, (900, images.height))
-    return _beside([page.convert("RGB"), images])
+    for ax, (name, image, one) in zip(axes, panels, strict=True):
+        drawn = draw_map(ax, image, one.spacing_m, one.origin_m, SAMPLE_MPS, colormap=SPEED, title=name)
+    figure.colorbar(drawn, ax=axes, label=LABELS["speed"], shrink=0.5)
+    return _beside([shown.convert("RGB"), _drawn(figure).convert("RGB")])
+
+
+def demo() -> Image.Image:
+    """The images of `bentray demo`, smaller: the upper half of its picture."""
+    with tempfile.TemporaryDirectory() as folder:
+        _run("demo", "-o", folder)
+        drawn = _opened(Path(folder) / "comparison.png")
+    images = drawn.crop((0, 0, drawn.width, round(0.49 * drawn.height)))
+    return images.resize((1500, round(1500 * images.height / images.width)), Image.Resampling.LANCZOS)
 
 
 def viewer(
@@ -482,6 +501,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
     one.__name__: one
     for one in (
         overview,
+        demo,
         fronts,
         coupling,
         mistakes,

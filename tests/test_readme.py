@@ -28,7 +28,7 @@ TEXTS = (
     "docs/how-to/use-over-http.md",
 )
 # Longer, and nobody reads it to the end.
-LONGEST_README = 6000
+LONGEST_README = 5000
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 
 

@@ -109,4 +109,4 @@ def _show(record: dict[str, dict[str, Any]], errors: dict[str, float]) -> None:
         others = (f"{job['truth']['ssim']:.2f}", f"{job['seconds']:.1f} s") if job else ("-", "-")
         rows.append((name, f"{error:.1f} m/s", *others))
     columns = ("image", "rms error", "SSIM", "time")
-    print_table("Simulated breast with lesions, errors inside the breast", columns, rows, columns[1:])
+    print_table("Sample scan, errors inside the breast", columns, rows, columns[1:])

@@ -11,9 +11,10 @@ import pytest
 from typer.testing import Result
 
 from bentray_service.cli import demo as module
+from bentray_workers.simulation.request import SAMPLE
 
 # Half the frequency and half the elements of the sample: a sixteenth of the work.
-SMALL = {**module.SAMPLE, "nodes": 64, "elements": 36, "emissions": 12, "frequency_hz": 1.25e5}
+SMALL = {**SAMPLE, "nodes": 64, "elements": 36, "emissions": 12, "frequency_hz": 1.25e5}
 
 
 @pytest.fixture(autouse=True)
@@ -60,3 +61,17 @@ def test_it_fails_in_one_line_when_full_waveforms_do_not_win(
     assert result.exit_code == 1
     assert "full waveforms are not the most accurate: straight rays" in result.stderr.splitlines()[-1]
     assert "rms error" in result.stdout, "the figures are shown all the same"
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+def test_the_errors_of_the_sample_scan_are_those_of_the_readme(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(module, "SAMPLE", SAMPLE)
+    result = bentray("demo", "-o", tmp_path, "--json")
+    text = (Path(__file__).resolve().parents[3] / "README.md").read_text()
+    stated = re.findall(r"^\| ([a-z ]+) \| \**([\d.]+)\** \| \S+ \| \S+ \|$", text, re.MULTILINE)
+    assert {name: float(error) for name, error in stated} == pytest.approx(
+        json.loads(result.stdout)["rmse_mps"], abs=0.1
+    )
