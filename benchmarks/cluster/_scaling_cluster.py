@@ -17,7 +17,7 @@ from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.dask_settings import NO_DASHBOARD, ours
 from bentray_workers.cluster.fair_shares import IN_FLIGHT
 from bentray_workers.cluster.resources import RECONSTRUCTION, THREADS
-from bentray_workers.cluster.task_pool import finished
+from bentray_workers.cluster.task_pool import EndedFutures
 
 from ._scaling_tasks import pause
 from ._scaling_work import Work
@@ -68,13 +68,13 @@ class Machine:
         window, left = IN_FLIGHT * workers, deque(range(tasks))
         state = bytes(int(work.sent))
         before, begun = self._spent(), time.perf_counter()
-        running = []
+        running, ended = [], EndedFutures()
         while left or running:
             while left and len(running) < window:
                 left.popleft()
                 asked = (pause, length, state, int(work.returned))
-                running.append(client.submit(*asked, resources=RECONSTRUCTION, pure=False))
-            for future in finished(client, running):
+                running.append(ended.watch(client.submit(*asked, resources=RECONSTRUCTION, pure=False)))
+            for future in ended.take():
                 running.remove(future)
                 future.result()
         seconds = time.perf_counter() - begun

@@ -23,7 +23,7 @@ from bentray_service.pictures import Pictures
 from bentray_service.rows.ids import LOCAL
 from bentray_workers.cluster.connection import Cluster, open_cluster
 from bentray_workers.cluster.fair_shares import IN_FLIGHT
-from bentray_workers.cluster.task_pool import finished
+from bentray_workers.cluster.task_pool import EndedFutures
 from bentray_workers.cluster.task_retries import Attempts
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
@@ -91,12 +91,13 @@ def empty_calls(cluster: Cluster, folder: Path, count: int) -> float:
     """Seconds of so many calls that do nothing."""
     attempts = Attempts(cluster.client, folder / "empty")
     running: list[Future] = []
+    ended = EndedFutures()
     begun, left = time.perf_counter(), count
     while left or running:
         while left and len(running) < 2 * IN_FLIGHT:
-            running.append(attempts.submit(Task(bool)))
+            running.append(ended.watch(attempts.submit(Task(bool))))
             left -= 1
-        for future in finished(cluster.client, running):
+        for future in ended.take():
             running.remove(future)
             attempts.result(future)
     return time.perf_counter() - begun
