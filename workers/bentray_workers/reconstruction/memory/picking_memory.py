@@ -19,9 +19,10 @@ from ...files.dataset.counts import Traces
 # Samples of object and water in one task: half a second to a second.
 TASK_SAMPLES = 10_000_000
 
-# Overhead of tasks that read traces, with their libraries; that examine times; that find chords through
-# water; that write the result.
-READING_BYTES, TIMES_BYTES, CHORDS_BYTES, WRITING_BYTES = 30 * 2**20, 6 * 2**20, 10 * 2**20, 11 * 2**20
+# Overhead of tasks that read traces, with their libraries; that compute with times, or check them; that find
+# chords through water; that write the result.
+READING_BYTES, TIMES_BYTES, CHECKING_BYTES = 30 * 2**20, 6 * 2**20, 9 * 2**20
+CHORDS_BYTES, WRITING_BYTES = 10 * 2**20, 12 * 2**20
 
 # Bytes per sample of one emission: statistics; reading; filtering, padded to a power of two.
 MEASURE_BYTES, READ_BYTES, FILTER_BYTES = 58, 12, 64
@@ -32,8 +33,10 @@ GATE_BYTES, POWER_BYTES = 24, 100
 # Bytes per sample of an estimated water shot; per chord that it is estimated from: pulse, spectra.
 SHOT_BYTES, PULSE_BYTES, SPECTRA_BYTES = 8, 2048, 10 * 1024
 
-# Bytes per pair: copies of a period of its pulse and statistics; chords; neighbours and their medians.
-PULSE_COPIES, FIGURE_BYTES, CHORD_BYTES, SETTLE_BYTES = 3 * 8, 100, 210, 720
+# Bytes per pair: copies of a period of its pulse and statistics; chords; checks of its time, measured from
+# 128 to 1024 elements (10.5 to 119 MiB, planned 10.8 to 127); joining of 16 and 40 slices of 256 elements
+# (52 and 122 MiB, planned 54 and 126).
+PULSE_COPIES, FIGURE_BYTES, CHORD_BYTES, CHECK_BYTES, WRITE_BYTES = 3 * 8, 100, 210, 118, 48
 
 
 def parts_of(emissions: int, trace_samples: int) -> list[range]:
@@ -70,7 +73,7 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
         pairs: in all slices.
         settings: of the reconstruction.
     """
-    sizes = {"write_picked": WRITING_BYTES + 48 * pairs}
+    sizes = {"write_picked": WRITING_BYTES + WRITE_BYTES * pairs}
     if traces is None:
         return sizes
     of_slice = traces.emissions * traces.receivers
@@ -92,7 +95,7 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
         sizes["estimate_slice_water"] = TIMES_BYTES + SPECTRA_BYTES * chords
     if settings.picking.examine or not traces.water_shot:
         sizes["measure_traces"] = reading + MEASURE_BYTES * samples
-    sizes["finish_slice"] = finish_slice_bytes(of_slice)
+    sizes["finish_slice"] = 2 * TIMES_BYTES + finish_slice_bytes(of_slice)
     if settings.picking.examine:
         pulse = PULSE_COPIES * (2 * math.ceil(traces.rate_hz / traces.frequency_hz) + 1)
         sizes["examine_slice"] = reading + READ_BYTES * samples + (pulse + FIGURE_BYTES) * of_slice
@@ -103,5 +106,10 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
 
 
 def finish_slice_bytes(pairs: int) -> int:
-    """Memory of the task that finishes one slice."""
-    return TIMES_BYTES + SETTLE_BYTES * pairs
+    """Memory of the task that finishes one slice with times."""
+    return CHECKING_BYTES + CHECK_BYTES * pairs
+
+
+def join_slices_bytes(pairs: int) -> int:
+    """Memory of the task that joins slices with times, which stay on the workers until then."""
+    return TIMES_BYTES + WRITE_BYTES * pairs

@@ -22,7 +22,7 @@ from bentray_kernels.tomography.uncertainty.ray_uncertainty import BATCHES
 from ...cluster.capacities import MIB, REAL
 from ...files.dataset.counts import Summary
 from .block_memory import block_task_parts
-from .picking_memory import finish_slice_bytes, picking_task_bytes
+from .picking_memory import finish_slice_bytes, join_slices_bytes, picking_task_bytes
 
 # Overhead of Python in any task: half of it on 3.11 and 3.12, all of it on 3.13.
 FLOOR_BYTES = 7 * MIB
@@ -117,6 +117,7 @@ def call_bytes(scan: Summary, settings: Settings) -> dict[str, int]:
         sizes |= picking_task_bytes(scan.recorded, scan.pairs, settings)
     elif settings.picking.examine:
         sizes["finish_slice"] = finish_slice_bytes(scan.pairs // scan.slices)
+        sizes["write_picked"] = join_slices_bytes(scan.pairs)
     return sizes | {name: sum(parts.values()) for name, parts in ray_task_parts(scan, settings).items()}
 
 
