@@ -25,6 +25,7 @@ install-dev: .venv/.installed-dev ## the same with the tools for tests and check
 install-docs: .venv/.installed-docs ## the same with the tools for the documentation
 
 demo: install ## simulate a scan, reconstruct it on a service by rays and full waveforms (two minutes the first time)
+	@echo "Running bentray demo"
 	@$(BIN)/bentray demo
 
 serve: install ## start the service; HOST=127.0.0.1 PORT=8000
