@@ -27,6 +27,7 @@ from .waveform_cost import advice
 from .waveform_settings import WaveSettings
 
 # ``auto`` gives the refined image if its misfit of held-out emitters is below this part of that before.
+# Set on the scans of README, which therefore do not judge it.
 CLEARLY = 0.92
 
 
