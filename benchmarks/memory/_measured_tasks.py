@@ -48,13 +48,13 @@ class Job(NamedTuple):
         name: of its kind.
         run: takes the client of a worker, a folder and a size; returns the planned bytes by task.
         size: further arguments of ``run``.
-        warm: a small size, which loads the compiled code; None: tasks load their libraries, as planned.
+        warm: a small size, which loads libraries and compiled code: plans are above a warm worker.
     """
 
     name: str
     run: Callable[..., Bytes]
     size: tuple[Any, ...]
-    warm: tuple[Any, ...] | None = None
+    warm: tuple[Any, ...]
 
     def __str__(self) -> str:
         return f"{self.name}, {' x '.join(str(part) for part in self.size)}"
@@ -107,7 +107,7 @@ def by_volume(name: str, client: Client, folder: Path, nodes: int, pixels: int =
         "mesh": (
             mesh_volume,
             {"iso": None, "step": 8, "target": folder / "mesh"},
-            picture_cost.mesh_cost,
+            partial(picture_cost.mesh_cost, step=8),
         ),
     }.get(name, (export_volume, written, partial(picture_cost.export_cost, name=name)))
     _call(client, task, path, **options)
@@ -225,11 +225,11 @@ def jobs() -> Iterator[Job]:
             yield Job(name, partial(by_phantom, asked), (phantom,), (small_phantom,))
     for name, shapes in VOLUMES.items():
         for shape in shapes:
-            yield Job(name, partial(by_volume, name), shape)
+            yield Job(name, partial(by_volume, name), shape, (16,))
     for field in ((6, 65, 64), (16, 257, 64), (6, 513, 3000)):
-        yield Job("geometry field", by_field, field)
+        yield Job("geometry field", by_field, field, (6, 33, 16))
     for name in ("quality", "geometry", "emission"):
-        yield Job(name, partial(by_scan, name), (96, 3000))
+        yield Job(name, partial(by_scan, name), (96, 3000), (16, 700))
 
 
 JOBS = tuple(jobs())

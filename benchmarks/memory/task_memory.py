@@ -30,8 +30,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 def measured(folder: Path, job: Job) -> tuple[Row, Row]:
     """Run a job in a worker process of its own that has run a small one of its kind."""
     with open_cluster(workers=1, local_directory=folder) as cluster:
-        if job.warm is not None:
-            job.run(cluster.client, folder, *job.warm)
+        job.run(cluster.client, folder, *job.warm)
         of_worker(cluster.client, forget_peak)
         idle = of_worker(cluster.client, peak_bytes)
         plan = job.run(cluster.client, folder, *job.size)

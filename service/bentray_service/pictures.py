@@ -217,7 +217,7 @@ class Pictures:
         self, volume: VolumeRow, iso: float | None, step: int, target: Path
     ) -> dict[str, Any]:
         """Extract the iso-surface of a volume to a mesh file, see ``isosurface_mesh.mesh_volume``."""
-        cost = picture_cost.mesh_cost(VolumeFile.from_row(volume.values()))
+        cost = picture_cost.mesh_cost(VolumeFile.from_row(volume.values()), step)
         return dict(await self._one(volume, cost, mesh_volume, {"iso": iso, "step": step, "target": target}))
 
     async def export(

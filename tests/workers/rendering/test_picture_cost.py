@@ -31,7 +31,7 @@ LANES = ("recon", "render")
 
 
 def test_a_large_picture_of_smooth_glass_is_taken_and_a_deep_one_refused():
-    stored = VolumeFile((128, 128, 128), 6)
+    stored = VolumeFile((128, 128, 128), 4)
     large = RefractionView(width=MAX_PIXELS, height=MAX_PIXELS)
     assert refraction_cost(stored, large).seconds < picture_cost.MAX_SECONDS + 1.0
     with pytest.raises(InvalidInput, match=r"width, height, depth: .* or submit a job of kind `refraction`"):
@@ -55,7 +55,7 @@ def test_default_pictures_of_the_page_are_accepted():
 
 
 def test_cost_grows_with_every_parameter():
-    stored, view = VolumeFile((64, 64, 64), 6), RefractionView
+    stored, view = VolumeFile((64, 64, 64), 4), RefractionView
     usual = refraction_cost(stored, view()).seconds
     for more in (
         view(width=1024),
@@ -124,7 +124,7 @@ def volumes(tmp_path_factory):
     return folder
 
 
-LARGE = VolumeFile((200, 200, 200), 6)
+LARGE = VolumeFile((200, 200, 200), 4)
 
 
 @pytest.mark.slow

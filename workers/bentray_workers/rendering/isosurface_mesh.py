@@ -77,7 +77,8 @@ def mesh_volume(path: Path, iso: float | None, step: int, target: Path) -> dict[
 
 
 def _check_size(values: NDArray[Any], iso: float) -> None:
-    above = values > iso
+    # The surface is closed where values above it reach the border.
+    above = np.pad(values > iso, 1)
     cuts = sum(int(np.count_nonzero(np.diff(above, axis=axis))) for axis in range(3))
     if cuts > MAX_CROSSINGS:
         accepted = f"at most {MAX_CROSSINGS}: a larger step, or an iso-value of a smaller surface"

@@ -1,7 +1,7 @@
 """Cost of a picture, estimated before it starts: CPU time and memory, checked against the workers.
 
 Seconds are typical for a core of 2023: rough volumes take several times as long. Bytes are an upper bound,
-compared with measured peaks in ``tests/workers/rendering/test_picture_cost.py``.
+compared with peaks in ``tests/workers/rendering/test_picture_cost.py`` and ``bentray bench task_memory``.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ from ..cluster.capacities import MIB, WorkerCapacity
 from ..cluster.resources import RECONSTRUCTION, RENDER
 from ..files.dataset.counts import BLOCK_BYTES
 from ..files.export.registry import EXPORTED, FormatName
+from ..files.quantities import IMAGES
 from .field_tasks import FACE_BYTES
 from .field_view import FieldView
+from .isosurface_mesh import MAX_CROSSINGS
 from .refraction_view import RefractionView
 from .scene_cache import BUILDING_BYTES, needed_bytes
 from .tiles import TASK_RAYS
@@ -40,20 +42,27 @@ RAY_BYTES, PIXEL_BYTES = 160, 8
 RAY_S, SURFACE_S = 6e-7, 1.5e-7
 SMOOTH_SCENE_S = 2.5e-7
 
-# Per pixel drawn and compressed by Matplotlib.
-DRAWN_BYTES, DRAWN_S = 56, 2e-7
+# Per pixel drawn and compressed by Matplotlib: measured 29 with a frame, 42 without; of a page of quality.
+DRAWN_BYTES, DRAWN_S = 46, 2e-7
+PAGE_BYTES = 40 * MIB
 # Sides of a picture without a given size, pixels.
 USUAL_SIZE = 1200
 
-# A reconstruction has four images at most, float64 each, and is read whole; a volume float32 at most.
-IMAGES, REAL = 4, 8
+# All images of a reconstruction are read, float64 each (measured: 42 to 46 bytes a node); a volume is float32
+# at most. Masks of finite values take a byte of a node.
+REAL, RECONSTRUCTION_MASKS, MASKS = 8, 4, 1
 READ_S = 2e-9
+
+# Measured with up to 380³ nodes: of any file that is read; per node while a volume is filtered; of a mesh, per
+# node of its grid and per cut edge (325 MiB for 74,896 edges in 120³ nodes).
+FILE_BYTES = 16 * MIB
+FILTER_BYTES, MESHED_BYTES, CROSSING_BYTES = 26, 17, 4600
 
 # Of a geometry field: per camera ray, and per surface at which it may continue (twice with exact lookups).
 # Measured: 0.3 to 2.4 us per ray at depths to 16, of which most rays need few; 22 us for glass that fills the
 # picture.
 FIELD_RAY_S, FIELD_SURFACE_S = 1e-6, 3e-7
-SCENE_BYTES = 96 * MIB
+SCENE_BYTES = 36 * MIB
 
 # Bytes of traces that a core examines in a second.
 TRACE_BYTES_PER_S = 2**25
@@ -118,17 +127,18 @@ def refraction_bytes(shape: Sequence[int], view: RefractionView) -> int:
 
 def histogram_cost(stored: VolumeFile) -> Cost:
     """Cost of a histogram of a volume, with the filter of a picture of it."""
-    filtered = needed_bytes(stored.shape, BUILDING_BYTES) if len(stored.shape) == 3 else 0
-    # NumPy converts pieces of the values; the mean and deviation take one copy in float64.
-    needed = FLOOR_BYTES + stored.read_bytes + max(REAL * math.prod(stored.shape), filtered)
-    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * math.prod(stored.shape), needed)
+    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * math.prod(stored.shape), _filtered_bytes(stored))
 
 
 def coefficients_cost(stored: VolumeFile) -> Cost:
     """Cost of a filtered volume, sent as float32: one array and its file."""
     nodes = math.prod(stored.shape)
-    needed = FLOOR_BYTES + stored.read_bytes + needed_bytes(stored.shape, BUILDING_BYTES + REAL)
-    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * nodes, needed)
+    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * nodes, _filtered_bytes(stored))
+
+
+def _filtered_bytes(stored: VolumeFile) -> int:
+    """Memory to read a volume, and then to filter one image of it, or to compute its histogram."""
+    return FLOOR_BYTES + max(stored.read_bytes, needed_bytes(stored.shape, FILTER_BYTES))
 
 
 def field_cost(figures: Mapping[str, Any], view: FieldView) -> Cost:
@@ -170,13 +180,13 @@ def quality_cost(dataset: Mapping[str, Any]) -> Cost:
     # Traces of one emission of object and water at a time, with a few copies.
     emission = 16 * traces // max(1, int(dataset["ntx"]) * int(dataset["slices"]))
     seconds = 1.0 + traces / TRACE_BYTES_PER_S + 2e-6 * pairs
-    return Cost(seconds, 2 * FLOOR_BYTES + DRAWN_BYTES * USUAL_SIZE**2 + emission + 256 * pairs)
+    return Cost(seconds, FLOOR_BYTES + PAGE_BYTES + emission + 256 * pairs)
 
 
 def geometry_cost(dataset: Mapping[str, Any]) -> Cost:
     """Cost of reading a scan without its traces."""
     pairs = int(dataset["ntx"]) * int(dataset["nrx"]) * int(dataset["slices"])
-    return Cost(FLOOR_SECONDS + 1e-7 * pairs, FLOOR_BYTES + 64 * pairs)
+    return Cost(FLOOR_SECONDS + 1e-7 * pairs, FILE_BYTES + 64 * pairs)
 
 
 def emission_cost(dataset: Mapping[str, Any]) -> Cost:
@@ -186,16 +196,19 @@ def emission_cost(dataset: Mapping[str, Any]) -> Cost:
     return Cost(whole.seconds + emission / TRACE_BYTES_PER_S, whole.bytes + 2 * BLOCK_BYTES + 16 * emission)
 
 
-def mesh_cost(stored: VolumeFile) -> Cost:
-    """Cost of the iso-surface of a volume as a mesh."""
+def mesh_cost(stored: VolumeFile, step: int) -> Cost:
+    """Cost of the iso-surface of a volume as a mesh, at most as large as ``isosurface_mesh`` allows."""
     nodes = math.prod(stored.shape)
-    return Cost(4.0 + 3e-8 * nodes, 4 * FLOOR_BYTES + stored.read_bytes + 16 * nodes)
+    used = math.prod(-(-n // step) for n in stored.shape)
+    surface = max(MESHED_BYTES * used, CROSSING_BYTES * min(MAX_CROSSINGS, len(stored.shape) * used))
+    return Cost(4.0 + 3e-8 * nodes, FLOOR_BYTES + stored.read_bytes + surface)
 
 
 def export_cost(stored: VolumeFile, name: FormatName) -> Cost:
-    """Cost of an export to one of ``EXPORTED``: the volume is read whole, and copied to write it."""
+    """Cost of an export to one of ``EXPORTED``: the volume is read whole, and images copied to write them."""
     written = EXPORTED[name]
-    needed = FLOOR_BYTES + written.library_bytes + int(written.copies * stored.read_bytes)
+    copied = written.copies * stored.value_bytes * (stored.images if written.copies_all else 1)
+    needed = FILE_BYTES + written.library_bytes + stored.read_bytes + copied * math.prod(stored.shape)
     return Cost(FLOOR_SECONDS + 4 * READ_S * stored.read_bytes, needed)
 
 
@@ -214,26 +227,28 @@ class VolumeFile:
 
     Attributes:
         shape: (nx, ny[, nz]).
-        node_bytes: memory per node when it is read.
+        value_bytes: of a node of one image.
+        images: their number; more than one of a reconstruction.
     """
 
     shape: tuple[int, ...]
-    node_bytes: int
+    value_bytes: int
+    images: int = 1
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any]) -> VolumeFile:
         """From a row of ``volumes`` or ``uploaded_volumes``."""
-        nodes = math.prod(row["shape"])
+        shape = tuple(row["shape"])
         if "job_id" in row:
-            # Read, and converted to float64.
-            return cls(tuple(row["shape"]), (IMAGES + 1) * REAL)
-        # The values are not compressed; a mask of finite values takes a byte each.
-        return cls(tuple(row["shape"]), 2 + max(1, min(4, int(row["bytes"]) // nodes)))
+            return cls(shape, REAL, len(IMAGES))
+        # The values are not compressed.
+        return cls(shape, max(1, min(4, int(row["bytes"]) // math.prod(shape))))
 
     @property
     def read_bytes(self) -> int:
         """Memory of the whole file."""
-        return math.prod(self.shape) * self.node_bytes
+        masks = MASKS if self.images == 1 else RECONSTRUCTION_MASKS
+        return math.prod(self.shape) * (self.images * self.value_bytes + masks)
 
 
 def spare_bytes(capacity: WorkerCapacity) -> float:

@@ -36,7 +36,8 @@ class ExportFormat:
         media_type: of a download.
         extension: of a download, without a dot; empty: the first suffix.
         local: suffixes of files that a service does not send.
-        copies: memory while it is written, in sizes of the volume as it is read (measured).
+        copies: of one image while it is written (measured).
+        copies_all: whether of all images at a time.
         library_bytes: memory of the libraries that it is written by.
     """
 
@@ -51,7 +52,8 @@ class ExportFormat:
     media_type: str = "application/octet-stream"
     extension: str = ""
     local: tuple[str, ...] = ()
-    copies: float = 2.0
+    copies: int = 0
+    copies_all: bool = False
     library_bytes: int = 0
 
     @property
@@ -127,6 +129,7 @@ FORMATS: Mapping[FormatName, ExportFormat] = MappingProxyType(
             uneven=True,
             writer="mat_writing",
             media_type="application/x-matlab-data",
+            copies=1,
         ),
         "vti": ExportFormat(
             "VTK (ParaView)", (".vti",), "all images as ImageData", "RAS, m", writer="vti_writing"
@@ -140,6 +143,8 @@ FORMATS: Mapping[FormatName, ExportFormat] = MappingProxyType(
             media_type="application/zip",
             extension="ome.zarr.zip",
             local=(".zarr",),
+            copies=1,
+            copies_all=True,
             library_bytes=96 * 2**20,
         ),
         "dicom": ExportFormat(
@@ -149,8 +154,8 @@ FORMATS: Mapping[FormatName, ExportFormat] = MappingProxyType(
             "LPS, mm (`ImageOrientationPatient`)",
             writer="dicom_writing",
             media_type="application/dicom",
-            copies=3.0,
-            library_bytes=160 * 2**20,
+            copies=4,
+            library_bytes=104 * 2**20,
         ),
     }
 )

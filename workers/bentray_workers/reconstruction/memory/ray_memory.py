@@ -81,7 +81,11 @@ def emitters_of(scan: Summary, settings: Settings) -> int:
 def rays_of(scan: Summary, settings: Settings) -> int:
     """Number of rays of one problem that are held at the same time."""
     rays = emitters_of(scan, settings) * scan.receivers
-    return -(-rays // 2) if settings.method == "gauss-newton" and settings.numerics.reciprocity else rays
+    # Elements that only receive are emitters too, of the reverse pairs.
+    recorded = -(-scan.pairs // (1 if settings.decomposition == "volume" else scan.slices))
+    if settings.method == "gauss-newton" and settings.numerics.reciprocity:
+        return min(-(-rays // 2), recorded)
+    return min(rays, 2 * recorded)
 
 
 def _entries(settings: Settings, in_space: bool) -> float:
