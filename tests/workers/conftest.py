@@ -6,6 +6,7 @@ import pytest
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.files.dataset import write_dataset
 
 
 @pytest.fixture(scope="session")
@@ -29,3 +30,11 @@ def scan():
         delta_tof_s=-1e-6 * chord * np.array([1.0, 0.5, 0.2])[:, None, None],
         slice_z_m=np.array([0.0, 0.003, 0.006]),
     )
+
+
+@pytest.fixture
+def path(scan, tmp_path):
+    """File of the scan of a test."""
+    target = tmp_path / "scan.h5"
+    write_dataset(target, scan)
+    return target

@@ -19,9 +19,9 @@ RESIDUAL_EDGES_S = np.concatenate((-_DECADES[::-1], _DECADES))
 # Begins the first line of a doubtful result, and the advice of its job.
 DOUBTFUL = "Doubtful result."
 CHECK = "Else check the scan (bentray quality): units, order of the elements, time zero, speed of the water."
+
 # Entry of the provenance where full waveforms are advised: how many times the noise the held-out misfit is.
 EXCESS = "misfit_over_noise"
-
 
 # Subjects of cautions by their codes.
 SUBJECTS = {

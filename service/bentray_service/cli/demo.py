@@ -81,8 +81,7 @@ def demo(
     errors["best constant"] = record[finest]["truth"]["statistics"]["truth"]["spread"]
     took = time.perf_counter() - started
     if as_json:
-        shown = {"jobs": record, "rmse_mps": errors, "picture": str(picture), "seconds": round(took, 3)}
-        print_json(shown)
+        print_json({"jobs": record, "rmse_mps": errors, "picture": str(picture), "seconds": round(took, 3)})
     else:
         _show(record, errors)
         print_lines([f"Total time {took:.0f} s; the first run compiles kernels. Picture:", str(picture)])

@@ -4,6 +4,7 @@ import json
 import threading
 import time
 from contextlib import ExitStack, contextmanager
+from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -13,6 +14,7 @@ from bentray_service.jobs import feed
 from bentray_service.routes import events
 from bentray_service.rows.ids import LOCAL, Tenant
 
+from ...clock import Clock
 from ...waiting import wait_until
 
 
@@ -172,22 +174,13 @@ def changes_in(answer):
     return [json.loads(one["data"]) for one in parsed(answer.text)]
 
 
-class Clock:
-    """In place of ``time`` for streams, which end when a test lets it go on."""
-
-    def __init__(self):
-        self.now = 0.0
-
-    def monotonic(self):
-        return self.now
-
-
 @contextmanager
 def all_events(http, monkeypatch):
     """What a stream of all jobs tells in the block, and what the feed knows, which has read once before."""
+    # Streams end when the test lets the clock go on.
     clock, told, watched = Clock(), {}, http.app.state.background.feed._tenants
     with monkeypatch.context() as patch:
-        patch.setattr(events, "time", clock)
+        patch.setattr(events, "time", SimpleNamespace(monotonic=clock))
         patch.setattr(events, "SILENCE_SECONDS", 0.05)
         listener = threading.Thread(target=lambda: told.update(all=http.get("/v1/events?seconds=1")))
         listener.start()

@@ -91,15 +91,10 @@ def test_simulated_scan_can_be_reconstructed(page, serve, monkeypatch):
 def test_a_queued_job_tells_its_place(page, serve, scan):
     # Jobs stay where they are: no disk has so much room.
     address = serve(min_free_bytes=2**60)
-    stream = {"Content-Type": "application/x-hdf5"}
-    sent = httpx.post(
-        f"{address}/v1/datasets", content=scan().read_bytes(), headers=stream, timeout=60
-    ).json()
-    asked = {"kind": "reconstruction", "dataset": sent["id"], "settings": {"method": "sart", "nodes": 16}}
-    made = [httpx.post(f"{address}/v1/jobs", json=asked).json() for _ in range(3)]
-    page.goto(f"{address}/#/jobs/{made[2]['id']}")
+    made = [submit(address, scan) for _ in range(3)]
+    page.goto(f"{address}/#/jobs/{made[2]}")
     page.get_by_text("2 jobs before this one").wait_for()
-    httpx.post(f"{address}{made[0]['links']['cancel']}").raise_for_status()
+    httpx.post(f"{address}/v1/jobs/{made[0]}/cancel").raise_for_status()
     page.get_by_text("1 job before this one").wait_for()
 
 

@@ -4,12 +4,7 @@ from bentray_kernels.compilation.compile_events import Compilation
 from bentray_kernels.tomography.result import Progress
 from bentray_workers.cluster.job_progress import JobProgress, compilation_on
 
-
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
+from ...clock import Clock
 
 
 def test_kernels_are_counted_while_nothing_else_is_reported():

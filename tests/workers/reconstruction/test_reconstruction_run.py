@@ -31,13 +31,6 @@ OTHERS = {
 }
 
 
-@pytest.fixture
-def path(scan, tmp_path):
-    target = tmp_path / "scan.h5"
-    write_dataset(target, scan)
-    return target
-
-
 @pytest.mark.parametrize("plan", METHODS, ids=lambda plan: plan.method)
 def test_amplitudes_give_the_attenuation_of_the_kernels(cluster, scan, tmp_path, plan):
     loud = replace(scan, log_ratio_np=-1e6 * scan.delta_tof_s, water_attenuation_np_m=0.1)

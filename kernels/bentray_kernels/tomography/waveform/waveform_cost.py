@@ -53,12 +53,11 @@ def advice(validation: Validation, rays: Candidate, noise_s: float, minutes: flo
     """
     if validation.misfit is not None and validation.water is not None:
         misfit, noise, much = validation.misfit, validation.water, MUCH
-        reason = f"waves through the image of rays miss held-out emitters by {validation.misfit:.2g}"
-        reason += f", those in water by {validation.water:.2g}"
+        reason = f"waves through the image of rays miss held-out emitters by {misfit:.2g}"
+        reason += f", those in water by {noise:.2g}"
     else:
         misfit, noise, much = rays.held_out_rms_s, noise_s, MUCH_OF_NOISE
-        reason = f"rays miss held-out times by {1e9 * rays.held_out_rms_s:.0f} ns"
-        reason += f", whose noise is {1e9 * noise_s:.0f} ns"
+        reason = f"rays miss held-out times by {1e9 * misfit:.0f} ns, whose noise is {1e9 * noise:.0f} ns"
     takes = "a minute" if minutes < 1.5 else f"{minutes:.0f} minutes"
     gain = misfit > much * noise
     advice = "is advised" if gain else "would gain little"

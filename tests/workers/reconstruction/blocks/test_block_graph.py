@@ -13,7 +13,6 @@ from bentray_kernels.task_graph import ThreadPool, run
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_kernels.tomography.scan import MemorySource, Scan
-from bentray_workers.files.dataset import write_dataset
 from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.reconstruction.blocks.block_files import BLOCKS
 from bentray_workers.reconstruction.blocks.block_graph import BlockSartGraph
@@ -48,13 +47,6 @@ def scan():
         delta_tof_s=delta,
         slice_z_m=0.01 * np.arange(HEIGHTS),
     )
-
-
-@pytest.fixture
-def path(scan, tmp_path):
-    target = tmp_path / "scan.h5"
-    write_dataset(target, scan)
-    return target
 
 
 @pytest.mark.parametrize(("changes", "blocks"), WAYS.values(), ids=WAYS)
