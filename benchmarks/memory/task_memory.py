@@ -19,12 +19,19 @@ EXCESS, WARM_FREE_BYTES = 0.4, 64 * MIB
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
-    """Peak of each size with its plan as goal, and the plan with what it may be at most."""
-    jobs = [job for job in JOBS if not context.quick or job.name in QUICK]
+    """Peak of each size with its plan as goal, and the plan with what it may be at most.
+
+    Pictures, which take seconds, come first, and Ctrl-C ends a run with the sizes measured so far.
+    """
+    jobs = [job for job in reversed(JOBS) if not context.quick or job.name in QUICK]
     for number, job in enumerate(jobs):
         context.progress(number, len(jobs), str(job))
-        with context.temporary_folder() as folder:
-            yield from measured(folder, job)
+        try:
+            with context.temporary_folder() as folder:
+                found = measured(folder, job)
+        except KeyboardInterrupt:
+            return
+        yield from found
 
 
 def measured(folder: Path, job: Job) -> tuple[Row, Row]:

@@ -22,7 +22,7 @@ TASK_SAMPLES = 10_000_000
 # Overhead of tasks that read traces, with their libraries; that compute with times, or check them; that find
 # chords through water; that write the result.
 READING_BYTES, TIMES_BYTES, CHECKING_BYTES = 30 * 2**20, 6 * 2**20, 9 * 2**20
-CHORDS_BYTES, WRITING_BYTES = 10 * 2**20, 12 * 2**20
+CHORDS_BYTES, WRITING_BYTES = 11 * 2**20, 12 * 2**20
 
 # Bytes per sample of one emission: statistics; reading; filtering, padded to a power of two.
 MEASURE_BYTES, READ_BYTES, FILTER_BYTES = 58, 12, 64
@@ -95,7 +95,7 @@ def picking_task_bytes(traces: Traces | None, pairs: int, settings: Settings) ->
         sizes["estimate_slice_water"] = TIMES_BYTES + SPECTRA_BYTES * chords
     if settings.picking.examine or not traces.water_shot:
         sizes["measure_traces"] = reading + MEASURE_BYTES * samples
-    sizes["finish_slice"] = 2 * TIMES_BYTES + finish_slice_bytes(of_slice)
+    sizes["finish_slice"] = CHECKING_BYTES + finish_slice_bytes(of_slice)
     if settings.picking.examine:
         pulse = PULSE_COPIES * (2 * math.ceil(traces.rate_hz / traces.frequency_hz) + 1)
         sizes["examine_slice"] = reading + READ_BYTES * samples + (pulse + FIGURE_BYTES) * of_slice
