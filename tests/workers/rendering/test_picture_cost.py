@@ -2,10 +2,10 @@
 
 import math
 import multiprocessing
-from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.reconstruction._worker_use import forget_peak, peak_bytes
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.request_fields import MAX_PIXELS
@@ -95,10 +95,10 @@ def taken(work, *given) -> int:
 def _peak(work, given) -> int:
     small, *rest = given
     _call(work, *small)
-    Path("/proc/self/clear_refs").write_text("5")
-    before = _high_water()
+    forget_peak()
+    before = peak_bytes()
     _call(work, *rest)
-    return _high_water() - before
+    return peak_bytes() - before
 
 
 def _call(work, *given) -> None:
@@ -106,11 +106,6 @@ def _call(work, *given) -> None:
     work(
         *positional, **{name: value for one in given if isinstance(one, dict) for name, value in one.items()}
     )
-
-
-def _high_water() -> int:
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM"))
 
 
 @pytest.fixture(scope="module")
