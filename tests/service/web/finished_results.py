@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ..conftest import ENDED, PATIENCE_S, FakeWork
+from .live_results import started
 
 SPACING_M, ORIGIN_M = (1e-3, 2e-3, 3e-3), (-0.01, -0.02, 0.005)
 
@@ -40,15 +41,11 @@ def finished(
         return replace(plain(self, *given, **named), speed=speed, **own, **grid)
 
     monkeypatch.setattr(type(work), "__call__", made)
-    with httpx.Client(base_url=address, timeout=60) as http:
-        stream = {"Content-Type": "application/x-hdf5"}
-        sent = http.post("/v1/datasets", content=scan().read_bytes(), headers=stream).json()
-        asked = {"kind": "reconstruction", "dataset": sent["id"], "settings": {"method": "sart", "nodes": 16}}
-        job = http.post("/v1/jobs", json=asked).json()
-        deadline = time.monotonic() + PATIENCE_S
-        while job["state"] not in ENDED and time.monotonic() < deadline:
-            time.sleep(0.02)
-            job = http.get(job["links"]["self"]).json()
+    job = started(address, scan)
+    deadline = time.monotonic() + PATIENCE_S
+    while job["state"] not in ENDED and time.monotonic() < deadline:
+        time.sleep(0.02)
+        job = httpx.get(f"{address}{job['links']['self']}", timeout=60).json()
     monkeypatch.setattr(type(work), "__call__", plain)
     assert job["state"] == "succeeded", job
     return str(job["id"])

@@ -68,10 +68,15 @@ def in_turns(
     return waiting
 
 
+def uploaded(address: str, file: Path) -> dict[str, Any]:
+    """The record of a scan that has just been uploaded."""
+    headers = {"Content-Type": "application/x-hdf5"}
+    sent = httpx.post(f"{address}/v1/datasets", content=file.read_bytes(), headers=headers, timeout=60)
+    return dict(sent.raise_for_status().json())
+
+
 def started(address: str, scan: Callable[..., Path]) -> dict[str, Any]:
     """The record of a reconstruction of the scan that has just been submitted."""
-    stream = {"Content-Type": "application/x-hdf5"}
-    with httpx.Client(base_url=address, timeout=60) as http:
-        sent = http.post("/v1/datasets", content=scan().read_bytes(), headers=stream).json()
-        asked = {"kind": "reconstruction", "dataset": sent["id"], "settings": {"method": "sart", "nodes": 16}}
-        return dict(http.post("/v1/jobs", json=asked).json())
+    dataset = uploaded(address, scan())["id"]
+    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"method": "sart", "nodes": 16}}
+    return dict(httpx.post(f"{address}/v1/jobs", json=asked, timeout=60).json())

@@ -16,7 +16,7 @@ from ...kernels.acquisition.traces import scan as trace_scan
 from ...waiting import wait_until
 from ..conftest import PATIENCE_S
 from .finished_results import finished, known
-from .live_results import in_turns, started
+from .live_results import in_turns, started, uploaded
 
 pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 
@@ -41,10 +41,7 @@ def places(shared_service):
     plane = [finished(address, scan, work, monkeypatch, known((12, 10), seed)) for seed in (0, 1)]
     volume = finished(address, scan, work, monkeypatch, known((6, 5, 4)))
     write_dataset(folder / "traced.h5", trace_scan(elements=12))
-    content = (folder / "traced.h5").read_bytes()
-    sent = httpx.post(
-        f"{address}/v1/datasets", content=content, headers={"Content-Type": "application/x-hdf5"}
-    )
+    sent = uploaded(address, folder / "traced.h5")
     work.error = InvalidInput("settings", "no finite speed at 3 nodes", "smaller relaxation")
     failed = started(address, scan)
     until(address, failed, lambda job: job["finished"])
@@ -61,7 +58,7 @@ def places(shared_service):
     return address, {
         "/": "Sixteen elements",
         # With the form of all settings open, and that of corrections with a refusal.
-        f"/scans/{sent.json()['id']}?from={plane[0]}": "Receiving element 0",
+        f"/scans/{sent['id']}?from={plane[0]}": "Receiving element 0",
         f"/jobs/{plane[0]}?{marks}": "node ",
         f"/jobs/{volume}?planes=3": "node ",
         # Under way, with an image and a curve; and failed.

@@ -6,6 +6,8 @@ import httpx
 import pytest
 from playwright.sync_api import expect
 
+from .live_results import uploaded
+
 pytestmark = pytest.mark.browser
 
 
@@ -18,10 +20,7 @@ def address(serve):
 @pytest.fixture
 def queued(address, scan):
     """Queue this many reconstructions of one scan, with a name each; returns their records."""
-    stream = {"Content-Type": "application/x-hdf5"}
-    sent = httpx.post(
-        f"{address}/v1/datasets", content=scan().read_bytes(), headers=stream, timeout=60
-    ).json()
+    sent = uploaded(address, scan())
 
     def make(*names, **settings):
         asked = {"kind": "reconstruction", "dataset": sent["id"], "settings": {"nodes": 16, **settings}}

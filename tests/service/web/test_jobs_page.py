@@ -12,6 +12,8 @@ from playwright.sync_api import expect
 from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.jobs import kinds
 
+from .live_results import started
+
 pytestmark = pytest.mark.browser
 
 
@@ -91,26 +93,17 @@ def test_simulated_scan_can_be_reconstructed(page, serve, monkeypatch):
 def test_a_queued_job_tells_its_place(page, serve, scan):
     # Jobs stay where they are: no disk has so much room.
     address = serve(min_free_bytes=2**60)
-    made = [submit(address, scan) for _ in range(3)]
-    page.goto(f"{address}/#/jobs/{made[2]}")
+    made = [started(address, scan) for _ in range(3)]
+    page.goto(f"{address}/#/jobs/{made[2]['id']}")
     page.get_by_text("2 jobs before this one").wait_for()
-    httpx.post(f"{address}/v1/jobs/{made[0]}/cancel").raise_for_status()
+    httpx.post(f"{address}{made[0]['links']['cancel']}").raise_for_status()
     page.get_by_text("1 job before this one").wait_for()
-
-
-def submit(address, scan):
-    stream = {"Content-Type": "application/x-hdf5"}
-    sent = httpx.post(
-        f"{address}/v1/datasets", content=scan().read_bytes(), headers=stream, timeout=60
-    ).json()
-    asked = {"kind": "reconstruction", "dataset": sent["id"], "settings": {"method": "sart", "nodes": 16}}
-    return httpx.post(f"{address}/v1/jobs", json=asked, timeout=60).json()["id"]
 
 
 def test_events_take_the_place_of_polling(page, serve, scan, work):
     address = serve()
     work.hold.clear()
-    submit(address, scan)
+    started(address, scan)
     asked = []
     page.on("request", lambda request: asked.append(request.url) if "/v1/jobs" in request.url else None)
     page.goto(f"{address}/#/jobs")
@@ -126,7 +119,7 @@ def test_events_take_the_place_of_polling(page, serve, scan, work):
     work.hold.set()
     job.get_by_text("succeeded").wait_for()
     # A job that another program starts appears too.
-    submit(address, scan)
+    started(address, scan)
     expect(job.get_by_text("succeeded")).to_have_count(2)
 
 
@@ -135,7 +128,7 @@ def test_without_a_stream_the_page_polls(page, serve, scan, work):
     address = serve()
     page.route("**/v1/events*", lambda route: route.abort())
     work.hold.clear()
-    submit(address, scan)
+    started(address, scan)
     page.goto(f"{address}/#/jobs")
     job = page.locator(".job-table tbody tr")
     job.get_by_text("running", exact=True).wait_for()

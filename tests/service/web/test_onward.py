@@ -11,12 +11,11 @@ from bentray_kernels.tomography.waveform.validation import Validation
 from bentray_kernels.tomography.waveform.waveform_cost import advice
 from bentray_workers.reconstruction import reconstruction_run
 
-from .live_results import ITERATIONS, in_turns
+from .live_results import ITERATIONS, in_turns, uploaded
 
 pytestmark = pytest.mark.browser
 
 RAYS = Candidate({"rays": "curved", "method": "gauss-newton"}, 1e-7, 9e-8, 8e-8)
-STREAM = {"Content-Type": "application/x-hdf5"}
 
 
 @pytest.fixture
@@ -37,8 +36,7 @@ def turns(work, monkeypatch):
 
 
 def test_fast_is_drawn_and_best_follows_in_its_place_until_it_is_stopped(page, address, scan, turns):
-    sent = httpx.post(f"{address}/v1/datasets", content=scan().read_bytes(), headers=STREAM).json()
-    page.goto(f"{address}/#/scans/{sent['id']}")
+    page.goto(f"{address}/#/scans/{uploaded(address, scan())['id']}")
     page.get_by_role("button", name="Reconstruct", exact=True).click()
     image, waves = page.locator("#result-viewer"), page.locator(".live-views")
     stop = page.get_by_role("button", name="Stop")

@@ -11,9 +11,10 @@ from bentray_service.rows.database import open_database
 from bentray_service.rows.deliveries import WebhookSecrets
 from bentray_service.rows.ids import LOCAL
 
+from .live_results import uploaded
+
 pytestmark = pytest.mark.browser
 
-HDF5 = {"Content-Type": "application/x-hdf5"}
 # Nobody listens there.
 WEBHOOK = "http://127.0.0.1:9/ended"
 
@@ -24,8 +25,8 @@ def address(shared_service):
     with closing(open_database(database)) as opened:
         WebhookSecrets(opened).create(LOCAL)
     for name in ("Left", "Right", "Other"):
-        content = shared_service.scan(lambda file, name=name: file.attrs.modify("title", name)).read_bytes()
-        httpx.post(f"{shared_service.address}/v1/datasets", content=content, headers=HDF5).raise_for_status()
+        file = shared_service.scan(lambda file, name=name: file.attrs.modify("title", name))
+        uploaded(shared_service.address, file)
     return shared_service.address
 
 

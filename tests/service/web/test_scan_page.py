@@ -17,6 +17,7 @@ from bentray_workers.files.dataset import write_dataset
 from ...effort import effort
 from ...kernels.acquisition.traces import blob_delay
 from ...kernels.acquisition.traces import scan as trace_scan
+from .live_results import uploaded
 
 pytestmark = pytest.mark.browser
 
@@ -24,17 +25,9 @@ pytestmark = pytest.mark.browser
 PIXELS = "canvas => canvas.toDataURL()"
 
 
-HDF5 = {"Content-Type": "application/x-hdf5"}
-
-
-def stored(address, file):
-    """The record of a file that has just been uploaded."""
-    return httpx.post(f"{address}/v1/datasets", content=file.read_bytes(), headers=HDF5, timeout=60.0).json()
-
-
 def sent(page, address, scan):
     """The page of a scan that has just been uploaded."""
-    page.goto(f"{address}/#/scans/{stored(address, scan())['id']}")
+    page.goto(f"{address}/#/scans/{uploaded(address, scan())['id']}")
     page.get_by_text("16 emitters").wait_for()
 
 
@@ -225,7 +218,7 @@ def test_by_keyboard_alone(page, address, scan, work):
 def with_traces(address, folder):
     """The record of a scan with traces that has just been uploaded."""
     write_dataset(folder / "traced.h5", trace_scan(blob_delay(12), elements=12, noise=0.01))
-    return stored(address, folder / "traced.h5")
+    return uploaded(address, folder / "traced.h5")
 
 
 def opened(page, address, scan):
@@ -279,7 +272,7 @@ def test_a_water_that_is_only_reported_is_used_at_the_press_of_a_button(page, ad
     dataset = trace_scan(blob_delay(16), elements=16, noise=0.01)
     wrong = replace(dataset, water_speed_mps=dataset.water_speed_mps + 20.0)
     write_dataset(tmp_path / "warm.h5", wrong)
-    scan = stored(address, tmp_path / "warm.h5")
+    scan = uploaded(address, tmp_path / "warm.h5")
     page.goto(f"{address}/#/scans/{scan['id']}")
     advice = page.locator("#quality li", has_text="water speed")
     expect(advice).to_contain_text("Only reported: reconstructions use the data as they are.")
@@ -395,7 +388,7 @@ def test_a_scan_in_wrong_units_is_corrected_as_the_page_proposes(page, address, 
     def in_microseconds(file):
         file["traveltime/delta_tof_s"][...] *= 1e-3
 
-    wrong = opened(page, address, stored(address, scan(in_microseconds)))
+    wrong = opened(page, address, uploaded(address, scan(in_microseconds)))
     proposed = page.locator("#proposed")
     expect(proposed).to_contain_text("Were times in ms read as µs?")
     page.get_by_role("button", name="Correct units, frequency or order").click()
@@ -429,7 +422,7 @@ def test_a_scan_in_wrong_units_is_corrected_as_the_page_proposes(page, address, 
 def test_without_a_water_shot_there_is_none_to_choose(page, address, tmp_path):
     made = trace_scan(blob_delay(12), elements=12, noise=0.01)
     write_dataset(tmp_path / "bare.h5", replace(made, waveform=replace(made.waveform, water=None)))
-    page.goto(f"{address}/#/scans/{stored(address, tmp_path / 'bare.h5')['id']}")
+    page.goto(f"{address}/#/scans/{uploaded(address, tmp_path / 'bare.h5')['id']}")
     expect(page.locator("#shot-legend")).to_contain_text("the scan has no water shot")
     expect(page.locator("#shot-quantity")).to_be_hidden()
     page.get_by_role("button", name="Edit name").click()

@@ -8,6 +8,8 @@ from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import Tenant
 from bentray_service.rows.keys import ApiKey, Keys
 
+from .live_results import uploaded
+
 pytestmark = pytest.mark.browser
 
 
@@ -24,9 +26,8 @@ def test_without_keys(page, serve, scan, cluster):
     second = {"nthreads": 2, "memory_limit": 2**31, "status": "paused"}
     cluster.scheduler_info = lambda n_workers: {"workers": {"a": one, "b": second}}
     address = serve(max_tenant_bytes=2**30)
-    stream = {"Content-Type": "application/x-hdf5"}
     for _ in range(2):
-        assert httpx.post(f"{address}/v1/datasets", content=scan().read_bytes(), headers=stream).is_success
+        uploaded(address, scan())
     page.goto(f"{address}/#/service")
     page.get_by_role("region", name="Table of workers").wait_for()
     assert rows(page, "Table of workers") == [

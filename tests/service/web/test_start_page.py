@@ -11,10 +11,9 @@ from bentray_service.jobs import kinds
 from bentray_workers.simulation.request import SAMPLE, PhantomScan
 
 from ...workers.foreign_scans.scans import delta_tof, positions
+from .live_results import uploaded
 
 pytestmark = pytest.mark.browser
-
-HDF5 = {"Content-Type": "application/x-hdf5"}
 
 
 @pytest.mark.nightly
@@ -59,7 +58,7 @@ def test_several_files_are_dropped_beside_the_zone(page, serve, scan, tmp_path):
 def test_scans_are_found_by_their_names_and_read_in_pages(page, serve, scan):
     address = serve()
     for name in ("Left", "Right", "Left again"):
-        sent = httpx.post(f"{address}/v1/datasets", content=scan().read_bytes(), headers=HDF5).json()
+        sent = uploaded(address, scan())
         httpx.patch(f"{address}{sent['links']['self']}", json={"title": name}).raise_for_status()
     # Two scans on a page, as if there were many.
     page.route("**/v1/datasets?*", lambda route: route.continue_(url=route.request.url.replace("=25", "=2")))
