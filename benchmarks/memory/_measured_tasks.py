@@ -102,8 +102,8 @@ def by_volume(name: str, client: Client, folder: Path, nodes: int, pixels: int =
     written: dict[str, Any] = {"target": folder / "exported", "name": name}
     task, options, cost = {
         "slice": (volume_slice_png, {"size": pixels}, partial(picture_cost.slice_cost, size=pixels)),
-        "histogram": (volume_histogram, {"quantity": "value", "bins": 256}, picture_cost.histogram_cost),
-        "coefficients": (coefficients_npy, {"view": RefractionView()}, picture_cost.coefficients_cost),
+        "histogram": (volume_histogram, {"quantity": "value", "bins": 256}, picture_cost.filter_cost),
+        "coefficients": (coefficients_npy, {"view": RefractionView()}, picture_cost.filter_cost),
         "mesh": (
             mesh_volume,
             {"iso": None, "step": 8, "target": folder / "mesh"},

@@ -138,14 +138,14 @@ class Pictures:
 
     async def coefficients(self, volume: VolumeRow, view: RefractionView) -> bytes:
         """Filter a volume, see ``bentray_workers.rendering.coefficients``."""
-        cost = picture_cost.coefficients_cost(VolumeFile.from_row(volume.values()))
+        cost = picture_cost.filter_cost(VolumeFile.from_row(volume.values()))
         return bytes(await self._one(volume, cost, coefficients_npy, {"view": view}))
 
     async def histogram(self, volume: VolumeRow, quantity: str, bins: int) -> dict[str, Any]:
         """Compute the histogram of a volume, see ``volume_histogram``; recent ones are kept."""
         key = volume.id, volume.created, quantity, bins
         if key not in self._histograms:
-            cost = picture_cost.histogram_cost(VolumeFile.from_row(volume.values()))
+            cost = picture_cost.filter_cost(VolumeFile.from_row(volume.values()))
             how = {"quantity": quantity, "bins": bins}
             self._histograms[key] = dict(await self._one(volume, cost, volume_histogram, how))
             while len(self._histograms) > MAX_HISTOGRAMS:

@@ -125,20 +125,11 @@ def refraction_bytes(shape: Sequence[int], view: RefractionView) -> int:
     return _tile_bytes(view) + needed_bytes(shape, BUILDING_BYTES)
 
 
-def histogram_cost(stored: VolumeFile) -> Cost:
-    """Cost of a histogram of a volume, with the filter of a picture of it."""
-    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * math.prod(stored.shape), _filtered_bytes(stored))
-
-
-def coefficients_cost(stored: VolumeFile) -> Cost:
-    """Cost of a filtered volume, sent as float32: one array and its file."""
+def filter_cost(stored: VolumeFile) -> Cost:
+    """Cost of a filtered volume as float32, or of a histogram, whose values have a filter of a picture."""
     nodes = math.prod(stored.shape)
-    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * nodes, _filtered_bytes(stored))
-
-
-def _filtered_bytes(stored: VolumeFile) -> int:
-    """Memory to read a volume, and then to filter one image of it, or to compute its histogram."""
-    return FLOOR_BYTES + max(stored.read_bytes, needed_bytes(stored.shape, FILTER_BYTES))
+    needed = FLOOR_BYTES + max(stored.read_bytes, needed_bytes(stored.shape, FILTER_BYTES))
+    return Cost(FLOOR_SECONDS + (READ_S + SMOOTH_SCENE_S) * nodes, needed)
 
 
 def field_cost(figures: Mapping[str, Any], view: FieldView) -> Cost:
