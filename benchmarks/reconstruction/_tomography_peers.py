@@ -41,7 +41,7 @@ def straight(method: Peer) -> Callable[..., Peer]:
     return lambda _: method
 
 
-def pygimli(module) -> Peer:
+def pygimli(module, error_s: float = PYGIMLI_ERROR_S) -> Peer:
     """pyGIMLi's own inversion: a shortest-path graph on triangles whose corners include the elements.
 
     Its times along the graph are up to a per cent long. So that this is no error of the data, it is given its
@@ -82,7 +82,7 @@ def pygimli(module) -> Peer:
             returnArray=True,
         )
         data["t"] = np.asarray(through_water) + times.delta_tof[emitter, receiver]
-        data["err"] = np.full(emitter.size, PYGIMLI_ERROR_S)
+        data["err"] = np.full(emitter.size, error_s)
         manager = traveltime.TravelTimeManager(data)
         speed = manager.invert(
             mesh=mesh,

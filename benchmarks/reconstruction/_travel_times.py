@@ -33,25 +33,29 @@ class TravelTimes:
 
     @classmethod
     def from_dataset(cls, dataset: Dataset, nodes: int, side_m: float) -> TravelTimes:
-        """The times of a ring whose elements all send and receive, in a square centred on 0.
+        """The times of a ring of which all or some elements send and receive, in a square centred on 0.
 
         A pair measured both ways keeps the mean, in one of its places: twice the rays would cost twice the
-        time and tell nothing more. Each emitter keeps the half of the ring that follows it.
+        time and tell nothing more. Each emitter keeps the half of the ring that follows it, and the pairs
+        that were measured in its direction alone.
         """
         position = dataset.element_position_m + 0.5 * side_m
-        both = dataset.delta_tof_s
-        assert both is not None
+        assert dataset.delta_tof_s is not None
         count = len(position)
+        every = np.full((count, count), np.nan)
+        every[np.ix_(dataset.tx, dataset.rx)] = dataset.delta_tof_s
         ahead = (np.arange(count) - np.arange(count)[:, None]) % count
         opposite = np.triu(2 * ahead == count)
         first = ((ahead > 0) & (2 * ahead < count)) | opposite
+        mean = np.where(np.isfinite(every.T), 0.5 * (every + every.T), every)
+        kept = first | (np.isnan(every.T) & (ahead > 0))
         spacing = side_m / (nodes - 1)
         axis = np.linspace(-0.5 * side_m, 0.5 * side_m, nodes)
         reach = np.linalg.norm(dataset.element_position_m, axis=1).min() - RIM_NODES * spacing
         return cls(
-            emitters=position,
-            receivers=position,
-            delta_tof=np.where(first, 0.5 * (both + both.T), np.nan),
+            emitters=position[dataset.tx],
+            receivers=position[dataset.rx],
+            delta_tof=np.where(kept, mean, np.nan)[np.ix_(dataset.tx, dataset.rx)],
             water_speed=dataset.water_speed_mps,
             region=np.hypot(axis[:, None], axis[None, :]) <= reach,
             spacing=spacing,

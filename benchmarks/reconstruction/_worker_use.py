@@ -1,8 +1,7 @@
-"""Peak memory and CPU time of this process, to be called on a worker."""
+"""Peak memory of this process, to be called on a worker."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,12 +29,6 @@ def peak_bytes() -> int:
     """
     lines = (SELF / "status").read_text().splitlines()
     return next(1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM:"))
-
-
-def cpu_seconds() -> float:
-    """CPU time of all threads, s."""
-    used = os.times()
-    return used.user + used.system
 
 
 def of_worker(client: Client, function: Callable[[], Any]) -> Any:

@@ -18,7 +18,7 @@ from bentray_workers.simulation.volume import VolumeSimulationSettings
 
 from ..shared._baselines import Compared, Images
 from ..shared._image_error import object_error
-from ._volume_picture import picture
+from ._sections_picture import picture_of_sections
 
 COUPLING_MPS = 1375.0
 
@@ -69,7 +69,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
             worse = compared["slices"].error - compared["volume"].error
             target = f"R9 slice-wise over 3-D, {label}"
             yield compared["slices"].row(target, worse, 0.003, "<=", "of range", f"NRMSE, {size}")
-        context.save_picture("reconstruction_volume.png", lambda: picture(clean.truth, results))
+        context.save_picture("reconstruction_volume.png", lambda: picture_of_sections(clean.truth, results))
         context.progress(1, 1, "done")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from time import process_time
 from typing import NamedTuple
 
 from bentray_kernels.tomography import Settings
@@ -18,7 +19,7 @@ from bentray_workers.reconstruction.planning import plan
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
 from ..shared._synthetic_scan import made_up_scan
-from ._worker_use import cpu_seconds, forget_peak, of_worker, peak_bytes
+from ._worker_use import forget_peak, of_worker, peak_bytes
 
 
 class Size(NamedTuple):
@@ -69,9 +70,9 @@ def measured(folder: Path, size: Size) -> Iterable[Row]:
         small = made_up_scan(folder / "small.h5", SMALL.elements, SMALL.slices)
         reconstruct(cluster.client, small, settings_of(SMALL))
         of_worker(cluster.client, forget_peak)
-        warm, before = (of_worker(cluster.client, figure) for figure in (peak_bytes, cpu_seconds))
+        warm, before = (of_worker(cluster.client, figure) for figure in (peak_bytes, process_time))
         result = reconstruct(cluster.client, path, settings, work_dir=work, on_saved=saved)
-        peak, after = (of_worker(cluster.client, figure) for figure in (peak_bytes, cpu_seconds))
+        peak, after = (of_worker(cluster.client, figure) for figure in (peak_bytes, process_time))
     write_reconstruction(volume, result)
     planned = plan(summary_of(path, settings), settings, ())
     files = {"scan": path.stat().st_size, "checkpoints": stored, "volume": volume.stat().st_size}

@@ -20,6 +20,18 @@ def test_each_pair_comes_once_and_with_the_mean_of_both_ways() -> None:
     assert times.delta_tof[emitter, receiver] == pytest.approx(scan.delta_tof_s[emitter, receiver] + 1e-8)
 
 
+def test_pairs_measured_in_one_direction_alone_are_kept() -> None:
+    scan, few = dataset(), np.arange(0, ELEMENTS, 4)
+    assert scan.delta_tof_s is not None
+    sparse = replace(scan, tx=few, delta_tof_s=scan.delta_tof_s[few])
+    times = TravelTimes.from_dataset(sparse, NODES, SIDE_M)
+    emitter, receiver = times.pairs()
+    pairs = {frozenset(pair) for pair in zip(few[emitter], receiver, strict=True)}
+    assert len(pairs) == len(emitter) == len(few) * (ELEMENTS - 1) - len(few) * (len(few) - 1) // 2
+    assert times.emitters == pytest.approx(times.receivers[few])
+    assert times.delta_tof[emitter, receiver] == pytest.approx(scan.delta_tof_s[few[emitter], receiver])
+
+
 def test_every_emitter_keeps_about_as_many_pairs() -> None:
     of_emitter = np.isfinite(ring().delta_tof).sum(axis=1)
     assert set(of_emitter) == {(ELEMENTS - 1) // 2, ELEMENTS // 2}
