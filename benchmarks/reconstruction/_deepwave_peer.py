@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 from scipy.ndimage import zoom
+from scipy.signal import butter, sosfiltfilt
 
 from bentray_kernels.acquisition import Dataset
 
@@ -45,9 +46,10 @@ def invert_band(torch, dataset: Dataset, start: np.ndarray, side_m: float, highe
     spacing = side_m / (nodes - 1)
     simulate = simulation(torch, dataset, side_m, spacing, highest_hz)
     waves, step = dataset.waveform, 1.0 / dataset.sampling_rate_hz
-    ends = LOWEST * dataset.center_frequency_hz, highest_hz
+    lowest_hz = LOWEST * dataset.center_frequency_hz
+    in_band = butter(4, (lowest_hz, highest_hz), "bandpass", fs=1.0 / step, output="sos")
     measured, in_water = (
-        torch.tensor(in_band(traces, step, *ends), dtype=torch.float32)
+        torch.tensor(sosfiltfilt(in_band, traces).copy(), dtype=torch.float32)
         for traces in (waves.object, waves.water)
     )
     # The wavelet of each emitter that turns the simulated traces through water into the measured ones.
@@ -109,14 +111,6 @@ def simulation(torch, dataset: Dataset, side_m: float, spacing: float, highest_h
         return (corners * weight[dataset.rx][..., None]).sum(dim=2)
 
     return simulate
-
-
-def in_band(traces: np.ndarray, step: float, lowest_hz: float, highest_hz: float) -> np.ndarray:
-    """Traces without what is below and above a band; its ends keep half of their amplitude."""
-    samples = traces.shape[-1]
-    frequency = np.fft.rfftfreq(2 * samples, step)
-    low, high = (0.5 ** ((frequency / end) ** 8) for end in (lowest_hz, highest_hz))
-    return np.fft.irfft(np.fft.rfft(traces, 2 * samples) * (1.0 - low) * high)[..., :samples]
 
 
 def ricker(peak_hz: float, step: float, samples: int) -> np.ndarray:

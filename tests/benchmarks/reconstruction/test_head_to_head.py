@@ -35,8 +35,7 @@ def test_a_missing_peer_has_its_reason_in_place_of_a_figure() -> None:
 
 
 def test_waves_of_deepwave_arrive_on_time() -> None:
-    torch = pytest.importorskip("torch")
-    pytest.importorskip("deepwave")
+    torch, _ = map(pytest.importorskip, ("torch", "deepwave"))
     scan = replace(dataset(), tx=np.array([3]), delta_tof_s=None, sampling_rate_hz=1e6)
     wavelet = _deepwave_peer.ricker(5e4, 1e-6, 250)
     simulate = _deepwave_peer.simulation(torch, scan, 0.2, 0.002, 5e4)

@@ -1,9 +1,5 @@
 """Plans of simulations: what does not fit is refused by name, and more of anything takes more."""
 
-import json
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,8 +15,9 @@ from bentray_workers.simulation.parts import parts_of
 from bentray_workers.simulation.request import PhantomScan
 from bentray_workers.simulation.simulation_planning import plan_simulation
 
+from ...memory_program import measured, wrong
+
 PROGRAM = Path(__file__).with_name("simulation_memory.py")
-ROOT = Path(__file__).parents[3]
 WORKER = WorkerCapacity(1024 * MIB, ("recon", "render"))
 WAVES = PhantomScan(waveform=True)
 
@@ -101,11 +98,5 @@ def test_tasks_stay_within_the_planned_memory():
         {"nodes": 100, "elements": 300, "snr": 10.0},
         {"waveform": True, "frequency_hz": 3e5, "emissions": 2, "elements": 256, "snr": 9.0},
     ]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, str(PROGRAM), json.dumps(scans)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    for scan, measured in zip(scans, json.loads(done.stdout), strict=True):
-        told = task_bytes(PhantomScan(**scan).chosen())
-        assert set(told) == set(measured)
-        for name, taken in measured.items():
-            assert taken <= told[name] <= 2.2 * taken + 24 * MIB, (scan, name, told[name], taken)
+    for scan, taken in zip(scans, measured(PROGRAM, scans), strict=True):
+        assert not wrong(task_bytes(PhantomScan(**scan).chosen()), taken, 2.2, 24 * MIB), scan

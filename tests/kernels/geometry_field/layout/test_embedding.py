@@ -5,19 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.geometry_field.layout.conformal import Disk
 from bentray_kernels.geometry_field.layout.distortion import crosses_itself, signed_areas
 from bentray_kernels.geometry_field.layout.embedding import relaxed, round_embedding, unfolded
-from bentray_kernels.meshes.opening import OpenMesh
 
 from ....effort import effort
 from ...meshes.examples import flat_patch, mesh
-
-
-def disk_of(surface):
-    return Disk.from_mesh(
-        surface.vertices, OpenMesh(surface.faces.astype(np.int64), np.arange(len(surface.vertices)))
-    )
+from .test_conformal import disk_of
 
 
 @given(st.integers(2, 9), st.integers(2, 9), st.integers(0, 1000))

@@ -1,9 +1,5 @@
 """The planned memory of a waveform refinement is what its tasks use; it grows with the scan."""
 
-import json
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,9 +24,9 @@ from bentray_workers.files.dataset.summary import summary_of
 from bentray_workers.reconstruction.memory.waveform_memory import wave_task_bytes, wave_tasks
 
 from ....kernels.tomography.waveform.scans import CENTRE_HZ, ELEMENTS, RADIUS, RATE_HZ, WATER, scan
+from ....memory_program import measured, wrong
 
 PROGRAM = Path(__file__).with_name("wave_task_memory.py")
-ROOT = Path(__file__).parents[4]
 SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
 
 
@@ -46,25 +42,10 @@ SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
     ],
 )
 def test_tasks_stay_within_the_planned_memory(asked, elements, samples):
-    # Freed arrays go back at once, so that a fork's peak is that of its own.
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(ROOT),
-        "MALLOC_MMAP_THRESHOLD_": "65536",
-        "MALLOC_TRIM_THRESHOLD_": "65536",
-    }
-    command = [sys.executable, str(PROGRAM), json.dumps(asked), str(elements), str(samples)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    measured = json.loads(done.stdout)
+    taken = measured(PROGRAM, asked, elements, samples)
     traces = replace(SCAN, emissions=elements, receivers=elements, samples=samples)
     told = wave_task_bytes(traces, 0.1, Settings.from_values(method="waveform", **asked))
-    assert set(told) == set(measured)
-    wrong = {
-        name: (told[name], taken)
-        for name, taken in measured.items()
-        if not taken <= told[name] <= 1.5 * taken + 4 * MIB
-    }
-    assert not wrong
+    assert not wrong(told, taken, 1.5, 4 * MIB)
 
 
 @given(
