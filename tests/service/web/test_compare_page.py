@@ -96,6 +96,8 @@ def test_a_comparison_is_chosen_on_the_page_of_a_result(page, both):
     first, second = both.rsplit("/", 1)[1].split(",")
     ready(page, f"{both.partition('#')[0]}#/jobs/{first}")
     page.get_by_text("Compare with").click()
+    drawn = page.locator(f"label:has(input[value={second}]) img.thumbnail")
+    page.wait_for_function("image => image.naturalHeight === 96", arg=drawn.element_handle())
     page.locator(f"input[value={second}]").check()
     page.get_by_role("button", name="Compare", exact=True).click()
     page.wait_for_url(re.compile(f"#/compare/{first},{second}"))

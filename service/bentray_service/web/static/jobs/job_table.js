@@ -7,6 +7,7 @@ import { loadTitles, titleOfJob } from "../parts/titles.js";
 import { Alert, Button, Choice, Field, html, useEffect, useRef, useState } from "../parts/view.js";
 import { useJobs } from "./followed_jobs.js";
 import { duration, inWords, moment } from "./job_words.js";
+import { Thumbnail } from "./thumbnail.js";
 
 const PAGE = 25;
 const ENDED = ["succeeded", "failed", "cancelled"];
@@ -46,7 +47,7 @@ function Actions({ job, act }) {
 // Roles in full, since a table that is laid out as cards is no table for a screen reader.
 function Row({ job, act }) {
   const cells = [
-    html`<a href=${`#/jobs/${job.id}`}>${job.title}</a>`, inWords(job.kind), source(job), html`<${State} job=${job} />`, job.started_by || "–",
+    html`<${Thumbnail} job=${job} /><a href=${`#/jobs/${job.id}`}>${job.title}</a>`, inWords(job.kind), source(job), html`<${State} job=${job} />`, job.started_by || "–",
     html`<time datetime=${job.created} title=${inTime(job.created)}>${moment(job.created)}</time>`,
     job.seconds === null ? "–" : duration(job.seconds), html`<${Actions} job=${job} act=${act} />`,
   ];

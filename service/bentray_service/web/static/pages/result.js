@@ -1,6 +1,7 @@
 // The result of a reconstruction: image to measure in, how it was made, and what can be done with it.
 import { go, keepQuery, parse } from "../parts/address.js";
 import { Onward, onwardIn } from "../jobs/onward.js";
+import { Thumbnail } from "../jobs/thumbnail.js";
 import { inTime } from "../parts/amounts.js";
 import { kept, request, send } from "../parts/api.js";
 import { CopyButton } from "../parts/copying.js";
@@ -45,7 +46,7 @@ function CompareMenu({ job }) {
   return html`<${Menu} title="Compare with">
     <${Form} class="sheet" onChange=${choose} onSubmit=${() => go(`/compare/${[job.id, ...chosen].join(",")}`)}>
       <div class="others">
-        ${others.map((other) => html`<label key=${other.id}><input type="checkbox" name="other" value=${other.id} /> ${" "}
+        ${others.map((other) => html`<label key=${other.id}><input type="checkbox" name="other" value=${other.id} /> <${Thumbnail} job=${other} />
           ${other.title}, ${isSame(other) ? "this scan" : "another scan"}, ${inTime(other.created)}</label>`)}
       </div>
       <${Facts}>One to three others</${Facts}>
