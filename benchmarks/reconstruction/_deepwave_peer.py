@@ -16,8 +16,8 @@ BANDS, LOWEST, ITERATIONS = (0.8, 1.2), 0.5, 8
 CELLS, ACCURACY, PML_CELLS = 6.0, 4, 10
 # Speed of the shortest wavelength, and the speeds that an image may have, m/s.
 SLOW_MPS, SPEED_RANGE_MPS = 1400.0, (1300.0, 1800.0)
-# Shortest wavelengths of water before the elements. Updates are not smoothed: a Gaussian of 0.15 wavelengths
-# gave 13.7 m/s where 0.03 gave 11.4, and 14 iterations 11.6.
+# Shortest wavelengths of water before the elements. Updates are not smoothed: with another
+# filter of the band a Gaussian of 0.15 wavelengths gave 13.7 m/s, 0.03 gave 11.4, and 14 iterations 11.6.
 RIM = 1.0
 # Speed, m/s, by which the unknowns of L-BFGS are scaled, so that its first step is neither tiny nor wild.
 SCALE_MPS = 100.0
