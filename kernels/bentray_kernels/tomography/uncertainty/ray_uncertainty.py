@@ -19,19 +19,18 @@ from .model_errors import ModelErrors
 from .posterior import Posterior
 from .probe_product import LANES
 
-# Solves of ``LANES`` probes each. The first probe is the mean; 15 samples give a standard deviation to 18 %,
-# which an average over ``AVERAGED_NODES`` improves.
-BATCHES = 2
-AVERAGED_NODES = 0.75
-
 # Correlation of the prior, as a part of the side of the image: the size of a lobe of tissue in a breast. The
 # prior's deviation at a node is ``PRIOR`` times the contrast of the image within that distance, at least
 # ``PRIOR_FLOOR`` of the mean contrast and ``PRIOR_FLOOR_MPS``. Half or twice any of these changes the
 # deviations by less than a fifth.
 CORRELATION, PRIOR, PRIOR_FLOOR, PRIOR_FLOOR_MPS = 0.026, 1.5, 0.15, 2.0
 
-# Widths that the truth may be smoothed by, nodes.
-WIDTHS = (0.0, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0)
+# The spread counts so many times: the prior follows the contrast of the image, which noise has flattened.
+SPREAD = 2.0
+
+# Widths that the truth may be smoothed by, nodes. Breasts are nearest to the truth smoothed by 0.75 to 1.25,
+# and no detail finer than the latter is promised.
+WIDTHS = (1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0)
 
 
 @dataclass(frozen=True)
@@ -73,8 +72,9 @@ def ray_uncertainty(
 
     The noise of a travel time is the misfit of the image, which includes errors of the model, but not less
     than pairs measured both ways differ. The deviation has three parts: the spread of the posterior, smoothed
-    like the truth; what the posterior's mean would still change, because an image that was stopped early,
-    penalised, or made along straight rays is not the mean; and errors of the model, see ``model_errors``.
+    like the truth, from the ``LANES`` probes but the first; what the posterior's mean, the first probe, would
+    still change, because an image that was stopped early, penalised, or made along straight rays is not the
+    mean; and errors of the model, see ``model_errors``.
 
     Args:
         problem: with each pair once.
@@ -102,19 +102,13 @@ def ray_uncertainty(
         width_in_nodes(problem, settings),
     )
     random = np.random.default_rng((settings.numerics.seed, index))
-    changes = []
-    for batch in range(BATCHES):
-        prior = random.standard_normal((LANES, *region.shape))
-        errors = [
-            random.standard_normal((LANES, weight.size)).T / np.sqrt(weight)[:, None] for weight in weights
-        ]
-        if batch == 0:
-            prior[0] = 0.0
-            for error, block in zip(errors, blocks, strict=True):
-                error[:, 0] = block.residual
-        changes.append(posterior.solutions(errors, prior))
+    prior = random.standard_normal((LANES, *region.shape))
+    errors = [random.standard_normal((LANES, weight.size)).T / np.sqrt(weight)[:, None] for weight in weights]
+    prior[0] = 0.0
+    for error, block in zip(errors, blocks, strict=True):
+        error[:, 0] = block.residual
     # From s of crossing time to m/s, linearised as the problem is.
-    mean, *samples = -np.concatenate(changes) * speed**2 / spacing
+    mean, *samples = -posterior.solutions(errors, prior) * speed**2 / spacing
     squares, width = min(
         (_squares(speed, mean, samples, width) for width in WIDTHS),
         key=lambda pair: float(pair[0][region].sum()),
@@ -122,8 +116,7 @@ def ray_uncertainty(
     errors_of_model = ModelErrors.from_misfit(
         speed, region, density, problem.noise_s, noise, spacing, problem.water_speed
     )
-    squares = gaussian_filter(errors_of_model.added_to(squares), AVERAGED_NODES, mode="nearest")
-    deviation = np.where(region, np.sqrt(squares), 0.0)
+    deviation = np.where(region, np.sqrt(errors_of_model.added_to(squares)), 0.0)
     return Uncertainty(deviation, width * spacing, errors_of_model.caution)
 
 
@@ -149,7 +142,7 @@ def _squares(speed: Floats, mean: Floats, samples: Sequence[Floats], width: floa
     squares = np.zeros_like(speed)
     for sample in samples:
         squares += _smoothed(sample, width) ** 2
-    return squares / len(samples) + (speed - _smoothed(speed + mean, width)) ** 2, width
+    return SPREAD / len(samples) * squares + (speed - _smoothed(speed + mean, width)) ** 2, width
 
 
 def _smoothed(image: Floats, width: float) -> Floats:

@@ -17,7 +17,6 @@ from bentray_kernels.tomography.settings import Settings
 from bentray_kernels.tomography.solver_choice import sart_engine, solver_of
 from bentray_kernels.tomography.stage_graphs import BATCH
 from bentray_kernels.tomography.uncertainty.probe_product import LANES
-from bentray_kernels.tomography.uncertainty.ray_uncertainty import BATCHES
 
 from ...cluster.capacities import MIB, REAL
 from ...files.dataset.counts import Summary
@@ -181,7 +180,7 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
         bent, once = settings.changed(rays="curved"), rays
         if settings.numerics.reciprocity and settings.method != "gauss-newton":
             once = -(-rays // 2)
-        probes = (PROBE_ARRAYS + BATCHES) * LANES
+        probes = (PROBE_ARRAYS + 1) * LANES
         # For each row its errors in all probes, weighted too.
         errors = {"probes": probes * image, "errors": (3 * LANES + 8) * REAL * once}
         entries = math.ceil(once * _entries(bent, scan.in_space) * ENTRY_BYTES)
