@@ -27,7 +27,7 @@ def test_the_best_constant_of_normal_errors_is_their_deviation():
 
 def test_rows_reward_deviations_that_follow_the_errors_and_bound_the_coverage_on_both_sides():
     random = np.random.default_rng(1)
-    true = np.where(np.arange(4000) % 2, 1.0, 10.0)
+    true = np.where(np.arange(4000) % 3, 1.0, 30.0)
     error, breast = true * random.standard_normal(4000), true > 5.0
 
     def rows(deviation):

@@ -85,7 +85,7 @@ class ReconstructionGraph:
             evaluations.append(Evaluation(at, trace_attenuation_rays, solve_attenuation, emitters))
         if settings.resolution_check:
             evaluations.append(Evaluation(at, trace_final_rays, check_resolution, problem.active_emitters))
-        if settings.uncertainty:
+        if settings.estimates_uncertainty:
             emitters = problem.each_pair_once().active_emitters
             evaluations.append(Evaluation(at, trace_uncertainty_rays, estimate_uncertainty, emitters))
         return evaluations
@@ -153,12 +153,24 @@ class ReconstructionGraph:
         image, number = self._stage.state.slowness, self._stage.number + 1
         if number == len(self._plans):
             pending = [evaluation for evaluation in self._evaluations if evaluation.value is None]
-            return [task for evaluation in pending for task in evaluation.first(image)]
+            rows, self._stage.final_rows = self._stage.final_rows, ()
+            return [
+                task
+                for evaluation in pending
+                for task in evaluation.first(image, rows if self._traces_as_stage(evaluation) else ())
+            ]
         self._history = self.history
         self._passes_before += self._stage.total
         earlier, problem = (self._scan.problem(self._index, k) for k in (number - 1, number))
         self._stage = self._stage_of(number, initial_slowness(problem, image, earlier))
         return self._stage.first()
+
+    def _traces_as_stage(self, evaluation: Evaluation) -> bool:
+        """Whether an evaluation uses the rays that the last stage has traced through its final image."""
+        settings = self._plans[-1]
+        if evaluation.trace is trace_uncertainty_rays:
+            return settings.rays == "curved" and settings.numerics.reciprocity
+        return evaluation.trace is trace_final_rays
 
     def _stage_of(self, number: int, image: Floats) -> Stage:
         kind = GaussNewtonStage if self._plans[number].method == "gauss-newton" else SartStage
@@ -193,11 +205,11 @@ class Evaluation:
         """Emitters whose rays are traced."""
         return sum(self.sizes) if self.value is not None else sum(self.sizes[batch] for batch in self._rows)
 
-    def first(self, image: Floats) -> list[Task]:
-        """Tasks to start with; without emitters the evaluation of no rows."""
+    def first(self, image: Floats, rows: Sequence[Any] = ()) -> list[Task]:
+        """Tasks to start with; the evaluation itself without emitters, or with the rows of all batches."""
         self._image = image
-        if not self.sizes:
-            return [Task(self.evaluate, (*self._at, image, []))]
+        if rows or not self.sizes:
+            return [Task(self.evaluate, (*self._at, image, list(rows)))]
         return [
             Task(self.trace, (*self._at, image, batch), keep_on_worker=True)
             for batch in range(len(self.sizes))

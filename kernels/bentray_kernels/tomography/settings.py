@@ -254,12 +254,13 @@ class Settings:
         "Also reconstruct a checkerboard along the same rays, and report its recovery at each node.",
         label="Resolution check",
     )
-    uncertainty: bool = setting(
-        False,
+    uncertainty: bool | None = setting(
+        None,
         "Also estimate the standard deviation of the speed at each node, and the resolution width of the "
         "image. Images by rays: from the misfit along bent rays and the differences of pairs measured both "
         "ways. Full waveforms: from two more inversions, each with half of the emitters, in about as much "
         "time again.",
+        unset="yes for slices by auto and gauss-newton, at less than a quarter of their time; else no",
         label="Uncertainty",
         basic=True,
     )
@@ -352,6 +353,13 @@ class Settings:
     def selects_model(self) -> bool:
         """Whether rays and method are chosen by held-out validation."""
         return self.method in ("auto", "waveform")
+
+    @property
+    def estimates_uncertainty(self) -> bool:
+        """Whether an image by rays has standard deviations."""
+        if self.uncertainty is None:
+            return self.method in ("auto", "gauss-newton") and self.decomposition != "volume"
+        return self.uncertainty
 
     @property
     def reads_amplitudes(self) -> bool:

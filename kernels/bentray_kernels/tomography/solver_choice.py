@@ -61,7 +61,7 @@ def undivided_reason(settings: Settings, *, amplitudes: bool) -> str:
         "coarser grids": numerics.coarser_grids > 0,
         "other gradients": numerics.ray_gradient != "differences",
         "resolution_check": settings.resolution_check,
-        "uncertainty": settings.uncertainty,
+        "uncertainty": settings.estimates_uncertainty,
         "attenuation": settings.attenuation.enabled and amplitudes,
     }
     return next((reason for reason, holds in reasons.items() if holds), "")

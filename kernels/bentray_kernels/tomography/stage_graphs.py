@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from ..arrays import Floats, Ints
 from ..task_graph import Task
@@ -32,9 +35,11 @@ class Stage(ABC):
     Attributes:
         number: from 0.
         state: of the iteration.
+        final_rows: rays of each batch through the final image, where the iteration has traced them.
     """
 
     state: sart_step.State | gauss_newton_step.Iterate
+    final_rows: Sequence[Any] = ()
 
     def __init__(self, scan: Scan, index: int, number: int) -> None:
         self._at = scan, index, number
@@ -114,6 +119,8 @@ class GaussNewtonStage(Stage):
             # In the order of the emitters, not of completion: floating-point sums depend on it.
             rows = [rows for _, rows in sorted(self._rows.items())]
             return [Task(update_gauss_newton, (*self._at, self.state, rows))]
+        if result.done and np.array_equal(result.slowness, self.state.slowness):
+            self.final_rows = [rows for _, rows in sorted(self._rows.items())]
         self.state, self._rows = result, {}
         return [] if self.state.done else self.first()
 

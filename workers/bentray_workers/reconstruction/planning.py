@@ -249,7 +249,7 @@ def _tasks(scan: Summary, settings: Settings, shape: tuple[int, ...]) -> int:
         batch = max(1.0, NODES_IN_A_TASK / (math.prod(shape) * 2.0 + scan.receivers * settings.grid_nodes))
         each = passes * math.ceil(emitters / batch)
     further = bool(settings.attenuation.enabled and scan.amplitudes) + settings.resolution_check
-    each += (parts + 1) * (further + settings.uncertainty)
+    each += (parts + 1) * (further + settings.estimates_uncertainty)
     return problems * each + 1
 
 

@@ -72,7 +72,7 @@ def candidate_settings(
 
 def final_settings(settings: Settings, changes: dict[str, Any]) -> Settings:
     """The settings of the reconstruction by a candidate: thin bent rays start on coarser grids."""
-    chosen = settings.changed(**changes)
+    chosen = settings.changed(**changes, uncertainty=settings.estimates_uncertainty)
     return chosen if chosen.numerics.coarser_grids else _from_coarser_grids(chosen)
 
 
@@ -176,7 +176,7 @@ def passes_to_come(dataset: Dataset, settings: Settings) -> int:
     plans = [stages(dataset, final_settings(settings, changes)) for changes in every]
     each = max(sum(plan.iterations for plan in grids) for grids in plans)
     each += settings.attenuation.enabled and dataset.log_ratio_np is not None
-    each += settings.resolution_check + settings.uncertainty
+    each += settings.resolution_check + settings.estimates_uncertainty
     problems = range(pairs.count(dataset, settings))
     return each * sum(len(pairs.from_dataset(dataset, settings, index).emitters) for index in problems)
 

@@ -176,7 +176,7 @@ def ray_task_parts(scan: Summary, settings: Settings) -> dict[str, dict[str, int
     if settings.resolution_check:
         parts["trace_final_rays"] = tracing(rays)
         parts["check_resolution"] = solving(rays)
-    if settings.uncertainty:
+    if settings.estimates_uncertainty:
         bent, once = settings.changed(rays="curved"), rays
         if settings.numerics.reciprocity and settings.method != "gauss-newton":
             once = -(-rays // 2)
