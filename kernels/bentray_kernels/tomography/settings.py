@@ -260,7 +260,7 @@ class Settings:
         "image. Images by rays: from the misfit along bent rays and the differences of pairs measured both "
         "ways. Full waveforms: from two more inversions, each with half of the emitters, in about as much "
         "time again.",
-        unset="yes for slices by auto and gauss-newton, at less than a quarter of their time; else no",
+        unset="yes for slices by auto or gauss-newton with bent rays, where it is cheap; else no",
         label="Uncertainty",
         basic=True,
     )
@@ -358,7 +358,8 @@ class Settings:
     def estimates_uncertainty(self) -> bool:
         """Whether an image by rays has standard deviations."""
         if self.uncertainty is None:
-            return self.method in ("auto", "gauss-newton") and self.decomposition != "volume"
+            cheap = self.method in ("auto", "gauss-newton") and self.rays == "curved"
+            return cheap and self.decomposition != "volume"
         return self.uncertainty
 
     @property
