@@ -168,6 +168,8 @@ class ReconstructionGraph:
     def _traces_as_stage(self, evaluation: Evaluation) -> bool:
         """Whether an evaluation uses the rays that the last stage has traced through its final image."""
         settings = self._plans[-1]
+        if evaluation.at[0] is not self._scan:
+            return False
         if evaluation.trace is trace_uncertainty_rays:
             return settings.rays == "curved" and settings.numerics.reciprocity
         return evaluation.trace is trace_final_rays
@@ -186,7 +188,7 @@ class Evaluation:
         emitters: whose rays are used.
 
     Attributes:
-        trace, evaluate: as above.
+        at, trace, evaluate: as above.
         sizes: emitters of each batch.
         value: result of ``evaluate``.
     """
@@ -194,7 +196,7 @@ class Evaluation:
     def __init__(
         self, at: tuple[Scan, int], trace: Callable[..., Rows], evaluate: Callable[..., Any], emitters: Ints
     ) -> None:
-        self._at, self.trace, self.evaluate = at, trace, evaluate
+        self.at, self.trace, self.evaluate = at, trace, evaluate
         self.sizes = [len(batch) for batch in batches_of(emitters)]
         self.value: Any = None
         self._image: Floats | None = None
@@ -209,9 +211,9 @@ class Evaluation:
         """Tasks to start with; the evaluation itself without emitters, or with the rows of all batches."""
         self._image = image
         if rows or not self.sizes:
-            return [Task(self.evaluate, (*self._at, image, list(rows)))]
+            return [Task(self.evaluate, (*self.at, image, list(rows)))]
         return [
-            Task(self.trace, (*self._at, image, batch), keep_on_worker=True)
+            Task(self.trace, (*self.at, image, batch), keep_on_worker=True)
             for batch in range(len(self.sizes))
         ]
 
@@ -224,7 +226,7 @@ class Evaluation:
         if len(self._rows) < len(self.sizes):
             return []
         rows = [rows for _, rows in sorted(self._rows.items())]
-        return [Task(self.evaluate, (*self._at, self._image, rows))]
+        return [Task(self.evaluate, (*self.at, self._image, rows))]
 
 
 def trace_attenuation_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:

@@ -10,12 +10,15 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.phantoms import EllipsePhantom
 from bentray_kernels.phantoms.ellipses import Ellipse
-from bentray_kernels.tomography import Settings, reconstruct
+from bentray_kernels.task_graph import ThreadPool, run
+from bentray_kernels.tomography import Settings, reconstruct, reconstruction_graph
 from bentray_kernels.tomography.gauss_newton.linearisation import Rows
 from bentray_kernels.tomography.problem import Problem
+from bentray_kernels.tomography.reconstruction_graph import ReconstructionGraph, estimate_uncertainty
+from bentray_kernels.tomography.scan import MemorySource, Scan
 from bentray_kernels.tomography.uncertainty import model_errors
 from bentray_kernels.tomography.uncertainty import ray_uncertainty as module
-from bentray_kernels.tomography.uncertainty.ray_uncertainty import ray_uncertainty
+from bentray_kernels.tomography.uncertainty.ray_uncertainty import ray_uncertainty, trace_probed_rays
 
 WATER, SIDE, NODES, RING = 1500.0, 0.16, 48, Ring(48, 0.07)
 PLAN = Settings.from_values(method="gauss-newton", nodes=NODES, side_m=SIDE, iterations=3, uncertainty=True)
@@ -209,3 +212,19 @@ def test_the_prior_follows_the_contrast_down_to_a_floor(contrast_mps, least_mps)
     problem, _, slowness, _ = row_sums(np.zeros(80))
     prior_s = module._prior(problem, slowness - contrast_mps / WATER**2)[40, 40]
     assert prior_s * WATER**2 / problem.spacing == pytest.approx(1.5 * np.hypot(contrast_mps, least_mps))
+
+
+def test_the_rays_of_the_last_iteration_are_those_of_the_finished_image(times, image, monkeypatch):
+    """Gauss-Newton has traced them; a resumed run traces them again, with the same bits."""
+    graph = ReconstructionGraph(Scan(MemorySource(scan(times)), PLAN), 0)
+    traced = []
+    monkeypatch.setattr(reconstruction_graph, "trace_probed_rays", lambda *at: traced.append(at) or rays(*at))
+    rays = trace_probed_rays
+    run({"0": graph}, ThreadPool(None))
+    assert not traced
+    again = ReconstructionGraph(Scan(MemorySource(scan(times)), PLAN), 0)
+    again.restore(replace(graph.checkpoint, values=(None,)))
+    run({"0": again}, ThreadPool(None))
+    assert len(traced) == 3
+    for finished in (graph, again):
+        assert np.array_equal(finished.value_of(estimate_uncertainty).deviation, image.uncertainty)
