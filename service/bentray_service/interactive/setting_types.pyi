@@ -22,7 +22,7 @@ class ReconstructionSettings(TypedDict, total=False):
     roi: bool
     device: Literal["auto", "cpu", "opencl"]
     resolution_check: bool
-    uncertainty: bool
+    uncertainty: bool | None
     minutes: float | None
     penalty_strength: float
     picker: PickerName

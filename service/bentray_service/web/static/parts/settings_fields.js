@@ -43,6 +43,15 @@ const KINDS = {
     read: ([box]) => box.checked,
     about: () => "",
   },
+  maybe: {
+    inputs: ({ schema, nullable, value, ...more }) => html`<select ...${more}>
+      <option value="">Automatic</option>
+      <${Options} entries=${[["true", "Yes"], ["false", "No"]]} chosen=${String(value)} />
+    </select>`,
+    read: ([select]) => (select.value ? select.value === "true" : undefined),
+    about: () => "",
+    unset: "Automatic",
+  },
   pair: {
     inputs: ({ schema, nullable, value, name, id, ...more }) => ["lowest", "highest"].map((end, i) => html`<${NumberInput} schema=${schema.prefixItems[i]}
       value=${value?.[i]} name=${`${name}.${i}`} id=${i ? undefined : id} aria-label=${`${captionOf(schema)}, ${end}`} placeholder=${end} ...${more} />`),
@@ -60,16 +69,17 @@ const KINDS = {
   },
 };
 
-function kindOf(schema) {
+function kindOf(schema, nullable) {
   if (schema.enum) return "choice";
-  if (schema.type === "boolean") return "yes";
+  if (schema.type === "boolean") return nullable ? "maybe" : "yes";
   return schema.prefixItems ? "pair" : "number";
 }
 
 // A setting as the form knows it: its path, and how it is described.
 export function settingOf(path, given) {
   const schema = without(given);
-  return { path: path.join("."), schema, kind: kindOf(schema), nullable: Boolean(given.anyOf) };
+  const nullable = Boolean(given.anyOf);
+  return { path: path.join("."), schema, kind: kindOf(schema, nullable), nullable };
 }
 
 // A setting below its caption, without words about it, as on a small form. value: the one to begin with, by default that of the schema.
