@@ -210,7 +210,10 @@ class Evaluation:
     def first(self, image: Floats, rows: Sequence[Any] = ()) -> list[Task]:
         """Tasks to start with; the evaluation itself without emitters, or with the rows of all batches."""
         self._image = image
-        if rows or not self.sizes:
+        if rows:
+            # Passes that are saved are not counted as made.
+            self.sizes = []
+        if not self.sizes:
             return [Task(self.evaluate, (*self.at, image, list(rows)))]
         return [
             Task(self.trace, (*self.at, image, batch), keep_on_worker=True)
