@@ -84,10 +84,12 @@ class ReconstructionGraph:
             emitters = attenuation.active_emitters(problem)
             evaluations.append(Evaluation(at, trace_attenuation_rays, solve_attenuation, emitters))
         if settings.resolution_check:
-            evaluations.append(Evaluation(at, trace_final_rays, check_resolution, problem.active_emitters))
+            emitters = problem.active_emitters
+            evaluations.append(Evaluation(at, trace_final_rays, check_resolution, emitters, as_stage=True))
         if settings.estimates_uncertainty:
             emitters = problem.each_pair_once().active_emitters
-            evaluations.append(Evaluation(at, trace_uncertainty_rays, estimate_uncertainty, emitters))
+            same = settings.rays == "curved" and settings.numerics.reciprocity
+            evaluations.append(Evaluation(at, trace_uncertainty_rays, estimate_uncertainty, emitters, same))
         return evaluations
 
     @property
@@ -154,25 +156,12 @@ class ReconstructionGraph:
         if number == len(self._plans):
             pending = [evaluation for evaluation in self._evaluations if evaluation.value is None]
             rows, self._stage.final_rows = self._stage.final_rows, ()
-            return [
-                task
-                for evaluation in pending
-                for task in evaluation.first(image, rows if self._traces_as_stage(evaluation) else ())
-            ]
+            return [task for evaluation in pending for task in evaluation.first(image, rows)]
         self._history = self.history
         self._passes_before += self._stage.total
         earlier, problem = (self._scan.problem(self._index, k) for k in (number - 1, number))
         self._stage = self._stage_of(number, initial_slowness(problem, image, earlier))
         return self._stage.first()
-
-    def _traces_as_stage(self, evaluation: Evaluation) -> bool:
-        """Whether an evaluation uses the rays that the last stage has traced through its final image."""
-        settings = self._plans[-1]
-        if evaluation.at[0] is not self._scan:
-            return False
-        if evaluation.trace is trace_uncertainty_rays:
-            return settings.rays == "curved" and settings.numerics.reciprocity
-        return evaluation.trace is trace_final_rays
 
     def _stage_of(self, number: int, image: Floats) -> Stage:
         kind = GaussNewtonStage if self._plans[number].method == "gauss-newton" else SartStage
@@ -186,17 +175,23 @@ class Evaluation:
         at: the scan and the index of the slice.
         trace, evaluate: the functions of the two kinds of task.
         emitters: whose rays are used.
+        as_stage: whether they are those that the last stage may have traced through its final image.
 
     Attributes:
-        at, trace, evaluate: as above.
+        trace, evaluate: as above.
         sizes: emitters of each batch.
         value: result of ``evaluate``.
     """
 
     def __init__(
-        self, at: tuple[Scan, int], trace: Callable[..., Rows], evaluate: Callable[..., Any], emitters: Ints
+        self,
+        at: tuple[Scan, int],
+        trace: Callable[..., Rows],
+        evaluate: Callable[..., Any],
+        emitters: Ints,
+        as_stage: bool = False,
     ) -> None:
-        self.at, self.trace, self.evaluate = at, trace, evaluate
+        self._at, self.trace, self.evaluate, self._as_stage = at, trace, evaluate, as_stage
         self.sizes = [len(batch) for batch in batches_of(emitters)]
         self.value: Any = None
         self._image: Floats | None = None
@@ -209,14 +204,14 @@ class Evaluation:
 
     def first(self, image: Floats, rows: Sequence[Any] = ()) -> list[Task]:
         """Tasks to start with; the evaluation itself without emitters, or with the rows of all batches."""
-        self._image = image
-        if rows:
+        self._image, rays = image, list[Any]()
+        if rows and self._as_stage:
             # Passes that are saved are not counted as made.
-            self.sizes = []
+            self.sizes, rays = [], list(rows)
         if not self.sizes:
-            return [Task(self.evaluate, (*self.at, image, list(rows)))]
+            return [Task(self.evaluate, (*self._at, image, rays))]
         return [
-            Task(self.trace, (*self.at, image, batch), keep_on_worker=True)
+            Task(self.trace, (*self._at, image, batch), keep_on_worker=True)
             for batch in range(len(self.sizes))
         ]
 
@@ -229,7 +224,7 @@ class Evaluation:
         if len(self._rows) < len(self.sizes):
             return []
         rows = [rows for _, rows in sorted(self._rows.items())]
-        return [Task(self.evaluate, (*self.at, self._image, rows))]
+        return [Task(self.evaluate, (*self._at, self._image, rows))]
 
 
 def trace_attenuation_rays(scan: Scan, index: int, slowness: Floats, batch: int) -> Rows:

@@ -357,10 +357,10 @@ class Settings:
     @property
     def estimates_uncertainty(self) -> bool:
         """Whether an image by rays has standard deviations."""
-        if self.uncertainty is None:
-            cheap = self.method in ("auto", "gauss-newton") and self.rays == "curved"
-            return cheap and self.decomposition != "volume"
-        return self.uncertainty
+        if self.uncertainty is not None:
+            return self.uncertainty
+        slices = self.decomposition != "volume"
+        return slices and self.method in ("auto", "gauss-newton") and self.rays == "curved"
 
     @property
     def reads_amplitudes(self) -> bool:

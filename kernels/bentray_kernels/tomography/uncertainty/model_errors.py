@@ -76,7 +76,7 @@ class ModelErrors:
             spacing: of the nodes, m.
             water_mps: speed of the water, m/s.
         """
-        contrast = speed - _around(speed, SURROUNDINGS * (max(speed.shape) - 1))
+        contrast = speed - around(speed, SURROUNDINGS * (max(speed.shape) - 1))
         square = float((contrast[region] ** 2).mean())
         excess = _excess(density, region)
         gathered = float(((contrast * excess)[region] ** 2).mean())
@@ -95,8 +95,8 @@ class ModelErrors:
     def added_to(self, squares: Floats) -> Floats:
         """Expected squares of the errors, (m/s)², from those of the posterior."""
         wrong = self.contrast**2
-        averaged = _around(squares + CONTRAST * wrong, AVERAGED_NODES)
-        behind = _around(wrong, 0.5 * SURROUNDINGS * (max(wrong.shape) - 1))
+        averaged = around(squares + CONTRAST * wrong, AVERAGED_NODES)
+        behind = around(wrong, 0.5 * SURROUNDINGS * (max(wrong.shape) - 1))
         return np.asarray((1.0 + self.excess) ** GATHERED * averaged + BEHIND * self.guided**4 * behind)
 
     @property
@@ -128,9 +128,10 @@ def _excess(density: Floats, region: Flags) -> Floats:
     """Relative excess of rays over the surroundings, at least 0."""
     radius = SURROUNDINGS * (max(density.shape) - 1)
     rays = np.where(region, density, 0.0)
-    around = _around(rays, radius) / np.maximum(_around(region.astype(float), radius), 1e-9)
-    return np.maximum(_around(rays, RAYS_NODES) / np.maximum(around, 1e-9) - 1.0, 0.0)
+    nearby = around(rays, radius) / np.maximum(around(region.astype(float), radius), 1e-9)
+    return np.maximum(around(rays, RAYS_NODES) / np.maximum(nearby, 1e-9) - 1.0, 0.0)
 
 
-def _around(image: Floats, radius: float) -> Floats:
+def around(image: Floats, radius: float) -> Floats:
+    """The image averaged over a Gaussian of this standard deviation, nodes."""
     return np.asarray(gaussian_filter(image, radius, mode="nearest"))

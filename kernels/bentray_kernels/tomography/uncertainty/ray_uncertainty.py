@@ -15,7 +15,7 @@ from ..gauss_newton.gauss_newton_step import trace_rays
 from ..gauss_newton.linearisation import Rows, ray_density
 from ..problem import Problem
 from ..settings import Settings
-from .model_errors import ModelErrors
+from .model_errors import ModelErrors, around
 from .posterior import Posterior
 from .probe_product import LANES
 
@@ -141,9 +141,5 @@ def _squares(speed: Floats, mean: Floats, samples: Sequence[Floats], width: floa
     """Expected squares of image minus truth smoothed by a width, (m/s)², and the width."""
     squares = np.zeros_like(speed)
     for sample in samples:
-        squares += _smoothed(sample, width) ** 2
-    return SPREAD / len(samples) * squares + (speed - _smoothed(speed + mean, width)) ** 2, width
-
-
-def _smoothed(image: Floats, width: float) -> Floats:
-    return np.asarray(gaussian_filter(image, width, mode="nearest") if width > 0.0 else image)
+        squares += around(sample, width) ** 2
+    return SPREAD / len(samples) * squares + (speed - around(speed + mean, width)) ** 2, width

@@ -27,6 +27,8 @@ function read(input) {
   return input.value === "" ? undefined : Number(input.value);
 }
 
+const MAYBE = { enum: ["true", "false"], "x-words": { true: "Yes", false: "No" } };
+
 // Kinds of fields: their inputs, and what the inputs say; undefined stands for the default.
 const KINDS = {
   choice: {
@@ -44,10 +46,7 @@ const KINDS = {
     about: () => "",
   },
   maybe: {
-    inputs: ({ schema, nullable, value, ...more }) => html`<select ...${more}>
-      <option value="">Automatic</option>
-      <${Options} entries=${[["true", "Yes"], ["false", "No"]]} chosen=${String(value)} />
-    </select>`,
+    inputs: ({ schema, value, ...more }) => KINDS.choice.inputs({ schema: MAYBE, value: String(value), ...more }),
     read: ([select]) => (select.value ? select.value === "true" : undefined),
     about: () => "",
     unset: "Automatic",
@@ -78,8 +77,7 @@ function kindOf(schema, nullable) {
 // A setting as the form knows it: its path, and how it is described.
 export function settingOf(path, given) {
   const schema = without(given);
-  const nullable = Boolean(given.anyOf);
-  return { path: path.join("."), schema, kind: kindOf(schema, nullable), nullable };
+  return { path: path.join("."), schema, kind: kindOf(schema, given.anyOf), nullable: Boolean(given.anyOf) };
 }
 
 // A setting below its caption, without words about it, as on a small form. value: the one to begin with, by default that of the schema.
