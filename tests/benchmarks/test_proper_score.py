@@ -13,8 +13,7 @@ def test_the_score_is_the_integral_of_the_squared_difference_of_distributions(er
     below, _ = quad(lambda x: norm.cdf(x, scale=deviation) ** 2, -40.0, error)
     above, _ = quad(lambda x: norm.sf(x, scale=deviation) ** 2, error, 40.0)
     assert score(np.array([error]), np.array([deviation])) == pytest.approx([below + above], rel=1e-5)
-    scores = score(np.ones(3), OF_KNOWN_ERROR * np.array([0.97, 1.0, 1.03]))
-    assert scores.argmin() == 1
+    assert score(np.ones(3), OF_KNOWN_ERROR * np.array([0.97, 1.0, 1.03])).argmin() == 1
 
 
 def test_rows_reward_deviations_that_follow_the_errors_and_bound_the_coverage_on_both_sides():

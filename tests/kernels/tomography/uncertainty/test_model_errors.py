@@ -19,7 +19,6 @@ def errors(density=EVEN, noise_s=5e-8, misfit_s=5e-8, speed=SPEED):
 
 def test_even_rays_through_a_flat_image_add_nothing():
     plain = errors(speed=np.full(SPEED.shape, WATER))
-    assert plain.guided < 0.05
     assert plain.added_to(np.full(SPEED.shape, 9.0))[np.hypot(X, Y) < 0.7] == pytest.approx(9.0, rel=0.02)
     assert plain.caution == ""
 
@@ -29,11 +28,10 @@ def test_a_layer_that_guides_rays_is_uncertain_by_its_contrast():
     assert even.guided < 0.05
     assert guided.guided > 0.5
     known, added = (np.sqrt(each.added_to(np.zeros(SPEED.shape))) for each in (even, guided))
-    far = REGION & (np.hypot(X, Y) < 0.2)
     # Of about 50 m/s of contrast.
     assert 8.0 < known[SKIN].mean() < 18.0
     assert added[SKIN].mean() > 1.3 * known[SKIN].mean()
-    assert added[far].max() < 1.0
+    assert added[np.hypot(X, Y) < 0.2].max() < 1.0
     assert "thin fast layer" in guided.caution
     assert "misfit" not in guided.caution
 
@@ -70,8 +68,7 @@ def test_errors_are_added_by_their_equation():
     """Of 9 (m/s)² of the posterior, a contrast of 10 m/s and rays half as many again as around."""
     even = np.ones((8, 8))
     plain = ModelErrors(10.0 * even, 0.5 * even, 0.4, 0.0, 0.0, 1.0, 1.0)
-    nearby = 1.25 * 0.4**4 * 100.0
-    assert plain.added_to(9.0 * even) == pytest.approx(1.5**2.5 * (9.0 + 0.1 * 100.0) + nearby)
+    assert plain.added_to(9.0 * even) == pytest.approx(1.5**2.5 * (9.0 + 0.1 * 100.0) + 1.25 * 0.4**4 * 100.0)
     # The excess is that of the node itself, squares are averaged.
     node = np.zeros((8, 8))
     node[4, 4] = 1.0
