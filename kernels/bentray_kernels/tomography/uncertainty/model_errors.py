@@ -9,10 +9,9 @@ from scipy.ndimage import gaussian_filter
 
 from ...arrays import Flags, Floats
 
-# Rays gather in thin fast layers, such as the skin. Variances are (1 + excess of rays)**``GATHERED`` times as
-# large, with ``CONTRAST`` of the squared contrast everywhere, and ``BEHIND`` times ``guided``**4 of that nearby.
-# Chosen with 36 simulated scans for the least CRPS, the last so that no scan has too few nodes within two
-# deviations. Squares are averaged over ``AVERAGED_NODES``.
+# Rays gather in thin fast layers such as the skin: variances grow by (1 + excess of rays)**``GATHERED``,
+# with ``CONTRAST`` of the squared contrast and ``BEHIND`` times ``guided``**4 of that nearby. Chosen with
+# 36 simulated scans for the least CRPS. Squares are averaged over ``AVERAGED_NODES``.
 CONTRAST, GATHERED, BEHIND, AVERAGED_NODES = 0.1, 2.5, 1.25, 0.75
 
 # Surroundings of a node: a Gaussian of this part of the side of the image, over twice the size of a lobe of

@@ -27,8 +27,7 @@ from ..gauss_newton.linearisation import Rows, halves
 from ..gauss_newton.penalties import roughness
 from .probe_product import LANES, back_projections, normal_products
 
-# Most conjugate gradient steps, and the relative gradient at which they end. Ten times as many did not better
-# the score of the deviations that ``bentray bench uncertainty`` judges.
+# Most conjugate gradient steps, and the relative gradient at which they end; more did not better the score.
 MAX_STEPS, TOLERANCE = 20, 1e-2
 
 Map = Callable[..., Iterable[Any]]
