@@ -10,7 +10,7 @@ from .command_line import commands
 from .dispersion import dispersion
 from .dissertation import dissertation
 from .export_formats import export_formats
-from .head_to_head import head_to_head_code
+from .head_to_head import head_to_head, head_to_head_code
 from .reconstruction_settings import reconstruction_settings
 from .rest import records, routes
 from .scan_limits import scan_limits
@@ -27,6 +27,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "records": records,
     "dispersion": dispersion,
     "export formats": export_formats,
+    "head to head": head_to_head,
     "head to head code": head_to_head_code,
     "scan limits": scan_limits,
     "scan readers": scan_readers,

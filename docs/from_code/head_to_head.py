@@ -1,12 +1,18 @@
-"""Code of the head-to-head page: the functions that its benchmark runs, from their files."""
+"""Table and code of the head-to-head page: recorded rows, and the functions that made them."""
 
 from __future__ import annotations
 
 import ast
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from .tables import table
+
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+ROWS = BENCHMARKS / "results" / "head_to_head.json"
+FIGURES = {"rms error": "rms error, m/s", "processor seconds": "processor seconds", "seconds": "seconds"}
+CONSTANT = "best constant"
 
 # Title, file in benchmarks/reconstruction, names shown of it, and whether they show without a click.
 CODE = (
@@ -35,6 +41,30 @@ CODE = (
         False,
     ),
 )
+
+
+def head_to_head(file: Path = ROWS) -> str:
+    """A row for each method, the least of each column bold; the best constant last."""
+    recorded = json.loads(file.read_text())
+    measured = [row for row in recorded if "figures" in row]
+    least = {name: min(row["figures"][name] for row in measured) for name in FIGURES}
+    rows = []
+    for row in measured:
+        figures = [_text(name, row["figures"][name], least[name]) for name in FIGURES]
+        rows.append((_method(row), *figures))
+    rows += [(_method(row), row["detail"], "", "") for row in recorded if row["value"] is None]
+    constants = {row["baselines"][CONSTANT] for row in measured}
+    rows += [(CONSTANT, f"{constant:.1f}", "", "") for constant in constants]
+    return table(("method", *FIGURES.values()), rows)
+
+
+def _method(row: dict) -> str:
+    return row["target"].removeprefix("H1 ").removesuffix(": rms error")
+
+
+def _text(name: str, value: float, least: float) -> str:
+    text = f"{value:.1f}" if name == "rms error" or value < 10.0 else f"{value:.0f}"
+    return f"**{text}**" if value == least else text
 
 
 def head_to_head_code() -> str:
