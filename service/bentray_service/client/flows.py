@@ -64,7 +64,8 @@ def upload(
         the record of the dataset, volume or mesh.
     """
     # The file of a scan that was read from another format has no name of its own.
-    metadata = {"filename": getattr(path, "title", "") or Path(path).name, **metadata}
+    title = "" if isinstance(path, str) else getattr(path, "title", "")
+    metadata = {"filename": title or Path(path).name, **metadata}
     if direct:
         response = yield from send_direct(Path(path), on_progress, kind, metadata)
     else:

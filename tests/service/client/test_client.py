@@ -17,7 +17,7 @@ def dataset(client, scan):
 
 def test_whole_path(client, scan, tmp_path):
     sent = []
-    dataset = client.upload(scan(), lambda done, total: sent.append((done, total)))
+    dataset = client.upload(str(scan()), lambda done, total: sent.append((done, total)))
     assert sent[-1] == (dataset.bytes, dataset.bytes)
     job = client.submit(dataset.id, {"nodes": 16, "iterations": 2})
     seen = []
@@ -25,7 +25,7 @@ def test_whole_path(client, scan, tmp_path):
     assert seen[-1] == done
     assert client.volume(done.volume).shape == [16, 16]
     assert client.slice_png(done.volume, quantity="coverage").startswith(b"\x89PNG")
-    assert np.load(client.download(done.volume, "npy", tmp_path / "speed.npy")).shape == (16, 16)
+    assert np.load(client.download(done.volume, "npy", str(tmp_path / "speed.npy"))).shape == (16, 16)
     assert client.download(done.volume, "hdf5", tmp_path / "r.h5").stat().st_size > 0
     assert not list(tmp_path.glob("*.partial"))
 
