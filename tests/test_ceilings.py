@@ -17,10 +17,10 @@ SOURCES = (".py", ".cl", ".js", ".css", ".html")
 # to which the ceilings are lowered as code is removed.
 LINES = {
     # folders: (ceiling, goal)
-    ("kernels", "workers", "service"): (96_100, 87_000),
+    ("kernels", "workers", "service"): (96_110, 87_000),
     ("service",): (33_600, 31_000),
-    ("tests",): (69_700, 58_000),
-    ("benchmarks",): (15_200, 13_000),
+    ("tests",): (69_860, 58_000),
+    ("benchmarks",): (15_330, 13_000),
 }
 
 FILES = 28

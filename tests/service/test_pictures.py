@@ -191,15 +191,15 @@ def test_a_picture_ends_with_its_client(tmp_path, held):
     "what", ["refraction.png?iso=0.5", "slice.png", "data?format=npy", "data?format=nifti"]
 )
 def test_rejects_pictures_larger_than_worker_memory(http, cluster, what):
-    """Workers of half a GiB, and a volume of 150 MiB."""
-    cluster.memory_bytes = 2**29 + 2**28
+    """Tasks of 128 MiB, and a volume of 150 MiB."""
+    cluster.memory_bytes = 2**29 + 2**27
     shape = (340, 340, 340)
     here = put(http.app.state, Tenant("local"), sampled(ONE_HOLE, 12), shape)
     answer = http.get(f"{here}/{what}")
     body = answer.json()
     assert (answer.status_code, body["type"]) == (422, "/problems/invalid-input"), body
     assert "bytes of a worker" in body["found"]
-    assert "at most 241591910 bytes" in body["accepted"]
+    assert "at most 134217728 bytes" in body["accepted"]
     assert not cluster.submitted
     asked = {"kind": "refraction", "volume": here.rpartition("/")[2], "settings": {"iso": [0.5]}}
     refused = http.post("/v1/jobs", json=asked)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +54,12 @@ class FringeSphere:
             slope = slope * (1.0 - fade)[..., np.newaxis] - product[..., np.newaxis] * its_slope
             product = product * (1.0 - fade)
         return slope
+
+    def iso_radius(self, iso: float) -> float:
+        """Radius of the outer surface on which the field is ``iso``, between 0 and 1; exact without holes."""
+        if not 0.0 < iso < 1.0:
+            raise InvalidInput("iso", iso, "a number between 0 and 1")
+        return self.radius + self.fringe * math.sqrt(-2.0 * math.log(iso))
 
     def _fade(
         self, points: Floats, centre: tuple[float, float, float], radius: float

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import time
 from types import SimpleNamespace
 
 import pytest
@@ -17,6 +16,8 @@ from bentray_kernels.compilation.compile_events import (
     needed,
 )
 from bentray_kernels.compilation.compiled import Kernel, compilation, kernel
+
+from ...clock import Clock
 
 
 @kernel
@@ -97,11 +98,14 @@ def test_a_kernel_that_another_process_compiles_is_waited_for(monkeypatch):
         assert other.stdout.readline() == "False\n"
         assert claim("another kernel")[1] is False
 
-        def release(_):
+        clock = Clock()
+
+        def release(seconds):
+            clock.now += seconds + 1.0
             if other.poll() is None:
                 other.communicate()
 
-        monkeypatch.setattr(compile_events, "time", SimpleNamespace(sleep=release, monotonic=time.monotonic))
+        monkeypatch.setattr(compile_events, "time", SimpleNamespace(sleep=release, monotonic=clock))
         with pytest.raises(CompiledMeanwhile):
             events.on_start(_of(first.py_func))
         events.on_end(_of(first.py_func))

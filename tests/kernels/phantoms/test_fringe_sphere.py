@@ -22,6 +22,13 @@ def test_gradient_is_the_derivative(field, point):
     assert field.gradient(at) == pytest.approx(expected, abs=1e-3)
 
 
+@given(radius=st.floats(0.1, 0.6), fringe=st.floats(0.02, 0.3), iso=st.floats(0.01, 0.99))
+def test_the_iso_radius_has_the_iso_value(radius, fringe, iso):
+    field = FringeSphere(radius, fringe)
+    at = np.array([0.0, 0.6, 0.8]) * field.iso_radius(iso)
+    assert field.value(at) == pytest.approx(iso)
+
+
 def test_plateaus_are_1_in_glass_and_0_in_air():
     assert FringeSphere(0.5, 0.1).value(np.array([0.3, 0.2, -0.3])) == 1.0
     assert ONE_HOLE.value(np.array([0.1, 0.1, 0.0])) == 0.0
@@ -44,3 +51,8 @@ def test_a_gradient_on_a_plateau_is_0():
 def test_impossible_balls_are_rejected(words, named):
     with pytest.raises(InvalidInput, match=named):
         FringeSphere(**words)
+
+
+def test_an_iso_value_off_the_range_is_rejected():
+    with pytest.raises(InvalidInput, match="iso"):
+        FringeSphere().iso_radius(1.0)

@@ -49,7 +49,8 @@ def image(scan: Dataset, method: str, **settings) -> Reconstruction:
 def codes(result: Reconstruction) -> list[str]:
     assert bool(result.doubt) == any(caution.doubtful for caution in result.cautions)
     assert result.doubt.startswith("Doubtful result. ") or not result.doubt
-    return [caution.code for caution in result.cautions]
+    # "uncertainty" is about the deviations, not about the image.
+    return [caution.code for caution in result.cautions if caution.code != "uncertainty"]
 
 
 DISC = ring()

@@ -42,7 +42,6 @@ CASES = (
     ("submit --batch {out} --at-once 2", "at_once: found 2; accepted: no --at-once without --scheduler"),
     ("submit {scan} -o {out} --no-wait", "there is no result to download yet"),
     ("submit {scan} --url lab:8000", "url: found 'lab:8000'"),
-    ("demo --elements 1 -o {out}/demo", "elements: found 1"),
     ("quality {scan} -o {out}/quality --picker eye", "Invalid value for '--picker'"),
     ("reconstruct {out}/absent.h5 -o {out}/r", "no such file"),
     ("reconstruct {scan} -o {scan}", "a file is in the way"),

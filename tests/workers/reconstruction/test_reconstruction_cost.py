@@ -11,9 +11,12 @@ from bentray_workers.reconstruction.reconstruction_cost import OVERHEAD_S, recon
 RING = Summary(64, 64, 64 * 64, 1, False, 0.0, 0.16, 0, False)
 TRACES = Traces(64, 64, 2000, 4, 8e6, 4e5, 1500.0)
 
+# Deviations are a part of their own.
+DEFAULTS = {"method": "sart", "nodes": 64, "decomposition": "slices", "uncertainty": False}
+
 
 def seconds(scan=RING, workers=1, **asked):
-    settings = Settings.from_values(**{"method": "sart", "nodes": 64, "decomposition": "slices", **asked})
+    settings = Settings.from_values(**{**DEFAULTS, **asked})
     return reconstruction_cost(scan, settings, workers).seconds - OVERHEAD_S
 
 
@@ -28,6 +31,7 @@ def test_more_work_takes_longer(method):
     assert seconds(replace(RING, receivers=128), method=method) > base_s
     assert seconds(method=method, rays="straight") < base_s
     assert seconds(method=method, resolution_check=True) > base_s
+    assert seconds(method=method, uncertainty=True) > base_s
 
 
 def test_methods_in_the_order_of_their_cost():
