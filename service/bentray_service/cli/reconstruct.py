@@ -66,7 +66,9 @@ def reconstruct(
             step(progress.done, progress.total, phase_note(progress.phase, rms))
 
         result = run(scan, dataset, settings, workers, show)
-    found = write_results(folder, result, dataset, time.perf_counter() - started, file=str(source))
+    took = time.perf_counter() - started
+    with progress_bar("Drawing"):
+        found = write_results(folder, result, dataset, took, file=str(source))
     show_results(f"Reconstruction of {source.name}", found, as_json=as_json)
     end_doubtful(bool(found["doubt"]), 1, accepted=accept_doubtful)
 
