@@ -84,6 +84,14 @@ def test_the_uncertainty_changes_nothing_else(times, image):
     assert image.image("uncertainty").values.shape == image.speed.shape
 
 
+def test_errors_of_the_model_are_added(times, monkeypatch):
+    squares = []
+    for added in (0.0, 400.0):
+        monkeypatch.setattr(model_errors.ModelErrors, "added_to", lambda _, known, added=added: known + added)
+        squares.append(mean_square(reconstruct(scan(times), PLAN)))
+    assert squares[1] - squares[0] == pytest.approx(400.0)
+
+
 def test_nodes_outside_the_array_are_not_estimated(image):
     assert image.uncertainty[0, 0] == 0.0
     assert np.isfinite(image.uncertainty).all()
