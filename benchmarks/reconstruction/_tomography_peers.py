@@ -3,6 +3,7 @@
 import importlib
 import logging
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator
@@ -20,10 +21,10 @@ Peer = Callable[[TravelTimes], np.ndarray]
 # by, in water 1500: in favour of the peers.
 SPEED_BOUNDS_MPS = (1300.0, 1800.0)
 
-# Largest triangle, squares of the nodes' spacing: 2830 triangles for an image of 128 nodes and 256 elements,
-# many because elements are corners. Four times as many take five times as long. An image of 64 nodes has too
-# few: 31.8 m/s, where a largest triangle of 4 gives 22.6.
-PYGIMLI_AREA = 16.0
+# Largest triangle, squares of the nodes' spacing, of a coarse and of a fine mesh: 16 gives 2830 triangles for
+# an image of 128 nodes and 256 elements, many because elements are corners. Four times as many take five
+# times as long. An image of 64 nodes has too few: 31.8 m/s, where a largest triangle of 4 gives 22.6.
+PYGIMLI_COARSE, PYGIMLI_FINE = 16.0, 8.0
 PYGIMLI_SECONDARY_NODES = 2
 # It weighs the roughness against a sum over pairs. For the 2016 pairs of 64 elements this is its default, 20,
 # which did better than 5; 20 for 256 elements gave 34.5 m/s. L1 roughness changed little.
@@ -41,7 +42,7 @@ def straight(method: Peer) -> Callable[..., Peer]:
     return lambda _: method
 
 
-def pygimli(module, error_s: float = PYGIMLI_ERROR_S) -> Peer:
+def pygimli(module, error_s: float = PYGIMLI_ERROR_S, area: float = PYGIMLI_COARSE) -> Peer:
     """pyGIMLi's own inversion: a shortest-path graph on triangles whose corners include the elements.
 
     Its times along the graph are up to a per cent long. So that this is no error of the data, it is given its
@@ -60,7 +61,7 @@ def pygimli(module, error_s: float = PYGIMLI_ERROR_S) -> Peer:
         x, y = (sensors - sensors.mean(axis=0)).T
         round_the_ring = np.argsort(np.arctan2(y, x))
         outline = meshtools.createPolygon(
-            sensors[round_the_ring], isClosed=True, area=PYGIMLI_AREA * times.spacing**2
+            sensors[round_the_ring], isClosed=True, area=area * times.spacing**2
         )
         mesh = meshtools.createMesh(outline, quality=34)
         emitter, receiver = times.pairs()
@@ -153,6 +154,7 @@ PEERS: dict[str, tuple[str, Callable[..., Peer]]] = {
     "straight SIRT": ("scipy.sparse", straight(sirt)),
     "straight SART": ("scipy.sparse", straight(sart)),
     "pyGIMLi": ("pygimli", pygimli),
+    "pyGIMLi, fine mesh": ("pygimli", partial(pygimli, area=PYGIMLI_FINE)),
     "ttcrpy + Gauss-Newton": ("ttcrpy.rgrid", ttcrpy),
 }
 

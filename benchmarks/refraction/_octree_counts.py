@@ -74,11 +74,10 @@ def rows(subject: Subject, pixels: int = PIXELS) -> Iterable[Row]:
     )
     counts = {search: operations(scene, subject, search, pixels) for search in ("steps", "dda", "octree")}
     listed = ", ".join(f"{search} {values:.1f} and {nodes:.1f}" for search, (values, nodes) in counts.items())
-    theirs = subject.seconds["steps"] / subject.seconds["accc octree"]
     yield Row(
         f"V5 {subject.name}, evaluations a ray, steps / accc octree",
         counts["steps"][0] / counts["octree"][0],
-        theirs,
+        round(subject.gain("accc octree")),
         ">=",
         "",
         f"evaluations of the spline, and cells or nodes, a ray: {listed}; the goal is their gain in time",

@@ -1,4 +1,4 @@
-"""Goals V2 to V6: refraction against other volume renderers, and the tables of Li 2008, chapter 4."""
+"""Goals V2, V3 and V6: refraction against other volume renderers, and supersampling after refraction."""
 
 import tempfile
 import time
@@ -14,7 +14,6 @@ from bentray_service.cli.output.benchmark_row import Row
 
 from ..eikonal.eikonal import alternate
 from ..shared._available import available
-from ._octree_counts import rows as operation_rows
 from ._refracting_ball import (
     DISTANCE_RADIUS,
     RIM_RADIUS,
@@ -26,7 +25,6 @@ from ._refracting_ball import (
     scene,
     signed_distance,
 )
-from ._refraction_ladders import cells, filters, ladder, subjects
 from ._refraction_mitsuba import Mitsuba
 from ._refraction_opencl import rows as opencl_rows
 from ._refraction_picture import picture as picture_of_balls
@@ -44,8 +42,8 @@ FRAME_POVRAY, FRAME_MITSUBA, SAMPLE_MITSUBA = 30.0, 2.0, 1.1
 
 
 def rows(context: BenchmarkContext) -> Iterable[Row]:
-    """V2 to V6, with a picture; the quick run leaves out the teapot and table 4."""
-    steps: list[Callable[[bool], Iterable[Row]]] = [mitsuba_rows, povray_rows, supersampling_rows, table_rows]
+    """V2, V3 and V6, with a picture."""
+    steps: list[Callable[[bool], Iterable[Row]]] = [mitsuba_rows, povray_rows, supersampling_rows]
     for k, step in enumerate(steps):
         context.progress(k, len(steps), step.__name__)
         yield from step(context.quick)
@@ -192,13 +190,3 @@ def photograph_row(made: Scene, quick: bool) -> Row:
         f"{psnr['prss']:.1f} dB after refraction, nine samples a pixel"
     )
     return Row("V6 extra time, photograph", extra, 5.0, "<=", "%", detail)
-
-
-def table_rows(quick: bool) -> Iterable[Row]:
-    """V4 and V5: tables 2, 3 and 4."""
-    for subject in subjects()[: 1 if quick else None]:
-        yield from cells(subject)
-        yield from ladder(subject, 5)
-        yield from operation_rows(subject)
-        if not quick:
-            yield from filters(subject, 5)

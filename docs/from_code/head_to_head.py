@@ -31,7 +31,7 @@ CODE = (
     (
         "pyGIMLi",
         "_tomography_peers.py",
-        "SPEED_BOUNDS_MPS PYGIMLI_AREA PYGIMLI_SECONDARY_NODES PYGIMLI_STRENGTH_A_PAIR pygimli _on_nodes",
+        "SPEED_BOUNDS_MPS PYGIMLI_COARSE PYGIMLI_SECONDARY_NODES PYGIMLI_STRENGTH_A_PAIR pygimli _on_nodes",
         False,
     ),
     (
