@@ -10,7 +10,7 @@ from bentray_workers.images.captions import LABELS
 from bentray_workers.images.maps import SPEED, UNCERTAINTY, draw_bar, draw_map, robust_limits
 
 from ..shared._small_png import figure_png
-from ._judged_image import Judged
+from ._judged_image import Judged, relative
 
 SHADOW, OTHER, CAUTION = "#c1272d", "#1f5fa8", "#9aa7b5"
 
@@ -27,7 +27,7 @@ def calibration_picture(judged: Sequence[Judged]) -> bytes:
             ("all scans", judged, OTHER),
             ("scan with the fewest", [worst], SHADOW),
         ):
-            sizes = np.concatenate([np.abs(image.error) / image.deviation for image in group])
+            sizes = np.concatenate([relative(image) for image in group])
             curve.plot(deviations, [(sizes <= k).mean() for k in deviations], color=colour, label=label)
         curve.plot([2.0], [0.85], "o", color="#e08a00", label="goal")
         curve.set_xlabel("deviations")

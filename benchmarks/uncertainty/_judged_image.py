@@ -22,8 +22,9 @@ class Judged:
     Attributes:
         name: of the scan, with the chosen model.
         result: the image.
-        error: (nodes,), m/s, of the nodes in the breast from the truth smoothed by the resolution width.
+        error: (nodes,), m/s, of the nodes with a deviation from the truth smoothed by the resolution width.
         deviation: (nodes,), m/s, their standard deviations.
+        breast: (nodes,), whether they are in the breast.
         image_s, uncertainty_s: CPU time, s.
     """
 
@@ -31,17 +32,23 @@ class Judged:
     result: Reconstruction
     error: Floats
     deviation: Floats
+    breast: NDArray[np.bool_]
     image_s: float
     uncertainty_s: float
 
     @property
+    def in_breast(self) -> tuple[Floats, Floats]:
+        """Errors and standard deviations of the nodes in the breast, m/s."""
+        return self.error[self.breast], self.deviation[self.breast]
+
+    @property
     def within(self) -> float:
-        """Part of the nodes within ``DEVIATIONS``."""
+        """Part of the nodes in the breast within ``DEVIATIONS``."""
         return part_within([self], DEVIATIONS)
 
 
 def part_within(judged: Sequence[Judged], deviations: float) -> float:
-    """Part of all nodes whose error is at most so many deviations."""
+    """Part of all nodes in the breasts whose error is at most so many deviations."""
     return float(np.mean(np.concatenate([relative(image) for image in judged]) <= deviations))
 
 
@@ -66,11 +73,13 @@ def row_of(target: str, error: Floats, deviation: Floats, goal: float, about: st
 
 
 def relative(judged: Judged) -> Floats:
-    """Absolute errors in deviations."""
-    return np.asarray(np.abs(judged.error) / judged.deviation)
+    """Absolute errors in the breast, in deviations."""
+    error, deviation = judged.in_breast
+    return np.asarray(np.abs(error) / deviation)
 
 
 def correlation(judged: Judged) -> float:
-    """Spearman's rank correlation of absolute error and deviation."""
-    ranks = [np.argsort(np.argsort(values)) for values in (np.abs(judged.error), judged.deviation)]
+    """Spearman's rank correlation of absolute error and deviation in the breast."""
+    error, deviation = judged.in_breast
+    ranks = [np.argsort(np.argsort(values)) for values in (np.abs(error), deviation)]
     return float(np.corrcoef(ranks)[0, 1])

@@ -1,9 +1,9 @@
-"""U1: the standard deviations of nodes hold on simulated scans, and their time."""
+"""U1 and U2: the standard deviations of nodes hold on simulated scans, their score and their time."""
 
 import math
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,9 +18,10 @@ from bentray_kernels.tomography.uncertainty.ray_uncertainty import ray_uncertain
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 
-from ._breast_scans import BreastScan, breast_scans
+from ._breast_scans import SEED, BreastScan, breast_scans
 from ._calibration_picture import calibration_picture
 from ._judged_image import DEVIATIONS, Judged, correlation, part_within, row_of
+from ._proper_score import score_rows
 from ._small_volume import small_volume
 from .uncertainty_waveform import beside_truth, wave_scans
 
@@ -30,6 +31,10 @@ Floats = NDArray[np.float64]
 # scans, so that nine tenths of their nodes lie within two, and is compared on the others.
 SCANS, QUICK_SCANS = 20, 2
 PART, CHOSEN_PART = 0.85, 0.9
+
+# Scans of the score; no other seed is theirs.
+SCORE_SEED = 20261128
+CHOSEN_ON = "settings chosen on 36 scans of seeds 501, 503 and 504"
 
 # Other breasts, all in water that is slower than skin and glands and hardly faster than fat.
 SLOW_SCANS, SLOW_SEED, SLOW_MPS = 6, 89, 1440.0
@@ -41,13 +46,10 @@ WAVE_SCANS, WAVE_HZ = 2, 3e5
 def rows(context: BenchmarkContext) -> Iterable[Row]:
     """Rows of the calibration, then of the time."""
     count = QUICK_SCANS if context.quick else SCANS
-    judged = []
-    for number, scan in enumerate(breast_scans(count)):
-        context.progress(number, count, scan.name)
-        judged.append(judge(scan))
+    judged = list(judged_scans(context, count, SEED))
     chosen_with, others = judged[: count // 2], judged[count // 2 :]
     constant = constant_deviation(chosen_with)
-    flat = float(np.mean(np.concatenate([np.abs(image.error) for image in others]) <= DEVIATIONS * constant))
+    flat = float(np.mean(np.abs(np.concatenate([x.in_breast[0] for x in others])) <= DEVIATIONS * constant))
     each = "; ".join(f"{image.name}: {100.0 * image.within:.0f} %" for image in judged)
     yield Row(
         "U1 nodes within two deviations, scans that chose nothing",
@@ -73,7 +75,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
         PART,
         ">=",
         "",
-        f"{least.name}; error {rms(least.error):.1f} m/s, deviations {rms(least.deviation):.1f} m/s",
+        f"{least.name}; {in_words(least)}",
     )
     yield from cautions(judged)
     correlations = [correlation(image) for image in judged]
@@ -96,6 +98,8 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     )
     context.save_picture("uncertainty.png", lambda: calibration_picture(judged))
     if not context.quick:
+        unseen = list(judged_scans(context, SCANS, SCORE_SEED))
+        yield from score_rows(unseen, f"{len(unseen)} scans of seed {SCORE_SEED}, judged once; {CHOSEN_ON}")
         yield from slow_water(context)
         yield picked_times(context)
         yield small_volume(context, PART)
@@ -109,7 +113,11 @@ def cautions(judged: Sequence[Judged]) -> Iterable[Row]:
     shares = [
         f"{100.0 * part_within(group, DEVIATIONS):.0f} %" if group else "none" for group in (told, rest)
     ]
-    error = [math.sqrt(float(np.mean([rms(x.error) ** 2 for x in group]))) for group in (told, rest) if group]
+    error = [
+        math.sqrt(float(np.mean([rms(x.in_breast[0]) ** 2 for x in group])))
+        for group in (told, rest)
+        if group
+    ]
     yield Row(
         "U1 rms error of images with a caution over that of the others",
         float(error[0] / error[1]) if told and rest else None,
@@ -123,10 +131,7 @@ def cautions(judged: Sequence[Judged]) -> Iterable[Row]:
 
 def slow_water(context: BenchmarkContext) -> Iterable[Row]:
     """Nodes within two deviations in water that is slower than skin and glands; they chose nothing."""
-    judged = []
-    for number, scan in enumerate(breast_scans(SLOW_SCANS, SLOW_SEED, SLOW_MPS)):
-        context.progress(number, SLOW_SCANS, scan.name)
-        judged.append(judge(scan))
+    judged = list(judged_scans(context, SLOW_SCANS, SLOW_SEED, SLOW_MPS))
     least = min(judged, key=lambda image: image.within)
     told = [bool(image.result.caution("uncertainty")) for image in judged]
     each = "; ".join(
@@ -140,8 +145,7 @@ def slow_water(context: BenchmarkContext) -> Iterable[Row]:
         PART,
         ">=",
         "",
-        f"{len(judged)} other breasts; error {rms(least.error):.1f} m/s, "
-        f"deviations {rms(least.deviation):.1f} m/s; {each}; rank correlation of deviation and error "
+        f"{len(judged)} other breasts; {in_words(least)}; {each}; rank correlation of deviation and error "
         f"at least {min(correlations):.2f}",
     )
 
@@ -164,6 +168,15 @@ def picked_times(context: BenchmarkContext) -> Row:
     return row_of("U1 picked wave times", error, deviation, PART, about)
 
 
+def judged_scans(
+    context: BenchmarkContext, count: int, seed: int, water_mps: float | None = None
+) -> Iterator[Judged]:
+    """Each of some breast scans, judged; see ``breast_scans``."""
+    for number, scan in enumerate(breast_scans(count, seed, water_mps)):
+        context.progress(number, count, scan.name)
+        yield judge(scan)
+
+
 def judge(scan: BreastScan) -> Judged:
     """Reconstruct a scan by the default settings, and compare with the truth."""
     begun = time.process_time()
@@ -175,11 +188,12 @@ def judge(scan: BreastScan) -> Judged:
     (width,) = result.resolution_width_m
     truth = scan.breast.speed(nodes, side)
     smooth = gaussian_filter(truth, width / spacing, mode="nearest") if width > 0.0 else truth
-    inside = scan.breast.inside(nodes, side) & (result.uncertainty > 0.0)
+    known, breast = result.uncertainty > 0.0, scan.breast.inside(nodes, side)
     own = seconds_of_uncertainty(scan.dataset, result)
     settings = result.settings
     name = f"{scan.name}, {'bent' if settings.rays == 'curved' else 'straight'} {settings.method}"
-    return Judged(name, result, (result.speed - smooth)[inside], result.uncertainty[inside], whole - own, own)
+    error = (result.speed - smooth)[known]
+    return Judged(name, result, error, result.uncertainty[known], breast[known], whole - own, own)
 
 
 def seconds_of_uncertainty(dataset: Dataset, result: Reconstruction) -> float:
@@ -197,10 +211,16 @@ def seconds_of_uncertainty(dataset: Dataset, result: Reconstruction) -> float:
 
 def constant_deviation(judged: Sequence[Judged]) -> float:
     """One deviation for all nodes with ``CHOSEN_PART`` of them within ``DEVIATIONS``, m/s."""
-    errors = np.concatenate([np.abs(image.error) for image in judged])
+    errors = np.abs(np.concatenate([image.in_breast[0] for image in judged]))
     return float(np.quantile(errors, CHOSEN_PART)) / DEVIATIONS
 
 
 def rms(values: Floats) -> float:
     """Root mean square."""
     return math.sqrt(float((values**2).mean()))
+
+
+def in_words(image: Judged) -> str:
+    """Error and deviations of an image in the breast."""
+    error, deviation = map(rms, image.in_breast)
+    return f"error {error:.1f} m/s, deviations {deviation:.1f} m/s"
