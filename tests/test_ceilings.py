@@ -19,7 +19,7 @@ LINES = {
     # folders: (ceiling, goal)
     ("kernels", "workers", "service"): (96_110, 87_000),
     ("service",): (33_600, 31_000),
-    ("tests",): (69_860, 58_000),
+    ("tests",): (69_875, 58_000),
     ("benchmarks",): (15_330, 13_000),
 }
 

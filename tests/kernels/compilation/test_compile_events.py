@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from types import SimpleNamespace
 
 import pytest
@@ -15,19 +16,31 @@ from bentray_kernels.compilation.compile_events import (
     claim,
     needed,
 )
-from bentray_kernels.compilation.compiled import Kernel, compilation, kernel
+from bentray_kernels.compilation.compiled import Kernel, compilation
 
 from ...clock import Clock
 
+SOURCE = """
+from bentray_kernels.compilation.compiled import kernel
 
 @kernel
 def first(x):
     return x + 1.0
 
-
 @kernel
 def second(x):
     return first(x) + first(2.0 * x)
+"""
+
+
+@pytest.fixture
+def fresh(tmp_path):
+    """Kernels in a file of their own, so that no earlier run has stored them."""
+    (tmp_path / "fresh.py").write_text(SOURCE)
+    spec = spec_from_file_location("fresh", tmp_path / "fresh.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def _of(function):
@@ -57,11 +70,11 @@ def test_kernels_are_counted_with_those_that_the_call_needs():
     events.on_end(other)
 
 
-def test_the_kernels_of_a_call_are_found_in_its_code():
-    assert needed(second.py_func, Kernel) == {first}
+def test_the_kernels_of_a_call_are_found_in_its_code(fresh):
+    assert needed(fresh.second.py_func, Kernel) == {fresh.first}
 
 
-def test_compilation_is_counted_while_it_lasts():
+def test_compilation_is_counted_while_it_lasts(fresh):
     seen = []
 
     class Witness(event.Listener):
@@ -71,10 +84,8 @@ def test_compilation_is_counted_while_it_lasts():
         def on_end(self, event):
             seen.append(compilation())
 
-    # Of a type that no other test stores.
-    fresh = kernel(second.py_func)
     with event.install_listener(compile_events.KIND, Witness()):
-        assert fresh(1j) == 2 + 3j
+        assert fresh.second(1j) == 2 + 3j
     assert [counts.active for counts in seen] == [True, True, True, False]
     assert [counts.done - seen[0].done for counts in seen] == [0, 0, 1, 2]
     assert seen[0].total - seen[0].done >= 1
@@ -89,7 +100,7 @@ sys.stdin.read()
 """
 
 
-def test_a_kernel_that_another_process_compiles_is_waited_for(monkeypatch):
+def test_a_kernel_that_another_process_compiles_is_waited_for(monkeypatch, fresh):
     monkeypatch.setattr(compile_events, "STORE_S", 0.0)
     events = CompileEvents(lambda _: 1, lambda _: "kernel of a test")
     with subprocess.Popen(
@@ -107,15 +118,15 @@ def test_a_kernel_that_another_process_compiles_is_waited_for(monkeypatch):
 
         monkeypatch.setattr(compile_events, "time", SimpleNamespace(sleep=release, monotonic=clock))
         with pytest.raises(CompiledMeanwhile):
-            events.on_start(_of(first.py_func))
-        events.on_end(_of(first.py_func))
+            events.on_start(_of(fresh.first.py_func))
+        events.on_end(_of(fresh.first.py_func))
     assert events.now() == Compilation(0, 0, active=False), "loaded from the cache, not compiled"
-    events.on_start(_of(first.py_func))
-    events.on_end(_of(first.py_func))
+    events.on_start(_of(fresh.first.py_func))
+    events.on_end(_of(fresh.first.py_func))
     assert events.now().done == 1
 
 
-def test_a_call_is_repeated_after_another_process_has_compiled_its_kernel(monkeypatch):
+def test_a_call_is_repeated_after_another_process_has_compiled_its_kernel(monkeypatch, fresh):
     refusals = [CompiledMeanwhile("kernel"), OSError(28, "No space left on device")]
 
     def called(x):
@@ -123,7 +134,6 @@ def test_a_call_is_repeated_after_another_process_has_compiled_its_kernel(monkey
             raise refusals.pop(0)
         return -x
 
-    fresh = kernel(first.py_func)
-    monkeypatch.setattr(fresh, "_called", called)
-    assert fresh(2) == -2
+    monkeypatch.setattr(fresh.first, "_called", called)
+    assert fresh.first(2) == -2
     assert refusals == []
