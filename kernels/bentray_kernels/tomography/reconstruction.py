@@ -138,8 +138,6 @@ def _speed_of(source: Source, chosen: Settled, run_graphs: Run, graph_of: GraphO
         after = refinement.total if waves.allowed else refinement.passes
     if settings.selects_model:
         settings, trials, before = select_model(source, settings, count // 2, run_graphs, after)
-    else:
-        settings = settings.changed(uncertainty=settings.estimates_uncertainty)
     scan = Scan(source, settings)
     graphs = [graph_of(scan, index) for index in range(count)]
     run_graphs(graphs, before, after)

@@ -64,7 +64,7 @@ class Settled(NamedTuple):
     """Settings without an open question but the model of ``auto``, which validation decides.
 
     Attributes:
-        settings: with nodes, decomposition, device and blocks.
+        settings: with nodes, decomposition, device, blocks and uncertainty.
         waves: the refinement that may follow; None without one.
         reasons: by what was decided automatically, the value and why.
     """
@@ -111,7 +111,11 @@ def settled(source: Source, settings: Settings, machine: Machine | None = None) 
             f"{len(bands)} of {bands[0].emitters} emitters, the most within {settings.minutes:g} minutes of "
             "one core"
         )
-    return Settled(chosen, waves, reasons)
+    deviations = chosen.estimates_uncertainty
+    if deviations and settings.uncertainty is None:
+        reasons["uncertainty"] = "estimated, since it is cheap for slices along bent rays"
+    # Those of the waveforms in ``waves`` stay off unless requested.
+    return Settled(chosen.changed(uncertainty=deviations), waves, reasons)
 
 
 def reasons_of_model(settings: Settings, requested: Settings, choice: str) -> dict[str, str]:

@@ -54,12 +54,14 @@ class Cluster:
             {"decomposition": "slices, since the elements are stacked", "nodes": ""},
         ),
         (replace(WATER, water_temperature_assumed=True), SART, {"water": "1500.0 m/s, as"}),
+        (WATER, SART.changed(method="gauss-newton"), {"uncertainty": "estimated, since it is cheap"}),
     ],
 )
 def test_what_is_open_is_decided_with_its_reason(dataset, settings, decided):
     found = settled(MemorySource(dataset), settings)
     assert found.settings.nodes is not None
     assert found.settings.decomposition is not None
+    assert found.settings.uncertainty == ("uncertainty" in decided)
     assert set(found.reasons) >= set(decided)
     assert all(found.reasons[name].startswith(words) for name, words in decided.items())
     requested = {name for name in ("nodes", "decomposition") if getattr(settings, name) is not None}

@@ -72,7 +72,7 @@ def candidate_settings(
 
 def final_settings(settings: Settings, changes: dict[str, Any]) -> Settings:
     """The settings of the reconstruction by a candidate: thin bent rays start on coarser grids."""
-    chosen = settings.changed(**changes, uncertainty=settings.estimates_uncertainty)
+    chosen = settings.changed(**changes)
     return chosen if chosen.numerics.coarser_grids else _from_coarser_grids(chosen)
 
 
