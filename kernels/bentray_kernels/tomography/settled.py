@@ -111,11 +111,10 @@ def settled(source: Source, settings: Settings, machine: Machine | None = None) 
             f"{len(bands)} of {bands[0].emitters} emitters, the most within {settings.minutes:g} minutes of "
             "one core"
         )
-    deviations = chosen.estimates_uncertainty
-    if deviations and settings.uncertainty is None:
+    # Of an image by rays: waveforms have deviations only if requested.
+    if chosen.uncertainty is None and chosen.estimates_uncertainty:
         reasons["uncertainty"] = "estimated, since it is cheap for slices along bent rays"
-    # Those of the waveforms in ``waves`` stay off unless requested.
-    return Settled(chosen.changed(uncertainty=deviations), waves, reasons)
+    return Settled(chosen.changed(uncertainty=chosen.estimates_uncertainty), waves, reasons)
 
 
 def reasons_of_model(settings: Settings, requested: Settings, choice: str) -> dict[str, str]:

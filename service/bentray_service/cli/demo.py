@@ -47,7 +47,6 @@ def demo(
     Example:  bentray demo -o demo-output
     """
     folder = output_folder(output)
-
     started = time.perf_counter()
     with ExitStack() as running:
         with progress_bar("Starting a service"):
