@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise, product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..opencl.program import Program
+from ..opencl.session import DeviceKernel, Session
 from .device_grid import ROWS, DeviceGrid, Gather, Group
 from .device_memory import ShotPlan, ShotSize
 from .medium import Medium
@@ -17,9 +18,6 @@ from .points import REACH, Points
 from .simulation import Unknown
 from .stencil import HALO, weights
 from .time_step import FLUSH
-
-if TYPE_CHECKING:
-    from ..opencl.session import DeviceKernel, Session
 
 # Work-items of a group. A processor runs a group in one thread, which turns rows into vectors; of these
 # widths the one is taken that fills up least.

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import InvalidInput
+from ..opencl import Session, computing_on, session_or_warning
 from .adjoint import MisfitGradient, gradient_of, misfit_gradient
+from .device_shots import ShotBatch
+from .device_waves import DeviceWaves, Scan, tiles
 from .medium import Medium
 from .points import Points
 from .simulation import Unknown, cut, place_scan, simulate
 from .time_blocks import Poll, no_poll
-
-if TYPE_CHECKING:
-    from ..opencl.session import Session
-    from .device_shots import ShotBatch
 
 # What simulates the waves.
 Engine = Literal["compiled", "opencl"]
@@ -96,24 +95,15 @@ def simulate_emissions(
     Warns:
         OpenCLFallbackWarning: once, where no device passes its self-test and compiled code is used instead.
     """
-    sources, receivers = place_scan(medium, *emissions.elements, emissions.wavelet)
+    placed = place_scan(medium, *emissions.elements, emissions.wavelet)
     session = _session(engine) if len(emissions.emitters) else None
     if session is None:
         for k, (emitter, valid) in enumerate(zip(emissions.emitters, emissions.valid, strict=True)):
             at, until = emissions.receivers[valid], emissions.needed(k)
             yield simulate(medium, emitter, at, emissions.wavelet, poll, until)
         return
-    from ..opencl.lost_device import computing_on
-    from .device_shots import ShotBatch
-    from .device_waves import DeviceWaves, Scan, tiles
-
     with computing_on(session):
-        waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
-        plan = waves.plan(memory_bytes)
-        pulse, scale = _normalised(medium, emissions.wavelet)
-        for tile in tiles(len(emissions.emitters), plan.emitters):
-            batch = ShotBatch(waves, _some(sources, tile), pulse, 1, poll)
-            batch.forward()
+        for tile, batch, scale in _batches(session, medium, emissions, placed, poll, memory_bytes):
             for k, samples in enumerate(batch.traces(), tile.start):
                 yield _traces(emissions, k, samples, scale)
 
@@ -133,17 +123,9 @@ def emission_misfits(
         simulated = simulate_emissions(medium, emissions, poll, engine, memory_bytes)
         yield from (misfit(k, traces)[0] for k, traces in enumerate(simulated))
         return
-    from ..opencl.lost_device import computing_on
-    from .device_shots import ShotBatch
-    from .device_waves import DeviceWaves, Scan, tiles
-
-    sources, receivers = place_scan(medium, *emissions.elements, emissions.wavelet)
+    placed = place_scan(medium, *emissions.elements, emissions.wavelet)
     with computing_on(session):
-        waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size))
-        pulse, scale = _normalised(medium, emissions.wavelet)
-        for tile in tiles(len(emissions.emitters), waves.plan(memory_bytes).emitters):
-            batch = ShotBatch(waves, _some(sources, tile), pulse, 1, poll)
-            batch.forward()
+        for tile, batch, scale in _batches(session, medium, emissions, placed, poll, memory_bytes):
             yield from _compared(batch, observed, tile, scale)[0].tolist()
 
 
@@ -178,7 +160,7 @@ def misfit_gradients(
     """
     if every < 1:
         raise InvalidInput("every", every, "at least 1 step")
-    sources, receivers = place_scan(medium, *emissions.elements, emissions.wavelet)
+    placed = place_scan(medium, *emissions.elements, emissions.wavelet)
     session = _session(engine) if len(emissions.emitters) else None
     if session is None:
         for k, (emitter, valid) in enumerate(zip(emissions.emitters, emissions.valid, strict=True)):
@@ -190,17 +172,8 @@ def misfit_gradients(
             until = emissions.needed(k)
             yield misfit_gradient(medium, emitter, at, emissions.wavelet, compare, every, by, poll, until)
         return
-    from ..opencl.lost_device import computing_on
-    from .device_shots import ShotBatch
-    from .device_waves import DeviceWaves, Scan, tiles
-
     with computing_on(session):
-        waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size, every, by))
-        plan = waves.plan(memory_bytes)
-        pulse, scale = _normalised(medium, emissions.wavelet)
-        for tile in tiles(len(emissions.emitters), plan.emitters):
-            batch = ShotBatch(waves, _some(sources, tile), pulse, plan.segments, poll)
-            batch.forward()
+        for tile, batch, scale in _batches(session, medium, emissions, placed, poll, memory_bytes, every, by):
             if observed is None:
                 values, factors = _compared_here(batch, emissions, misfit, tile, scale)
             else:
@@ -210,6 +183,30 @@ def misfit_gradients(
             for value, factor, image, light in zip(values, factors, *batch.backward(), strict=True):
                 summed = factor * image.astype(np.float64)
                 yield gradient_of(medium, scale, float(value), summed, light.astype(np.float64), every, by)
+
+
+def _batches(
+    session: Session,
+    medium: Medium,
+    emissions: Emissions,
+    placed: tuple[Points, Points],
+    poll: Poll,
+    memory_bytes: float,
+    every: int = 0,
+    by: Unknown = "speed",
+) -> Iterator[tuple[slice, ShotBatch, float]]:
+    """Tiles of emissions, simulated together on the device, and the pressure that is 1 there."""
+    sources, receivers = placed
+    waves = DeviceWaves(session, medium, Scan(receivers, emissions.wavelet.size, every, by))
+    plan = waves.plan(memory_bytes)
+    # A point source is 1 / spacing^d on its node; the factors contain spacing^2.
+    largest = float(np.abs(emissions.wavelet).max())
+    scale = largest / medium.spacing ** (medium.speed.ndim - 2)
+    for tile in tiles(len(emissions.emitters), plan.emitters):
+        shots = Points(sources.first[tile], sources.weights[tile])
+        batch = ShotBatch(waves, shots, emissions.wavelet / largest, plan.segments, poll)
+        batch.forward()
+        yield tile, batch, scale
 
 
 def _compared(batch: ShotBatch, observed: Observed, tile: slice, scale: float) -> tuple[Floats, Floats]:
@@ -233,23 +230,7 @@ def _compared_here(
 
 
 def _session(engine: Engine) -> Session | None:
-    if engine == "compiled":
-        return None
-    # Imported here, so that OpenCL is loaded only when it is used.
-    from ..opencl.device_selection import session_or_warning
-
-    return session_or_warning(instead="compiled code")
-
-
-def _some(points: Points, indices: slice) -> Points:
-    return Points(points.first[indices], points.weights[indices])
-
-
-def _normalised(medium: Medium, wavelet: Floats) -> tuple[Floats, float]:
-    """The wavelet over its largest magnitude, and the pressure that this makes 1."""
-    largest = float(np.abs(wavelet).max())
-    # A point source is 1 / spacing^d on its node; the factors contain spacing^2.
-    return wavelet / largest, largest / medium.spacing ** (medium.speed.ndim - 2)
+    return None if engine == "compiled" else session_or_warning(instead="compiled code")
 
 
 def _traces(emissions: Emissions, k: int, samples: NDArray[Any], scale: float) -> NDArray[Any]:
