@@ -8,7 +8,7 @@ import numpy as np
 
 from bentray_kernels.geometry_field.tracing.packed_scene import world_of
 from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, trace
-from bentray_kernels.geometry_field.tracing.ray_tracer_opencl import on_the_device
+from bentray_kernels.geometry_field.tracing.ray_tracer_opencl import OpenCLTracer
 from bentray_kernels.opencl import OpenCLFallbackWarning
 from bentray_service.cli.output.benchmark_row import Row
 
@@ -37,7 +37,7 @@ def rows(quick: bool) -> Iterable[Row]:
     runs = {way: here(way) for way in ("nearest", "walk", "exact")}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", OpenCLFallbackWarning)
-        tracer = on_the_device(world)
+        tracer = OpenCLTracer.on_the_device(world)
         if tracer is not None and tracer.fault_of(camera) == "":
             runs["OpenCL"] = lambda: tracer.follow(camera, settings("walk", "walk"))
     seconds = alternate(runs, 3 if quick else 7)

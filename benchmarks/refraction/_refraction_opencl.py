@@ -8,7 +8,7 @@ import numpy as np
 
 from bentray_kernels.opencl import OpenCLFallbackWarning, select_device
 from bentray_kernels.refraction import Picture, RenderSettings, Scene, render
-from bentray_kernels.refraction.caster_opencl import OpenCLCaster, on_the_device
+from bentray_kernels.refraction.caster_opencl import OpenCLCaster
 from bentray_kernels.splines import Spline
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
@@ -36,7 +36,7 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
     context.progress(0, 2, "trying the device")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", OpenCLFallbackWarning)
-        casters = {precision: on_the_device(made, precision) for precision in ODD_PIXELS}
+        casters = {precision: OpenCLCaster.on_the_device(made, precision) for precision in ODD_PIXELS}
         pictures = {
             precision: _frame(made, 1, caster)()
             for precision, caster in casters.items()

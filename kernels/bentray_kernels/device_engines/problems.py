@@ -17,7 +17,7 @@ from ..geometry_field.tables.inner_field import build_inner_rows, inner_field, s
 from ..geometry_field.tables.outer_field import build_rows, outer_field
 from ..geometry_field.tracing.packed_scene import World, world_of
 from ..geometry_field.tracing.ray_tracer import TraceSettings, trace
-from ..geometry_field.tracing.ray_tracer_opencl import on_the_device as tracer_on_the_device
+from ..geometry_field.tracing.ray_tracer_opencl import OpenCLTracer
 from ..geometry_field.tracing.scene import Ground, Instance, Material, Shape, placed
 from ..geometry_field.tracing.scene import Scene as FieldScene
 from ..meshes.example_surfaces import sphere
@@ -34,7 +34,7 @@ from ..refraction import (
     perspective,
     render,
 )
-from ..refraction.caster_opencl import on_the_device as caster_on_the_device
+from ..refraction.caster_opencl import OpenCLCaster
 from ..splines import Spline
 from ..tomography import Problem, Settings
 from ..tomography.grid_schedule import initial_slowness
@@ -291,7 +291,7 @@ def echoes(pixels: int, elements: int, emissions: int) -> Engine:
 def refraction(pixels: int) -> Engine:
     """A picture of a refracting ball, float32 rays."""
     made = glass_ball()
-    caster = caster_on_the_device(made, "float32")
+    caster = OpenCLCaster.on_the_device(made, "float32")
     settings = RenderSettings(pixels, pixels, threads=DRAWING_THREADS)
     side = float(BALL_NODES)
     board = checkerboard((0.0, 0.0, BACKDROP_Z), (side, 0.0, 0.0), (0.0, side, 0.0), 16)
@@ -317,7 +317,7 @@ def field(pixels: int) -> Engine:
     world = mirrors()
     eye = perspective((0.0, -3.4, 1.3), (0.0, 0.0, 0.5), (0.0, 0.0, 1.0), 38.0)
     settings = TraceSettings(pixels, pixels, threads=DRAWING_THREADS)
-    tracer = tracer_on_the_device(world)
+    tracer = OpenCLTracer.on_the_device(world)
     good = tracer is not None and tracer.fault_of(eye) == ""
     return Engine(
         "field",

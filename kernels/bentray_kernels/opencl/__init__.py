@@ -1,13 +1,8 @@
 """OpenCL devices: selection of device and engine, self-test and benchmark in a child process, sessions."""
 
 from .device_benchmark import ENGINES, DeviceBenchmark, benchmark_of
-from .device_selection import (
-    DeviceSelection,
-    OpenCLFallbackWarning,
-    scene_or_warning,
-    select_device,
-    session_or_warning,
-)
+from .device_scene import DeviceScene
+from .device_selection import DeviceSelection, OpenCLFallbackWarning, select_device, session_or_warning
 from .devices import VARIABLE, WISH, Device, find_devices
 from .engine_selection import Work, check_available, requested, select_engine
 from .lost_device import DeviceLostError, computed, computing_on, on_cpu, with_cpu_retry
@@ -21,6 +16,7 @@ __all__ = [
     "Device",
     "DeviceBenchmark",
     "DeviceLostError",
+    "DeviceScene",
     "DeviceSelection",
     "OpenCLFallbackWarning",
     "SelfTestResult",
@@ -33,7 +29,6 @@ __all__ = [
     "find_devices",
     "on_cpu",
     "requested",
-    "scene_or_warning",
     "select_device",
     "select_engine",
     "self_test_result",

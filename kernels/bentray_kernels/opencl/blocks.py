@@ -44,11 +44,6 @@ def travel_times(
     return times
 
 
-def programs() -> Iterator[Program]:
-    """The programs in two and three dimensions."""
-    return map(_program, EDGES)
-
-
 def _program(ndim: int) -> Program:
     return Program(("fast_iterative",), (f"DIMS={ndim}", f"EDGE={EDGES[ndim]}"))
 

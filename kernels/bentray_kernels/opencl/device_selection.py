@@ -5,17 +5,13 @@ from __future__ import annotations
 import os
 import threading
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import TypeVar
 
 from .devices import WISH, Device, find_devices, hidden, select_devices
 from .lost_device import DeviceLostError, cpu_only
 from .self_test_results import self_test_result
 from .session import Session
-
-Placed = TypeVar("Placed")
 
 
 class OpenCLFallbackWarning(UserWarning):
@@ -88,30 +84,6 @@ def open_session(device: Device) -> Session:
     """The device, open; the same for every caller in this process."""
     with _OPENING:
         return _opened(device)
-
-
-def scene_or_warning(build: Callable[[Session], Placed], instead: str) -> Placed | None:
-    """The result of ``build`` on the chosen device; or None after a warning, also without enough memory.
-
-    Args:
-        build: called with an open session.
-        instead: the function that replaces it.
-
-    Raises:
-        InvalidInput: as ``select_device``, and what ``build`` raises.
-    """
-    session = session_or_warning(instead)
-    if session is None:
-        return None
-    # Imported here, so that pyopencl is loaded only with a device.
-    import pyopencl as cl
-
-    try:
-        return build(session)
-    except cl.Error as error:
-        message = f"{session.handle.name} cannot hold the scene, {instead} takes over: {error}"
-        warnings.warn(OpenCLFallbackWarning(message), stacklevel=3)
-        return None
 
 
 _OPENING = threading.Lock()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class Program(NamedTuple):
-    """Sources that are built as one. Each engine lists its own; ``device_engines.programs`` has all.
+    """Sources that are built as one.
 
     Attributes:
         sources: names of the files ``sources/<source>.cl``, in the order in which the compiler reads them.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,11 +141,6 @@ class DeviceKernel(NamedTuple):
     def set_from(self, arguments: Mapping[str, Any]) -> DeviceKernel:
         """Set those of the engine's arguments that this kernel has."""
         return self.set(**{name: arguments[name] for name in self.positions if name in arguments})
-
-
-def programs() -> Iterator[Program]:
-    """The programs of ``probe``."""
-    return map(_probing, WIDTHS)
 
 
 def _probing(width: int) -> Program:

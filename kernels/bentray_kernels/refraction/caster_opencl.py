@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
-from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Flags, Floats
 from ..errors import InvalidInput
 from ..isosurface import crossing
 from ..isosurface.crossing import Search
 from ..isosurface.roots import STEPS
-from ..opencl import OpenCLFallbackWarning, Session, Work, computing_on, scene_or_warning
+from ..opencl import Session, Work, computing_on
+from ..opencl.device_scene import REALS, DeviceScene, fault_in
 from ..opencl.program import Program
-from ..splines.filters import FILTERS
-from ..splines.sampling import Stencil, stencil_of
+from ..splines.sampling import Stencil
 from .camera import perspective
 from .caster import RefractiveMedium, Traced, allocate_results, cast
 from .scene import Scene
@@ -52,31 +49,33 @@ TOLERANCES = {"float64": (1e-6, 0.02), "float32": (1e-2, 0.05)}
 RESULTS = ("points", "directions", "fates", "crossings", "weights", "vertices")
 
 
-class OpenCLCaster:
+class Rays(NamedTuple):
+    """Arguments of ``caster.cast``."""
+
+    medium: RefractiveMedium
+    search: Search
+    camera: tuple[Floats, Floats]
+    places: Floats
+    depth: int
+    traced: Traced
+
+
+class OpenCLCaster(DeviceScene):
     """A scene on a device; ``caster.cast`` replaces root finders that fail their self-test.
 
     Args:
         scene: its volume and octree are copied to the device, once.
         session: the device.
-        precision: of all numbers there, "float64" or "float32", which finds crossings to 1e-4 nodes instead
-            of 1e-9; None for the best one of the device.
-
-    Raises:
-        InvalidInput: for another precision.
+        precision: of all numbers there; "float32" finds crossings to 1e-4 nodes instead of 1e-9.
     """
 
+    instead, work = "caster.cast", "casts rays"
+
     def __init__(self, scene: Scene, session: Session, precision: str | None = None) -> None:
-        if precision is None:
-            precision = "float64" if "cl_khr_fp64" in session.handle.extensions else "float32"
-        if precision not in FINENESS:
-            raise InvalidInput("precision", precision, "one of " + ", ".join(FINENESS))
+        super().__init__(session, precision)
         self.scene = scene
-        self.session = session
-        self.precision = precision
-        self._real: Any = np.dtype(precision)
         # Sums are in the type of the coefficients, as on the CPU.
         self._sum: Any = min(self._real, scene.field.coefficients.dtype, key=lambda kind: kind.itemsize)
-        self._faults: dict[str, str] = {}
         with session.lock:
             counts = map(np.int32, scene.field.coefficients.shape)
             self._arguments: dict[str, Any] = {
@@ -110,71 +109,41 @@ class OpenCLCaster:
         """
         if medium.octree is not self.scene.octree:
             raise InvalidInput("medium", "that of another scene", "a medium of the scene on the device")
-        way = _way(search)
-        if way not in self._faults:
-            self._faults[way] = fault = self.fault_of(medium, search)
-            if fault:
-                name = self.session.handle.name
-                message = f"{name} casts rays wrong ({way.lower()}), caster.cast takes over: {fault}"
-                warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
-        rays = medium, search, camera, pixels, depth, traced
-        if self._faults[way]:
-            cast(*rays)
-        else:
+        rays = Rays(medium, search, camera, pixels, depth, traced)
+        if self._passes(lambda: self.fault_of(medium, search), _way(search)):
             with computing_on(self.session):
-                self.follow(*rays)
-
-    @property
-    def fault(self) -> str:
-        """Why ``caster.cast`` takes over; empty if it does not."""
-        return next(filter(None, self._faults.values()), "")
+                self.follow(rays)
+        else:
+            cast(*rays)
 
     def fault_of(self, medium: RefractiveMedium, search: Search) -> str:
         """Difference from ``caster.cast`` for rays at the object, as a message; empty if correct."""
-        import pyopencl as cl
-
-        camera, pixels = _towards_the_object(self.scene)
-        traced, expected = (allocate_results(TRIED, TRIED_DEPTH, False) for _ in range(2))
-        try:
-            self.follow(medium, search, camera, pixels, TRIED_DEPTH, traced)
-        except cl.Error as error:
-            return f"it ends with {str(error).splitlines()[0]}"
-        cast(medium, search, camera, pixels, TRIED_DEPTH, expected)
         far, allowed = TOLERANCES[self.precision]
-        same = (traced.fate == expected.fate) & (traced.crossed == expected.crossed)
-        same &= np.abs(traced.direction - expected.direction).max(axis=1) <= far
-        off = 1.0 - float(same.mean())
-        return "" if off <= allowed else f"{off:.0%} of its rays are off, {allowed:.0%} may be"
 
-    def follow(
-        self,
-        medium: RefractiveMedium,
-        search: Search,
-        camera: tuple[Floats, Floats],
-        pixels: Floats,
-        depth: int,
-        traced: Traced,
-    ) -> None:
+        def off() -> Flags:
+            traced, expected = (allocate_results(TRIED, TRIED_DEPTH, False) for _ in range(2))
+            rays = Rays(medium, search, *_towards_the_object(self.scene), TRIED_DEPTH, traced)
+            self.follow(rays)
+            cast(*rays._replace(traced=expected))
+            same = (traced.fate == expected.fate) & (traced.crossed == expected.crossed)
+            same &= np.abs(traced.direction - expected.direction).max(axis=1) <= far
+            return np.asarray(~same)
+
+        return fault_in(off, allowed, "rays")
+
+    def follow(self, rays: Rays) -> None:
         """Like ``cast``, on the device, without self-test."""
         # Place, point, direction, weight and the two whole numbers of a ray; its path.
-        at_once = max(1, self.session.doubles_at_once() // (10 + 3 * traced.vertices.shape[1]))
-        program = _program(self.precision, self._sum.name, self.scene.field.stencil, _way(search))
+        at_once = max(1, self.session.doubles_at_once() // (10 + 3 * rays.traced.vertices.shape[1]))
+        program = _program(self.precision, self._sum.name, self.scene.field.stencil, _way(rays.search))
         kernel = self.session.kernel(program, "follow")
-        for start in range(0, len(pixels), at_once):
-            rays = slice(start, start + at_once)
+        for start in range(0, len(rays.places), at_once):
+            part = slice(start, start + at_once)
             with self.session.lock:
-                self._launch(kernel, medium, search, camera, pixels[rays], depth, traced.part(rays))
+                self._launch(kernel, rays._replace(places=rays.places[part], traced=rays.traced.part(part)))
 
-    def _launch(
-        self,
-        kernel: Any,
-        medium: RefractiveMedium,
-        search: Search,
-        camera: tuple[Floats, Floats],
-        pixels: Floats,
-        depth: int,
-        traced: Traced,
-    ) -> None:
+    def _launch(self, kernel: Any, rays: Rays) -> None:
+        medium, search, camera, pixels, depth, traced = rays
         real, session = self._real.type, self.session
         frame = np.array([medium.origin, medium.density, medium.low, medium.high])
         # Setting an argument does not keep its buffer alive: the names do.
@@ -224,21 +193,11 @@ class OpenCLCaster:
         return self._real if array.dtype.kind == "f" else array.dtype
 
 
-def programs() -> Iterator[Program]:
-    """The programs of every filter and root finder, in every precision of rays and of sums."""
-    ways = ("STEPS", *WITHIN_CELLS.values())
-    sums = {"float64": ("float64", "float32"), "float32": ("float32",)}
-    for name, way, precision in product(FILTERS, ways, FINENESS):
-        for summed in sums[precision]:
-            yield _program(precision, summed, stencil_of(FILTERS[name]), way)
-
-
 def _program(precision: str, summed: str, stencil: Stencil, way: str) -> Program:
-    names = {"float64": "double", "float32": "float"}
     tolerance, shortest = FINENESS[precision]
     defines = (
-        f"REAL={names[precision]}",
-        f"SUM={names[summed]}",
+        f"REAL={REALS[precision]}",
+        f"SUM={REALS[summed]}",
         f"TAPS={len(stencil.places)}",
         f"POWERS={int(np.flatnonzero(stencil.weights.any(axis=(1, 2)))[-1]) + 1}",
         f"WIDTH={stencil.weights.shape[-1]}",
@@ -271,19 +230,3 @@ def _towards_the_object(scene: Scene) -> tuple[tuple[Floats, Floats], Floats]:
     camera = perspective(middle - 1.5 * size * np.array([0.48, 0.6, 0.64]), middle, (0.0, 0.0, 1.0), 40.0)
     pixels = np.random.default_rng(0).uniform(-0.5, 0.5, (TRIED, 2))
     return (camera.origin, camera.direction), pixels
-
-
-def on_the_device(scene: Scene, precision: str | None = None) -> OpenCLCaster | None:
-    """The scene on the chosen OpenCL device, for ``render``; None where no device passes its self-test.
-
-    Args:
-        scene: to render.
-        precision: as in ``OpenCLCaster``.
-
-    Raises:
-        InvalidInput: for another precision, or where ``BENTRAY_OPENCL_DEVICE`` does not match one device.
-
-    Warns:
-        OpenCLFallbackWarning: once, where no device passes its self-test; and without enough memory.
-    """
-    return scene_or_warning(lambda session: OpenCLCaster(scene, session, precision), "caster.cast")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..opencl.device_scene import REALS
 from ..opencl.program import Program
 from ..opencl.session import DeviceKernel, Session
 from .device_grid import ROWS, DeviceGrid, Gather, Group
@@ -185,14 +186,6 @@ class DeviceWaves:
         return self.session.own_kernel(program, name).set_from(self._arguments | own)
 
 
-def programs() -> Iterator[Program]:
-    """The programs in both precisions and dimensions, for all that a step stores."""
-    for kind in (np.dtype(np.float32), np.dtype(np.float64)):
-        yield _misfits(kind)
-        for ndim, store, fills in product((2, 3), (NOTHING, *STORES.values()), (False, True)):
-            yield _waves(kind, ndim, store, fills)
-
-
 def _misfits(kind: np.dtype[Any]) -> Program:
     return Program(("wave/misfits",), (_real(kind),))
 
@@ -210,7 +203,7 @@ def _waves(kind: np.dtype[Any], ndim: int, store: int, fills: bool) -> Program:
 
 
 def _real(kind: np.dtype[Any]) -> str:
-    return "REAL=" + ("float" if kind == np.float32 else "double")
+    return f"REAL={REALS[kind.name]}"
 
 
 def tiles(emitters: int, most: int) -> Iterator[slice]:

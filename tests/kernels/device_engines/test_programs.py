@@ -3,14 +3,22 @@
 import shutil
 import subprocess
 from importlib import resources
+from itertools import product
 
+import numpy as np
 import pytest
 
 from bentray_kernels.device_engines.benchmark_process import answer
-from bentray_kernels.device_engines.programs import every_program
-from bentray_kernels.opencl import Session
+from bentray_kernels.geometry_field.tracing import ray_tracer_opencl
+from bentray_kernels.opencl import Session, blocks, session
 from bentray_kernels.opencl.device_benchmark import ENGINES
 from bentray_kernels.opencl.program import Program
+from bentray_kernels.refraction import caster_opencl
+from bentray_kernels.splines import FILTERS
+from bentray_kernels.splines.sampling import stencil_of
+from bentray_kernels.tomography.reflection import delay_and_sum_opencl
+from bentray_kernels.tomography.sart import device_slices
+from bentray_kernels.wave import device_waves
 
 # In NVIDIA's headers these are functions, so no constant of a program may be initialised with them.
 PRELUDE = """
@@ -26,6 +34,25 @@ float function_of_the_driver(void);
 """
 # The front end itself, which takes many files at a time: starting it takes longer than a program.
 FRONT_END = "-cc1 -triple spir64 -x cl -cl-std=CL1.2 -fdeclare-opencl-builtins -finclude-default-header"
+
+
+def every_program():
+    """The programs of all engines, each with every combination of macros that its engine may define."""
+    yield from map(session._probing, session.WIDTHS)
+    yield from map(blocks._program, blocks.EDGES)
+    yield from map(device_slices._program, device_slices.GROUPS)
+    yield delay_and_sum_opencl.PROGRAM
+    yield from map(ray_tracer_opencl._program, ray_tracer_opencl.ROUNDING)
+    for kind in map(np.dtype, (np.float32, np.float64)):
+        yield device_waves._misfits(kind)
+        stores = (device_waves.NOTHING, *device_waves.STORES.values())
+        for sizes in product((2, 3), stores, (False, True)):
+            yield device_waves._waves(kind, *sizes)
+    ways = ("STEPS", *caster_opencl.WITHIN_CELLS.values())
+    precisions = (("float64", "float64"), ("float64", "float32"), ("float32", "float32"))
+    for chosen, way, numbers in product(FILTERS.values(), ways, precisions):
+        yield caster_opencl._program(*numbers, stencil_of(chosen), way)
+
 
 PROGRAMS = tuple(dict.fromkeys(every_program()))
 

@@ -4,7 +4,7 @@ import pytest
 
 from bentray_kernels.opencl import OpenCLFallbackWarning, device_selection
 from bentray_kernels.refraction import Layers, Scene
-from bentray_kernels.refraction.caster_opencl import on_the_device
+from bentray_kernels.refraction.caster_opencl import OpenCLCaster
 from bentray_kernels.splines import Spline
 
 from .solids import distance
@@ -15,5 +15,5 @@ def test_without_a_device_there_is_no_caster(monkeypatch):
     device_selection._warn_once.cache_clear()
     ball = Scene.build(Spline(0.3 - distance(12)), Layers((0.0,), (1.0, 1.5)), 1.0 / 11)
     with pytest.warns(OpenCLFallbackWarning, match="takes over: this machine has no"):
-        assert on_the_device(ball) is None
+        assert OpenCLCaster.on_the_device(ball) is None
     device_selection._warn_once.cache_clear()

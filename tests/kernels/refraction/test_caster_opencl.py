@@ -19,7 +19,7 @@ from bentray_kernels.refraction import (
     render,
 )
 from bentray_kernels.refraction.caster import LOST, REFRACTED, Traced, allocate_results, cast, medium_of
-from bentray_kernels.refraction.caster_opencl import OpenCLCaster, on_the_device
+from bentray_kernels.refraction.caster_opencl import OpenCLCaster, Rays
 from bentray_kernels.splines import Spline
 
 from ...effort import effort
@@ -37,7 +37,7 @@ CAMERAS = {
 
 
 def caster_of(scene: Scene, precision: str = "float64") -> OpenCLCaster:
-    made = on_the_device(scene, precision)
+    made = OpenCLCaster.on_the_device(scene, precision)
     assert made is not None
     return made
 
@@ -97,7 +97,7 @@ def both(
     medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.1)
     computed, expected = (allocate_results(300, depth, paths) for _ in range(2))
     views = camera.origin, camera.direction
-    caster_of(scene, precision).follow(medium, search, views, points, depth, computed)
+    caster_of(scene, precision).follow(Rays(medium, search, views, points, depth, computed))
     if compiled is not None:
         medium, search = medium_of(compiled, structure), compiled.search(structure, roots, 0.1)
     cast(medium, search, views, points, depth, expected)
@@ -257,9 +257,9 @@ def test_a_device_that_casts_wrong_is_left_with_a_warning(monkeypatch):
     scene = nested()
     caster, right, seen = caster_of(scene), OpenCLCaster.follow, CAMERAS["perspective"]
 
-    def wrong(there, medium, search, camera, points, depth, traced):
-        right(there, medium, search, camera, points, depth, traced)
-        traced.direction[:, 0] += 1e-3
+    def wrong(there, rays):
+        right(there, rays)
+        rays.traced.direction[:, 0] += 1e-3
 
     monkeypatch.setattr(OpenCLCaster, "follow", wrong)
     how = RenderSettings(24, 24)
@@ -296,7 +296,7 @@ def test_a_scene_that_the_device_cannot_hold_is_left_to_the_cpu(monkeypatch):
 
     monkeypatch.setattr(type(session_or_warning(instead="cast")), "upload", full)
     with pytest.warns(OpenCLFallbackWarning, match="cannot hold the scene"):
-        assert on_the_device(nested()) is None
+        assert OpenCLCaster.on_the_device(nested()) is None
 
 
 def test_rejects_objects_of_another_scene():
@@ -305,5 +305,5 @@ def test_rejects_objects_of_another_scene():
         render(other, CAMERAS["perspective"], BACKDROP, RenderSettings(8, 8), caster_of(first))
     assert refusal.value.field == "medium"
     with pytest.raises(InvalidInput) as refusal:
-        on_the_device(first, "float16")
+        OpenCLCaster.on_the_device(first, "float16")
     assert refusal.value.field == "precision"

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 
+from ...arrays import Flags
 from ...errors import InvalidInput
 from ...meshes.intersector import WAITING
-from ...opencl import OpenCLFallbackWarning, Session, Work, computing_on, scene_or_warning
+from ...opencl import Session, Work, computing_on
+from ...opencl.device_scene import REALS, DeviceScene, fault_in
 from ...opencl.program import Program
 from ...refraction.backdrop import Colours
 from ...refraction.camera import Camera
@@ -56,33 +54,28 @@ OF_WORLD = (
 OF_WORLD_REAL = ("to_local", "looks", "ground", "light")
 
 
-class OpenCLTracer:
+class OpenCLTracer(DeviceScene):
     """A world on a device; ``ray_tracer.trace`` replaces a device that fails its self-test.
 
     Args:
         world: ``world_of``; copied to the device, once.
-        session: the device.
-        precision: of places and directions there, "float64" or "float32"; None for the best one of the
-            device.
-
-    Raises:
-        InvalidInput: for another precision.
+        session, precision: as in ``DeviceScene``.
     """
 
+    instead, work = "tracing.trace", "traces rays"
+
     def __init__(self, world: World, session: Session, precision: str | None = None) -> None:
-        if precision is None:
-            precision = "float64" if "cl_khr_fp64" in session.handle.extensions else "float32"
-        if precision not in ROUNDING:
-            raise InvalidInput("precision", precision, "one of " + ", ".join(ROUNDING))
-        self.world, self.session, self.precision = world, session, precision
-        self._real: Any = np.dtype(precision)
-        self._fault: str | None = None
-        surface = world.surface
+        super().__init__(session, precision)
+        self.world = world
         with session.lock:
-            arrays = {name: getattr(surface, name) for name in OF_SURFACE}
+            arrays = {name: getattr(world.surface, name) for name in OF_SURFACE}
             arrays |= {name: getattr(world, name) for name in OF_WORLD}
             arrays |= {name: getattr(world, name).astype(self._real) for name in OF_WORLD_REAL}
-            self._arguments = dict(zip(arrays, self._there(*arrays.values()), strict=True))
+            # No device gives a buffer of no bytes.
+            self._arguments = {
+                name: session.upload(np.ascontiguousarray(array) if array.size else np.zeros(1, array.dtype))
+                for name, array in arrays.items()
+            }
             self._arguments["count"] = np.int32(len(world.instances))
             self._arguments["sky_rows"], self._arguments["sky_columns"] = map(np.int32, world.sky.shape[:2])
 
@@ -100,36 +93,20 @@ class OpenCLTracer:
         """
         if {settings.way, settings.eye} & set(lookup_scene.UV_WAYS):
             return trace(self.world, camera, settings)
-        if self._fault is None:
-            self._fault = self.fault_of(camera)
-            if self._fault:
-                name = self.session.handle.name
-                message = f"{name} traces rays wrong, tracing.trace takes over: {self._fault}"
-                warnings.warn(OpenCLFallbackWarning(message), stacklevel=2)
-        if self._fault:
+        if not self._passes(lambda: self.fault_of(camera)):
             return trace(self.world, camera, settings)
         with computing_on(self.session):
             return self.follow(camera, settings)
 
-    @property
-    def fault(self) -> str:
-        """Why ``ray_tracer.trace`` takes over; empty if it does not."""
-        return self._fault or ""
-
     def fault_of(self, camera: Camera) -> str:
         """Difference from ``ray_tracer.trace`` in a small image, as a message; empty if correct."""
-        import pyopencl as cl
-
         settings = TraceSettings(TRIED, TRIED)
-        try:
-            image = self.follow(camera, settings)
-        except cl.Error as error:
-            return f"it ends with {str(error).splitlines()[0]}"
-        off = np.abs(image.astype(int) - trace(self.world, camera, settings)).max(axis=2) > 1
-        allowed = ODD[self.precision]
-        return (
-            "" if off.mean() <= allowed else f"{off.mean():.0%} of its pixels are off, {allowed:.0%} may be"
-        )
+
+        def off() -> Flags:
+            image = self.follow(camera, settings).astype(int)
+            return np.asarray(np.abs(image - trace(self.world, camera, settings)).max(axis=2) > 1)
+
+        return fault_in(off, ODD[self.precision], "pixels")
 
     def follow(self, camera: Camera, settings: TraceSettings) -> Colours:
         """Like ``trace``, on the device, without self-test.
@@ -157,23 +134,11 @@ class OpenCLTracer:
             self.session.download(image, there)
         return image
 
-    def _there(self, *arrays: Any) -> list[Any]:
-        # No device gives a buffer of no bytes.
-        return [
-            self.session.upload(np.ascontiguousarray(array) if array.size else np.zeros(1, array.dtype))
-            for array in arrays
-        ]
-
-
-def programs() -> Iterator[Program]:
-    """The programs in both precisions."""
-    return map(_program, ROUNDING)
-
 
 def _program(precision: str) -> Program:
     later, never = ROUNDING[precision]
     defines = (
-        "REAL=" + {"float64": "double", "float32": "float"}[precision],
+        f"REAL={REALS[precision]}",
         f"LATER=R({later!r})",
         f"NEVER=R({never!r})",
         f"ALMOST_ZERO=R({float(cube.ALMOST_ZERO)!r})",
@@ -191,19 +156,3 @@ def work_of(world: World, rays: int) -> Work:
     sizes = [array.nbytes for array in (*world.surface, *world) if isinstance(array, np.ndarray)]
     # The colours of the picture.
     return Work("field", rays, sum(sizes) + 3 * rays, max(sizes))
-
-
-def on_the_device(world: World, precision: str | None = None) -> OpenCLTracer | None:
-    """The world on the chosen OpenCL device; None where no device passes its self-test.
-
-    Args:
-        world: to render.
-        precision: as in ``OpenCLTracer``.
-
-    Raises:
-        InvalidInput: for another precision, or where ``BENTRAY_OPENCL_DEVICE`` does not match one device.
-
-    Warns:
-        OpenCLFallbackWarning: once, where no device passes its self-test; and without enough memory.
-    """
-    return scene_or_warning(lambda session: OpenCLTracer(world, session, precision), "tracing.trace")

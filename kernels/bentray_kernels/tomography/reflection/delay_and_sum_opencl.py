@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,11 +21,6 @@ GROUP, PIXELS = 64, 2**15
 
 # Of a view of a pixel from an element, and of a sum of a pixel, bytes.
 VIEW_BYTES = SUM_BYTES = 16
-
-
-def programs() -> Iterator[Program]:
-    """The one program."""
-    yield PROGRAM
 
 
 def sum_echoes_opencl(

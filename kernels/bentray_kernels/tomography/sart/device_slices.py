@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -301,11 +301,6 @@ def local_memory(size_bytes: int) -> Any:
     import pyopencl as cl
 
     return cl.LocalMemory(size_bytes)
-
-
-def programs() -> Iterator[Program]:
-    """The programs for all sizes of groups."""
-    return map(_program, GROUPS)
 
 
 def _program(group: int) -> Program:

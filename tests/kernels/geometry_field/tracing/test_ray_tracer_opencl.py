@@ -7,7 +7,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tracing.lookup_scene import FACE_WAYS, UV_WAYS
 from bentray_kernels.geometry_field.tracing.packed_scene import World, world_of
 from bentray_kernels.geometry_field.tracing.ray_tracer import TraceSettings, trace
-from bentray_kernels.geometry_field.tracing.ray_tracer_opencl import OpenCLTracer, on_the_device
+from bentray_kernels.geometry_field.tracing.ray_tracer_opencl import OpenCLTracer
 from bentray_kernels.geometry_field.tracing.scene import Ground, Instance, Material, Scene, Shape, placed
 from bentray_kernels.opencl import OpenCLFallbackWarning
 from bentray_kernels.refraction import perspective
@@ -21,7 +21,7 @@ CAMERA = perspective((0.3, -3.0, 0.9), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 45.0)
 
 
 def tracer_of(world: World, precision: str = "float64") -> OpenCLTracer:
-    made = on_the_device(world, precision)
+    made = OpenCLTracer.on_the_device(world, precision)
     assert made is not None
     return made
 
@@ -78,4 +78,4 @@ def test_device_that_passes_the_self_test_is_used():
 
 def test_other_precisions_are_rejected():
     with pytest.raises(InvalidInput, match="precision"):
-        on_the_device(world_of(crowded()), "float16")
+        OpenCLTracer.on_the_device(world_of(crowded()), "float16")
