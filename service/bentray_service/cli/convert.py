@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from .options.paths import check_apart, output_file
-from .options.scan_options import ScanOptions, input_scan, with_scan_options
+from .options.scan_options import input_scan, metadata_of, with_scan_options
 from .output.terminal import AsJson, print_result
 
 TIMES, LENGTHS = "<s|ms|us|ns>", "<m|cm|mm|um>"
@@ -18,7 +18,7 @@ TIMES, LENGTHS = "<s|ms|us|ns>", "<m|cm|mm|um>"
 def convert(
     file: Annotated[Path, typer.Argument(help="Scan; the format is detected from its content.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (.h5).")],
-    scan_options: ScanOptions,
+    scan_options: dict[str, Any],
     force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -35,7 +35,7 @@ def convert(
     """
     source, target = input_scan(file), output_file(output, force=force, suffix=".h5")
     check_apart({"output": target}, {"file": source})
-    given = scan_options.metadata()
+    given = metadata_of(scan_options)
 
     from bentray_workers.foreign_scans import convert_dataset
 

@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .options.field_options import FieldOptions, with_field_options
+from .options.option_tables import with_options
 from .options.paths import input_file, output_folder
-from .output.terminal import AsJson, Step, phase_note, print_json, print_lines, print_table, progress_bar
+from .options.view_options import FIELD_SETTINGS, FIELD_VIEW, field_of
+from .output.terminal import AsJson, Step, print_json, print_lines, print_table, progress_bar, progress_shown
 
 if TYPE_CHECKING:
-    from bentray_kernels.tomography import Progress
     from bentray_workers.files.mesh_formats import ReadMesh
     from bentray_workers.rendering.field_view import FieldView
 
 ACCEPTED = "a triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB"
 
 
-@with_field_options
+@with_options({**FIELD_SETTINGS, **FIELD_VIEW})
 def geometry_field(
     mesh: Annotated[Path, typer.Argument(help="Triangle mesh: PLY, OBJ, OFF, STL, glTF or GLB.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
-    options: FieldOptions,
+    options: dict[str, Any],
     as_json: AsJson = False,
 ) -> None:
     """Build the geometry field of a mesh and render it into OUTPUT.
@@ -37,11 +37,11 @@ def geometry_field(
     Example:  bentray geometry-field bunny.ply -o bunny --mode refract --up y
     """
     source, folder = input_file(mesh, ACCEPTED), output_folder(output)
-    settings, view = options.settings(), options.view()
+    settings, view = field_of(options)
     view.check_samples(settings.samples)
 
     with progress_bar("Building the field") as step:
-        from bentray_service.rows.ids import field_of
+        from bentray_service.rows.ids import field_of as field_name
         from bentray_workers.files.geometry_field_folder import write_json
         from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
         from bentray_workers.files.mesh_formats import read_mesh
@@ -52,16 +52,13 @@ def geometry_field(
         check_faces(len(read.surface.mesh.faces))
         stored = StoredMesh(read.surface.mesh, read.colours)
         summary = summary_of(stored, read.surface, read.format)
-        name = field_of(settings.content(summary["content"]))
+        name = field_name(settings.content(summary["content"]))
         target, work = folder / name, folder / f"{name}-unfinished"
         work.mkdir(exist_ok=True)
         write_mesh(work / "mesh.h5", stored)
         started = time.perf_counter()
-
-        def show(progress: Progress) -> None:
-            step(progress.done, progress.total, phase_note(progress.phase))
-
-        figures = build_field(None, work / "mesh.h5", settings, target, work, on_progress=show)
+        shown = progress_shown(step)
+        figures = build_field(None, work / "mesh.h5", settings, target, work, on_progress=shown)
     shutil.rmtree(work)
     made = time.perf_counter()
     with progress_bar("Drawing") as step:

@@ -12,7 +12,7 @@ from bentray_kernels.requests.limits import MAX_LEFT_OUT
 from bentray_kernels.requests.picker_names import DEFAULT_PICKER, PickerName
 
 from .options.paths import output_folder
-from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options
+from .options.scan_options import dataset_file, input_scan, metadata_of, with_scan_options
 from .output.exit_codes import WorkFailed
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
@@ -21,7 +21,7 @@ from .output.terminal import AsJson, print_json, print_lines, print_table, progr
 def quality(
     file: Annotated[Path, typer.Argument(help="Dataset file, or a scan of another program.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder; created if missing.")],
-    scan_options: ScanOptions,
+    scan_options: dict[str, Any],
     picker: Annotated[
         PickerName, typer.Option(help="Picker of first arrivals in raw traces.")
     ] = DEFAULT_PICKER,
@@ -48,7 +48,7 @@ def quality(
     Example:  bentray quality scan.h5 -o report
     """
     source, folder = input_scan(file), output_folder(output)
-    given = scan_options.metadata()
+    given = metadata_of(scan_options)
 
     from bentray_workers.files.atomic import write_bytes
     from bentray_workers.files.dataset import write_dataset

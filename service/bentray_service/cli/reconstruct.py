@@ -6,16 +6,16 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .options.paths import output_folder
-from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options
-from .options.settings_options import SettingsOptions, settings_from, with_settings_options
+from .options.scan_options import checked_dataset, dataset_file, input_scan, metadata_of, with_scan_options
+from .options.settings_options import settings_from, with_settings_options
 from .output.exit_codes import AcceptDoubtful, end_doubtful
 from .output.results import show_results, write_results
-from .output.terminal import AsJson, phase_note, progress_bar
+from .output.terminal import AsJson, progress_bar, progress_shown
 
 if TYPE_CHECKING:
     from bentray_kernels.acquisition import Dataset
@@ -29,8 +29,8 @@ def reconstruct(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Output folder; an earlier result in it is replaced.")
     ],
-    options: SettingsOptions,
-    scan_options: ScanOptions,
+    options: dict[str, Any],
+    scan_options: dict[str, Any],
     workers: Annotated[
         int | None,
         typer.Option(
@@ -49,23 +49,13 @@ def reconstruct(
     Example:  bentray reconstruct scan.h5 -o result --rays curved --iterations 6
     """
     source, folder = input_scan(file), output_folder(output)
-    settings, given = settings_from(options), scan_options.metadata()
+    settings, given = settings_from(options), metadata_of(scan_options)
 
     started = time.perf_counter()
     with progress_bar("Reconstructing") as step, dataset_file(source, given, folder) as scan:
         # Loading kernels takes seconds.
-        from bentray_kernels.tomography.requirements import check_scan
-        from bentray_workers.files.dataset import read_dataset
-        from bentray_workers.files.dataset.traces import trace_samples
-
-        dataset = read_dataset(scan, traces=False)
-        check_scan(dataset, settings, trace_samples(scan))
-
-        def show(progress: Progress) -> None:
-            rms = progress.history[-1].residual_rms_s if progress.history else None
-            step(progress.done, progress.total, phase_note(progress.phase, rms))
-
-        result = run(scan, dataset, settings, workers, show)
+        dataset = checked_dataset(scan, settings)
+        result = run(scan, dataset, settings, workers, progress_shown(step))
     took = time.perf_counter() - started
     with progress_bar("Drawing"):
         found = write_results(folder, result, dataset, took, file=str(source))

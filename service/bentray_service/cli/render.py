@@ -14,8 +14,9 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
+from .options.option_tables import with_options
 from .options.paths import check_apart, input_file, output_file
-from .options.view_options import ViewOptions, with_view_options
+from .options.view_options import VIEW, view_of
 from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar
 
 if TYPE_CHECKING:
@@ -35,10 +36,10 @@ PHANTOM_SIDE_M = 0.1
 SampledPhantom = Literal["sphere", "one-hole", "two-holes", "marschner-lobb"]
 
 
-@with_view_options
+@with_options(VIEW)
 def render(
     output: Annotated[Path, typer.Option("--output", "-o", help="Image file to write (PNG).")],
-    options: ViewOptions,
+    options: dict[str, Any],
     file: Annotated[
         Path | None, typer.Argument(help="Volume file; the format is detected from its content.")
     ] = None,
@@ -78,7 +79,7 @@ def render(
         raise InvalidInput("file", shown, "one of the two")
     if phantom is not None:
         _refuse({"--shape": shape, "--dtype": dtype, "--spacing": spacing})
-    view, picture = options.view()
+    view, picture = view_of(options)
     check_available(view.device)
     outputs = {"--output": output, "--map": position_map}
     check_apart(outputs, {"the volume": file, "the backdrop": picture})

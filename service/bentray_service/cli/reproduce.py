@@ -9,11 +9,11 @@ import typer
 
 from .options.paths import input_file
 from .output.exit_codes import WorkFailed
-from .output.terminal import AsJson, phase_note, print_json, print_lines, print_table, progress_bar
+from .output.terminal import AsJson, print_json, print_lines, print_table, progress_bar, progress_shown
 from .reconstruct import run
 
 if TYPE_CHECKING:
-    from bentray_kernels.tomography import Progress, Reconstruction
+    from bentray_kernels.tomography import Reconstruction
 
 
 def reproduce(
@@ -43,12 +43,7 @@ def reproduce(
     record, source = input_file(result), input_file(scan)
     before, dataset = read_reconstruction(record), read_dataset(source, traces=False)
     with progress_bar("Reproducing") as step:
-
-        def show(progress: Progress) -> None:
-            rms = progress.history[-1].residual_rms_s if progress.history else None
-            step(progress.done, progress.total, phase_note(progress.phase, rms))
-
-        after = run(source, dataset, before.settings, workers, show)
+        after = run(source, dataset, before.settings, workers, progress_shown(step))
     differences = compared(before, after)
     here = provenance()
     other = {

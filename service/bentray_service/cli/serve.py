@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import logging
 import os
@@ -17,12 +18,12 @@ import typer
 
 from bentray_kernels.errors import InvalidInput
 
+from .options.option_tables import Option, with_options
 from .output.exit_codes import WorkFailed
 from .output.terminal import print_lines, progress_bar, remark
 
 if TYPE_CHECKING:
     from ..settings import ServiceSettings
-import ctypes
 
 log = logging.getLogger("bentray.serve")
 
@@ -30,14 +31,22 @@ BARE = (
     "No proxy is in front of the service (--bare): connections are not encrypted, and slow clients are not "
     "limited; deploy/nginx.conf does both."
 )
+# By the settings that they set.
 OPTIONS = {
-    "host": "--host",
-    "port": "--port",
-    "behind_proxy": "--behind-proxy",
-    "bare": "--bare",
-    "data_dir": "--data",
-    "dask_scheduler_address": "--scheduler",
-    "workers": "--workers",
+    "host": Option("--host", str, "127.0.0.1", "Address to listen on."),
+    "port": Option("--port", int, "8000", "Port; 0 picks a free one."),
+    "behind_proxy": Option(
+        "--behind-proxy",
+        str,
+        "",
+        "Addresses of the proxy in front, needed to listen on more than this machine.",
+    ),
+    "bare": Option("--bare", bool, "", "Listen without a proxy: no TLS, no limits of slow clients."),
+    "data_dir": Option("--data", Path, "./bentray-data", "Folder of the datasets, volumes and the database."),
+    "dask_scheduler_address": Option(
+        "--scheduler", str, "", "Dask scheduler to use instead of own workers, e.g. tcp://head:8786."
+    ),
+    "workers": Option("--workers", int, "one per core", "Worker processes to start."),
 }
 # Parameter of ``mallopt`` in <malloc.h>.
 M_ARENA_MAX = -8
@@ -45,28 +54,9 @@ M_ARENA_MAX = -8
 MAX_ARENAS = 2
 
 
+@with_options(OPTIONS)
 def serve(
-    host: Annotated[str | None, typer.Option(help="Address to listen on.", show_default="127.0.0.1")] = None,
-    port: Annotated[int | None, typer.Option(help="Port; 0 picks a free one.", show_default="8000")] = None,
-    behind_proxy: Annotated[
-        str | None,
-        typer.Option(help="Addresses of the proxy in front, needed to listen on more than this machine."),
-    ] = None,
-    bare: Annotated[
-        bool | None,
-        typer.Option("--bare", help="Listen without a proxy: no TLS, no limits of slow clients."),
-    ] = None,
-    data: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the datasets, volumes and the database.", show_default="./bentray-data"),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(help="Dask scheduler to use instead of own workers, e.g. tcp://head:8786."),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Worker processes to start.", show_default="one per core")
-    ] = None,
+    options: dict[str, Any],
     as_json: Annotated[
         bool, typer.Option("--json", help="Print {url, pid, data} as one JSON object.")
     ] = False,
@@ -80,24 +70,14 @@ def serve(
     from ..settings import ServiceSettings
     from ..web.server import listen
 
-    options = {
-        "host": host,
-        "port": port,
-        "behind_proxy": behind_proxy,
-        "bare": bare,
-        "data_dir": data,
-        "dask_scheduler_address": scheduler,
-        "workers": workers,
-    }
-    given = {name: value for name, value in options.items() if value is not None}
     try:
-        settings = ServiceSettings.load(**given)
+        settings = ServiceSettings.load(**options)
     except InvalidInput as error:
         # Name the option instead of the environment variable if the option was given.
         name = error.field.removeprefix("BENTRAY_").lower()
-        field = OPTIONS[name] if name in given else error.field
+        field = OPTIONS[name].name if name in options else error.field
         raise InvalidInput(field, error.value, error.accepted) from error
-    shown = {name: f"{OPTIONS[name]} {value}" for name, value in given.items()}
+    shown = {name: f"{OPTIONS[name].name} {value}" for name, value in options.items()}
     unused = list(ServiceSettings.unused_variables(os.environ, shown))
     # The socket is bound before any worker starts, so that a busy port is reported early
     # and port 0 is replaced by the actual number.

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from bentray_workers.simulation.waves import WaveSimulationSettings
 
 
-OPTIONS = options_of(PhantomScan, {}, {})
+OPTIONS = options_of(PhantomScan)
 # A person types nanoseconds.
 del OPTIONS["noise_s"]
 
 
-@with_options(OPTIONS, dict)
+@with_options(OPTIONS)
 def simulate(
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset file to write (HDF5).")],
     options: dict[str, Any],

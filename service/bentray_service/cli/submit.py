@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 from tempfile import gettempdir
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bentray_kernels.errors import InvalidInput
 
 from .options.paths import output_folder
-from .options.scan_options import ScanOptions, dataset_file, input_scan, with_scan_options
-from .options.settings_options import SettingsOptions, settings_from, with_settings_options
+from .options.scan_options import checked_dataset, dataset_file, input_scan, metadata_of, with_scan_options
+from .options.settings_options import settings_from, with_settings_options
+from .output.batch_view import report
 from .output.exit_codes import AcceptDoubtful, client_errors, end_doubtful
 from .output.results import show_results, write_results
 from .output.terminal import AsJson, Step, phase_note, print_json, print_lines, progress_bar, remark
@@ -32,8 +33,8 @@ def submit(
         Path | None,
         typer.Argument(help="Dataset file, or a scan of another program.", show_default="with --batch, none"),
     ] = None,
-    options: SettingsOptions,
-    scan_options: ScanOptions,
+    options: dict[str, Any],
+    scan_options: dict[str, Any],
     url: Annotated[str, typer.Option(help="Address of the service.")] = "http://127.0.0.1:8000",
     output: Annotated[
         Path | None,
@@ -116,22 +117,26 @@ def submit(
         shown = "an address with --batch" if batch is not None else "an address without --no-wait"
         raise InvalidInput("webhook", shown, "FILE with --no-wait")
     settings = settings_from(options)
-    given = scan_options.metadata()
+    given = metadata_of(scan_options)
     if file is not None:
         source = input_scan(file)
         folder = None if output is None else output_folder(output)
         with dataset_file(source, given, folder or Path(gettempdir())) as scan:
             job = _submit(source, scan, settings, url, folder, wait=wait, webhook=webhook, as_json=as_json)
         end_doubtful(job.doubtful, 1, accepted=accept_doubtful)
-    if batch is not None and scheduler is None:
-        from .service_batch import submit_service_batch
+    elif batch is not None:
+        from .batch import Batch, run_on_cluster, run_on_service
 
-        entries = submit_service_batch(batch, url, settings, given, output, wait=wait, as_json=as_json)
-        end_doubtful(sum(bool(entry.doubt) for entry in entries), len(entries), accepted=accept_doubtful)
-    elif batch is not None and scheduler is not None:
-        from .batch import submit_batch
-
-        entries = submit_batch(batch, scheduler, settings, given, output, at_once, tls, as_json=as_json)
+        results = (output or batch / "results").resolve()
+        scans = Batch(batch, results, settings, given)
+        entries, finished = scans.entries, True
+        output_folder(results)
+        if scheduler is None:
+            finished = run_on_service(scans, url, wait=wait, as_json=as_json)
+        else:
+            run_on_cluster(scans, scheduler, at_once, tls)
+        if finished:
+            report(batch, results, entries, as_json=as_json)
         end_doubtful(sum(bool(entry.doubt) for entry in entries), len(entries), accepted=accept_doubtful)
 
 
@@ -147,18 +152,14 @@ def _submit(
     as_json: bool,
 ) -> JobRecord:
     """Submit ``scan``, the dataset file made of ``source``; the last record of its job."""
-    from bentray_kernels.tomography.requirements import check_scan
-    from bentray_workers.files.dataset import read_dataset
-    from bentray_workers.files.dataset.traces import trace_samples
-
     from ..client import Client
 
-    check_scan(read_dataset(scan, traces=False), settings, trace_samples(scan))
-
+    # The ground truth is in the local file only.
+    dataset = checked_dataset(scan, settings)
     with client_errors(), Client(url, on_wait=remark) as client:
         with progress_bar("Uploading") as step:
-            dataset = client.upload(scan, step, filename=source.name)
-        job = client.submit(dataset.id, settings.to_dict(), webhook=webhook)
+            stored = client.upload(scan, step, filename=source.name)
+        job = client.submit(stored.id, settings.to_dict(), webhook=webhook)
         if job.plan is not None:
             remark(job.plan.why)
         if wait:
@@ -167,7 +168,11 @@ def _submit(
         if folder is not None:
             volume = client.download(job.volume or "", "hdf5", folder / "reconstruction.h5")
     if folder is not None:
-        _report(source, scan, folder, volume, job, as_json)
+        from bentray_workers.files.reconstruction import read_reconstruction
+
+        result, seconds = read_reconstruction(volume), job.seconds or 0.0
+        record = write_results(folder, result, dataset, seconds, file=str(source), job=job.id)
+        show_results(f"Reconstruction of {source.name}", record, as_json=as_json)
     elif as_json:
         print_json(job.model_dump(mode="json"))
     else:
@@ -181,14 +186,3 @@ def show_job(record: JobRecord, step: Step) -> None:
     progress, history = record.progress, record.history
     note = phase_note(progress.phase, history[-1].residual_rms_s if history else None)
     step(progress.done, progress.total, note or record.state)
-
-
-def _report(source: Path, scan: Path, folder: Path, volume: Path, job: JobRecord, as_json: bool) -> None:
-    from bentray_workers.files.dataset import read_dataset
-    from bentray_workers.files.reconstruction import read_reconstruction
-
-    # The ground truth is in the local file only.
-    dataset = read_dataset(scan, traces=False)
-    result = read_reconstruction(volume)
-    record = write_results(folder, result, dataset, job.seconds or 0.0, file=str(source), job=job.id)
-    show_results(f"Reconstruction of {source.name}", record, as_json=as_json)

@@ -6,9 +6,9 @@ import html
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rich.console import Console
 from rich.progress import (
@@ -22,6 +22,9 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from bentray_kernels.tomography import result
 
 # Shortest time between two drawings in a notebook, s: each is a message to the browser.
 REDRAW_S = 0.2
@@ -68,6 +71,16 @@ def phase_note(phase: str, rms_s: float | None = None) -> str:
     if rms_s is not None and phase in ("", "reconstructing"):
         return f"residual {rms_s * 1e9:.0f} ns"
     return "compiling kernels" if phase == "compiling" else phase
+
+
+def progress_shown(step: Step) -> Callable[[result.Progress], None]:
+    """A function that shows the progress of a computation and its last residual on a bar."""
+
+    def show(now: result.Progress) -> None:
+        rms = now.history[-1].residual_rms_s if now.history else None
+        step(now.done, now.total, phase_note(now.phase, rms))
+
+    return show
 
 
 def compilation_note() -> str:

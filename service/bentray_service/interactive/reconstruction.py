@@ -8,10 +8,10 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
-from bentray_kernels.tomography.result import Progress, Reconstruction
+from bentray_kernels.tomography.result import Reconstruction
 
 from .interruption import OnProgress, Stop, run_interruptibly
-from .progress_bar import phase_note, progress_bar
+from .progress_bar import progress_bar, progress_shown
 from .result import Result, result_of
 from .scan import Scan, read
 
@@ -76,11 +76,7 @@ def reconstruct(
         def work(report: OnProgress, stop: Stop) -> Reconstruction:
             return run(None, Path(source), chosen, report, stop, threads=threads)
 
-        def show(now: Progress) -> None:
-            rms = now.history[-1].residual_rms_s if now.history else None
-            step(now.done, now.total, phase_note(now.phase, rms))
-
-        image = run_interruptibly(work, show)
+        image = run_interruptibly(work, progress_shown(step))
     if image.doubt:
         warnings.warn(image.doubt, DoubtfulWarning, stacklevel=2)
     told = {"title": source.title, "scan": source.name, "seconds": f"{time.perf_counter() - begun:.2f}"}

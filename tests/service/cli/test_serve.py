@@ -74,12 +74,14 @@ def test_a_bad_setting_is_named_as_it_was_given(
     assert result.stderr.startswith(f"bentray: {line}; accepted: ")
 
 
-def test_an_option_wins_over_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_an_option_wins_over_the_environment(
+    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setenv("BENTRAY_WORKERS", "7")
     monkeypatch.setenv("BENTRAY_JOBS_AT_ONCE", "3")
     seen = []
     monkeypatch.setattr(module, "_run", lambda settings, *_: seen.append(settings))
-    module.serve(port=0, data=tmp_path, workers=2)
+    assert bentray("serve", "--port", 0, "--data", tmp_path, "--workers", 2).exit_code == 0
     assert (seen[0].workers, seen[0].jobs_at_once, seen[0].data_dir) == (2, 3, tmp_path)
 
 

@@ -43,15 +43,12 @@ class Option:
         )
 
 
-def with_options(
-    options: Mapping[str, Option], collect: Callable[[dict[str, Any]], Any], replaced: str = "options"
-) -> Callable[[Command], Command]:
+def with_options(options: Mapping[str, Option], replaced: str = "options") -> Callable[[Command], Command]:
     """A decorator that replaces one parameter of a command by one CLI option per field.
 
     Args:
         options: by field.
-        collect: converts the values of the CLI options, by field, to the argument.
-        replaced: name of the parameter.
+        replaced: name of the parameter, a dictionary of the values of the given options by field.
     """
 
     def decorate(command: Command) -> Command:
@@ -59,7 +56,7 @@ def with_options(
         def run(**given: Any) -> None:
             # Typer passes an empty list for a repeatable option that is not given.
             values = {name: value for name in options if (value := given.pop(name)) not in (None, [])}
-            command(**{replaced: collect(values)}, **given)
+            command(**{replaced: values}, **given)
 
         parameters: list[inspect.Parameter] = []
         for parameter in inspect.signature(command, eval_str=True).parameters.values():
@@ -73,37 +70,31 @@ def with_options(
     return decorate
 
 
-def options_of(kind: Any, names: Mapping[str, str], more: Mapping[str, str]) -> dict[str, Option]:
-    """One option for each field of a dataclass, by field.
+def options_of(
+    record: Any, names: Mapping[str, str] | None = None, more: Mapping[str, str] | None = None
+) -> dict[str, Option]:
+    """One option for each field with a ``description``, by field; its help is that, with choices or range.
 
     Args:
-        kind: whose fields have a ``description`` in their metadata.
-        names: of options that are not called as their field.
+        record: a dataclass.
+        names: of options that are not called as their field, without hyphens at their beginning.
         more: further sentences of the help, by field.
     """
-    hints, choices = get_type_hints(kind), choices_of(kind)
+    hints, choices = get_type_hints(record), choices_of(record)
     return {
-        field.name: option_of(
+        field.name: _option_of(
             field,
             hints[field.name],
             choices.get(field.name, ()),
-            names.get(field.name, field.name),
-            more.get(field.name, ""),
+            (names or {}).get(field.name, field.name),
+            (more or {}).get(field.name, ""),
         )
-        for field in fields(kind)
+        for field in fields(record)
+        if "description" in field.metadata
     }
 
 
-def option_of(field: Field[Any], hint: Any, choices: tuple[str, ...], name: str, more: str = "") -> Option:
-    """The option of one field; its help is the description, with choices or range.
-
-    Args:
-        field: of a dataclass, with metadata.
-        hint: its type.
-        choices: accepted words, if any.
-        name: of the option, without hyphens at its beginning.
-        more: a further sentence of the help.
-    """
+def _option_of(field: Field[Any], hint: Any, choices: tuple[str, ...], name: str, more: str) -> Option:
     flag = flag_of(name)
     kind, metavar, text = hint, None, field.metadata["description"]
     if field.default is None:

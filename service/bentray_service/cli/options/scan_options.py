@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from bentray_kernels.errors import InvalidInput
 
-from .option_tables import Command, Option, with_options
+from .option_tables import Option, with_options
 
 if TYPE_CHECKING:
+    from bentray_kernels.acquisition import Dataset
+    from bentray_kernels.tomography import Settings
     from bentray_workers.foreign_scans import ScanMetadata
 
 ACCEPTED = "the path of a scan, see the documentation of scan files"
@@ -33,23 +34,15 @@ OPTIONS = {
     "frequency_hz": Option("--frequency", float, "of FILE", "Centre frequency, Hz."),
 }
 
-
-@dataclass(frozen=True)
-class ScanOptions:
-    """Statements of a command line about a scan: values of the options that were given, by name."""
-
-    options: dict[str, Any]
-
-    def metadata(self) -> ScanMetadata:
-        """The values as metadata of a scan; raises InvalidInput naming the first invalid one."""
-        from bentray_workers.foreign_scans import ScanMetadata
-
-        return ScanMetadata.from_options(**self.options)
+# The command with the options about a scan in place of its parameter ``scan_options``.
+with_scan_options = with_options(OPTIONS, "scan_options")
 
 
-def with_scan_options(command: Command) -> Command:
-    """The command with the options about a scan in place of its parameter ``scan_options``."""
-    return with_options(OPTIONS, ScanOptions, "scan_options")(command)
+def metadata_of(options: dict[str, Any]) -> ScanMetadata:
+    """The given options as metadata of a scan; raises InvalidInput naming the first invalid one."""
+    from bentray_workers.foreign_scans import ScanMetadata
+
+    return ScanMetadata.from_options(**options)
 
 
 def input_scan(path: Path) -> Path:
@@ -84,3 +77,14 @@ def dataset_file(source: Path, given: ScanMetadata, folder_of: Path) -> Iterator
         converted = Path(folder) / f"{source.stem}.h5"
         convert_dataset(source, converted, given=given)
         yield converted
+
+
+def checked_dataset(scan: Path, settings: Settings) -> Dataset:
+    """A dataset file without its traces; raises InvalidInput unless it has what the settings require."""
+    from bentray_kernels.tomography.requirements import check_scan
+    from bentray_workers.files.dataset import read_dataset
+    from bentray_workers.files.dataset.traces import trace_samples
+
+    dataset = read_dataset(scan, traces=False)
+    check_scan(dataset, settings, trace_samples(scan))
+    return dataset

@@ -2,31 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any, get_type_hints
+from typing import Any
 
-from bentray_kernels.requests.request_fields import choices_of
 from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_kernels.tomography.stored_settings import WITHDRAWN
 
-from .option_tables import Command, Option, flag_of, option_of, with_options
-
-
-@dataclass(frozen=True)
-class SettingsOptions:
-    """The settings of a command line: values of the options that were given, by the names of ``PLACES``."""
-
-    options: dict[str, Any]
+from .option_tables import Option, flag_of, options_of, with_options
 
 
 def _options() -> dict[str, Option]:
-    found = {}
+    options = {}
     for name, place in PLACES.items():
         record, _, leaf = place.rpartition(".")
         kind: Any = type(getattr(Settings(), record)) if record else Settings
-        (field,) = (one for one in fields(kind) if one.name == leaf)
-        found[name] = option_of(field, get_type_hints(kind)[leaf], choices_of(kind).get(leaf, ()), name)
-    return found
+        options[name] = options_of(kind, {leaf: name})[leaf]
+    return options
 
 
 def _withdrawn() -> dict[str, Option]:
@@ -44,18 +34,19 @@ def _withdrawn() -> dict[str, Option]:
 # By the names of ``PLACES``, in the order of the help.
 OPTIONS = _options()
 
-
-def with_settings_options(command: Command) -> Command:
-    """The command with one CLI option per setting in place of its parameter ``options``."""
-    return with_options({**OPTIONS, **_withdrawn()}, SettingsOptions)(command)
+# The command with one CLI option per setting in place of its parameter ``options``.
+with_settings_options = with_options({**OPTIONS, **_withdrawn()})
 
 
-def settings_from(options: SettingsOptions) -> Settings:
+def settings_from(options: dict[str, Any]) -> Settings:
     """The settings of a command line; an option that is not given takes its default.
+
+    Args:
+        options: values of the options that were given, by the names of ``PLACES``.
 
     Raises:
         InvalidInput: naming the setting, its value and what is accepted.
     """
     from ...settings_request import nested, settings_of
 
-    return settings_of(nested(options.options))
+    return settings_of(nested(options))

@@ -17,6 +17,7 @@ from rich.text import Text
 from ...interactive.progress_bar import Step as Step
 from ...interactive.progress_bar import phase_note as phase_note
 from ...interactive.progress_bar import progress_bar as progress_bar
+from ...interactive.progress_bar import progress_shown as progress_shown
 
 # Width of tables in files and pipes.
 WIDTH = 120

@@ -10,7 +10,7 @@ from typer.testing import Result
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_service.cli import app
-from bentray_service.cli.options.settings_options import OPTIONS, SettingsOptions, settings_from
+from bentray_service.cli.options.settings_options import OPTIONS, settings_from
 
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 
@@ -46,7 +46,7 @@ def received(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
     """The settings that ``bentray reconstruct`` would have worked with; it then stops."""
     seen: list[Settings] = []
 
-    def stop(given: SettingsOptions) -> Settings:
+    def stop(given: dict[str, object]) -> Settings:
         seen.append(settings_from(given))
         raise InvalidInput("stop", "here", "nothing")
 
@@ -83,7 +83,7 @@ def test_every_setting_has_its_option() -> None:
 
 
 def test_no_options_give_default_settings() -> None:
-    assert settings_from(SettingsOptions({})) == Settings()
+    assert settings_from({}) == Settings()
 
 
 @pytest.mark.parametrize(

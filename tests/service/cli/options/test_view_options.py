@@ -7,15 +7,20 @@ import pytest
 
 from bentray_kernels.requests.request_fields import choices_of
 from bentray_kernels.splines import FILTERS
-from bentray_service.cli.options.field_options import SETTINGS, VIEW, FieldOptions
-from bentray_service.cli.options.view_options import OPTIONS, ViewOptions
+from bentray_service.cli.options.view_options import (
+    FIELD_SETTINGS,
+    FIELD_VIEW,
+    VIEW,
+    field_of,
+    view_of,
+)
 from bentray_workers.rendering.field_settings import FieldSettings
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.refraction_view import RefractionView
 
 
 @pytest.mark.parametrize(
-    ("options", "kind"), [(OPTIONS, RefractionView), (SETTINGS, FieldSettings), (VIEW, FieldView)]
+    ("options", "kind"), [(VIEW, RefractionView), (FIELD_SETTINGS, FieldSettings), (FIELD_VIEW, FieldView)]
 )
 def test_every_field_has_an_option_with_default_and_choices(options, kind) -> None:
     assert list(options) == [field.name for field in fields(kind)]
@@ -29,23 +34,22 @@ def test_every_field_has_an_option_with_default_and_choices(options, kind) -> No
 
 
 def test_omitted_options_take_defaults() -> None:
-    assert ViewOptions({}).view() == (RefractionView(), None)
-    asked = ViewOptions({"iso": [0.5, 0.7], "index": [1.2, 1.3], "fresnel": True})
-    assert asked.view()[0] == RefractionView(iso=(0.5, 0.7), index=(1.2, 1.3), fresnel=True)
+    assert view_of({}) == (RefractionView(), None)
+    view, _ = view_of({"iso": [0.5, 0.7], "index": [1.2, 1.3], "fresnel": True})
+    assert view == RefractionView(iso=(0.5, 0.7), index=(1.2, 1.3), fresnel=True)
 
 
 def test_each_option_of_a_field_sets_its_own() -> None:
-    asked = FieldOptions({"samples": 8, "mode": "refract"})
-    assert asked.settings() == FieldSettings(samples=8)
-    assert asked.view() == FieldView(mode="refract")
-    placed = FieldOptions({"scene": "two-mirrors", "positions_m": [0.0, 1.0, 2.0, 3.0]})
-    assert placed.view().positions_m == (0.0, 1.0, 2.0, 3.0)
+    asked = field_of({"samples": 8, "mode": "refract"})
+    assert asked == (FieldSettings(samples=8), FieldView(mode="refract"))
+    _, placed = field_of({"scene": "two-mirrors", "positions_m": [0.0, 1.0, 2.0, 3.0]})
+    assert placed.positions_m == (0.0, 1.0, 2.0, 3.0)
 
 
 def test_a_backdrop_may_be_a_file() -> None:
-    view, file = ViewOptions({"backdrop": "garden.jpg"}).view()
+    view, file = view_of({"backdrop": "garden.jpg"})
     assert (view.backdrop, file) == ("picture", Path("garden.jpg"))
-    assert ViewOptions({"backdrop": "picture"}).view()[1] is None
+    assert view_of({"backdrop": "picture"})[1] is None
 
 
 def test_the_names_of_filters_are_those_of_the_splines() -> None:
