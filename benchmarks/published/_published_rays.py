@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from bentray_kernels import eikonal, rays
-from bentray_kernels.requests.ray_gradient_names import RayGradient
+from bentray_kernels.requests.names import RayGradient
 from bentray_service.cli.output.benchmark_row import Row
 
 from ..eikonal.eikonal import alternate

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.requests.picker_names import DEFAULT_PICKER
+from bentray_kernels.requests.names import DEFAULT_PICKER
 from bentray_workers.cluster.capacities import WorkerCapacity, capacities_by_address
 from bentray_workers.cluster.resources import PICTURE_PRIORITY
 from bentray_workers.files import volume_export

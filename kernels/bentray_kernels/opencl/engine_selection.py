@@ -10,7 +10,7 @@ from functools import cache
 from typing import NamedTuple
 
 from ..errors import InvalidInput
-from ..requests.device_request import REQUESTS
+from ..requests.names import REQUESTS
 from .device_benchmark import ENGINES, MOST_ATTEMPTS, DeviceBenchmark, benchmark_engine, stored_benchmark
 from .device_selection import open_session, select_device
 from .devices import NEVER, VARIABLE, WISH, Device, find_devices, hidden, select_devices

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, refuse_mask
 from ..compilation.compiled import kernel
 from ..errors import InvalidInput
-from ..requests.ray_gradient_names import RayGradient
+from ..requests.names import RayGradient
 from .squared_time_spline import squared_time_spline
 
 RayKind = Literal["curved", "straight"]

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 from ..arrays import Floats, Ints
 from ..compilation.compiled import kernel
-from ..requests.ray_gradient_names import RayGradient
+from ..requests.names import RayGradient
 from .descent import PARTS, STEP, empty_path, list_entries, merge_entries, trace_ray
 from .fan import Fan, RayKind
 

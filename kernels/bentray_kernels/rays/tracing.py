@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..compilation.compiled import kernel
-from ..requests.ray_gradient_names import RayGradient
+from ..requests.names import RayGradient
 from .descent import STEP, empty_path, trace_ray
 from .fan import Fan, RayKind
 

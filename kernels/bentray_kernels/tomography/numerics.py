@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Literal
 
 from ..requests.limits import check_speeds
+from ..requests.names import RayGradient
 from ..requests.ranges import SEED, Range, ranged
-from ..requests.ray_gradient_names import RayGradient
 from ..requests.request_fields import check
 
 BANDS = 4

@@ -7,10 +7,9 @@ from typing import Any, ClassVar, Literal
 
 from ..errors import InvalidInput
 from ..requests.limits import LEFT_OUT, MAX_LEFT_OUT, SPEED_MPS, WATER_C, check_speeds
-from ..requests.picker_names import DEFAULT_PICKER, PickerName
+from ..requests.names import DEFAULT_PICKER, PickerName, SolverName
 from ..requests.ranges import Range
 from ..requests.request_fields import ABOVE_ZERO, Uses, check, declared, setting
-from ..requests.solver_names import SolverName
 from .numerics import Numerics
 
 # The wave front of the compiled pass over a slice; see ``eikonal.deviation``.

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from bentray_kernels.requests.limits import MAX_LEFT_OUT
-from bentray_kernels.requests.picker_names import DEFAULT_PICKER, PickerName
+from bentray_kernels.requests.names import DEFAULT_PICKER, PickerName
 
 from .options.paths import output_folder
 from .options.scan_options import dataset_file, input_scan, metadata_of, with_scan_options

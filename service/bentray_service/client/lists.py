@@ -8,7 +8,7 @@ from urllib.parse import parse_qsl, urlsplit
 from pydantic import BaseModel
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.requests.picker_names import DEFAULT_PICKER, PickerName
+from bentray_kernels.requests.names import DEFAULT_PICKER, PickerName
 from bentray_kernels.requests.ranges import Range
 
 from ..html_tables import RecordList

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Unpack
 
-from bentray_kernels.requests.picker_names import DEFAULT_PICKER, PickerName
+from bentray_kernels.requests.names import DEFAULT_PICKER, PickerName
 
 from ..interactive.picture import Picture
 from ..settings_request import check_setting_names

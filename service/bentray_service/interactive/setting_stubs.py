@@ -16,9 +16,7 @@ HEAD = '''"""The settings of jobs as types, for editors and type checkers; writt
 
 from typing import Literal, TypedDict
 
-from bentray_kernels.requests.device_request import DeviceRequest
-from bentray_kernels.requests.picker_names import PickerName
-from bentray_kernels.requests.solver_names import SolverName
+from bentray_kernels.requests.names import DeviceRequest, PickerName, SolverName
 '''
 
 

@@ -2,9 +2,7 @@
 
 from typing import Literal, TypedDict
 
-from bentray_kernels.requests.device_request import DeviceRequest
-from bentray_kernels.requests.picker_names import PickerName
-from bentray_kernels.requests.solver_names import SolverName
+from bentray_kernels.requests.names import DeviceRequest, PickerName, SolverName
 
 Method = Literal["sart", "gauss-newton", "auto", "waveform"]
 PhantomName = Literal["table6", "table6-vertical", "detailed", "breast", "table7"]

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response, status
 from pydantic import Field
 
 from bentray_kernels.requests.limits import FREQUENCY_HZ, SPEED_MPS, TEMPERATURE_C
-from bentray_kernels.requests.picker_names import DEFAULT_PICKER, PickerName
+from bentray_kernels.requests.names import DEFAULT_PICKER, PickerName
 from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
 
 from ..files.deletion import StoredItem

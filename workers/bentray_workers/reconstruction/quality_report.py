@@ -17,7 +17,7 @@ from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED
 from bentray_kernels.acquisition.water import temperature_from_speed
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import MAX_LEFT_OUT
-from bentray_kernels.requests.picker_names import DEFAULT_PICKER
+from bentray_kernels.requests.names import DEFAULT_PICKER
 
 from ..cluster.task_cancellation import cancellation_check
 from ..files.dataset import Limits, read_dataset

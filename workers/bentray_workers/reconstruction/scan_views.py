@@ -16,7 +16,7 @@ from bentray_kernels.acquisition.picking.first_arrivals import read_times, scree
 from bentray_kernels.acquisition.quality.water_speed import stated_water
 from bentray_kernels.arrays import Floats
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.requests.picker_names import DEFAULT_PICKER
+from bentray_kernels.requests.names import DEFAULT_PICKER
 
 from ..files.dataset import read_dataset
 from ..files.dataset.scan import measured_spectrum

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.requests.device_request import DESCRIPTION, DeviceRequest
+from bentray_kernels.requests.names import DESCRIPTION, DeviceRequest
 from bentray_kernels.requests.ranges import Range
 from bentray_kernels.requests.rendering_limits import MAX_REFERENCE_SAMPLES
 from bentray_kernels.requests.request_fields import MAX_PIXELS, MAX_RAYS, check, setting

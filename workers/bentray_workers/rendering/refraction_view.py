@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.requests.device_request import DESCRIPTION, DeviceRequest
+from bentray_kernels.requests.names import DESCRIPTION, DeviceRequest
 from bentray_kernels.requests.ranges import Range
 from bentray_kernels.requests.rendering_limits import MAX_ISOS, MAX_SMOOTHING
 from bentray_kernels.requests.request_fields import MAX_PIXELS, MAX_RAYS, Uses, check, setting

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import InvalidInput
-from ...requests.picker_names import DEFAULT_PICKER
+from ...requests.names import DEFAULT_PICKER
 from ..dataset import Dataset, Floats
 from .consistency import consistent
 from .differential import emission

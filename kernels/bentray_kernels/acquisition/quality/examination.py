@@ -12,7 +12,7 @@ from ...arrays import Flags, Floats
 from ...errors import InvalidInput
 from ...requests.limits import LEFT_OUT as SHARE
 from ...requests.limits import MAX_LEFT_OUT
-from ...requests.picker_names import DEFAULT_PICKER
+from ...requests.names import DEFAULT_PICKER
 from ..dataset import Dataset
 from ..picking.first_arrivals import pick
 from .array_shape import COVERAGE, find_limited_angle, inapplicable
