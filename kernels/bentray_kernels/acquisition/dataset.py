@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,15 @@ POSITION = "geometry/element_position_m"
 FARTHEST_M = 1e9
 
 ARRAY_TYPES = ("ring", "rings", "free")
+
+# Arrays over pairs, by their paths in the file format.
+OVER_PAIRS = {
+    "tof_s": "traveltime/tof_s",
+    "delta_tof_s": "traveltime/delta_tof_s",
+    "sigma_s": "traveltime/sigma_s",
+    "log_ratio_np": "amplitude/log_ratio_np",
+    "valid": "mask/valid",
+}
 
 
 @dataclass(frozen=True)
@@ -157,7 +167,7 @@ class Dataset:
         """Replace travel times that no sound can have by NaN, and count them."""
         if np.abs(self.element_position_m).max() > FARTHEST_M:
             return
-        pairs = (*(() if self.slice_z_m is None else self.slice_z_m.shape), len(self.tx), len(self.rx))
+        pairs = self._pairs
         geometry = Geometry(self.element_position_m, self.tx, self.rx, self.water_speed_mps)
         counts = dict(self.impossible_times)
         for name in ("tof_s", "delta_tof_s"):
@@ -188,33 +198,28 @@ class Dataset:
             rules.shape("geometry/element_normal", self.element_normal, self.element_position_m.shape)
             rules.finite("geometry/element_normal", self.element_normal)
         rules.positive("geometry@radius_m", self.radius_m, "m")
-        if self.wavelet is not None:
-            if self.wavelet.ndim != 1 or self.wavelet.size == 0:
-                raise InvalidInput("acquisition/wavelet", f"shape {self.wavelet.shape}", "(nt,), not empty")
-            rules.finite("acquisition/wavelet", self.wavelet)
-        if self.slice_z_m is not None:
-            if self.slice_z_m.ndim != 1 or self.slice_z_m.size == 0:
-                raise InvalidInput("slice/z_m", f"shape {self.slice_z_m.shape}", "(nz,), not empty")
-            rules.finite("slice/z_m", self.slice_z_m)
-            if not (np.diff(self.slice_z_m) > 0.0).all():
-                raise InvalidInput(
-                    "slice/z_m", "positions that do not rise", "strictly rising positions in m"
-                )
-
-    def _check_pairs(self) -> None:
-        pairs: tuple[int, ...] = (len(self.tx), len(self.rx))
-        if self.slice_z_m is not None:
-            pairs = (len(self.slice_z_m), *pairs)
-        for name, array in (
-            ("traveltime/tof_s", self.tof_s),
-            ("traveltime/delta_tof_s", self.delta_tof_s),
-            ("traveltime/sigma_s", self.sigma_s),
-            ("amplitude/log_ratio_np", self.log_ratio_np),
-            ("mask/valid", self.valid),
+        for path, array, axis in (
+            ("acquisition/wavelet", self.wavelet, "nt"),
+            ("slice/z_m", self.slice_z_m, "nz"),
         ):
             if array is not None:
-                rules.shape(name, array, pairs)
-                rules.no_infinity(name, array)
+                if array.ndim != 1 or array.size == 0:
+                    raise InvalidInput(path, f"shape {array.shape}", f"({axis},), not empty")
+                rules.finite(path, array)
+        if self.slice_z_m is not None and not (np.diff(self.slice_z_m) > 0.0).all():
+            raise InvalidInput("slice/z_m", "positions that do not rise", "strictly rising positions in m")
+
+    @property
+    def _pairs(self) -> tuple[int, ...]:
+        """Shape of the arrays over pairs."""
+        return (*(() if self.slice_z_m is None else self.slice_z_m.shape), len(self.tx), len(self.rx))
+
+    def _check_pairs(self) -> None:
+        pairs = self._pairs
+        for name, path in OVER_PAIRS.items():
+            if (array := getattr(self, name)) is not None:
+                rules.shape(path, array, pairs)
+                rules.no_infinity(path, array)
         if self.sigma_s is not None:
             rules.positive_or_nan("traveltime/sigma_s", self.sigma_s)
         if self.waveform is not None:
@@ -247,6 +252,24 @@ class Dataset:
         return {path: array.shape for path, array in arrays.items() if array is not None}
 
     @property
+    def traces(self) -> Waveform:
+        """The traces of a scan that must have them."""
+        assert self.waveform is not None
+        return self.waveform
+
+    @property
+    def rate_hz(self) -> float:
+        """Sampling rate of a scan with traces, Hz."""
+        assert self.sampling_rate_hz is not None
+        return self.sampling_rate_hz
+
+    @property
+    def frequency_hz(self) -> float:
+        """Centre frequency of a scan that must state it, Hz."""
+        assert self.center_frequency_hz is not None
+        return self.center_frequency_hz
+
+    @property
     def slices(self) -> int:
         """Number of axial slices, 1 for a plain 2-D scan."""
         return 1 if self.slice_z_m is None else len(self.slice_z_m)
@@ -262,30 +285,19 @@ class Dataset:
             raise InvalidInput("slice", index, f"0 to {self.slices - 1}")
         if self.slice_z_m is None:
             return self
+        return self.each_pair_changed(lambda array: array[index], truth=None, slice_z_m=None)
 
-        def slice_of(array: NDArray | None) -> NDArray | None:  # type: ignore[type-arg]
-            return None if array is None else array[index]
+    def each_pair_changed(self, change: Callable[[Any], Any], **values: Any) -> Dataset:
+        """This scan with all arrays over pairs and traces changed in the same way.
 
-        traces = self.waveform
-        if traces is not None:
-            traces = Waveform(
-                traces.object[index],
-                slice_of(traces.water),
-                traces.scale,
-                slice_of(traces.object_scale),
-                slice_of(traces.water_scale),
-            )
-        return replace(
-            self,
-            tof_s=slice_of(self.tof_s),
-            delta_tof_s=slice_of(self.delta_tof_s),
-            sigma_s=slice_of(self.sigma_s),
-            log_ratio_np=slice_of(self.log_ratio_np),
-            valid=slice_of(self.valid),
-            waveform=traces,
-            truth=None,
-            slice_z_m=None,
-        )
+        Args:
+            change: takes an array, or ``Emissions``, and returns the new one.
+            values: of other fields.
+        """
+        arrays = {name: getattr(self, name) for name in OVER_PAIRS}
+        changed = {name: change(array) for name, array in arrays.items() if array is not None}
+        traces = None if self.waveform is None else self.waveform.changed(change)
+        return replace(self, **changed, waveform=traces, **values)
 
     def in_water(self, speed_mps: float) -> Dataset:
         """This scan in water of a measured speed, m/s."""

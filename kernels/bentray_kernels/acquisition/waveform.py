@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,9 @@ from ..requests.limits import SCALE
 from . import rules
 
 Floats = NDArray[np.float64]
+
+# Traces, and factors of each.
+ARRAYS = ("object", "water", "object_scale", "water_scale")
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,7 @@ class Waveform:
     water_scale: Floats | None = None
 
     def __post_init__(self) -> None:
-        for name in ("object", "water", "object_scale", "water_scale"):
+        for name in ARRAYS:
             array = getattr(self, name)
             if isinstance(array, np.ma.MaskedArray):
                 # A trace with a sample that is not finite is left out.
@@ -57,3 +62,14 @@ class Waveform:
             if scale is not None:
                 rules.shape(f"waveform/{name}", scale, self.object.shape[:-1])
                 rules.no_infinity(f"waveform/{name}", scale)
+
+    @property
+    def water_traces(self) -> Any:
+        """The traces of a scan that must have a water shot."""
+        assert self.water is not None
+        return self.water
+
+    def changed(self, change: Callable[[Any], Any]) -> Waveform:
+        """These traces with all arrays changed in the same way."""
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        return replace(self, **{name: change(array) for name, array in arrays.items() if array is not None})

@@ -35,14 +35,10 @@ def water_times(dataset: Dataset) -> Floats:
         InvalidInput: without water traces, sampling rate, centre frequency, or a pulse.
     """
     require_traces(dataset)
-    assert dataset.waveform is not None
-    assert dataset.waveform.water is not None
-    assert dataset.sampling_rate_hz is not None
-    assert dataset.center_frequency_hz is not None
-    rate = dataset.sampling_rate_hz
-    crest = Measures.from_traces(dataset.waveform.water, dataset).strongest_s
+    rate, water = dataset.rate_hz, dataset.traces.water_traces
+    crest = Measures.from_traces(water, dataset).strongest_s
     pulse = measured_pulse(dataset, crest)
-    period = rate / dataset.center_frequency_hz
+    period = rate / dataset.frequency_hz
     ahead = math.ceil(BEFORE * period)
     begin, end = max(0, ahead - math.ceil(1.5 * period)), min(pulse.size, ahead + math.ceil(1.5 * period))
     times = np.full(crest.shape, np.nan)
@@ -51,7 +47,7 @@ def water_times(dataset: Dataset) -> Floats:
     if dataset.valid is not None:
         valid &= dataset.valid
     for e in np.flatnonzero(valid.any(axis=1)):
-        emission = dataset.waveform.water[e]
+        emission = water[e]
         for r in np.flatnonzero(valid[e]):
             trace = np.asarray(emission[r], dtype=np.float64)
             trace = trace - np.median(trace)

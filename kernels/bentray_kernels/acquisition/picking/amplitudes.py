@@ -60,21 +60,17 @@ def read_log_ratios(dataset: Dataset, emissions: Sequence[int], delta_s: Floats,
     if way not in WAYS:
         raise InvalidInput("amplitudes", repr(way), "one of " + ", ".join(WAYS))
     require_traces(dataset)
-    traces = dataset.waveform
-    assert traces is not None
-    assert traces.water is not None
-    assert dataset.sampling_rate_hz is not None
-    assert dataset.center_frequency_hz is not None
-    gate, rate = Gate.from_dataset(dataset), dataset.sampling_rate_hz
+    traces, water_traces = dataset.traces, dataset.traces.water_traces
+    gate, rate = Gate.from_dataset(dataset), dataset.rate_hz
     rounding = ROUNDING if traces.object.dtype.kind == "i" else 0.0
     straight = (dataset.distance_m() / dataset.water_speed_mps - dataset.t0_s) * rate
     ratios = np.empty((len(emissions), len(dataset.rx)))
     for row, e in enumerate(emissions):
-        water, water_noise = gate.powers(traces.water[e], straight[e], rounding)
+        water, water_noise = gate.powers(water_traces[e], straight[e], rounding)
         other, other_noise = gate.powers(traces.object[e], straight[e] + rate * delta_s[row], rounding)
         noises = water_noise[:, None], other_noise[:, None]
         powers = Powers(
-            water, other, *noises, gate.frequency_hz / dataset.center_frequency_hz, gate.noise_correlation
+            water, other, *noises, gate.frequency_hz / dataset.frequency_hz, gate.noise_correlation
         )
         with np.errstate(all="ignore"):
             value, sigma = WAYS[way](powers)

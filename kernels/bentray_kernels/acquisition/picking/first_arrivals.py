@@ -150,13 +150,9 @@ def _pick_emission(
     delta: Floats,
     sigma: Floats,
 ) -> None:
-    traces = dataset.waveform
-    assert traces is not None
-    assert traces.water is not None
-    assert dataset.sampling_rate_hz is not None
-    assert dataset.center_frequency_hz is not None
+    traces = dataset.traces
     rounding = ROUNDING if traces.object.dtype.kind == "i" else 0.0
-    object_, water = (np.ascontiguousarray(t[e]) for t in (traces.object, traces.water))
+    object_, water = (np.ascontiguousarray(t[e]) for t in (traces.object, traces.water_traces))
     if inverse is not None:
         object_, water, rounding = inverse(object_), inverse(water), inverse.gain * rounding
     emission(
@@ -166,9 +162,9 @@ def _pick_emission(
             dataset.element_position_m[dataset.rx] - dataset.element_position_m[dataset.tx[e]], axis=1
         ),
         float(dataset.water_speed_mps),
-        float(dataset.sampling_rate_hz),
+        float(dataset.rate_hz),
         float(dataset.t0_s),
-        float(dataset.center_frequency_hz),
+        float(dataset.frequency_hz),
         rounding,
         picker.code,
         delta,

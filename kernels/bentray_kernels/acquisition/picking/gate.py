@@ -57,9 +57,7 @@ class Gate:
         Raises:
             InvalidInput: as ``measured_pulse``; for a pulse without a signal.
         """
-        assert dataset.sampling_rate_hz is not None
-        assert dataset.center_frequency_hz is not None
-        rate, period = dataset.sampling_rate_hz, dataset.sampling_rate_hz / dataset.center_frequency_hz
+        rate, period = dataset.rate_hz, dataset.rate_hz / dataset.frequency_hz
         pulse = measured_pulse(dataset)
         power, time = pulse**2, np.arange(float(pulse.size)) - math.ceil(BEFORE * period)
         if not power.any():

@@ -38,21 +38,17 @@ def measured_pulse(dataset: Dataset, arrival_s: Floats | None = None) -> Floats:
     Raises:
         InvalidInput: where no water trace contains the whole pulse.
     """
-    assert dataset.waveform is not None
-    assert dataset.waveform.water is not None
-    assert dataset.sampling_rate_hz is not None
-    assert dataset.center_frequency_hz is not None
-    period = dataset.sampling_rate_hz / dataset.center_frequency_hz
+    period, water = dataset.rate_hz / dataset.frequency_hz, dataset.traces.water_traces
     before, length = math.ceil(BEFORE * period), math.ceil((BEFORE + AFTER) * period)
     distance = dataset.distance_m()
-    least = min(FAR * dataset.water_speed_mps / dataset.center_frequency_hz, 0.5 * float(distance.max()))
+    least = min(FAR * dataset.water_speed_mps / dataset.frequency_hz, 0.5 * float(distance.max()))
     if arrival_s is None:
         arrival_s = distance / dataset.water_speed_mps
     pieces: list[Floats] = []
     for e in range(0, len(dataset.tx), max(1, len(dataset.tx) // EMISSIONS)):
-        sample = (arrival_s[e] - dataset.t0_s) * dataset.sampling_rate_hz
+        sample = (arrival_s[e] - dataset.t0_s) * dataset.rate_hz
         detected = (distance[e] >= least) & np.isfinite(sample)
-        pieces += _pieces(dataset.waveform.water[e], sample, detected, before, length)
+        pieces += _pieces(water[e], sample, detected, before, length)
     if not pieces:
         raise InvalidInput(
             "waveform/water", "no pulse whole in any trace", "traces that hold it about its arrival"
@@ -106,11 +102,10 @@ class Inverse:
         Raises:
             InvalidInput: as ``measured_pulse``; for a wavelet without a signal.
         """
-        assert dataset.waveform is not None
         pulse = measured_pulse(dataset) if dataset.wavelet is None else dataset.wavelet
         if not np.any(pulse):
             raise InvalidInput("acquisition/wavelet", "zeros", "samples of the pulse")
-        length = 2 ** math.ceil(math.log2(dataset.waveform.object.shape[-1] + pulse.size))
+        length = 2 ** math.ceil(math.log2(dataset.traces.object.shape[-1] + pulse.size))
         power = np.fft.rfft(pulse, length)
         # Time is relative to the largest extremum, whatever the reference of the wavelet.
         power = power * np.exp(2j * np.pi * np.fft.rfftfreq(length) * int(np.argmax(np.abs(pulse))))

@@ -34,8 +34,7 @@ def examine_chords(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
     Raises:
         InvalidInput: where too few chords pass through water.
     """
-    assert dataset.center_frequency_hz is not None
-    period, strongest = 1.0 / dataset.center_frequency_hz, measures.unclipped_s
+    period, strongest = 1.0 / dataset.frequency_hz, measures.unclipped_s
     if mismatch := find_wrong_order(dataset, strongest):
         raise InvalidInput(ORDER, mismatch[0].found, mismatch[0].accepted)
     chords = find_water_chords(dataset, strongest, period)

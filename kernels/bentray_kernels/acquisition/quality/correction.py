@@ -9,9 +9,9 @@ import numpy as np
 
 from ...arrays import Flags, Ints
 from ...errors import InvalidInput
-from ..dataset import Dataset
+from ..dataset import OVER_PAIRS, Dataset
 from ..emissions import invert_polarity, reorder_channels
-from ..waveform import Waveform
+from ..waveform import ARRAYS, Waveform
 from .finding import Finding, Report
 from .time_zero import OBJECT, RECORDING
 from .water_speed import WATER_SPEED
@@ -63,13 +63,12 @@ def stacked(dataset: Dataset, slices: list[Dataset]) -> Dataset:
         shape = next(array.shape for array in arrays if array is not None)
         return np.stack([np.ones(shape, dtype=bool) if array is None else array for array in arrays])
 
-    names = ("tof_s", "delta_tof_s", "sigma_s", "log_ratio_np", "valid")
     waveform = None
     if dataset.waveform is not None and all(slice_data.waveform is not None for slice_data in slices):
         held = [slice_data.waveform for slice_data in slices]
         pieces = {
             name: None if getattr(held[0], name) is None else np.stack([getattr(w, name) for w in held])
-            for name in ("object", "water", "object_scale", "water_scale")
+            for name in ARRAYS
         }
         waveform = replace(dataset.waveform, **pieces)  # type: ignore[arg-type]
     first = slices[0]
@@ -81,7 +80,7 @@ def stacked(dataset: Dataset, slices: list[Dataset]) -> Dataset:
         water_temperature_c=first.water_temperature_c,
         water_temperature_assumed=first.water_temperature_assumed,
         picker=first.picker,
-        **{name: several(name) for name in names},  # type: ignore[arg-type]
+        **{name: several(name) for name in OVER_PAIRS},  # type: ignore[arg-type]
     )
 
 
@@ -114,19 +113,7 @@ def _with_polarity(dataset: Dataset, finding: Finding) -> Waveform | None:
 def _exchanged(dataset: Dataset, finding: Finding) -> Dataset:
     """Exchange two channels in all recorded data."""
     order, axis = exchange_order(dataset, finding)
-
-    def other(array: np.ndarray | None) -> np.ndarray | None:
-        return None if array is None else reorder_channels(array, order, axis)
-
-    pairs = {
-        name: other(getattr(dataset, name))
-        for name in ("tof_s", "delta_tof_s", "sigma_s", "log_ratio_np", "valid")
-    }
-    traces = dataset.waveform
-    if traces is not None:
-        names = ("object", "water", "object_scale", "water_scale")
-        traces = replace(traces, **{name: other(getattr(traces, name)) for name in names})  # type: ignore[arg-type]
-    return replace(dataset, waveform=traces, **pairs)  # type: ignore[arg-type]
+    return dataset.each_pair_changed(lambda array: reorder_channels(array, order, axis))
 
 
 def exchange_order(dataset: Dataset, finding: Finding) -> tuple[Ints, int]:

@@ -26,11 +26,10 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
         dataset: of one slice, channels in their places, with a centre frequency.
         residual_s: (ntx, nrx), s: times in water minus those of the stated positions; NaN where unknown.
     """
-    assert dataset.center_frequency_hz is not None
     if dataset.element_position_m.shape[1] != 2:
         return []
     errors = fit_element_errors(dataset, residual_s)
-    least_s = MIN_DELAY / dataset.center_frequency_hz
+    least_s = MIN_DELAY / dataset.frequency_hz
     roles: tuple[tuple[Role, Floats, Floats], ...] = (
         ("emission", errors.emission_delay_s, errors.sigma_s[:, 2]),
         ("reception", errors.reception_delay_s, errors.sigma_s[:, 3]),
@@ -54,7 +53,7 @@ def find_element_errors(dataset: Dataset, residual_s: Floats) -> list[Finding]:
                 )
             )
     distance = np.linalg.norm(errors.displacement_m, axis=1)
-    least_m = MIN_DISPLACEMENT * dataset.water_speed_mps / dataset.center_frequency_hz
+    least_m = MIN_DISPLACEMENT * dataset.water_speed_mps / dataset.frequency_hz
     sigma_m = np.hypot(*errors.sigma_s[:, :2].T) * dataset.water_speed_mps
     displaced = _unusual(distance, sigma_m, least_m)
     if displaced.size:

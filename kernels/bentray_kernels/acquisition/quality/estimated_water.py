@@ -32,9 +32,8 @@ def estimate_water(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
     Raises:
         InvalidInput: where too few chords pass through water.
     """
-    assert dataset.center_frequency_hz is not None
     findings, chords = examine_chords(dataset, measures)
-    period_s = 1.0 / dataset.center_frequency_hz
+    period_s = 1.0 / dataset.frequency_hz
     pulses = read_pulses(apply(dataset, findings), range(len(dataset.tx)), chords, period_s)
     estimated, reference = estimate_from_pulses(apply(dataset, findings), chords, pulses)
     return [*findings, *estimated], reference
@@ -54,8 +53,7 @@ def estimate_from_pulses(
     Raises:
         InvalidInput: where too few chords pass through water.
     """
-    assert dataset.center_frequency_hz is not None
-    period_s = 1.0 / dataset.center_frequency_hz
+    period_s = 1.0 / dataset.frequency_hz
     findings: list[Finding] = []
     if examine:
         findings = find_inverted(dataset, chord_signs(dataset, chords, pulses, period_s))

@@ -45,12 +45,11 @@ class Measures:
     @classmethod
     def from_traces(cls, traces: Iterable[NDArray[Any]], dataset: Dataset) -> Measures:
         """Measures of the traces of emissions, (nrx, nt) each; converted to floating point one by one."""
-        assert dataset.sampling_rate_hz is not None
         rows = [_emission(np.asarray(emission)) for emission in traces]
         broken, constant, detected, clipped, strongest, peak = (
             np.stack(rows_of_field) for rows_of_field in zip(*rows, strict=True)
         )
-        time = np.where(detected, dataset.t0_s + strongest / dataset.sampling_rate_hz, np.nan)
+        time = np.where(detected, dataset.t0_s + strongest / dataset.rate_hz, np.nan)
         return cls(broken, constant, detected, clipped, time, peak)
 
     @property

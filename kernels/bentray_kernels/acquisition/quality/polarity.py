@@ -65,23 +65,19 @@ def water_signs(dataset: Dataset, strongest_s: Floats) -> Floats:
         dataset: of one slice, with water traces, channels in their places, and a centre frequency.
         strongest_s: (ntx, nrx), times of the maxima; NaN where there is none.
     """
-    assert dataset.waveform is not None
-    assert dataset.waveform.water is not None
-    assert dataset.sampling_rate_hz is not None
-    assert dataset.center_frequency_hz is not None
-    period = dataset.sampling_rate_hz / dataset.center_frequency_hz
+    period, water = dataset.rate_hz / dataset.frequency_hz, dataset.traces.water_traces
     reach = math.ceil(REACH * period)
     # Traces without a maximum are not compared; any position will do.
     sample = np.where(np.isfinite(strongest_s), strongest_s, dataset.t0_s) - dataset.t0_s
-    sample *= dataset.sampling_rate_hz
-    nt = dataset.waveform.water.shape[-1]
+    sample *= dataset.rate_hz
+    nt = water.shape[-1]
     pieces = np.full((*sample.shape, 2 * reach + 1), np.nan)
     steps = np.arange(-reach, reach + 1)
     for e in range(len(sample)):
         at = sample[e][:, None] + steps
         inside = (at[:, 0] >= 0.0) & (at[:, -1] <= nt - 2) & np.isfinite(strongest_s[e])
         low = np.clip(np.floor(at).astype(np.int64), 0, nt - 2)
-        trace = np.array(dataset.waveform.water[e], dtype=np.float64)
+        trace = np.array(water[e], dtype=np.float64)
         trace[~np.isfinite(trace).all(axis=1)] = 0.0
         trace = trace - np.median(trace, axis=1, keepdims=True)
         left, right = (np.take_along_axis(trace, low + k, axis=1) for k in (0, 1))

@@ -30,7 +30,6 @@ def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> li
         strongest_s: (ntx, nrx), times of the water maxima; NaN where there is none.
         line: through them.
     """
-    assert dataset.center_frequency_hz is not None
     distance = dataset.distance_m()
     off = np.where(distance > 0.25 * distance.max(), strongest_s - distance / line.speed_mps, np.nan)
     elements = len(dataset.element_position_m)
@@ -43,7 +42,7 @@ def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> li
         return []
     alike, noise = (robust_deviation(0.5 * (there + sign * back)[both]) for sign in (1.0, -1.0))
     apart = math.sqrt(max(alike**2 - noise**2, 0.0)) * dataset.water_speed_mps
-    allowed = LARGEST_OFF * dataset.water_speed_mps / dataset.center_frequency_hz
+    allowed = LARGEST_OFF * dataset.water_speed_mps / dataset.frequency_hz
     if apart <= allowed:
         return []
     return [

@@ -58,7 +58,6 @@ class Measured(NamedTuple):
         cls, dataset: Dataset, emissions: Sequence[int], done: Callable[[], None] = lambda: None
     ) -> Measured:
         """Measure a slice with traces, which may be ``Emissions``; ``done`` is called after each emission."""
-        assert dataset.waveform is not None
 
         def read(traces: Any) -> Iterator[NDArray[Any]]:
             for e in emissions:
@@ -67,7 +66,7 @@ class Measured(NamedTuple):
 
         received, water = (
             None if traces is None else Measures.from_traces(read(traces), dataset)
-            for traces in (dataset.waveform.object, dataset.waveform.water)
+            for traces in (dataset.traces.object, dataset.traces.water)
         )
         assert received is not None
         return cls(water, received)

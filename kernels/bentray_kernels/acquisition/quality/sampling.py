@@ -45,9 +45,8 @@ def sampling(dataset: Dataset, speed_mps: float, sigma_mps: float = 0.0) -> list
 
 def frequency(dataset: Dataset) -> list[Finding]:
     """A centre frequency that differs from the spectrum of the water traces."""
-    assert dataset.waveform is not None
-    assert dataset.sampling_rate_hz is not None
-    traces = dataset.waveform.water if dataset.waveform.water is not None else dataset.waveform.object
+    recorded = dataset.traces
+    traces = recorded.object if recorded.water is None else recorded.water
     if dataset.center_frequency_hz is None:
         return []
     power = np.zeros(traces.shape[-1] // 2 + 1)
@@ -56,7 +55,7 @@ def frequency(dataset: Dataset) -> list[Finding]:
         power += power_of(emission[np.isfinite(emission).all(axis=1)])
     if not power.any():
         return []
-    of_power = np.asarray(np.fft.rfftfreq(traces.shape[-1], 1.0 / dataset.sampling_rate_hz), dtype=np.float64)
+    of_power = np.asarray(np.fft.rfftfreq(traces.shape[-1], 1.0 / dataset.rate_hz), dtype=np.float64)
     middle = mean_frequency(without_noise(power), of_power)
     factor = middle / dataset.center_frequency_hz
     if 1.0 / LARGEST_FREQUENCY_FACTOR <= factor <= LARGEST_FREQUENCY_FACTOR:

@@ -43,7 +43,6 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
         dataset: of one slice, with elements in a plane and a centre frequency.
         log_ratio: (ntx, nrx), logarithm of the amplitude over that in water; NaN where unknown.
     """
-    assert dataset.center_frequency_hz is not None
     usable = np.isfinite(log_ratio) & (dataset.tx[:, None] != dataset.rx[None, :])
     if dataset.element_position_m.shape[1] != 2 or usable.sum() < MIN_PAIRS:
         return []
@@ -55,7 +54,7 @@ def find_scatterer(dataset: Dataset, log_ratio: Floats) -> list[Finding]:
     dark = shadow[pairs[:, 0], pairs[:, 1]]
     normal, height = _lines(dataset)
     normal, height = normal[pairs[:, 0], pairs[:, 1]], height[pairs[:, 0], pairs[:, 1]]
-    width = HALF_WIDTH * dataset.water_speed_mps / dataset.center_frequency_hz
+    width = HALF_WIDTH * dataset.water_speed_mps / dataset.frequency_hz
 
     def darkness(line: Floats) -> float:
         """Part of the chords through a place in shadow; 0 where few cross it, or many beside it are dark."""

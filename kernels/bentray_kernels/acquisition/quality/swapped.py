@@ -27,8 +27,7 @@ def find_swapped(dataset: Dataset, strongest_s: Floats, expected_s: Floats) -> l
         strongest_s: (ntx, nrx), times of the maxima of envelopes.
         expected_s: (ntx, nrx), these times in water, for the stated positions; NaN for pairs not in water.
     """
-    assert dataset.center_frequency_hz is not None
-    period = 1.0 / dataset.center_frequency_hz
+    period = 1.0 / dataset.frequency_hz
     roles: tuple[tuple[Role, Floats, Floats], ...] = (
         ("reception", strongest_s, expected_s),
         ("emission", strongest_s.T, expected_s.T),

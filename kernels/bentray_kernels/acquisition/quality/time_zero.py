@@ -39,8 +39,7 @@ LARGEST_OFFSET_S = 5e-8
 
 def find_recording_shift(dataset: Dataset, line: WaterLine) -> list[Finding]:
     """Find a start of the recording that deviates by more than the delay of the pulse."""
-    assert dataset.center_frequency_hz is not None
-    if abs(line.intercept_s) <= LARGEST_DELAY / dataset.center_frequency_hz:
+    if abs(line.intercept_s) <= LARGEST_DELAY / dataset.frequency_hz:
         return []
     residuals = line.residual_s[np.isfinite(line.residual_s)]
     action, more = _correctable(dataset, line.intercept_s, robust_deviation(residuals))

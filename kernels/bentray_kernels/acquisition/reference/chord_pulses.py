@@ -65,14 +65,12 @@ def read_pulses(
         chords: see ``find_water_chords``.
         period_s: of the pulse, s.
     """
-    traces = dataset.waveform
-    assert traces is not None
-    assert dataset.sampling_rate_hz is not None
-    before, length = window(dataset.sampling_rate_hz * period_s)
+    traces = dataset.traces
+    before, length = window(dataset.rate_hz * period_s)
     late = chords.arrival_s(dataset.distance_m())
     if chords.emission_delay_s is not None and chords.reception_delay_s is not None:
         late = late + chords.emission_delay_s[:, None] + chords.reception_delay_s
-    arrival = (late - dataset.t0_s) * dataset.sampling_rate_hz
+    arrival = (late - dataset.t0_s) * dataset.rate_hz
     begin = np.floor(arrival).astype(np.int64) - before
     most = chords_of_emission(len(dataset.tx))
     whole = chords.pairs & (begin >= 0) & (begin + length <= traces.object.shape[-1])

@@ -85,8 +85,7 @@ class ReferenceShot:
 
     def applied(self, dataset: Dataset) -> Dataset:
         """The dataset of one slice with this as its water shot; its traces are computed on access."""
-        traces = dataset.waveform
-        assert traces is not None
+        traces = dataset.traces
         samples = int(traces.object.shape[-1])
         shape = (len(dataset.tx), len(dataset.rx), samples)
         water = Emissions.from_reader(
@@ -98,13 +97,12 @@ class ReferenceShot:
 
     def traces(self, dataset: Dataset, emission: int, samples: int) -> NDArray[np.float32]:
         """The traces of one emission in water, (nrx, samples)."""
-        assert dataset.sampling_rate_hz is not None
         offset = dataset.element_position_m[dataset.rx] - dataset.element_position_m[dataset.tx[emission]]
         distance = np.linalg.norm(offset, axis=1)
         # A period with room for the pulse at either end.
-        pulse = math.ceil(dataset.sampling_rate_hz / self.frequency_hz[1])
+        pulse = math.ceil(dataset.rate_hz / self.frequency_hz[1])
         length = 2 ** math.ceil(math.log2(samples + pulse))
-        frequency = np.fft.rfftfreq(length, 1.0 / dataset.sampling_rate_hz)
+        frequency = np.fft.rfftfreq(length, 1.0 / dataset.rate_hz)
         real, imaginary = (
             np.interp(frequency, self.frequency_hz, component, right=0.0)
             for component in (self.spectrum.real, self.spectrum.imag)
@@ -178,8 +176,7 @@ class _Fit:
     """State of the estimation; phases are relative to the arrival by the model."""
 
     def __init__(self, dataset: Dataset, chords: WaterChords, pulses: ChordPulses, period_s: float) -> None:
-        assert dataset.sampling_rate_hz is not None
-        rate, self._period_s, self._pulses = dataset.sampling_rate_hz, period_s, pulses
+        rate, self._period_s, self._pulses = dataset.rate_hz, period_s, pulses
         self._distance = dataset.distance_m()[pulses.emission, pulses.reception]
         _, length = window(rate * period_s)
         padded = 2 ** math.ceil(math.log2(4 * length))

@@ -204,10 +204,7 @@ def measure_scan_pulse(scan: EchoScan, plan: ReflectionPlan, times: list[Element
     emissions = plan.emissions
     chosen = emissions[:: max(1, len(emissions) // PULSE_EMISSIONS)]
     with scan.open() as dataset:
-        recorded = dataset.waveform
-        rate = dataset.sampling_rate_hz
-        assert recorded is not None
-        assert rate is not None
+        recorded, rate = dataset.traces, dataset.rate_hz
         if recorded.water is not None:
             shots, expected = recorded.water, _water_times(plan, chosen)
         else:
@@ -257,9 +254,7 @@ def echo_signals(
         transmitted_s: (emissions, nrx), travel times of the transmitted waves, s.
         emissions: indices.
     """
-    recorded, rate = dataset.waveform, dataset.sampling_rate_hz
-    assert recorded is not None
-    assert rate is not None
+    recorded, rate = dataset.traces, dataset.rate_hz
     at = _sample_times(dataset)
     factor, period = upsampling(rate, plan.frequency_hz), 1.0 / plan.frequency_hz
     used = plan.used[emissions].copy()
@@ -290,10 +285,8 @@ def echo_signals(
 
 
 def _sample_times(dataset: Dataset) -> Floats:
-    assert dataset.waveform is not None
-    assert dataset.sampling_rate_hz is not None
-    samples = dataset.waveform.object.shape[-1]
-    return dataset.t0_s + np.arange(samples, dtype=np.float64) / dataset.sampling_rate_hz
+    samples = dataset.traces.object.shape[-1]
+    return dataset.t0_s + np.arange(samples, dtype=np.float64) / dataset.rate_hz
 
 
 def _water_times(plan: ReflectionPlan, emissions: Ints) -> Floats:

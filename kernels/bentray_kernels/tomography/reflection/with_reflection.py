@@ -38,12 +38,12 @@ def with_reflection(
     dataset = source.dataset()
     speeds = _slices(result.speed)
     origin = (result.origin_m[0], result.origin_m[1])
-    rate = dataset.sampling_rate_hz
-    assert rate is not None
     graphs, envelopes, plans = [], [], []
     for index, speed in enumerate(speeds):
         plan = plan_reflection(dataset.slice(index), settings, speed, result.spacing_m[0], origin)
-        graph = ReflectionGraph(EchoScan(source, index), plan, source.samples, rate, result.history)
+        graph = ReflectionGraph(
+            EchoScan(source, index), plan, source.samples, dataset.rate_hz, result.history
+        )
         run_graphs([graph], before, graph.total * (len(speeds) - 1 - index))
         before += graph.total
         plans.append(plan)

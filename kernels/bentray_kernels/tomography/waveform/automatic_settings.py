@@ -104,9 +104,8 @@ def scale_of(dataset: Dataset, settings: Settings, samples: int, slices: int) ->
         raise InvalidInput(
             "acquisition@center_frequency_hz", "nothing", "the centre frequency of the pulse, Hz"
         )
-    assert dataset.sampling_rate_hz is not None
     width = float(np.ptp(dataset.element_position_m, axis=0).max())
-    record_s = (samples - 1) / dataset.sampling_rate_hz
+    record_s = (samples - 1) / dataset.rate_hz
     return WaveScale(dataset.center_frequency_hz, dataset.water_speed_mps, width, record_s, slices)
 
 

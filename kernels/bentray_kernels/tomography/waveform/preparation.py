@@ -109,11 +109,10 @@ def _without_dead_traces(
 
     The traces are copies, because an emission may be a view of a larger block.
     """
-    assert recorded.water is not None
     by_emitter, use = {}, use.copy()
     for emitter in np.sort(emitters).tolist():
         by_emitter[emitter] = recorded.object[emitter].copy()
-        for traces in (by_emitter[emitter], recorded.water[emitter]):
+        for traces in (by_emitter[emitter], recorded.water_traces[emitter]):
             use[emitter] &= (traces != 0).any(axis=-1)
     return by_emitter, use
 
