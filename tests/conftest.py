@@ -74,7 +74,7 @@ LONG_S = {
     "service/rows/test_database_away.py": 8.0,
     "workers/rendering/test_geometry_field.py": 8.0,
     "service/web/test_service_page.py": 7.0,
-    "service/routes/test_database_away.py": 7.0,
+    "service/routes/test_unavailable.py": 7.0,
     "kernels/tomography/waveform/test_refinement.py": 7.0,
     "service/access/test_every_route.py": 6.0,
     "service/client/test_uploading.py": 6.0,
@@ -82,7 +82,7 @@ LONG_S = {
     "service/test_extremes.py": 6.0,
     "workers/cluster/test_supervision.py": 6.0,
     "kernels/isosurface/test_crossing.py": 6.0,
-    "service/routes/test_quality.py": 5.0,
+    "service/routes/test_scan_views.py": 5.0,
 }
 
 

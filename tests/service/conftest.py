@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import threading
 import time
 import warnings
@@ -26,6 +27,7 @@ from bentray_service.ingest.ingest_process import convert_upload
 from bentray_service.ingest.sandbox import summary_in
 from bentray_service.rows.accounts import Account, Accounts
 from bentray_service.rows.ids import Tenant
+from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.settings import ServiceSettings
 from bentray_service.web.server import configuration, listen
 from bentray_workers.cluster.connection import Cluster, open_cluster
@@ -37,10 +39,63 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore", UserWarning)
     from fastapi.testclient import TestClient
 
+
 HDF5 = {"Content-Type": "application/x-hdf5"}
+STREAM = {"Content-Type": "application/octet-stream"}
+
+
 ENDED = ("succeeded", "failed", "cancelled")
 # What takes longer hangs: a job may have to compile its kernels first, on a machine that is busy.
 PATIENCE_S = 240.0
+
+
+def npy(values: np.ndarray) -> bytes:
+    """The bytes of a file of NumPy."""
+    buffer = io.BytesIO()
+    np.save(buffer, values, allow_pickle=True)
+    return buffer.getvalue()
+
+
+def signed(
+    http: TestClient, tenant: str = "local", scopes: tuple[str, ...] = ("read", "write")
+) -> dict[str, str]:
+    """Headers with a new key of a tenant."""
+    token = ApiKey.new()
+    Keys(http.app.state.stores.database).add(token, Tenant(tenant), f"scanner of {tenant}", scopes)
+    return {"Authorization": f"Bearer {token.shown()}"}
+
+
+def refused(answer: Any, field: str, accepted: str = "", status: int = 422) -> dict[str, Any]:
+    """The problem by which a request was refused: its status, the field at fault, and what is accepted."""
+    body = dict(answer.json())
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert (answer.status_code, body["status"], body["field"]) == (status, status, field), body
+    assert body["found"], body
+    assert body["accepted"], body
+    assert accepted in body["accepted"], body
+    return body
+
+
+def made_once(http: TestClient, cluster: FakeCluster, here: str) -> None:
+    """Check that a picture is made once for its tag, and by no request for its head."""
+    submitted = len(cluster.submitted)
+    assert http.get(here, headers={"If-None-Match": "*"}).status_code == 304
+    assert len(cluster.submitted) == submitted
+    whole = http.get(here)
+    assert whole.headers["cache-control"] == "private, no-cache"
+    submitted, tag = len(cluster.submitted), whole.headers["etag"]
+    for ask in (http.get, http.head):
+        known = ask(here, headers={"If-None-Match": tag})
+        assert (known.status_code, known.content, known.headers["etag"]) == (304, b"", tag)
+    head = http.head(here)
+    assert (head.status_code, head.content) == (200, b"")
+    same = ("etag", "content-type", "cache-control")
+    assert [head.headers[name] for name in same] == [whole.headers[name] for name in same]
+    # The body would have that length, which nobody knows yet.
+    assert "content-length" not in head.headers
+    assert len(cluster.submitted) == submitted
+    wrong = http.delete(here)
+    assert (wrong.status_code, wrong.headers["allow"]) == (405, "GET, HEAD")
 
 
 class NoProjects(Accounts):
@@ -292,6 +347,19 @@ def submitted() -> Callable[..., dict[str, Any]]:
         return dict(answer.json())
 
     return send
+
+
+@pytest.fixture
+def running(
+    uploaded: Callable[..., str], submitted: Callable[..., Any], until: Callable[..., Any], work: FakeWork
+) -> Callable[..., dict[str, Any]]:
+    """Start a reconstruction that runs until ``work.hold`` is set; returns its record."""
+
+    def begin(http: TestClient) -> dict[str, Any]:
+        work.hold.clear()
+        return dict(until(http, submitted(http, uploaded(http))["id"], "running"))
+
+    return begin
 
 
 @pytest.fixture

@@ -1,14 +1,22 @@
-"""/v1/jobs: accepted and rejected requests."""
+"""/v1/jobs and /v1/batches: accepted and rejected requests, search, previews, deletion."""
 
+import base64
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 
+import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import PICKERS
+from bentray_kernels.tomography.reconstruction_graph import ReconstructionCheckpoint
 from bentray_kernels.tomography.result import Candidate
+from bentray_kernels.tomography.sart import sart_step
 from bentray_kernels.tomography.settings import Settings
-from bentray_service.rows.ids import LOCAL
+from bentray_service.files.tenant_files import CHECKPOINTS
+from bentray_service.rows.ids import LOCAL, Tenant
+from bentray_service.rows.keys import ApiKey, Keys
+from bentray_workers.cluster.checkpoints import Checkpoints
+from bentray_workers.reconstruction import reconstruction_run
 
 pytestmark = pytest.mark.usefixtures("work")
 
@@ -279,3 +287,141 @@ def test_a_running_job_is_not_deleted(http, dataset, work, until):
     assert (answer.status_code, problem(answer)["type"]) == (409, "/problems/in-use")
     work.hold.set()
     until(http, job["id"], "succeeded")
+
+
+def test_values_of_the_checkpoint_for_its_owner_alone(http, uploaded, submitted, until, work):
+    state, auth = http.app.state, {}
+    for tenant in ("acme", "other"):
+        token = ApiKey.new()
+        Keys(state.stores.database).add(token, Tenant(tenant), tenant, ("read", "write"))
+        auth[tenant] = {"Authorization": f"Bearer {token.shown()}"}
+    http.headers.update(auth["acme"])
+    work.hold.clear()
+    job = submitted(http, uploaded(http))["id"]
+    here = f"/v1/jobs/{job}/preview"
+    assert until(http, job, "running")["links"]["preview"] == here
+    none_yet = http.get(here)
+    assert (none_yet.status_code, none_yet.json()["type"]) == (409, "/problems/no-preview")
+    assert "before its first image" in none_yet.json()["found"]
+    speed = 1500.0 + np.arange(20.0).reshape(5, 4)
+    checkpoint = ReconstructionCheckpoint(0, 0, (), sart_step.begin(1.0 / speed), (), 2e-3, (-0.01, 0.0))
+    Checkpoints(state.stores.files.of(Tenant("acme")).checkpoints(job)).save("0-00000", checkpoint)
+    answer = http.get(here)
+    assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
+    body = answer.json()
+    values = np.frombuffer(base64.b64decode(body["speed"]), dtype="<f4").reshape(body["shape"])
+    np.testing.assert_array_equal(values, speed.astype(np.float32))
+    assert body["range_mps"] == [1500.0, 1519.0]
+    assert (body["spacing_m"], body["origin_m"]) == ([2e-3, 2e-3], [-0.01, 0.0])
+    stranger = http.get(here, headers=auth["other"])
+    assert (stranger.status_code, stranger.json()["type"]) == (404, "/problems/unknown-id")
+    work.hold.set()
+    assert "preview" not in until(http, job)["links"]
+    over = http.get(here)
+    assert over.status_code == 409
+    assert "succeeded" in over.json()["found"]
+
+
+def test_a_queued_job_and_another_kind_have_none(start, uploaded, submitted):
+    # Jobs stay where they are: no disk has so much room.
+    http = start(min_free_bytes=2**60)
+    simulation = http.post("/v1/jobs", json={"kind": "simulation", "settings": {"nodes": 16}}).json()
+    for job in (submitted(http, uploaded(http)), simulation):
+        answer = http.get(f"/v1/jobs/{job['id']}/preview")
+        problem = answer.json()
+        assert (answer.status_code, problem["type"]) == (409, "/problems/no-preview")
+        assert f"{job['kind']}, queued" in problem["found"]
+        assert "after its first iteration" in problem["accepted"]
+        assert "preview" not in job["links"]
+
+
+def test_the_folder_is_that_of_the_worker():
+    assert CHECKPOINTS == reconstruction_run.CHECKPOINTS
+
+
+SART = {"method": "sart", "nodes": 16, "iterations": 2}
+
+
+@pytest.fixture
+def scans(scan):
+    """Upload different scans; returns their ids."""
+
+    def send(http, number=3):
+        ids = []
+        for one in range(number):
+            path = scan(lambda file, one=one: file.attrs.update(title=f"Scan {one}"), f"{one}.h5")
+            answer = http.post(
+                "/v1/datasets", content=path.read_bytes(), headers={"Content-Type": "application/x-hdf5"}
+            )
+            ids.append(answer.json()["id"])
+        return ids
+
+    return send
+
+
+def ended(http, batch, until):
+    for job in batch["jobs"]:
+        until(http, job["id"])
+    return http.get(batch["links"]["self"]).json()
+
+
+def test_many_scans_as_one(http, scans, work, until):
+    datasets = scans(http)
+    answer = http.post("/v1/batches", json={"datasets": datasets, "settings": SART, "name": "Ward 3"})
+    assert answer.status_code == 202, answer.text
+    batch = answer.json()
+    assert answer.headers["location"] == batch["links"]["self"]
+    assert [job["dataset"] for job in batch["jobs"]] == datasets
+    done = ended(http, batch, until)
+    assert (done["state"], done["progress"], done["counts"]) == ("succeeded", 1.0, {"succeeded": 3})
+    assert "cancel" not in done["links"]
+    for job in done["jobs"]:
+        assert http.get(f"/v1/volumes/{job['volume']}").json()["dataset"] == job["dataset"]
+    listed = http.get(done["links"]["jobs"]).json()["jobs"]
+    assert {job["id"] for job in listed} == {job["id"] for job in batch["jobs"]}
+    assert {job["batch"] for job in listed} == {batch["id"]}
+    assert [row["id"] for row in http.get("/v1/batches").json()["batches"]] == [batch["id"]]
+    # Its deletion takes the results along, not the scans.
+    assert http.delete(batch["links"]["self"]).status_code == 204
+    assert http.get(batch["links"]["self"]).status_code == 404
+    assert http.get("/v1/volumes").json()["volumes"] == http.get("/v1/jobs").json()["jobs"] == []
+    assert len(http.get("/v1/datasets").json()["datasets"]) == 3
+
+
+def test_it_goes_on_after_a_restart(start, scans, work, until):
+    http = start(jobs_at_once=1)
+    work.hold.clear()
+    batch = http.post("/v1/batches", json={"datasets": scans(http), "settings": SART}).json()
+    until(http, batch["jobs"][0]["id"], "running")
+    assert http.get(batch["links"]["self"]).json()["state"] == "running"
+    assert http.delete(batch["links"]["self"]).status_code == 409
+    http.__exit__(None, None, None)
+    work.hold.set()
+    again = start(jobs_at_once=1)
+    assert ended(again, batch, until)["state"] == "succeeded"
+
+
+def test_cancel_ends_the_rest(start, scans, work, until):
+    http = start(jobs_at_once=1)
+    work.hold.clear()
+    batch = http.post("/v1/batches", json={"datasets": scans(http), "settings": SART}).json()
+    until(http, batch["jobs"][0]["id"], "running")
+    assert http.post(batch["links"]["cancel"]).status_code == 202
+    work.hold.set()
+    assert ended(http, batch, until)["state"] == "cancelled"
+    assert http.post(f"{batch['links']['self']}/cancel").status_code == 409
+
+
+def test_a_request_that_is_refused_starts_nothing(http, scans):
+    (scan,) = scans(http, 1)
+    for change, field in (
+        ({"datasets": []}, "datasets"),
+        ({"datasets": ["ds-0123456789abcdef0123"] * 2}, "datasets"),
+        ({"settings": {"nodez": 8}}, "settings.nodez"),
+        ({"datasets": ["ds-0123456789abcdef0123"]}, "dataset"),
+        ({"name": "x" * 201}, "name"),
+        ({"more": 1}, "more"),
+    ):
+        answer = http.post("/v1/batches", json={"datasets": [scan], **change})
+        assert (answer.status_code in (404, 422), answer.json()["field"]) == (True, field)
+    assert http.get("/v1/jobs").json()["jobs"] == http.get("/v1/batches").json()["batches"] == []
