@@ -2,17 +2,16 @@
 
 import threading
 
-import pytest
 from sqlalchemy import text
 
 from bentray_service import readiness
-from bentray_service.rows.ids import Tenant
-from bentray_service.rows.keys import ApiKey, Keys
+
+from ..conftest import signed
 
 
-def faults(answer):
-    assert answer.status_code == 503
-    assert answer.json()["type"] == "/problems/not-ready"
+def faults(http):
+    answer = http.get("/health/ready")
+    assert (answer.status_code, answer.json()["type"]) == (503, "/problems/not-ready")
     return [one["field"] for one in answer.json()["errors"]]
 
 
@@ -22,30 +21,18 @@ def test_all_well(http):
     assert (body["status"], body["workers"]) == ("ready", 1)
 
 
-def test_no_workers(http, cluster):
+def test_every_fault_is_named(start, cluster):
+    http = start()
     cluster.workers = 0
-    assert faults(http.get("/health/ready")) == ["workers"]
-
-
-def test_disk_full(start):
-    assert faults(start(min_free_bytes=2**62).get("/health/ready")) == ["disk"]
-
-
-def test_database_that_cannot_be_written(http):
+    assert faults(http) == ["workers"]
+    assert faults(start("full", min_free_bytes=2**62)) == ["disk", "workers"]
+    cluster.workers = 1
+    http.app.state.background.ingest.stop()
+    assert faults(http) == ["ingest"]
     with http.app.state.stores.database.write() as connection:
         connection.execute(text("DROP TABLE about"))
-    assert faults(http.get("/health/ready")) == ["database"]
+    assert sorted(faults(http)) == ["database", "ingest"]
     assert http.get("/health/live").status_code == 200
-
-
-def test_stalled_ingestion_is_reported(http):
-    http.app.state.background.ingest.stop()
-    assert faults(http.get("/health/ready")) == ["ingest"]
-
-
-def test_several_faults_are_all_named(start, cluster):
-    cluster.workers = 0
-    assert faults(start(min_free_bytes=2**62).get("/health/ready")) == ["disk", "workers"]
 
 
 def test_a_part_that_hangs_is_named_in_time(start, monkeypatch):
@@ -58,9 +45,8 @@ def test_a_part_that_hangs_is_named_in_time(start, monkeypatch):
 
     monkeypatch.setattr(http.app.state.stores.database, "probe", probe)
     for _ in range(3):
-        answer = http.get("/health/ready")
-        assert faults(answer) == ["database"]
-        assert answer.json()["errors"][0]["found"] == "no answer in 0.2 s"
+        assert faults(http) == ["database"]
+        assert http.get("/health/ready").json()["errors"][0]["found"] == "no answer in 0.2 s"
         assert http.get("/health/live").status_code == 200
     # However many ask, one thread looks.
     assert len(looks) == 1
@@ -69,30 +55,19 @@ def test_a_part_that_hangs_is_named_in_time(start, monkeypatch):
     assert http.get("/health/ready").status_code == 200
 
 
-pytestmark = pytest.mark.usefixtures("work")
-
-
-HDF5 = {"Content-Type": "application/x-hdf5"}
-
-
-def test_the_queue_of_others_is_a_number(http, work, scan, until):
+def test_the_queue_of_others_is_a_number(http, work, uploaded, submitted, until):
     """Three queued jobs of one tenant behind a running one, seen by that tenant and by another."""
-    store, auth = Keys(http.app.state.stores.database), {}
-    for tenant in ("acme", "other"):
-        token = ApiKey.new()
-        store.add(token, Tenant(tenant), tenant, ("read", "write"))
-        auth[tenant] = {"Authorization": f"Bearer {token.shown()}"}
-    http.headers.update(auth["acme"])
-    sent = http.post("/v1/datasets", content=scan().read_bytes(), headers=HDF5).json()["id"]
+    acme, other = signed(http, "acme"), signed(http, "other")
+    http.headers.update(acme)
+    sent = uploaded(http)
     work.hold.clear()
-    asked = {"kind": "reconstruction", "dataset": sent, "settings": {"method": "sart", "nodes": 16}}
-    jobs = [http.post("/v1/jobs", json=asked).json()["id"] for _ in range(4)]
+    jobs = [submitted(http, sent)["id"] for _ in range(4)]
     until(http, jobs[0], "running")
     states = [http.get(f"/v1/jobs/{one}").json()["state"] for one in jobs]
     running, queued = states.count("running"), states.count("queued")
     assert running >= 1
     mine = http.get("/v1/cluster").json()["queue"]
-    theirs = http.get("/v1/cluster", headers=auth["other"])
+    theirs = http.get("/v1/cluster", headers=other)
     work.hold.set()
     whole = {"all_queued": queued, "all_running": running, "waiting_images": 0}
     assert mine == {"queued": queued, "running": running, **whole}

@@ -14,9 +14,10 @@ from bentray_kernels.tomography.sart import sart_step
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.files.tenant_files import CHECKPOINTS
 from bentray_service.rows.ids import LOCAL, Tenant
-from bentray_service.rows.keys import ApiKey, Keys
 from bentray_workers.cluster.checkpoints import Checkpoints
 from bentray_workers.reconstruction import reconstruction_run
+
+from ..conftest import HDF5, refused, signed
 
 pytestmark = pytest.mark.usefixtures("work")
 
@@ -30,11 +31,6 @@ def ask(http, dataset, settings=None, **more):
     return http.post(
         "/v1/jobs", json={"kind": "reconstruction", "dataset": dataset, "settings": settings or {}, **more}
     )
-
-
-def problem(answer):
-    assert answer.headers["content-type"] == "application/problem+json"
-    return answer.json()
 
 
 def test_a_job_is_stored_before_the_answer(http, dataset, work, until):
@@ -74,21 +70,10 @@ def test_plan_is_stored_and_returned(http, dataset):
 
 def test_a_task_that_no_worker_can_hold_is_rejected_before_it_is_stored(http, dataset, cluster):
     cluster.memory_bytes = 500 * 2**20
-    body = problem(ask(http, dataset, {"nodes": 2048, "method": "gauss-newton"}))
-    assert (body["status"], body["field"]) == (422, "nodes")
+    body = refused(ask(http, dataset, {"nodes": 2048, "method": "gauss-newton"}), "nodes", "at most")
     assert "bytes" in body["found"]
-    assert "at most" in body["accepted"]
     assert http.get("/v1/jobs").json()["jobs"] == []
     assert ask(http, dataset, {"nodes": 16}).status_code == 202
-
-
-def test_a_device_that_no_worker_offers_is_rejected(http, dataset):
-    for settings, field in (
-        ({"eikonal": "fim-opencl"}, "eikonal"),
-        ({"method": "sart", "device": "opencl"}, "device"),
-    ):
-        body = problem(ask(http, dataset, settings))
-        assert (body["status"], body["field"]) == (422, field)
 
 
 def test_jobs_are_taken_while_no_worker_is_connected(http, dataset, cluster):
@@ -111,21 +96,14 @@ def test_automatic_choices_are_returned(http, dataset, work, until):
     assert told.startswith("auto chose straight rays, SART: bent rays do not")
 
 
-def test_newest_first(http, dataset):
-    made = [ask(http, dataset, {"nodes": 16}).json()["id"] for _ in range(3)]
-    assert [job["id"] for job in http.get("/v1/jobs?limit=2").json()["jobs"]] == [made[2], made[1]]
-
-
-def test_unknown_picker_lists_the_known_ones(http, dataset):
-    body = problem(ask(http, dataset, {"picking": {"picker": "magic"}}))
-    assert (body["status"], body["field"], body["found"]) == (422, "settings.picking.picker", "'magic'")
-    assert all(picker in body["accepted"] for picker in PICKERS)
-
-
-def test_unknown_setting_lists_the_known_ones(http, dataset):
-    body = problem(ask(http, dataset, {"node": 64}))
-    assert (body["status"], body["field"], body["found"]) == (422, "settings.node", "64")
-    assert all(field.name in body["accepted"] for field in fields(Settings))
+def test_unknown_choices_and_settings_list_the_known_ones(http, dataset):
+    for settings, field, found, known in (
+        ({"picking": {"picker": "magic"}}, "settings.picking.picker", "'magic'", PICKERS),
+        ({"node": 64}, "settings.node", "64", [field.name for field in fields(Settings)]),
+    ):
+        body = refused(ask(http, dataset, settings), field)
+        assert body["found"] == found
+        assert all(name in body["accepted"] for name in known)
 
 
 @pytest.mark.parametrize(
@@ -140,15 +118,16 @@ def test_unknown_setting_lists_the_known_ones(http, dataset):
         ({"reflection": {"gain": "spreading"}}, "settings.reflection.gain"),
         ({"seed": 0}, "settings.seed"),
         ([], "settings"),
+        # Devices that no worker offers.
+        ({"eikonal": "fim-opencl"}, "eikonal"),
+        ({"method": "sart", "device": "opencl"}, "device"),
     ],
 )
 def test_wrong_settings(http, dataset, settings, field):
-    body = problem(
-        http.post("/v1/jobs", json={"kind": "reconstruction", "dataset": dataset, "settings": settings})
-    )
-    assert body["status"] == 422
+    asked = {"kind": "reconstruction", "dataset": dataset, "settings": settings}
+    answer = http.post("/v1/jobs", json=asked)
+    body = refused(answer, answer.json()["field"])
     assert body["field"].startswith(field)
-    assert body["errors"][0]["accepted"]
 
 
 def test_a_setting_of_the_earlier_flat_record_is_rejected_with_what_to_use_instead(http, dataset):
@@ -162,35 +141,30 @@ def test_a_setting_of_the_earlier_flat_record_is_rejected_with_what_to_use_inste
         ("speed_update", "fixed", "no such setting: the wave front"),
         ("numerics", {}, "a known setting: "),
     ):
-        body = problem(ask(http, dataset, {name: value}))
-        assert (body["status"], body["field"]) == (422, f"settings.{name}")
+        body = refused(ask(http, dataset, {name: value}), f"settings.{name}")
         assert body["accepted"].startswith(accepted)
 
 
 def test_every_wrong_value_is_listed(http, dataset):
-    body = problem(ask(http, dataset, {"nodes": "many", "rays": "wavy"}, colour="red"))
+    body = ask(http, dataset, {"nodes": "many", "rays": "wavy"}, colour="red").json()
     assert {"settings.nodes", "settings.rays", "colour"} <= {one["field"] for one in body["errors"]}
 
 
-def test_no_json(http):
-    body = problem(http.post("/v1/jobs", content=b"{", headers={"Content-Type": "application/json"}))
-    assert (body["status"], body["accepted"]) == (422, "a JSON object")
-
-
-def test_a_request_of_megabytes(http, dataset):
-    body = problem(ask(http, dataset, {"method": "x" * 1_000_000}))
-    assert (body["status"], body["type"], body["field"]) == (413, "/problems/too-large", "body")
-
-
-def test_wrong_media_type(http):
-    body = problem(http.post("/v1/jobs", content=b"a=b", headers={"Content-Type": "text/plain"}))
-    assert (body["status"], body["accepted"]) == (415, "application/json")
+def test_bodies_that_are_no_request(http, dataset):
+    for content, kind, status, accepted in (
+        (b"{", "application/json", 422, "a JSON object"),
+        (b"a=b", "text/plain", 415, "application/json"),
+    ):
+        answer = http.post("/v1/jobs", content=content, headers={"Content-Type": kind})
+        assert (answer.status_code, answer.json()["accepted"]) == (status, accepted)
+    answer = ask(http, dataset, {"method": "x" * 1_000_000})
+    assert refused(answer, "body", status=413)["type"] == "/problems/too-large"
 
 
 def test_cancel_an_ended_job(http, dataset, until):
     job = until(http, ask(http, dataset, {"nodes": 16}).json()["id"])
-    body = problem(http.post(f"/v1/jobs/{job['id']}/cancel"))
-    assert (body["status"], body["found"]) == (409, "succeeded")
+    answer = http.post(f"/v1/jobs/{job['id']}/cancel")
+    assert (answer.status_code, answer.json()["found"]) == (409, "succeeded")
 
 
 def test_the_same_request_twice_makes_one_job(http, dataset, work):
@@ -202,19 +176,14 @@ def test_the_same_request_twice_makes_one_job(http, dataset, work):
     assert first.json()["id"] == again.json()["id"]
     assert [one.headers.get("idempotency-replayed") for one in (first, again)] == [None, "true"]
     other = http.post("/v1/jobs", json={**asked, "settings": {"method": "sart", "nodes": 17}}, headers=key)
-    assert (other.status_code, problem(other)["field"]) == (409, "Idempotency-Key")
+    refused(other, "Idempotency-Key", status=409)
     assert http.post("/v1/jobs", json=asked).json()["id"] != first.json()["id"]
-    assert len(http.get("/v1/jobs").json()["jobs"]) == 2
     assert http.post("/v1/jobs", json=asked, headers={"Idempotency-Key": 201 * "x"}).status_code == 422
-    work.hold.set()
-
-
-def test_many_at_once_with_one_key_make_one_job(http, dataset):
-    asked = {"kind": "reconstruction", "dataset": dataset, "settings": {"method": "sart", "nodes": 16}}
     with ThreadPoolExecutor(16) as pool:
         send = lambda _: http.post("/v1/jobs", json=asked, headers={"Idempotency-Key": "k"}).json()["id"]  # noqa: E731
         assert len(set(pool.map(send, range(50)))) == 1
-    assert len(http.get("/v1/jobs").json()["jobs"]) == 1
+    assert len(http.get("/v1/jobs").json()["jobs"]) == 3
+    work.hold.set()
 
 
 def test_pages_lead_to_every_job_once(http, dataset, until):
@@ -251,6 +220,9 @@ def test_text_filters_by_name_scan_and_owner(http, dataset):
     # No character is a pattern, and what is found is what was written, also beyond ASCII.
     for words, expected in (("%", [named]), ("_", [named]), ("\\", [named]), ("Übung", [named]), ("%%", [])):
         assert found(http, text=words) == expected, words
+    for text in ("' OR 1=1 --", "\\\\'", "%' ESCAPE '", "\N{PILE OF POO}", "a\nb"):
+        answer = http.get("/v1/jobs", params={"text": text})
+        assert (answer.status_code, answer.json()) == (200, {"jobs": [], "next": None}), text
     assert found(http, text="") == [noted, named, plain]
     assert found(http, text="sixteen ELEMENTS") == [noted, named, plain]
     http.patch(f"/v1/datasets/{dataset}", json={"title": "Right breast"})
@@ -259,13 +231,6 @@ def test_text_filters_by_name_scan_and_owner(http, dataset):
     page = http.get("/v1/jobs", params={"text": "right", "limit": 2}).json()
     assert [job["id"] for job in page["jobs"]] == [noted, named]
     assert [job["id"] for job in http.get(page["next"]).json()["jobs"]] == [plain]
-
-
-def test_hostile_text_finds_nothing(http, dataset):
-    ask(http, dataset, {"nodes": 16})
-    for text in ("' OR 1=1 --", "\\\\'", "%' ESCAPE '", "\N{PILE OF POO}", "a\nb"):
-        answer = http.get("/v1/jobs", params={"text": text})
-        assert (answer.status_code, answer.json()) == (200, {"jobs": [], "next": None}), text
 
 
 def test_a_deleted_job_is_gone_with_its_volume(http, dataset, work, until):
@@ -279,33 +244,26 @@ def test_a_deleted_job_is_gone_with_its_volume(http, dataset, work, until):
     assert http.get(f"/v1/datasets/{dataset}").status_code == 200
 
 
-def test_a_running_job_is_not_deleted(http, dataset, work, until):
-    work.hold.clear()
-    job = ask(http, dataset, {"nodes": 16}).json()
-    until(http, job["id"], "running")
+def test_a_running_job_is_not_deleted(http, running, work, until):
+    job = running(http)
     answer = http.delete(job["links"]["self"])
-    assert (answer.status_code, problem(answer)["type"]) == (409, "/problems/in-use")
+    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/in-use")
     work.hold.set()
     until(http, job["id"], "succeeded")
 
 
-def test_values_of_the_checkpoint_for_its_owner_alone(http, uploaded, submitted, until, work):
-    state, auth = http.app.state, {}
-    for tenant in ("acme", "other"):
-        token = ApiKey.new()
-        Keys(state.stores.database).add(token, Tenant(tenant), tenant, ("read", "write"))
-        auth[tenant] = {"Authorization": f"Bearer {token.shown()}"}
-    http.headers.update(auth["acme"])
-    work.hold.clear()
-    job = submitted(http, uploaded(http))["id"]
-    here = f"/v1/jobs/{job}/preview"
-    assert until(http, job, "running")["links"]["preview"] == here
+def test_values_of_the_checkpoint_for_its_owner_alone(http, running, until, work):
+    state, other = http.app.state, signed(http, "other")
+    http.headers.update(signed(http, "acme"))
+    job = running(http)
+    here = f"/v1/jobs/{job['id']}/preview"
+    assert job["links"]["preview"] == here
     none_yet = http.get(here)
     assert (none_yet.status_code, none_yet.json()["type"]) == (409, "/problems/no-preview")
     assert "before its first image" in none_yet.json()["found"]
     speed = 1500.0 + np.arange(20.0).reshape(5, 4)
     checkpoint = ReconstructionCheckpoint(0, 0, (), sart_step.begin(1.0 / speed), (), 2e-3, (-0.01, 0.0))
-    Checkpoints(state.stores.files.of(Tenant("acme")).checkpoints(job)).save("0-00000", checkpoint)
+    Checkpoints(state.stores.files.of(Tenant("acme")).checkpoints(job["id"])).save("0-00000", checkpoint)
     answer = http.get(here)
     assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
     body = answer.json()
@@ -313,10 +271,10 @@ def test_values_of_the_checkpoint_for_its_owner_alone(http, uploaded, submitted,
     np.testing.assert_array_equal(values, speed.astype(np.float32))
     assert body["range_mps"] == [1500.0, 1519.0]
     assert (body["spacing_m"], body["origin_m"]) == ([2e-3, 2e-3], [-0.01, 0.0])
-    stranger = http.get(here, headers=auth["other"])
+    stranger = http.get(here, headers=other)
     assert (stranger.status_code, stranger.json()["type"]) == (404, "/problems/unknown-id")
     work.hold.set()
-    assert "preview" not in until(http, job)["links"]
+    assert "preview" not in until(http, job["id"])["links"]
     over = http.get(here)
     assert over.status_code == 409
     assert "succeeded" in over.json()["found"]
@@ -324,14 +282,13 @@ def test_values_of_the_checkpoint_for_its_owner_alone(http, uploaded, submitted,
 
 def test_a_queued_job_and_another_kind_have_none(start, uploaded, submitted):
     # Jobs stay where they are: no disk has so much room.
-    http = start(min_free_bytes=2**60)
+    http = start("full", min_free_bytes=2**60)
     simulation = http.post("/v1/jobs", json={"kind": "simulation", "settings": {"nodes": 16}}).json()
     for job in (submitted(http, uploaded(http)), simulation):
         answer = http.get(f"/v1/jobs/{job['id']}/preview")
-        problem = answer.json()
-        assert (answer.status_code, problem["type"]) == (409, "/problems/no-preview")
-        assert f"{job['kind']}, queued" in problem["found"]
-        assert "after its first iteration" in problem["accepted"]
+        assert (answer.status_code, answer.json()["type"]) == (409, "/problems/no-preview")
+        assert f"{job['kind']}, queued" in answer.json()["found"]
+        assert "after its first iteration" in answer.json()["accepted"]
         assert "preview" not in job["links"]
 
 
@@ -347,14 +304,11 @@ def scans(scan):
     """Upload different scans; returns their ids."""
 
     def send(http, number=3):
-        ids = []
-        for one in range(number):
-            path = scan(lambda file, one=one: file.attrs.update(title=f"Scan {one}"), f"{one}.h5")
-            answer = http.post(
-                "/v1/datasets", content=path.read_bytes(), headers={"Content-Type": "application/x-hdf5"}
-            )
-            ids.append(answer.json()["id"])
-        return ids
+        paths = [
+            scan(lambda file, k=k: file.attrs.update(title=f"Scan {k}"), f"{k}.h5") for k in range(number)
+        ]
+        sent = [http.post("/v1/datasets", content=path.read_bytes(), headers=HDF5) for path in paths]
+        return [answer.json()["id"] for answer in sent]
 
     return send
 
