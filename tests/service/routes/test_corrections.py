@@ -15,6 +15,8 @@ from bentray_service.rows.stored_tables import Datasets
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.files.dataset.units import POSITION_UNITS, TIME_UNITS
 
+from ..conftest import STREAM, refused
+
 pytestmark = pytest.mark.usefixtures("work")
 
 WRONG = {"times_in": "ms", "times_read_as": "us"}
@@ -27,8 +29,7 @@ def in_microseconds(file):
 
 @pytest.fixture
 def here(http, scan):
-    stream = {"Content-Type": "application/x-hdf5"}
-    answer = http.post("/v1/datasets", content=scan(in_microseconds).read_bytes(), headers=stream)
+    answer = http.post("/v1/datasets", content=scan(in_microseconds).read_bytes(), headers=STREAM)
     return answer.json()["links"]["self"]
 
 
@@ -88,20 +89,16 @@ def test_the_geometry_proposes_the_correction(http, here):
     ],
 )
 def test_refusals_name_field_and_accepted_values_and_leave_nothing(http, here, wrong, field, accepted):
-    answer = http.post(f"{here}/corrections", json=wrong)
-    assert (answer.status_code, answer.json()["field"]) == (422, field), answer.text
-    assert accepted in answer.json()["accepted"]
+    refused(http.post(f"{here}/corrections", json=wrong), field, accepted)
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1
     folder = http.app.state.stores.files.of(Tenant("local")).root
     assert len(list((folder / "datasets").iterdir())) == 1
     assert list((folder / "incoming").iterdir()) == []
 
 
-def test_the_quota_holds(start, scan, work):
-    size = scan().stat().st_size
-    http = start(max_tenant_bytes=2 * size)
-    stream = {"Content-Type": "application/x-hdf5"}
-    here = http.post("/v1/datasets", content=scan().read_bytes(), headers=stream).json()["links"]["self"]
+def test_the_quota_holds(start, scan, uploaded, work):
+    http = start(max_tenant_bytes=2 * scan().stat().st_size)
+    here = f"/v1/datasets/{uploaded(http)}"
     statuses = [http.post(f"{here}/corrections", json={"frequency_hz": 5e5}).status_code for _ in range(5)]
     assert set(statuses) <= {201, 507}
     assert statuses[-1] == 507
@@ -121,7 +118,7 @@ def test_a_repeated_request_makes_no_second_copy(http, here, scan):
     assert [one.headers.get("idempotency-replayed") for one in (first, again)] == [None, "true"]
     assert [one["id"] for one in copies_of(http, here)] == [first.json()["id"]]
     other = http.post(f"{here}/corrections", json={**WRONG, "frequency_hz": 5e5}, headers=key)
-    assert (other.status_code, other.json()["field"]) == (409, "Idempotency-Key")
+    refused(other, "Idempotency-Key", status=409)
     # One that has been deleted is made again, and without a key each request makes its own.
     http.delete(first.json()["links"]["self"])
     for headers in (key, {}, {}):
@@ -156,12 +153,9 @@ def test_corrections_are_audited(http, here):
     """Done and refused ones, with the ids of the scan and of its copy."""
     copy = http.post(f"{here}/corrections", json=WRONG).json()["id"]
     http.post(f"{here}/corrections", json={"times_in": "min"})
-    brief = [
-        (one["method"], one["route"], one["ids"], one["status"])
-        for one in entries(http.app.state.stores.files.audit)
-    ]
     route, scan = "/v1/datasets/{dataset_id}/corrections", here.rpartition("/")[2]
-    assert [one for one in brief if one[1] == route] == [
-        ("POST", route, [scan, copy], 201),
-        ("POST", route, [scan], 422),
+    audited = [one for one in entries(http.app.state.stores.files.audit) if one["route"] == route]
+    assert [(one["method"], one["ids"], one["status"]) for one in audited] == [
+        ("POST", [scan, copy], 201),
+        ("POST", [scan], 422),
     ]

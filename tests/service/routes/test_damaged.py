@@ -1,6 +1,5 @@
 """Bytes that changed on the disk are a named error, not a wrong picture; deletion is none."""
 
-import io
 import os
 from concurrent.futures import ThreadPoolExecutor
 
@@ -8,13 +7,11 @@ import httpx
 import numpy as np
 import pytest
 
-STREAM = {"Content-Type": "application/octet-stream"}
+from ..conftest import STREAM, npy
 
 
 def packed(side=12):
-    values = io.BytesIO()
-    np.save(values, np.random.default_rng(0).integers(0, 255, (side, side, side), dtype=np.uint8))
-    return values.getvalue()
+    return npy(np.random.default_rng(0).integers(0, 255, (side, side, side), dtype=np.uint8))
 
 
 def flip(path):

@@ -16,6 +16,7 @@ from bentray_service.rows.ids import LOCAL, Tenant
 
 from ...clock import Clock
 from ...waiting import wait_until
+from ..conftest import refused
 
 
 @pytest.fixture(autouse=True)
@@ -40,12 +41,10 @@ def once_watched(http, then, pause_s=0.0):
     threading.Thread(target=wait).start()
 
 
-def test_a_job_from_its_beginning_to_its_end(http, uploaded, submitted, until, work):
-    work.hold.clear()
-    job = submitted(http, uploaded(http))
-    until(http, job["id"], "running")
+def test_a_job_from_its_beginning_to_its_end(http, running, work):
+    here = f"/v1/jobs/{running(http)['id']}/events"
     once_watched(http, work.hold.set)
-    answer = http.get(f"/v1/jobs/{job['id']}/events")
+    answer = http.get(here)
     assert answer.headers["content-type"].startswith("text/event-stream")
     assert answer.headers["cache-control"] == "no-store"
     told = parsed(answer.text)
@@ -56,42 +55,28 @@ def test_a_job_from_its_beginning_to_its_end(http, uploaded, submitted, until, w
     assert progress
     assert all("id" not in one for one in told if one["event"] == "progress")
     assert progress[-1]["total"] == 24
-    later = parsed(
-        http.get(f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": str(states[1][0])}).text
-    )
-    assert [json.loads(one["data"])["state"] for one in later] == ["succeeded"]
-    assert http.get(f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": str(states[2][0])}).text == ""
+    later = http.get(here, headers={"Last-Event-ID": str(states[1][0])})
+    assert [change["state"] for change in changes_in(later)] == ["succeeded"]
+    assert http.get(here, headers={"Last-Event-ID": str(states[2][0])}).text == ""
+    for last in ("x", "-1", str(2**70)):
+        refused(http.get(here, headers={"Last-Event-ID": last}), "last-event-id")
 
 
-def test_it_ends_when_the_service_leaves(http, uploaded, submitted, until, work):
-    work.hold.clear()
-    job = submitted(http, uploaded(http))
-    until(http, job["id"], "running")
+def test_it_ends_when_the_service_leaves(http, running):
+    job = running(http)
     # By then it has sent what it has read.
     once_watched(http, http.app.state.leaving.set, 0.2)
     told = parsed(http.get(f"/v1/jobs/{job['id']}/events").text)
-    assert [json.loads(one["data"])["state"] for one in told if one["event"] == "state"] == [
-        "queued",
-        "running",
-    ]
+    states = [json.loads(one["data"])["state"] for one in told if one["event"] == "state"]
+    assert states == ["queued", "running"]
 
 
-def test_heartbeats_are_sent(serve, uploaded, submitted, until, work, monkeypatch):
+def test_heartbeats_are_sent(serve, running, work, monkeypatch):
     monkeypatch.setattr(events, "SILENCE_SECONDS", 0.05)
-    work.hold.clear()
     with httpx.Client(base_url=serve(), timeout=60.0) as http:
-        job = submitted(http, uploaded(http))
-        until(http, job["id"], "running")
-        with http.stream("GET", f"/v1/jobs/{job['id']}/events") as answer:
+        with http.stream("GET", f"/v1/jobs/{running(http)['id']}/events") as answer:
             assert ": keep-alive" in answer.iter_lines()
         work.hold.set()
-
-
-@pytest.mark.parametrize("last", ["x", "-1", str(2**70)])
-def test_a_wrong_place_is_rejected(http, uploaded, submitted, work, last):
-    job = submitted(http, uploaded(http))
-    answer = http.get(f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": last})
-    assert (answer.status_code, answer.json()["field"]) == (422, "last-event-id")
 
 
 def test_event_streams_share_one_query(http, uploaded, submitted, until, work, monkeypatch):
@@ -129,19 +114,17 @@ def test_event_streams_share_one_query(http, uploaded, submitted, until, work, m
     assert (len(told), ends) == (30, {"succeeded"})
 
 
-def test_streams_are_bounded_for_a_tenant_and_in_all(serve, monkeypatch, uploaded, submitted, until, work):
+def test_streams_are_bounded_for_a_tenant_and_in_all(serve, monkeypatch, running, work):
     monkeypatch.setattr(feed, "OF_ACCOUNT", 3)
-    work.hold.clear()
-    url = serve()
-    with httpx.Client(base_url=url, timeout=60.0) as http, ExitStack() as stack:
-        job = submitted(http, uploaded(http))
+    with httpx.Client(base_url=serve(), timeout=60.0) as http, ExitStack() as stack:
+        job = running(http)
         place = f"/v1/jobs/{job['id']}/events"
         streams = [stack.enter_context(http.stream("GET", place)) for _ in range(3)]
         assert [one.status_code for one in streams] == [200, 200, 200]
-        refused = http.get(place)
-        assert (refused.status_code, refused.json()["type"]) == (429, "/problems/too-many-streams")
-        assert int(refused.headers["retry-after"]) > 0
-        assert f"GET /v1/jobs/{job['id']}" in refused.json()["accepted"]
+        answer = http.get(place)
+        assert (answer.status_code, answer.json()["type"]) == (429, "/problems/too-many-streams")
+        assert int(answer.headers["retry-after"]) > 0
+        assert f"GET /v1/jobs/{job['id']}" in answer.json()["accepted"]
         streams[0].close()
         monkeypatch.setattr(feed, "IN_ALL", 3)
         wait_until(lambda: opens(http, place))
@@ -153,10 +136,8 @@ def opens(http, place):
         return answer.status_code == 200
 
 
-def test_unavailable_database_ends_no_stream(http, uploaded, submitted, until, work, monkeypatch):
-    work.hold.clear()
-    job = submitted(http, uploaded(http))
-    until(http, job["id"], "running")
+def test_unavailable_database_ends_no_stream(http, running, work, monkeypatch):
+    job = running(http)
     news, failures = http.app.state.stores.jobs.__class__.updates, iter(range(5))
 
     def fails_at_first(self, known):

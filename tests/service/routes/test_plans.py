@@ -1,16 +1,12 @@
 """POST /v1/plans: what a job would be, its time from jobs of the tenant, its place in the queue."""
 
-import io
-
 import numpy as np
 import pytest
 from sqlalchemy import text
 
 from bentray_service.jobs import kinds
-from bentray_service.rows.ids import Tenant
-from bentray_service.rows.keys import ApiKey, Keys
 
-from ..conftest import HDF5
+from ..conftest import STREAM, npy, refused, signed
 
 ASKED = {"method": "sart", "nodes": 32, "iterations": 3}
 
@@ -69,39 +65,30 @@ def test_no_number_without_a_sound_estimate(http, uploaded):
     assert found["basis"].startswith("No estimate yet")
 
 
-def test_a_tenant_learns_nothing_of_the_jobs_of_another(http, scan, until, work):
-    state = http.app.state
-    auth = {}
-    for name in ("acme", "other"):
-        token = ApiKey.new()
-        Keys(state.stores.database).add(token, Tenant(name), name, ("read", "write"))
-        auth[name] = {"Authorization": f"Bearer {token.shown()}"}
-    content = scan().read_bytes()
-    scans = {
-        name: http.post("/v1/datasets", content=content, headers={**HDF5, **key}).json()["id"]
-        for name, key in auth.items()
-    }
-    before = planned(http, scans["other"], headers=auth["other"]).json()
+def test_a_tenant_learns_nothing_of_the_jobs_of_another(http, uploaded, until, work):
+    acme, other = signed(http, "acme"), signed(http, "other")
+    scans = []
+    for headers in (acme, other):
+        http.headers.update(headers)
+        scans.append(uploaded(http))
+    mine, theirs = scans
+    before = planned(http, theirs).json()
+    http.headers.update(acme)
     for _ in range(3):
-        job = submit(http, scans["acme"], headers=auth["acme"])
-        http.headers.update(auth["acme"])
+        job = submit(http, mine)
         until(http, job, "succeeded")
-        http.headers.pop("authorization")
         done_in(http, job, 3600.0)
-    assert planned(http, scans["other"], headers=auth["other"]).json() == before
-    mine = planned(http, scans["acme"], headers=auth["acme"]).json()
-    assert (mine["minutes"], mine["compared"]) == (pytest.approx(60.0), 3)
-    refused = planned(http, scans["acme"], headers=auth["other"])
-    assert (refused.status_code, refused.json()["field"]) == (404, "dataset")
+    assert planned(http, theirs, headers=other).json() == before
+    found = planned(http, mine).json()
+    assert (found["minutes"], found["compared"]) == (pytest.approx(60.0), 3)
+    refused(planned(http, mine, headers=other), "dataset", status=404)
 
 
 def test_turntables_take_times_in_proportion_to_their_frames(start, until, monkeypatch):
     monkeypatch.setattr(kinds, "draw_turntable", lambda *args, **control: args[3].write_bytes(b"pictures"))
     http = start()
-    values = io.BytesIO()
-    np.save(values, np.arange(8.0**3).reshape(8, 8, 8))
-    stream = {"Content-Type": "application/octet-stream"}
-    volume = http.post("/v1/volumes", content=values.getvalue(), headers=stream).json()["id"]
+    content = npy(np.arange(8.0**3).reshape(8, 8, 8))
+    volume = http.post("/v1/volumes", content=content, headers=STREAM).json()["id"]
 
     def body(**settings):
         return {"kind": "refraction", "volume": volume, "settings": settings}
@@ -148,7 +135,6 @@ def test_what_a_job_is_refused_for_a_plan_is_too(http, uploaded, settings, field
     body = f'{{"kind": "reconstruction", "dataset": "{uploaded(http)}", "settings": {settings}}}'
     headers = {"Content-Type": "application/json"}
     plan, job = (http.post(f"/v1/{what}", content=body, headers=headers) for what in ("plans", "jobs"))
-    assert (plan.status_code, plan.json()["field"]) == (422, field)
-    assert plan.headers["content-type"] == "application/problem+json"
+    refused(plan, field)
     told = [(one.json()["type"], one.json()["found"], one.json()["accepted"]) for one in (plan, job)]
     assert told[0] == told[1]
