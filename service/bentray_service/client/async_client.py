@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager
-from typing import Any, Self, TypeVar, Unpack
+from typing import Any, Self, TypeVar
 
 import anyio
 import httpx
 from tenacity import AsyncRetrying
 
 from ..web.outbound import AsyncTransport
-from .connection import ConnectionOptions, saving
+from .connection import saving
 from .errors import ClientError, from_response, no_answer
 from .operations import Operations
-from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, FlowRun, PauseStep, RequestStep, Step
+from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, PauseStep, RequestStep, Step
 
 T = TypeVar("T")
 
@@ -22,10 +22,8 @@ T = TypeVar("T")
 class AsyncClient(Operations):
     """Like :class:`Client`; use it with ``async with``, and await its methods."""
 
-    def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
-        super().__init__(url, key, **options)
+    def _open(self) -> None:
         self._http = httpx.AsyncClient(**self._options, transport=AsyncTransport(retries=2))
-        # For addresses of the bucket, which must not see the key.
         self._bucket = httpx.AsyncClient(timeout=self._options["timeout"], transport=AsyncTransport())
 
     async def __aenter__(self) -> Self:
@@ -40,17 +38,20 @@ class AsyncClient(Operations):
         await self._bucket.aclose()
 
     async def _run(self, flow: Flow[T]) -> T:
-        run = FlowRun(flow)
+        advance: Callable[[Any], Step] = flow.send
         outcome: Any = None
         async with AsyncExitStack() as streams:
             listening: dict[str, AsyncIterator[str]] = {}
-            while (step := run.next(outcome)) is not None:
+            while True:
+                try:
+                    step = advance(outcome)
+                except StopIteration as end:
+                    return end.value  # type: ignore[no-any-return]
                 try:
                     retrying = AsyncRetrying(sleep=anyio.sleep, **self._retries.options(step))
-                    outcome = await retrying(self._do, step, streams, listening)
+                    advance, outcome = flow.send, await retrying(self._do, step, streams, listening)
                 except ClientError as error:
-                    outcome = error
-        return run.result
+                    advance, outcome = flow.throw, error
 
     async def _do(self, step: Step, streams: AsyncExitStack, listening: dict[str, AsyncIterator[str]]) -> Any:
         if isinstance(step, PauseStep):

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Any, Self, TypeVar, Unpack
+from typing import Any, Self, TypeVar
 
 import httpx
 from tenacity import Retrying
 
 from ..web.outbound import Transport
-from .connection import Connection, ConnectionOptions, saving
+from .connection import Connection, saving
 from .errors import ClientError, from_response, no_answer
 from .operations import Operations
-from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, FlowRun, PauseStep, RequestStep, Step
+from .steps import CHUNK_BYTES, DownloadStep, EventStep, Flow, PauseStep, RequestStep, Step
 
 T = TypeVar("T")
 
@@ -22,10 +22,8 @@ T = TypeVar("T")
 class Client(Operations):
     __doc__ = Connection.__doc__
 
-    def __init__(self, url: str, key: str | None = None, **options: Unpack[ConnectionOptions]) -> None:
-        super().__init__(url, key, **options)
+    def _open(self) -> None:
         self._http = httpx.Client(**self._options, transport=Transport(retries=2))
-        # For addresses of the bucket, which must not see the key.
         self._bucket = httpx.Client(timeout=self._options["timeout"], transport=Transport())
 
     def __enter__(self) -> Self:
@@ -40,17 +38,20 @@ class Client(Operations):
         self._bucket.close()
 
     def _run(self, flow: Flow[T]) -> T:
-        run = FlowRun(flow)
+        advance: Callable[[Any], Step] = flow.send
         outcome: Any = None
         with ExitStack() as streams:
             listening: dict[str, Iterator[str]] = {}
-            while (step := run.next(outcome)) is not None:
+            while True:
+                try:
+                    step = advance(outcome)
+                except StopIteration as end:
+                    return end.value  # type: ignore[no-any-return]
                 try:
                     retrying = Retrying(sleep=time.sleep, **self._retries.options(step))
-                    outcome = retrying(self._do, step, streams, listening)
+                    advance, outcome = flow.send, retrying(self._do, step, streams, listening)
                 except ClientError as error:
-                    outcome = error
-        return run.result
+                    advance, outcome = flow.throw, error
 
     def _do(self, step: Step, streams: ExitStack, listening: dict[str, Iterator[str]]) -> Any:
         if isinstance(step, PauseStep):

@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, TypedDict
+from typing import Any
 
 import httpx
 from tenacity import RetryCallState, stop_before_delay, wait_exponential
@@ -97,16 +97,6 @@ def repeatable(step: Step, error: ClientError) -> bool:
     return never_sent or isinstance(step, DownloadStep) or step.repeatable
 
 
-class ConnectionOptions(TypedDict, total=False):
-    """Keyword arguments of both clients, see ``Connection``."""
-
-    timeout_s: float
-    poll_s: float
-    patience_s: float
-    on_wait: Callable[[str], None] | None
-    project: str | None
-
-
 class Connection:
     """A connection to one service, to be used as a context manager.
 
@@ -159,6 +149,10 @@ class Connection:
             # An upload is answered after the service has read the file.
             "timeout": httpx.Timeout(timeout_s, connect=CONNECT_S),
         }
+        self._open()
+
+    def _open(self) -> None:
+        """Make the connections of a client, to the service and to its bucket, which must not see the key."""
 
     def __repr__(self) -> str:
         return f"<bentray.{type(self).__name__} of {self.url}>"

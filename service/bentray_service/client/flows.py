@@ -6,25 +6,26 @@ import os
 import re
 import tempfile
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
 from bentray_workers.files.export.registry import FormatName
 
-from ..interactive.progress_bar import phase_note, progress_bar
+from ..interactive.progress_bar import progress_bar
 from ..interactive.result import Result, result_of
+from ..routes.models.batch_records import BatchRecord
 from ..routes.models.job_records import DatasetRecord, JobRecord, VolumeRecord
 from ..routes.models.name_changes import LengthUnit, TimeUnit
 from ..routes.models.surface_records import MeshRecord
 from ..settings_request import check_setting_names, nested, plain_numbers
 from .connection import Connection
 from .errors import ClientError
+from .lists import Answer, BatchId, DatasetId, JobId, StoredId, VolumeId, answer, id_of, volume_of
 from .lists import volume as volume_record
 from .steps import DownloadStep, Flow, RequestStep
-from .stored import DatasetId, JobId, StoredId, VolumeId, id_of, volume_of
 from .uploading import PLACES, OnBytes, UploadKind, send_direct, send_file
-from .waiting import wait_for
+from .waiting import wait
 
 if TYPE_CHECKING:
     from ..interactive.setting_types import Method, PhantomName, ReconstructionSettings, SimulationSettings
@@ -109,8 +110,7 @@ def correct_dataset(
         "arrangement": arrangement,
     }
     place = f"/v1/datasets/{id_of(dataset)}/corrections"
-    response = yield RequestStep("POST", place, _once(plain_numbers(given)), repeatable=True)
-    return DatasetRecord.model_validate_json(response.content)
+    return (yield from _post_once(DatasetRecord, place, plain_numbers(given)))
 
 
 def submit(
@@ -137,7 +137,29 @@ def submit(
     merged = merged_settings(settings, method, {**values})
     called = {} if webhook is None else {"webhook": webhook}
     request = {"kind": "reconstruction", "dataset": id_of(dataset), "settings": merged, **called}
-    return (yield from _start(request))
+    return (yield from _post_once(JobRecord, "/v1/jobs", request))
+
+
+def submit_batch(
+    connection: Connection,
+    datasets: Sequence[DatasetId],
+    settings: Mapping[str, Any] | None = None,
+    *,
+    name: str = "",
+    method: Method | None = None,
+    **values: Unpack[ReconstructionSettings],
+) -> Flow[BatchRecord]:
+    """Start one reconstruction for each dataset, as one batch; omitted settings take their defaults.
+
+    Args:
+        datasets: ids or records, at most 1000.
+        settings: as the REST interface has them.
+        name: of the batch.
+        method, values: as for ``bentray.reconstruct``, in place of those of ``settings``.
+    """
+    merged = merged_settings(settings, method, {**values})
+    request = {"datasets": [id_of(dataset) for dataset in datasets], "name": name, "settings": merged}
+    return (yield from _post_once(BatchRecord, "/v1/batches", request))
 
 
 def merged_settings(
@@ -172,9 +194,8 @@ def simulate(
 
     check_setting_names(values, PhantomScan)
     given = {**values} if phantom is None else {"phantom": phantom, **values}
-    return (
-        yield from _start({"kind": "simulation", "settings": {**(settings or {}), **plain_numbers(given)}})
-    )
+    request = {"kind": "simulation", "settings": {**(settings or {}), **plain_numbers(given)}}
+    return (yield from _post_once(JobRecord, "/v1/jobs", request))
 
 
 def reconstruct(
@@ -209,39 +230,12 @@ def reconstruct(
 
 def cancel(connection: Connection, job: JobId) -> Flow[JobRecord]:
     """Cancel a job."""
-    response = yield RequestStep("POST", f"/v1/jobs/{id_of(job)}/cancel")
-    return JobRecord.model_validate_json(response.content)
+    return (yield from answer(JobRecord, "POST", f"/v1/jobs/{id_of(job)}/cancel"))
 
 
-def wait(
-    connection: Connection,
-    job: JobId,
-    on_progress: Callable[[JobRecord], None] | None = None,
-    timeout_s: float | None = None,
-    *,
-    progress: bool = False,
-) -> Flow[JobRecord]:
-    """Wait until a job has succeeded and return its record.
-
-    Args:
-        job: id or record.
-        on_progress: called with every record.
-        timeout_s: time limit, s; None: none.
-        progress: show a progress bar.
-
-    Raises:
-        ClientError: when the job failed or was cancelled, or after ``timeout_s``.
-    """
-    words = "Waiting" if isinstance(job, str) else job.kind.replace("-", " ").capitalize()
-    with progress_bar(words, shown=progress) as step:
-
-        def show(record: JobRecord) -> None:
-            now = record.progress
-            step(now.done, now.total, phase_note(now.phase) or record.state)
-            if on_progress is not None:
-                on_progress(record)
-
-        return (yield from wait_for(id_of(job), show, timeout_s, connection.poll_s))
+def cancel_batch(connection: Connection, batch: BatchId) -> Flow[BatchRecord]:
+    """Cancel the jobs of a batch that have not ended."""
+    return (yield from answer(BatchRecord, "POST", f"/v1/batches/{id_of(batch)}/cancel"))
 
 
 def download(
@@ -290,12 +284,7 @@ def delete(connection: Connection, stored: StoredId) -> Flow[None]:
     yield RequestStep("DELETE", f"{PLACES[kind]}/{name}")
 
 
-def _start(request: dict[str, Any]) -> Flow[JobRecord]:
-    """Start a job."""
-    response = yield RequestStep("POST", "/v1/jobs", _once(request), repeatable=True)
-    return JobRecord.model_validate_json(response.content)
-
-
-def _once(request: dict[str, Any]) -> dict[str, Any]:
-    """A request with an idempotency key, so that retries make nothing a second time."""
-    return {"json": request, "headers": {"Idempotency-Key": str(uuid.uuid4())}}
+def _post_once(model: type[Answer], path: str, request: dict[str, Any]) -> Flow[Answer]:
+    """Post a request with an idempotency key, so that retries make nothing a second time."""
+    options = {"json": request, "headers": {"Idempotency-Key": str(uuid.uuid4())}}
+    return (yield from answer(model, "POST", path, options, repeatable=True))

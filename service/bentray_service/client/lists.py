@@ -1,8 +1,8 @@
-"""Flows that get records, one or a list, newest first; and those of projects."""
+"""Flows that get records, one or a list, newest first, and pictures; and those of projects."""
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, Unpack
 from urllib.parse import parse_qsl, urlsplit
 
 from pydantic import BaseModel
@@ -12,6 +12,8 @@ from bentray_kernels.requests.names import DEFAULT_PICKER, PickerName
 from bentray_kernels.requests.ranges import Range
 
 from ..html_tables import RecordList
+from ..interactive.picture import Picture
+from ..routes.models.batch_records import BatchList, BatchRecord
 from ..routes.models.job_records import (
     DatasetList,
     DatasetRecord,
@@ -31,15 +33,45 @@ from ..routes.models.project_records import (
 )
 from ..routes.models.quality_records import QualityRecord
 from ..routes.models.surface_records import MeshList, MeshRecord
+from ..settings_request import check_setting_names
 from .connection import Connection
+from .errors import ClientError
 from .steps import Flow, RequestStep
-from .stored import DatasetId, JobId, VolumeId, id_of, volume_of
+
+if TYPE_CHECKING:
+    from ..interactive.setting_types import RefractionSettings
+
+# Every method of the clients takes the id of a record in its place.
+DatasetId: TypeAlias = str | DatasetRecord
+JobId: TypeAlias = str | JobRecord
+VolumeId: TypeAlias = str | VolumeRecord | JobRecord
+BatchId: TypeAlias = str | BatchRecord
+ProjectId: TypeAlias = str | ProjectRecord
+StoredId: TypeAlias = str | DatasetRecord | VolumeRecord | MeshRecord
 
 Answer = TypeVar("Answer", bound=BaseModel)
 JobKind = Literal["reconstruction", "simulation", "refraction", "geometry-field"]
 
 # Records of one request, as the service limits them.
 LIMIT = Range(1, 1000)
+
+
+def id_of(stored: StoredId | JobId | BatchId | ProjectId) -> str:
+    """The id of a record, or the id itself."""
+    return stored if isinstance(stored, str) else stored.id
+
+
+def volume_of(stored: VolumeId) -> str:
+    """The id of a volume: its own, or that of the result of a job.
+
+    Raises:
+        ClientError: for a job without a result.
+    """
+    if not isinstance(stored, JobRecord):
+        return id_of(stored)
+    if stored.volume is None or stored.state != "succeeded":
+        raise ClientError(f"{stored.id} is {stored.state} and has no volume: wait for it with client.wait")
+    return stored.volume
 
 
 def datasets(
@@ -90,8 +122,7 @@ def jobs(
     listed: RecordList[JobRecord] = RecordList()
     while True:
         how["limit"] = min(limit - len(listed), int(LIMIT.most))
-        response = yield RequestStep("GET", "/v1/jobs", {"params": dict(how)}, repeatable=True)
-        page = JobList.model_validate_json(response.content)
+        page = yield from get(JobList, "/v1/jobs", dict(how))
         listed.extend(page.jobs)
         if page.next is None or len(listed) >= limit:
             return listed
@@ -126,18 +157,38 @@ def quality(
     return (yield from get(QualityRecord, place, {"picker": picker}))
 
 
+def batch(connection: Connection, batch: BatchId) -> Flow[BatchRecord]:
+    """Get the current record of a batch."""
+    return (yield from get(BatchRecord, f"/v1/batches/{id_of(batch)}"))
+
+
+def batches(connection: Connection, limit: int = 100) -> Flow[RecordList[BatchRecord]]:
+    """List the newest batches, at most 1000."""
+    found = yield from _list(BatchList, "/v1/batches", limit)
+    return RecordList(found.batches)
+
+
 def get(model: type[Answer], path: str, params: dict[str, Any] | None = None) -> Flow[Answer]:
     """Get one record."""
-    response = yield RequestStep("GET", path, {"params": params or {}}, repeatable=True)
+    return (yield from answer(model, "GET", path, {"params": params or {}}, repeatable=True))
+
+
+def answer(
+    model: type[Answer],
+    method: str,
+    path: str,
+    options: dict[str, Any] | None = None,
+    *,
+    repeatable: bool = False,
+) -> Flow[Answer]:
+    """Send a request, see ``RequestStep``; the result is the record in its response."""
+    response = yield RequestStep(method, path, options or {}, repeatable=repeatable)
     return model.model_validate_json(response.content)
 
 
 def _list(model: type[Answer], path: str, limit: int, text: str | None = None) -> Flow[Answer]:
     LIMIT.check("limit", limit)
     return (yield from get(model, path, {"limit": limit} | ({} if text is None else {"text": text})))
-
-
-ProjectId: TypeAlias = str | ProjectRecord
 
 
 def projects(connection: Connection) -> Flow[RecordList[ProjectRecord]]:
@@ -147,13 +198,12 @@ def projects(connection: Connection) -> Flow[RecordList[ProjectRecord]]:
 
 def project(connection: Connection, project: ProjectId) -> Flow[ProjectDetails]:
     """Get a project with its members."""
-    return (yield from get(ProjectDetails, _place(project)))
+    return (yield from get(ProjectDetails, f"/v1/projects/{id_of(project)}"))
 
 
 def create_project(connection: Connection, name: str) -> Flow[ProjectDetails]:
     """Create a project, whose owner is the caller. ``Client(url, project=…)`` works in it."""
-    response = yield RequestStep("POST", "/v1/projects", {"json": {"name": name}})
-    return ProjectDetails.model_validate_json(response.content)
+    return (yield from answer(ProjectDetails, "POST", "/v1/projects", {"json": {"name": name}}))
 
 
 def set_member(
@@ -166,15 +216,45 @@ def set_member(
         member: ``key:`` and the id of a key, or ``user:`` and the name of a user.
         role: ``reader``, ``contributor`` or ``owner``; None: no member any more.
     """
-    request = {"json": {"member": member, "role": role}}
-    response = yield RequestStep("PUT", f"{_place(project)}/members", request, repeatable=True)
-    return RecordList(MemberList.model_validate_json(response.content).members)
+    request, path = {"json": {"member": member, "role": role}}, f"/v1/projects/{id_of(project)}/members"
+    return RecordList((yield from answer(MemberList, "PUT", path, request, repeatable=True)).members)
 
 
 def delete_project(connection: Connection, project: ProjectId) -> Flow[None]:
     """Delete an empty project."""
-    yield RequestStep("DELETE", _place(project))
+    yield RequestStep("DELETE", f"/v1/projects/{id_of(project)}")
 
 
-def _place(project: ProjectId) -> str:
-    return f"/v1/projects/{project if isinstance(project, str) else project.id}"
+def slice_png(connection: Connection, volume: VolumeId, /, **how: str | float) -> Flow[Picture]:
+    """Get a slice as PNG; ``how``: axis, index, quantity, low, high, colormap, size, frame."""
+    return (yield from _picture(f"/v1/volumes/{volume_of(volume)}/slice.png", how))
+
+
+def refraction_png(
+    connection: Connection, volume: VolumeId, /, **view: Unpack[RefractionSettings]
+) -> Flow[Picture]:
+    """Render a 3-D volume with even spacing as refracting glass, or its surface, as PNG.
+
+    Args:
+        volume: id or record of the volume, or record of its job.
+        view: such as ``iso=(1500.0,)``, ``index=(1.5,)``, ``azimuth_deg=30``, ``mode="shaded"``.
+
+    Raises:
+        InvalidInput: for an unknown setting, with the one that is spelt most like it.
+    """
+    from bentray_workers.rendering.refraction_view import RefractionView
+
+    check_setting_names(view, RefractionView)
+    return (yield from _picture(f"/v1/volumes/{volume_of(volume)}/refraction.png", dict(view)))
+
+
+def quality_png(
+    connection: Connection, dataset: DatasetId, picker: PickerName = DEFAULT_PICKER
+) -> Flow[Picture]:
+    """Get the quality report of a scan as PNG: gathers with picks, matrix of times, findings."""
+    return (yield from _picture(f"/v1/datasets/{id_of(dataset)}/quality.png", {"picker": picker}))
+
+
+def _picture(path: str, params: dict[str, Any]) -> Flow[Picture]:
+    given = {name: value for name, value in params.items() if value is not None}
+    return Picture((yield RequestStep("GET", path, {"params": given}, repeatable=True)).content)

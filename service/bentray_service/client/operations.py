@@ -8,8 +8,7 @@ from functools import update_wrapper
 from types import MethodType
 from typing import Any, Concatenate, Generic, ParamSpec, Protocol, TypeVar, overload
 
-from . import batches as batch_flows
-from . import flows, lists, pictures
+from . import flows, lists, waiting
 from .connection import Connection
 from .steps import Flow
 
@@ -68,13 +67,13 @@ class Operations(Connection):
     submit = _Operation(flows.submit)
     simulate = _Operation(flows.simulate)
     reconstruct = _Operation(flows.reconstruct)
-    wait = _Operation(flows.wait)
+    wait = _Operation(waiting.wait)
     cancel = _Operation(flows.cancel)
-    submit_batch = _Operation(batch_flows.submit_batch)
-    wait_batch = _Operation(batch_flows.wait_batch)
-    cancel_batch = _Operation(batch_flows.cancel_batch)
-    batch = _Operation(batch_flows.batch)
-    batches = _Operation(batch_flows.batches)
+    submit_batch = _Operation(flows.submit_batch)
+    wait_batch = _Operation(waiting.wait_batch)
+    cancel_batch = _Operation(flows.cancel_batch)
+    batch = _Operation(lists.batch)
+    batches = _Operation(lists.batches)
     result = _Operation(flows.result)
     download = _Operation(flows.download)
     download_dataset = _Operation(flows.download_dataset)
@@ -92,6 +91,6 @@ class Operations(Connection):
     job = _Operation(lists.job)
     volume = _Operation(lists.volume)
     quality = _Operation(lists.quality)
-    quality_png = _Operation(pictures.quality_png)
-    slice_png = _Operation(pictures.slice_png)
-    refraction_png = _Operation(pictures.refraction_png)
+    quality_png = _Operation(lists.quality_png)
+    slice_png = _Operation(lists.slice_png)
+    refraction_png = _Operation(lists.refraction_png)

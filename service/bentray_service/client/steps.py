@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeAlias, TypeVar
-
-from .errors import ClientError
+from typing import Any, TypeAlias, TypeVar
 
 T = TypeVar("T")
 
@@ -78,26 +76,3 @@ class PauseStep:
 
 Step = RequestStep | DownloadStep | EventStep | PauseStep
 Flow: TypeAlias = Generator[Step, Any, T]
-
-
-class FlowRun(Generic[T]):
-    """A flow in progress.
-
-    Attributes:
-        result: of the flow, once ``next`` has returned None.
-    """
-
-    result: T
-
-    def __init__(self, flow: Flow[T]) -> None:
-        self._flow = flow
-
-    def next(self, outcome: Any) -> Step | None:
-        """Pass the outcome of the last step, a result or a ``ClientError``; returns the next step, if any."""
-        try:
-            if isinstance(outcome, ClientError):
-                return self._flow.throw(outcome)
-            return self._flow.send(outcome)
-        except StopIteration as end:
-            self.result = end.value
-            return None

@@ -13,6 +13,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..routes.models.upload_records import DirectUploadRecord, PartAddresses, UploadRecord
 from .errors import ClientError, NoAnswer, from_problem
+from .lists import answer
 from .steps import CHUNK_BYTES, Flow, PauseStep, RequestStep
 
 UploadKind = Literal["dataset", "volume", "mesh"]
@@ -38,10 +39,7 @@ def send_file(
     """Upload a file; the result is the response with the record of the stored item."""
     if kind not in PLACES:
         raise InvalidInput("kind", repr(kind), " or ".join(PLACES))
-    try:
-        total = path.stat().st_size
-    except OSError as error:
-        raise _unreadable(path, error) from error
+    total = _size(path)
     if resume is None:
         location = yield from _begin(total, {**metadata, "kind": kind})
     else:
@@ -58,19 +56,15 @@ def send_direct(
     path: Path, on_progress: OnBytes | None, kind: UploadKind, metadata: Mapping[str, str]
 ) -> Flow[httpx.Response]:
     """Upload a file in parts to the bucket of the service; the result is as of ``send_file``."""
-    try:
-        total = path.stat().st_size
-    except OSError as error:
-        raise _unreadable(path, error) from error
+    total = _size(path)
     request = {"json": {"kind": kind, "length": total, "metadata": dict(metadata)}}
     # An unused upload expires.
-    response = yield RequestStep("POST", "/v1/direct-uploads", request, repeatable=True)
-    upload = DirectUploadRecord.model_validate_json(response.content)
+    upload = yield from answer(DirectUploadRecord, "POST", "/v1/direct-uploads", request, repeatable=True)
     for number in range(1, upload.parts + 1):
         # Asked for one by one, since addresses expire.
         asked = {"json": {"numbers": [number]}}
-        response = yield RequestStep("POST", upload.links["parts"], asked, repeatable=True)
-        piece = PartAddresses.model_validate_json(response.content).parts[0]
+        addresses = yield from answer(PartAddresses, "POST", upload.links["parts"], asked, repeatable=True)
+        piece = addresses.parts[0]
         begin = (number - 1) * upload.part_bytes
         headers = {"Content-Length": str(piece.bytes)}
         chunks = _chunks(path, begin, begin + piece.bytes, on_progress, total)
@@ -118,7 +112,7 @@ def _read(where: str) -> Flow[httpx.Response]:
     """Wait until the service has ingested the upload."""
     pause = FIRST_LOOK_S
     while True:
-        record = UploadRecord.model_validate_json((yield RequestStep("GET", where, repeatable=True)).content)
+        record = yield from answer(UploadRecord, "GET", where, repeatable=True)
         if record.state == "done":
             result: httpx.Response = yield RequestStep("GET", record.links["result"], repeatable=True)
             return result
@@ -145,6 +139,13 @@ def _chunks(
             raise _unreadable(path, error) from error
 
     return chunks
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError as error:
+        raise _unreadable(path, error) from error
 
 
 def _unreadable(path: Path, error: OSError) -> ClientError:

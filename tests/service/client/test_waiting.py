@@ -4,9 +4,10 @@ import json
 
 import pytest
 
+from bentray_service.client.connection import Connection
 from bentray_service.client.errors import ClientError, NoAnswer
 from bentray_service.client.steps import EventStep, PauseStep, RequestStep
-from bentray_service.client.waiting import STREAMS, wait_for
+from bentray_service.client.waiting import STREAMS, wait
 from bentray_service.routes.models.job_records import JobRecord
 
 JOB = {
@@ -30,7 +31,11 @@ class Answer:
 
 def walk(answers, timeout_s=None):
     """The kinds of steps of a flow that gets these answers, and its value."""
-    flow, steps, answer = wait_for("job-1", None, timeout_s, 0.01), [], None
+    flow, steps, answer = (
+        wait(Connection("http://127.0.0.1", poll_s=0.01), "job-1", None, timeout_s),
+        [],
+        None,
+    )
     answers = iter(answers)
     try:
         while True:
