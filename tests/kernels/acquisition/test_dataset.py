@@ -86,9 +86,8 @@ def test_a_slice_is_a_plain_dataset():
     ],
 )
 def test_each_rule_names_its_field(fields, field):
-    with pytest.raises(InvalidInput) as refused:
+    with pytest.raises(InvalidInput, match=f"^{field}: found"):
         made(**fields)
-    assert refused.value.field == field
 
 
 @pytest.mark.parametrize(

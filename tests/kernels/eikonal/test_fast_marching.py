@@ -1,4 +1,4 @@
-"""Fast marching, tidy or not: neither mirrors nor transposes change a time, though seeds and fronts tie."""
+"""Fast marching, tidy or not: symmetric where the problem is, and no later than the stated bound."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels import eikonal
+from bentray_kernels.eikonal.fast_marching_untidy import BUCKETS, _bucket_width
+from bentray_kernels.eikonal.problem import PointSource
+from bentray_kernels.errors import InvalidInput
 
 from ...effort import effort
 
@@ -63,3 +66,74 @@ def test_units_of_length_and_speed_change_no_time_but_its_unit(method, ndim, see
     plain = eikonal.solve(speed, 1.0, source, method)
     scaled = eikonal.solve(speed_unit * speed, length_unit, length_unit * source, method)
     assert np.allclose(scaled * speed_unit / length_unit, plain, rtol=1e-9, atol=1e-12)
+
+
+def untidy_error_bound(problem, width=0.01):
+    """By which part a first-order untidy time may be later than that of ``fast_marching``."""
+    least = problem.spacing * float(problem.slowness.min())
+    return _bucket_width(problem, width) * np.sqrt(problem.slowness.ndim) / least
+
+
+WIDTHS = st.sampled_from([1e-4, 0.01, 0.1, 0.5, 1.0])
+
+
+def excess(speed, source, order, width):
+    """By which part untidy times are later than tidy ones: least and most, and the bound."""
+    tidy = eikonal.solve(speed, 0.1, source, "fmm", order=order)
+    untidy = eikonal.solve(speed, 0.1, source, "fmm-untidy", order=order, width=width)
+    late = (untidy - tidy) / np.where(tidy > 0.0, tidy, 1.0)
+    return late.min(), late.max(), untidy_error_bound(PointSource.checked(speed, 0.1, source), width=width)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1), width=WIDTHS, flat=st.booleans(), contrast=st.sampled_from([1.1, 5, 100])
+)
+@settings(max_examples=effort(20, 60), deadline=None)
+def test_first_order_stays_within_the_bound_on_rough_models(seed, width, flat, contrast):
+    shape = (24, 19) if flat else (8, 9, 7)
+    rng = np.random.default_rng(seed)
+    speed = contrast ** rng.uniform(0.0, 1.0, shape)
+    source = 0.1 * rng.uniform(0.0, 1.0, len(shape)) * (np.array(shape) - 1)
+    least, most, bound = excess(speed, source, 1, width)
+    assert least >= -1e-12
+    assert most <= bound + 1e-12
+
+
+@given(seed=st.integers(0, 2**32 - 1), width=st.sampled_from([0.01, 0.1, 0.5]), middle=st.booleans())
+@settings(max_examples=effort(20, 30), deadline=None)
+def test_second_order_stays_within_the_bound_on_smooth_models(seed, width, middle):
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.arange(40) / 39, np.arange(40) / 39, indexing="ij")
+    waves = rng.normal(size=(3, 2))
+    speed = 1.5 + 0.1 * sum(np.sin(2 * np.pi * (a * x + b * y)) for a, b in waves)
+    source = 0.1 * rng.integers(0, 39, 2) + 0.05 if middle else rng.uniform(0.0, 3.9, 2)
+    least, most, bound = excess(speed, source, 2, width)
+    assert max(most, -least) <= bound
+
+
+def test_wide_buckets_are_untidy():
+    """The bound is worth stating only where times do differ."""
+    speed = np.random.default_rng(1).uniform(0.5, 2.0, (40, 40))
+    assert excess(speed, (2.0, 2.0), 1, 1.0)[1] > 1e-4
+
+
+def test_the_bound_falls_with_the_width():
+    problem = PointSource.checked(np.ones((5, 5)), 1.0, (2.0, 2.0))
+    assert untidy_error_bound(problem, width=0.01) == pytest.approx(0.01 * np.sqrt(2.0))
+    assert untidy_error_bound(problem, width=0.02) == pytest.approx(0.02 * np.sqrt(2.0))
+
+
+def test_high_contrast_widens_the_buckets_and_the_error_bound():
+    speed = np.ones((6, 6))
+    speed[3] = 1e-9
+    problem = PointSource.checked(speed, 1.0, (0.0, 0.0))
+    assert untidy_error_bound(problem) == pytest.approx(1e9 / BUCKETS * np.sqrt(2.0))
+    assert np.isfinite(eikonal.solve(speed, 1.0, (0.0, 0.0), "fmm-untidy")).all()
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, 1.5, float("nan")])
+def test_rejects_invalid_bucket_widths(width):
+    with pytest.raises(InvalidInput, match="above 0 and at most 1"):
+        eikonal.solve(np.ones((3, 3)), 1.0, (1.0, 1.0), "fmm-untidy", width=width)
+    with pytest.raises(InvalidInput, match="1 or 2"):
+        eikonal.solve(np.ones((3, 3)), 1.0, (1.0, 1.0), "fmm-untidy", order=3)

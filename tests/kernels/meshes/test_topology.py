@@ -1,4 +1,4 @@
-"""Edges, boundaries, pieces, genus."""
+"""Meshes: edges, boundaries, pieces, genus, opening along cuts, normals."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,12 @@ from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere, torus
+from bentray_kernels.meshes.mesh import TriangleMesh
+from bentray_kernels.meshes.opening import cut_open
+from bentray_kernels.meshes.pieces import pieces_of
 from bentray_kernels.meshes.topology import edges_of, side_end, topology_of
 
-from .examples import ball_with_holes, flat_patch, tetrahedron, two_handles, without
+from .examples import ball_with_holes, flat_patch, mesh, tetrahedron, two_handles, without
 
 
 @pytest.mark.parametrize(
@@ -97,3 +100,69 @@ def test_large_meshes_have_the_numbers_of_euler():
     topology = topology_of(ball.faces)
     assert len(topology.edges) == 3 * len(ball.faces) // 2
     assert topology.euler == 2
+
+
+@given(st.lists(st.booleans(), min_size=96, max_size=96))
+def test_any_cut_parts_its_edges_and_keeps_the_others(chosen):
+    topology = topology_of(torus(8, 4).faces)
+    cut = np.array(chosen)
+    meeting = np.bincount(topology.edges[cut].ravel(), minlength=32)
+    parted = cut & (meeting[topology.edges] > 1).any(axis=1)
+    opened = cut_open(topology, cut)
+    np.testing.assert_array_equal(opened.origin[opened.faces], topology.faces)
+    after = topology_of(opened.faces)
+    assert after.on_boundary.sum() == 2 * parted.sum()
+    ends = np.sort(opened.origin[after.edges[~after.on_boundary]], axis=1)
+    assert sorted(map(tuple, ends.tolist())) == sorted(map(tuple, topology.edges[~parted].tolist()))
+
+
+def test_no_cut_changes_nothing_but_parts_touching_fans():
+    ball = topology_of(sphere(4, 5).faces)
+    assert len(cut_open(ball, np.zeros(len(ball.edges), bool)).origin) == ball.faces.max() + 1
+    bowtie = topology_of(mesh(np.zeros((5, 3)), [(0, 1, 2), (0, 3, 4)]).faces)
+    assert len(cut_open(bowtie, np.zeros(6, bool)).origin) == 6
+
+
+def test_a_path_makes_one_boundary_of_both_its_sides():
+    topology = topology_of(sphere(6, 8).faces)
+    cut = np.zeros(len(topology.edges), bool)
+    # Down one meridian: vertices of the circles lie eight apart.
+    for ring in range(4):
+        cut |= (topology.edges == (8 * ring, 8 * ring + 8)).all(axis=1)
+    opened = topology_of(cut_open(topology, cut).faces)
+    assert (opened.euler, [len(loop) for loop in opened.boundary_loops]) == (1, [8])
+
+
+def test_pieces_come_apart_the_largest_first():
+    parts = [tetrahedron(), flat_patch(9, 9), sphere(4, 5)]
+    count = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    whole = mesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + first for part, first in zip(parts, count, strict=False)]),
+    )
+    pieces = pieces_of(whole)
+    for piece, part in zip(pieces, [parts[1], parts[2], parts[0]], strict=True):
+        np.testing.assert_array_equal(piece.vertices, part.vertices)
+        np.testing.assert_array_equal(piece.faces, part.faces)
+
+
+def test_touching_fans_are_two_pieces():
+    assert [len(piece.vertices) for piece in pieces_of(mesh(np.eye(5)[:, :3], [(0, 1, 2), (0, 3, 4)]))] == [
+        3,
+        3,
+    ]
+
+
+def test_normals_of_vertices_are_of_length_one_and_0_without_a_face():
+    solid = tetrahedron()
+    lonely = TriangleMesh(np.concatenate((3.0 * solid.vertices, [[9.0, 9.0, 9.0]])), solid.faces)
+    normals = lonely.vertex_normals
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), [1.0, 1.0, 1.0, 1.0, 0.0], atol=1e-12)
+    # By symmetry; the faces at the origin have equal areas.
+    np.testing.assert_allclose(normals[0], np.full(3, -1.0 / np.sqrt(3.0)), atol=1e-12)
+
+
+def test_the_longest_side_of_the_unit_cube_is_filled_and_the_others_are_in_its_middle():
+    box = np.array([[2.0, -3.0, 5.0], [6.0, -1.0, 6.0], [3.0, -2.0, 5.5]])
+    moved = TriangleMesh(box, np.array([[0, 1, 2]], np.int32)).in_unit_cube().vertices
+    np.testing.assert_allclose([moved.min(axis=0), moved.max(axis=0)], [[0, 0.25, 0.375], [1, 0.75, 0.625]])

@@ -166,9 +166,8 @@ def test_bad_input_is_named(change, field):
         "source": (0.0, 0.0),
         **change,
     }
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=f"^{field}: found"):
         rays.trace(**arguments)
-    assert refusal.value.field == field
 
 
 def test_points_outside_by_rounding_are_moved_onto_the_grid():

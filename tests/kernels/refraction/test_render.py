@@ -1,15 +1,18 @@
-"""Refraction pictures: maps in metres, supersampling, independence of threads, rejected settings."""
+"""Refraction pictures: cameras, maps in metres, supersampling, previews, threads, rejected settings."""
 
 import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.refraction import (
+    Camera,
     Picture,
     RenderSettings,
     Scene,
     backdrop_of,
     checkerboard,
+    orthographic,
+    perspective,
     render,
 )
 from bentray_kernels.refraction.caster import LOST, REFRACTED
@@ -106,6 +109,99 @@ def test_lost_rays_show_what_lies_beyond_the_backdrop(scene):
     ],
 )
 def test_settings_that_cannot_be_are_rejected(wrong, field):
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=f"^{field}: found"):
         RenderSettings(**wrong)
-    assert refusal.value.field == field
+
+
+def preview(scene: Scene, **options) -> Picture:
+    given = {"rows": 60, "columns": 61, "supersampling": "none"} | options
+    return render(scene, CAMERA, BACKDROP, RenderSettings(**given))
+
+
+@pytest.mark.parametrize("spacing", [2, 3])
+def test_rays_between_others_end_between_them(scene, spacing):
+    full, coarse = preview(scene), preview(scene, ray_spacing=spacing)
+    assert coarse.image.shape == full.image.shape == (60, 61, 3)
+    u, v = np.meshgrid((np.arange(61) + 0.5) / 61 - 0.5, (np.arange(60) + 0.5) / 60 - 0.5)
+    radius = np.hypot(u, v)
+    beside, inside = radius > RADIUS + 0.1, radius < 0.6 * RADIUS
+    # Beside the ball rays are straight, and interpolation is exact but for the pixels before the first ray.
+    middle = (np.abs(u) < 0.46) & (np.abs(v) < 0.46)
+    np.testing.assert_allclose(
+        coarse.position_m[beside & middle], full.position_m[beside & middle], atol=1e-9
+    )
+    assert np.abs(coarse.position_m - full.position_m)[inside].max() < 0.02
+    np.testing.assert_array_equal(coarse.crossed[inside], 2)
+
+
+def test_the_outline_is_that_of_the_nearest_ray(scene):
+    coarse, few = preview(scene, columns=60, ray_spacing=2), preview(scene, rows=30, columns=30)
+    np.testing.assert_array_equal(coarse.crossed, few.crossed.repeat(2, 0).repeat(2, 1))
+    # No place lies between one that the ball bent and one beside it, where rays are straight.
+    straight = np.stack(np.meshgrid(*[(np.arange(60) + 0.5) / 60 - 0.5] * 2), axis=-1)
+    beside = coarse.crossed == 0
+    np.testing.assert_allclose(coarse.position_m[beside], straight[beside], atol=1.0 / 60)
+
+
+def test_each_piece_keeps_its_own_light(scene):
+    coarse = preview(scene, ray_spacing=2, fresnel=True)
+    assert (coarse.weight[coarse.crossed == 0] == 1.0).all()
+    assert (coarse.weight[coarse.crossed == 2] < 0.97).all()
+
+
+def test_one_pixel_a_ray_is_the_whole_picture(scene):
+    for name in ("image", "position_m", "plane", "fate", "crossed", "weight"):
+        np.testing.assert_array_equal(
+            getattr(preview(scene), name), getattr(preview(scene, ray_spacing=1), name)
+        )
+
+
+@pytest.mark.parametrize(
+    ("options", "accepted"),
+    [
+        ({"ray_spacing": 0}, ">= 1"),
+        ({"ray_spacing": 2, "supersampling": "real"}, "1 with real supersampling"),
+    ],
+)
+def test_rejects_invalid_spacing(options, accepted):
+    with pytest.raises(InvalidInput, match="ray_spacing") as caught:
+        RenderSettings(**options)
+    assert accepted in str(caught.value)
+
+
+def ray(camera: Camera, u: float, v: float) -> tuple[np.ndarray, np.ndarray]:
+    position = np.array([1.0, u, v])
+    direction = position @ camera.direction
+    return position @ camera.origin, direction / np.linalg.norm(direction)
+
+
+def test_parallel_rays_start_on_the_rectangle():
+    camera = orthographic((0.0, -2.0, 0.0), (0.0, 3.0, 0.0), (0.0, 0.0, 1.0), 0.4, 0.5)
+    start, ahead = ray(camera, 0.5, -0.5)
+    np.testing.assert_allclose(start, [0.2, -2.0, 0.1], atol=1e-12)
+    np.testing.assert_allclose(ahead, [0.0, 1.0, 0.0], atol=1e-12)
+
+
+def test_rays_from_the_eye_span_the_angle():
+    camera = perspective((0.0, -2.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 60.0)
+    left, right = ray(camera, -0.5, 0.0), ray(camera, 0.5, 0.0)
+    np.testing.assert_allclose(left[0], [0.0, -2.0, 0.0])
+    assert np.degrees(np.arccos(left[1] @ right[1])) == pytest.approx(60.0)
+    assert right[1][0] > 0.0
+    assert ray(camera, 0.0, -0.5)[1][2] > 0.0
+    np.testing.assert_allclose(ray(camera, 0.0, 0.0)[1], [0.0, 1.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: orthographic((0, 0, 0), (0, 0, 1), (0, 0, 2), 1.0), "up"),
+        (lambda: orthographic((0, 0, 0), (0, 0, 1), (0, 1, 0), 0.0), "width_m"),
+        (lambda: orthographic((0, 0, 0), (0, 0, 1), (0, 1, 0), 1.0, float("nan")), "aspect"),
+        (lambda: perspective((0, 0, 0), (0, 0, 1), (0, 1, 0), 180.0), "view_deg"),
+        (lambda: perspective((0, 0, 0), (0, 0, 0), (0, 1, 0), 30.0), "up"),
+    ],
+)
+def test_rejects_invalid_cameras(make, field):
+    with pytest.raises(InvalidInput, match=f"^{field}: found"):
+        make()

@@ -89,9 +89,8 @@ def test_smoothing_of_trace_ratios_does_not_depend_on_the_grid(scan, rays):
 
 
 def test_amplitudes_from_traces_need_a_frequency(scan):
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^amplitude@frequency_hz: found"):
         reconstruct(scan, plan("sart", rays="straight", iterations=1, amplitudes="ratio"))
-    assert refusal.value.field == "amplitude@frequency_hz"
 
 
 def inside_ring(scan):
@@ -203,6 +202,5 @@ def test_a_pair_of_one_element_is_ignored(scan):
 
 
 def test_focusing_needs_a_frequency(scan):
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^amplitude@frequency_hz: found"):
         reconstruct(scan, plan("sart", iterations=1, focusing=True))
-    assert refusal.value.field == "amplitude@frequency_hz"

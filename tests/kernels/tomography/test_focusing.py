@@ -107,6 +107,5 @@ def test_taken_off_it_leaves_the_line_integrals():
 
 @pytest.mark.parametrize("wavelength", [-1e-3, float("nan"), float("inf")])
 def test_a_wavelength_that_is_no_length_is_rejected(wavelength):
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^wavelength_m: found"):
         ask(lens(10.0), ring(3), wavelength)
-    assert refusal.value.field == "wavelength_m"

@@ -1,4 +1,4 @@
-"""Stages: coarse grids and straight rays first, each from the image before, all in the history."""
+"""Stages: coarse grids and straight rays first, each from the image before, all in the history; batches."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Problem, Settings, reconstruct
 from bentray_kernels.tomography.grid_schedule import initial_slowness, stages
+from bentray_kernels.tomography.stage_graphs import next_batch
 
 from ...table6 import table6_scan
 
@@ -71,3 +72,11 @@ def test_a_finer_grid_of_a_volume_begins_with_the_same_image_at_the_same_heights
 
     slowness = initial_slowness(fine, tilted(coarse), coarse)
     assert np.allclose(slowness[fine.region], tilted(fine)[fine.region], rtol=0.0, atol=1e-12)
+
+
+def test_batches_aim_at_the_time_of_a_task():
+    assert next_batch(8, 8, 0.5) == 8
+    assert next_batch(8, 8, 0.25) == 16
+    assert next_batch(8, 8, 0.001) == 32
+    assert next_batch(8, 8, 60.0) == 1
+    assert next_batch(8, -3, 0.1) == 8

@@ -106,16 +106,14 @@ def test_an_uneven_ring_is_one_ring():
 
 
 def test_one_height_is_no_volume():
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^decomposition: found"):
         from_dataset(moved().slice(0), VOLUME, 0)
-    assert refusal.value.field == "decomposition"
 
 
 def test_an_array_in_space_that_moves_is_rejected():
     both = replace(rings(), delta_tof_s=np.zeros((2, 18, 18)), slice_z_m=np.array([0.0, 0.1]))
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^slice/z_m: found"):
         count(both, VOLUME)
-    assert refusal.value.field == "slice/z_m"
 
 
 @pytest.mark.parametrize("dataset", [moved(), rings()], ids=["moved", "rings"])

@@ -159,9 +159,8 @@ def test_progress_rises_to_the_end(scan, method):
     ],
 )
 def test_bad_settings_are_named(scan, change, field):
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=f"^{field}: found"):
         reconstruct(scan, Settings.from_values(**{"method": "sart", "nodes": NODES, **change}))
-    assert refusal.value.field == field
 
 
 def test_scan_without_one_valid_pair_is_rejected(scan, method):
@@ -185,9 +184,8 @@ def test_the_slice_without_a_valid_pair_is_named(scan, method):
     ids=["one point", "a line"],
 )
 def test_an_array_that_surrounds_no_image_is_rejected(scan, position):
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^geometry/element_position_m: found"):
         reconstruct(replace(scan, element_position_m=position), Settings(method="sart", nodes=32))
-    assert refusal.value.field == "geometry/element_position_m"
 
 
 def test_repeated_run_gives_the_same_bits(scan, method):

@@ -60,9 +60,8 @@ def test_bad_regions_are_named() -> None:
         ((0.0, 0.0), 0.0, "radius_m"),
         ((0.0, 0.0), math.inf, "radius_m"),
     ):
-        with pytest.raises(InvalidInput) as refused:
+        with pytest.raises(InvalidInput, match=f"^{field}: found"):
             RoundRegion(centre, radius)
-        assert refused.value.field == field
     with pytest.raises(InvalidInput, match="2 coordinates"):
         RoundRegion((0.0, 0.0, 0.0), 1.0).nodes(*GRID)
     with pytest.raises(InvalidInput, match="between all nodes"):

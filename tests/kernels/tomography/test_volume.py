@@ -96,9 +96,7 @@ def test_a_region_of_interest_keeps_the_rest_water(scan):
     assert not np.allclose(result.speed[roi], WATER)
     slices = reconstruct(complete, replace(PLAN, iterations=1, roi=True, decomposition="slices"))
     assert (np.abs(slices.speed - WATER) > 1e-6).any()
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^mask/roi: found"):
         reconstruct(dataset, replace(PLAN, roi=True))
-    assert refusal.value.field == "mask/roi"
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^mask/roi: found"):
         reconstruct(replace(dataset, roi=roi), replace(PLAN, roi=True))
-    assert refusal.value.field == "mask/roi"

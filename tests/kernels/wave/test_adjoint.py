@@ -1,13 +1,25 @@
-"""The adjoint: its gradient against finite differences, the dot products of both directions."""
+"""The adjoint: gradients against finite differences, dot products of both directions, blocks of time."""
 
+from functools import partial
+
+import llvmlite.binding as llvm
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba import njit
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.waveform import misfits
+from bentray_kernels.tomography.waveform.misfits import correlation
+from bentray_kernels.wave import adjoint
+from bentray_kernels.wave import time_blocks as cut
 from bentray_kernels.wave.adjoint import backward, misfit_gradient
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import forward, place_elements, simulate
+from bentray_kernels.wave.vector_width import use_widest_vectors
+
+from . import emissions_scan as small
 
 SPACING, STEP, STEPS = 1e-3, 2e-7, 180
 EMITTER = np.array([0.0123, 0.0201])
@@ -161,3 +173,90 @@ def test_fewer_stored_fields_and_single_precision_change_the_gradient_little(by)
 def test_rejects_a_zero_step():
     with pytest.raises(InvalidInput, match="every"):
         misfit_gradient(medium(speeds(0)), EMITTER, RECEIVERS, WAVELET, lambda traces: (0.0, traces), 0)
+
+
+class Unheard(Exception):
+    """Exception that a poll raises."""
+
+
+@given(steps=st.integers(0, 5000), nodes=st.integers(1, 10**9))
+def test_every_step_is_in_exactly_one_block(steps, nodes):
+    polled = []
+    listed = list(cut.split_steps(steps, nodes, lambda: polled.append(None)))
+    assert [n for first, end in listed for n in range(first, end)] == list(range(steps))
+    assert all((end - first) % 2 == 0 for first, end in listed[:-1])
+    assert all((end - first - 2) * nodes <= cut.BLOCK for first, end in listed)
+    assert len(polled) == len(listed)
+
+
+@pytest.mark.parametrize("by", ["speed", "attenuation"])
+def test_time_blocks_give_the_bits_of_one_run(monkeypatch, by):
+    recorded = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
+    compare = partial(correlation, recorded=recorded, weight=np.ones((3, 1)))
+    whole = misfit_gradient(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, 3, by)
+    monkeypatch.setattr(cut, "BLOCK", 4 * medium(speeds()).keep.size)
+    parts = misfit_gradient(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, 3, by)
+    assert parts.misfit == whole.misfit
+    np.testing.assert_array_equal(parts.gradient, whole.gradient)
+    np.testing.assert_array_equal(parts.illumination, whole.illumination)
+    again = simulate(medium(speeds(1)), EMITTER, RECEIVERS, WAVELET)
+    np.testing.assert_array_equal(again, recorded)
+
+
+@pytest.mark.parametrize("most", [3, STEPS // 4 + 3])
+def test_poll_error_stops_both_directions(monkeypatch, most):
+    monkeypatch.setattr(cut, "BLOCK", 4 * medium(speeds()).keep.size)
+    polled = []
+
+    def poll():
+        polled.append(None)
+        if len(polled) == most:
+            raise Unheard
+
+    def compare(traces):
+        return 0.0, traces
+
+    with pytest.raises(Unheard):
+        misfit_gradient(medium(speeds()), EMITTER, RECEIVERS, WAVELET, compare, poll=poll)
+    assert len(polled) == most
+
+
+def test_loops_take_512_bits_where_the_processor_has_them():
+    if not llvm.get_host_cpu_features().get("avx512f"):
+        pytest.skip("the processor has no vectors of 512 bits")
+
+    @njit
+    def add(into, other):
+        use_widest_vectors()
+        for k in range(into.shape[0]):
+            into[k] += other[k]
+
+    numbers = np.arange(3, dtype=np.float32)
+    add(numbers, np.ones_like(numbers))
+    assert numbers.tolist() == [1.0, 2.0, 3.0]
+    assert "zmm" in next(iter(add.inspect_asm().values()))
+
+
+def test_a_gradient_does_not_depend_on_the_one_before_it():
+    def gradient(emitter, misfit):
+        # Each emitter has its own cone: where it stores nothing, the fields of the other one are left.
+        until = np.full(len(small.RECEIVERS), 120)
+        gradients = adjoint.misfit_gradient(
+            small.medium(), emitter, small.RECEIVERS, small.WAVELET, misfit, 4, until=until
+        )
+        return gradients.gradient.tobytes(), gradients.illumination.tobytes()
+
+    def energy(traces):
+        return float((traces**2).sum()), traces
+
+    def nested(traces):
+        gradient(small.EMITTERS[1], energy)
+        return energy(traces)
+
+    adjoint._kept.fields = None
+    fresh = gradient(small.EMITTERS[0], energy)
+    gradient(small.EMITTERS[1], energy)
+    kept = adjoint._kept.fields
+    assert gradient(small.EMITTERS[0], energy) == fresh
+    assert adjoint._kept.fields is kept
+    assert gradient(small.EMITTERS[0], nested) == fresh

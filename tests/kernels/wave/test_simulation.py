@@ -197,9 +197,8 @@ def test_waves_too_short_for_the_grid_are_rejected():
 )
 def test_bad_media_are_rejected(change, field):
     words = {"speed": np.full((5, 5), 1500.0), "spacing": 1e-3, "time_step_s": 1e-7} | change
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInput, match=f"^{field}: found"):
         Medium.from_speed(**words)
-    assert caught.value.field == field
 
 
 def test_the_shortest_wavelength_does_not_depend_on_the_delay_of_the_wavelet():

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import PICKERS, Waveform, pick
 from bentray_kernels.acquisition.picking.first_arrivals import ROUNDING
+from bentray_kernels.acquisition.picking.pickers import picker_named
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.settings import PickingSettings
 
 from ....effort import effort
 from ..traces import FREQUENCY_HZ, RATE_HZ, WATER_MPS, scan, smooth_delay
@@ -167,9 +170,8 @@ def test_slices_are_picked_one_by_one_and_progress_counts_emissions():
     ],
 )
 def test_names_missing_input(change, field):
-    with pytest.raises(InvalidInput) as refused:
+    with pytest.raises(InvalidInput, match=f"^{field}: found"):
         pick(replace(scan(elements=4), **change))
-    assert refused.value.field == field
 
 
 def test_a_scan_without_water_and_an_unknown_picker_are_rejected():
@@ -251,3 +253,17 @@ def test_a_scan_by_another_teams_wave_solver(by_another_team, picker):
 def test_rounding_to_whole_numbers_has_this_deviation():
     values = np.random.default_rng(0).uniform(-1000.0, 1000.0, 100_000)
     assert pytest.approx((values - np.round(values)).std(), rel=0.01) == ROUNDING
+
+
+def test_every_picker_has_a_name_a_code_of_its_own_and_a_line_of_help():
+    assert [p.code for p in PICKERS.values()] == list(range(len(PICKERS)))
+    assert all(name == p.name and p.summary for name, p in PICKERS.items())
+
+
+def test_the_settings_offer_them_all():
+    assert get_args(get_type_hints(PickingSettings)["picker"]) == tuple(PICKERS)
+
+
+def test_an_unknown_one_is_rejected_with_the_names_known():
+    with pytest.raises(InvalidInput, match="aic, threshold, energy-ratio"):
+        picker_named("eye")

@@ -1,12 +1,13 @@
-"""Onsets of single traces: accurate to a fraction of a sample, and missing where there is no pulse."""
+"""Onsets and delays of single traces: to a fraction of a sample, and missing where there is no pulse."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.acquisition.picking.cross_correlation import match_pulse
+from bentray_kernels.acquisition.picking.cross_correlation import find_delay, match_pulse
 from bentray_kernels.acquisition.picking.differential import MIN_CORRELATION
+from bentray_kernels.acquisition.picking.energy_onsets import energy_ratio, risen, sta_lta
 from bentray_kernels.acquisition.picking.onset import AIC_FLOOR, aic, prepare, threshold
 from bentray_kernels.acquisition.picking.pickers import AIC, ENERGY_RATIO, STA_LTA, THRESHOLD, onset
 
@@ -95,3 +96,49 @@ def test_offset_and_noise_come_from_before_the_arrival():
     noisy[7] = np.nan
     assert np.isnan(prepare(noisy, 120, 0.0, out))
     assert prepare(np.zeros(200, np.int16), 120, 0.29, out) == 0.29
+
+
+@pytest.mark.parametrize("onset", [energy_ratio, sta_lta])
+@given(shift=st.integers(0, 30), gain=st.floats(1e-3, 1e3))
+@settings(max_examples=20, deadline=None)
+def test_an_onset_moves_with_the_pulse_and_not_with_the_unit(onset, shift, gain):
+    first = onset(trace(90.0), 40, 96, PERIOD)
+    moved = onset(gain * trace(90.0 + shift), 40 + shift, 96 + shift, PERIOD)
+    assert moved - first == pytest.approx(shift, abs=1e-6)
+    assert 90.0 - 1.5 * PERIOD < first < 90.0 + 0.25 * PERIOD
+
+
+@pytest.mark.parametrize("onset", [energy_ratio, sta_lta])
+@given(part=st.floats(0.0, 1.0))
+@settings(max_examples=20, deadline=None)
+def test_fractions_of_a_sample_are_followed(onset, part):
+    first = onset(trace(90.0), 40, 97, PERIOD)
+    assert onset(trace(90.0 + part), 40, 97, PERIOD) - first == pytest.approx(part, abs=0.5)
+
+
+@pytest.mark.parametrize("onset", [energy_ratio, sta_lta])
+def test_silence_and_too_few_samples_have_none(onset):
+    assert np.isnan(onset(np.zeros(100), 10, 90, PERIOD))
+    assert np.isnan(onset(trace(90.0), 88, 91, PERIOD))
+
+
+def test_signals_that_start_high_have_no_onset():
+    assert np.isnan(risen(np.array([1.0, 0.4, 0.8]), 0))
+    assert risen(np.array([0.0, 0.25, 0.75, 1.0]), 0) == pytest.approx(1.5)
+
+
+@given(shift=st.floats(-28.0, 28.0), gain=st.floats(0.01, 100.0), seed=st.integers(0, 99))
+@settings(max_examples=effort(20, 40), deadline=None)
+def test_the_pulse_is_found_anywhere_in_noise(shift, gain, seed):
+    noise = 0.1 * np.random.default_rng(seed).standard_normal(200)
+    delay = find_delay(trace(100.0), gain * (trace(100.0 + shift) + noise), 90, 110, -30.0, 30.0, 0.1 * gain)
+    assert abs(delay - shift) <= 1.5
+
+
+def test_silence_and_window_edges_give_no_delay():
+    assert np.isnan(find_delay(trace(100.0), np.zeros(200), 90, 110, -30.0, 30.0, 0.0))
+    assert np.isnan(find_delay(trace(100.0), trace(130.0), 90, 110, -30.0, 29.0, 0.0))
+
+
+def test_an_empty_range_has_no_delay():
+    assert np.isnan(find_delay(trace(100.0), trace(100.0), 90, 110, 5.0, -5.0, 0.0))

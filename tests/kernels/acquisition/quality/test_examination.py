@@ -1,4 +1,4 @@
-"""Checks that need pulses at known times, and clean scans; most faults: ``test_planted_faults``."""
+"""Checks that need pulses at known times, measures, corrections; most faults: ``test_planted_faults``."""
 
 import json
 from dataclasses import replace
@@ -6,11 +6,18 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.signal import hilbert
 
 from bentray_kernels.acquisition import Dataset, Waveform, pick
 from bentray_kernels.acquisition.quality import Examined, corrected, examine
+from bentray_kernels.acquisition.quality.correction import exchange_order, pairs_of
+from bentray_kernels.acquisition.quality.finding import Finding
+from bentray_kernels.acquisition.quality.measures import Measures, _envelope
 
-from ..traces import FREQUENCY_HZ, blob_delay, scan
+from ..traces import FREQUENCY_HZ, RATE_HZ, blob_delay, ricker, scan
 
 ELEMENTS = 32
 
@@ -184,3 +191,49 @@ def test_cycle_jumps_are_checked_only_where_the_period_is_known(frequency_hz) ->
     report = examine(times).report
     assert ("cycle jumps" in report.checked) == (frequency_hz is not None)
     assert ("cycle jumps" in report.not_checked) == (frequency_hz is None)
+
+
+@pytest.mark.parametrize("start_s", [-4e-6, 0.0, 1e-5])
+def test_the_maximum_of_a_pulse_is_at_its_time_after_the_time_zero(start_s):
+    dataset = replace(scan(elements=4), t0_s=start_s)
+    time = start_s + np.arange(200) / RATE_HZ
+    at = start_s + np.array([6e-6, 9.03e-6, 12.51e-6])
+    measures = Measures.from_traces([7.0 + ricker(time - at[:, None], FREQUENCY_HZ)], dataset)
+    assert measures.strongest_s[0] == pytest.approx(at, abs=0.02 / RATE_HZ)
+    assert measures.detected.all()
+    assert not (measures.broken | measures.constant | measures.clipped).any()
+    assert measures.peak[0] == pytest.approx(1.0, abs=0.1)
+
+
+@given(
+    hnp.arrays(np.float64, st.tuples(st.integers(1, 3), st.integers(1, 40)), elements=st.floats(-1e3, 1e3))
+)
+def test_the_envelope_is_that_of_scipy(traces):
+    np.testing.assert_allclose(_envelope(traces), np.abs(hilbert(traces, axis=1)), atol=1e-9)
+
+
+def test_a_tone_has_a_flat_one():
+    tone = np.sin(2 * np.pi * 5 * np.arange(100) / 100)[None]
+    assert _envelope(tone) == pytest.approx(np.ones((1, 100)))
+
+
+# Elements in another order among emissions than among receptions, and fewer of them.
+SCAN = replace(scan(elements=6), waveform=None, tx=np.array([4, 0, 5, 2]), rx=np.array([1, 2, 3, 4, 5]))
+
+
+def finding(role, *elements):
+    return Finding("swapped", "", "", "corrected", elements=elements, role=role)
+
+
+@pytest.mark.parametrize(
+    ("role", "axis", "order"), [("emission", 0, [3, 1, 2, 0]), ("reception", 1, [0, 3, 2, 1, 4])]
+)
+def test_two_channels_are_exchanged_where_they_are(role, axis, order):
+    result, along = exchange_order(SCAN, finding(role, 2, 4))
+    assert (result.tolist(), along) == (order, axis)
+
+
+def test_pairs_of_an_element_are_its_row_or_its_column():
+    rows, columns = (pairs_of(SCAN, finding(role, 4, 5)) for role in ("emission", "reception"))
+    assert np.array_equal(rows, np.isin(SCAN.tx, (4, 5))[:, None] & np.ones(5, bool))
+    assert np.array_equal(columns, np.ones((4, 1), bool) & np.isin(SCAN.rx, (4, 5)))

@@ -1,28 +1,31 @@
-"""Geometry images hold the surface: the finer, the nearer."""
+"""Geometry images hold the surface: positions, its topology, and as few pixels as the error allows."""
 
 import numpy as np
 import pytest
 
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.image.geometry_image import geometry_image
 from bentray_kernels.geometry_field.image.raster import INSIDE, OUTSIDE
+from bentray_kernels.geometry_field.image.subsampling import fitted_image
 from bentray_kernels.geometry_field.layout.parameterisation import parameterise
-from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere
+from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere, torus
 from bentray_kernels.meshes.geometric_error import geometric_error
 from bentray_kernels.meshes.surface_distance import SurfaceGrid
+from bentray_kernels.meshes.topology import topology_of
 
-from ...meshes.examples import bunny
+from ...meshes.examples import ball_with_holes, bunny, flat_patch, two_handles, without
 
 
 @pytest.fixture(scope="module")
-def ball():
+def bumpy():
     return parameterise(bumpy_ball(5000)).chart
 
 
-def test_positions_lie_on_the_surface(ball):
-    image = geometry_image(ball, 100)
+def test_positions_lie_on_the_surface(bumpy):
+    image = geometry_image(bumpy, 100)
     assert image.size == 100
     assert image.positions.shape == image.normals.shape == (100, 100, 3)
-    assert SurfaceGrid(ball.mesh).distance(image.positions[image.valid]).max() < 1e-12
+    assert SurfaceGrid(bumpy.mesh).distance(image.positions[image.valid]).max() < 1e-12
     assert (image.positions[~image.valid] == 0.0).all()
     np.testing.assert_array_equal(image.valid, image.raster.kind != OUTSIDE)
     assert 0.4 < (image.raster.kind == INSIDE).mean() < 0.8
@@ -37,15 +40,15 @@ def test_normals_of_a_sphere_point_away_from_its_middle():
     assert (normals * outward).sum(axis=-1).min() > 0.998
 
 
-def test_colours_are_read_where_the_positions_are(ball):
-    image = geometry_image(ball, 64)
-    np.testing.assert_allclose(image.sampled(ball.mesh.vertices), image.positions, atol=1e-12)
-    assert image.sampled(np.ones((len(ball.mesh.vertices), 1)))[image.valid] == pytest.approx(1.0)
+def test_colours_are_read_where_the_positions_are(bumpy):
+    image = geometry_image(bumpy, 64)
+    np.testing.assert_allclose(image.sampled(bumpy.mesh.vertices), image.positions, atol=1e-12)
+    assert image.sampled(np.ones((len(bumpy.mesh.vertices), 1)))[image.valid] == pytest.approx(1.0)
 
 
-def test_the_error_falls_with_the_pixels(ball):
+def test_the_error_falls_with_the_pixels(bumpy):
     errors = [
-        geometric_error(ball.mesh, geometry_image(ball, size).mesh(), 10_000) for size in (65, 129, 257)
+        geometric_error(bumpy.mesh, geometry_image(bumpy, size).mesh(), 10_000) for size in (65, 129, 257)
     ]
     # Twice the pixels, a quarter of the error, as long as a pixel is larger than a face.
     assert errors[0].rms / errors[1].rms > 2.5
@@ -59,3 +62,91 @@ def test_bunny():
     chart = parameterise(bunny()).chart
     error = geometric_error(chart.mesh, geometry_image(chart, 512).mesh(), 20_000)
     assert error.rms < 3.2e-4
+
+
+@pytest.fixture(scope="module")
+def chart():
+    return parameterise(bumpy_ball(2000)).chart
+
+
+def test_the_smallest_image_within_the_threshold(chart):
+    fitted = fitted_image(chart, 4e-3, finest=129, coarsest=9, samples=5000)
+    sizes, errors = zip(*((size, error.rms) for size, error in fitted.tried), strict=True)
+    assert sizes == (129, 65, 33, 17, 9)[: len(sizes)]
+    assert len(sizes) > 2
+    assert errors[-1] > 4e-3 >= errors[-2]
+    assert (fitted.image.size, fitted.error.rms) == (sizes[-2], errors[-2])
+    assert list(errors) == sorted(errors)
+
+
+def test_it_stops_at_the_coarsest(chart):
+    fitted = fitted_image(chart, 1.0, finest=65, coarsest=33, samples=1000)
+    assert [size for size, _ in fitted.tried] == [65, 33]
+    assert fitted.image.size == 33
+
+
+def test_a_threshold_that_cannot_be_reached_is_rejected(chart):
+    with pytest.raises(InvalidInput, match=r"threshold: found 1e-06, where 33² pixels have"):
+        fitted_image(chart, 1e-6, finest=33, samples=1000)
+
+
+def test_every_second_pixel_is_kept(chart):
+    fine, coarse = geometry_image(chart, 65), geometry_image(chart, 33)
+    inside = coarse.raster.kind == INSIDE
+    np.testing.assert_array_equal(inside, fine.raster.kind[::2, ::2] == INSIDE)
+    np.testing.assert_allclose(coarse.positions[inside], fine.positions[::2, ::2][inside], atol=1e-12)
+
+
+SURFACES = {
+    "sphere": sphere(),
+    "torus": torus(40, 40),
+    "two handles": two_handles(),
+    "ball": bumpy_ball(5000),
+    "holes": ball_with_holes(),
+    "torus with a hole": without(torus(30, 30), [5]),
+    "patch": flat_patch(9, 9, lambda x, y: np.sin(0.4 * x) * np.cos(0.3 * y)),
+}
+
+
+def volume_of(surface):
+    first, second, third = np.moveaxis(surface.corners - 0.5, 1, 0)
+    return (first * np.cross(second, third)).sum() / 6.0
+
+
+@pytest.mark.parametrize("size", [65, 128])
+@pytest.mark.parametrize("name", SURFACES)
+def test_topology_comes_back(name, size):
+    surface = SURFACES[name]
+    chart = parameterise(surface).chart
+    before, mesh = topology_of(surface.faces), geometry_image(chart, size).mesh()
+    after = topology_of(mesh.faces)
+    assert (after.genus, len(after.boundary_loops), after.pieces.max()) == (
+        before.genus,
+        len(before.boundary_loops),
+        0,
+    )
+    # No two fans touch.
+    assert after.fans(~after.on_boundary).max() + 1 == len(mesh.vertices)
+    if not before.on_boundary.any():
+        assert volume_of(mesh) == pytest.approx(volume_of(chart.mesh), rel=0.05)
+
+
+def test_the_boundary_of_a_patch_is_kept_whole():
+    patch = flat_patch(9, 9, lambda x, y: np.sin(0.4 * x) * np.cos(0.3 * y))
+    chart = parameterise(patch).chart
+    mesh = geometry_image(chart, 64).mesh()
+
+    def rim(surface):
+        topology = topology_of(surface.faces)
+        return np.linalg.norm(
+            np.diff(surface.vertices[topology.edges[topology.on_boundary]], axis=1), axis=-1
+        ).sum()
+
+    assert rim(mesh) == pytest.approx(rim(chart.mesh), rel=1e-9)
+
+
+def test_a_flat_square_comes_back_as_a_square():
+    chart = parameterise(flat_patch(5, 5)).chart
+    mesh = geometry_image(chart, 16).mesh()
+    assert np.linalg.norm(mesh.face_normals, axis=1).sum() == pytest.approx(1.0, rel=1e-9)
+    assert geometric_error(chart.mesh, mesh, 1000).greatest < 1e-12

@@ -1,12 +1,17 @@
-"""The published table of (u, v): averages over entries that hit, and bilinear geometry images."""
+"""The published tables of (u, v): averages over entries that hit, interpolation, and bilinear images."""
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from bentray_kernels.compilation.compiled import kernel
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.geometry_field.tables import reference_inner_field
+from bentray_kernels.geometry_field.tables.cube import samples
+from bentray_kernels.geometry_field.tables.inner_field import spread_points
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
-from bentray_kernels.geometry_field.tables.quadrilinear import nearest_of
+from bentray_kernels.geometry_field.tables.quadrilinear import corner_of, lerp4, nearest_of
 from bentray_kernels.geometry_field.tables.reference_field import (
     MAX_REFERENCE_SAMPLES,
     image_at,
@@ -14,8 +19,11 @@ from bentray_kernels.geometry_field.tables.reference_field import (
     reference_field,
     uv_table,
 )
+from bentray_kernels.geometry_field.tables.reference_inner_field import inner_uv_table, linear_exit_uv
+from bentray_kernels.meshes.mesh import Chart
+from bentray_kernels.meshes.surface import surface_of
 
-from ..shapes import ball, field_of
+from ..shapes import ball, field_of, inner_of, octahedron, turned
 
 N = 6
 
@@ -87,9 +95,102 @@ def test_a_field_holds_table_and_image():
 def test_too_many_samples_and_other_shapes_are_rejected():
     surface, valid, points = ball(0), np.ones((9, 9), bool), np.zeros((9, 9, 3))
     many = OuterField(MAX_REFERENCE_SAMPLES + 1, np.zeros((1, 1), np.int32), np.zeros((1, 1), np.float32))
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInput, match=r"^samples: found"):
         reference_field(surface, many, points, points, valid)
-    assert caught.value.field == "samples"
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInput, match=r"^positions: found"):
         reference_field(surface, field_of(surface, 4), points[:8], points, valid)
-    assert caught.value.field == "positions"
+
+
+INNER_N, DIVISIONS = 5, 4
+
+
+@kernel
+def averaged_exit_at(row, n, face, x, y):
+    return linear_exit_uv(row, n, face, x, y)
+
+
+def flat_table():
+    """A ball whose u and v are x and y, its inner field, points and table."""
+    mesh = turned(octahedron(3))
+    surface = surface_of(Chart(mesh, mesh.corners[..., :2]))
+    field, points = inner_of(surface, INNER_N, DIVISIONS), spread_points(surface, DIVISIONS)[0]
+    return surface, field, points, inner_uv_table(surface, field, points)
+
+
+def test_the_table_holds_where_its_own_rays_end():
+    surface, field, points, table = flat_table()
+    np.testing.assert_array_equal(np.isnan(table[..., 0]), field.faces < 0)
+    row, exit_ = np.nonzero(field.faces >= 0)
+    corners = surface.triangles[:, :9].reshape(-1, 3, 3).astype(float)
+    starts = corners.mean(axis=1)[points[row]]
+    along = samples(INNER_N)[exit_] - starts
+    first, second, third = np.moveaxis(corners[field.faces[row, exit_]], 1, 0)
+    normals = np.cross(second - first, third - first)
+    far = ((first - starts) * normals).sum(axis=1) / (along * normals).sum(axis=1)
+    ends = starts + far[:, None] * along
+    # Nearly all rays run through the body; few graze a face.
+    flat = np.abs((along * normals).sum(axis=1)) > 0.05 * np.linalg.norm(normals, axis=1)
+    assert flat.mean() > 0.8
+    np.testing.assert_allclose(table[row, exit_][flat], ends[flat, :2], atol=1e-4)
+
+
+def test_exits_are_averaged_and_those_without_a_hit_left_out():
+    q, p = np.indices((INNER_N, INNER_N), dtype=np.float32)
+    row = np.full((INNER_N, 6, INNER_N, 2), np.nan, np.float32)
+    row[:, 2, :, 0], row[:, 2, :, 1] = 0.1 * p + 0.02 * q, 0.05 * q
+    position = (2.25 + 0.5) / INNER_N, (1.5 + 0.5) / INNER_N
+    result = averaged_exit_at(row.ravel(), INNER_N, 2, *map(np.float32, position))
+    np.testing.assert_allclose(result, (0.1 * 2.25 + 0.02 * 1.5, 0.05 * 1.5), atol=1e-6)
+    row[:, 2, 3] = np.nan
+    result = averaged_exit_at(row.ravel(), INNER_N, 2, *map(np.float32, position))
+    np.testing.assert_allclose(result, (0.1 * 2.0 + 0.02 * 1.5, 0.05 * 1.5), atol=1e-6)
+
+
+def test_points_of_another_field_and_large_tables_are_rejected(monkeypatch):
+    surface, field, points, _ = flat_table()
+    with pytest.raises(InvalidInput, match=r"^points: found"):
+        inner_uv_table(surface, field, points[:-1])
+    monkeypatch.setattr(reference_inner_field, "MAX_INNER_ENTRIES", field.faces.size - 1)
+    with pytest.raises(InvalidInput, match=r"^divisions: found"):
+        inner_uv_table(surface, field, points)
+
+
+PLACES = st.floats(0.0, 1.0, width=32)
+
+
+def table(n, value):
+    """Entries by entry and exit sample, flat (6n², 6n², 2) float32: zeros, and ``value(faces, xs, ys)``."""
+    number = np.arange(6 * n * n)
+    face, x, y = number % (6 * n) // n, (number % n + 0.5) / n, (number // (6 * n) + 0.5) / n
+    entries = np.zeros((6 * n * n, 6 * n * n, 2), np.float32)
+    entries[..., 1] = value(*(np.meshgrid(axis, axis, indexing="ij") for axis in (face, x, y)))
+    return entries.ravel()
+
+
+def product(faces, xs, ys):
+    return (
+        (1.0 + faces[0] + 0.1 * faces[1])
+        * (1.0 + 2.0 * xs[0])
+        * (2.0 - ys[0])
+        * (0.5 + xs[1])
+        * (1.0 + 3.0 * ys[1])
+    )
+
+
+@pytest.mark.parametrize("n", [2, 3, 5])
+@given(faces=st.tuples(st.integers(0, 5), st.integers(0, 5)), ends=st.tuples(*[PLACES] * 4))
+@settings(deadline=None)
+def test_products_of_linear_functions_are_exact_between_samples_and_constant_beyond(n, faces, ends):
+    entries = table(n, product)
+    s, t = faces
+    corner = corner_of(n, s, np.float32(ends[0]), np.float32(ends[1]), t, *map(np.float32, ends[2:]))
+    inside = np.clip(ends, 0.5 / n, 1.0 - 0.5 / n)
+    expected = product((s, t), inside[::2], inside[1::2])
+    assert lerp4(entries, n, corner, 2, 1) == pytest.approx(expected, rel=1e-4)
+    assert lerp4(entries, n, corner, 2, 0) == 0.0
+    nearest = np.clip(np.floor(np.array(ends) * n), 0, n - 1)
+    whole = (np.abs(np.array(ends) * n - np.rint(np.array(ends) * n)) > 1e-4).all()
+    if whole:
+        centre = (nearest + 0.5) / n
+        at = entries.reshape(-1, 2)[nearest_of(n, corner), 1]
+        assert at == pytest.approx(product((s, t), centre[::2], centre[1::2]), rel=1e-5)

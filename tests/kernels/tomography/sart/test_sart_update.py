@@ -1,18 +1,22 @@
-"""Updates of an image: speeds are stretched as published, the compiled pass is the traced one, options do."""
+"""SART: cuts change no bit, each pass has its order, speeds are stretched as published, options do."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
 from bentray_kernels.tomography.grid_schedule import initial_slowness
-from bentray_kernels.tomography.sart.sart_step import advance, begin
+from bentray_kernels.tomography.sart.sart_step import advance, begin, emitter_order
 from bentray_kernels.tomography.sart.sart_update import propagation_speed, update_for
 
 from ....table6 import table6_scan
+from ..ring_scans import ring_scan
 
 NODES, WATER = 64, 1375.0
 PHANTOM = table6(WATER)
@@ -80,23 +84,6 @@ def test_the_compiled_pass_gives_the_images_of_the_traced_one(scan, changes):
     assert [sweep.emitters for sweep in fast.history] == [sweep.emitters for sweep in slow.history]
 
 
-@pytest.mark.parametrize("changes", [{"cut": 3}, {"cut": 7, "subset": 5}], ids=["one", "subsets"])
-def test_cuts_of_the_compiled_pass_change_no_bit(scan, changes):
-
-    wanted = plan(subset=changes.get("subset", 1))
-    problem = Problem.from_dataset(scan, wanted)
-    whole = cut = begin(initial_slowness(problem, None))
-    before = whole.slowness.copy()
-    while not whole.done:
-        whole = advance(problem, wanted, whole, 10**6)
-    while not cut.done:
-        cut = advance(problem, wanted, cut, changes["cut"])
-    for name in ("slowness", "coverage", "residuals"):
-        assert np.array_equal(getattr(whole, name), getattr(cut, name)), name
-    assert whole.history == cut.history
-    assert np.array_equal(before, begin(initial_slowness(problem, None)).slowness)
-
-
 def test_a_subset_is_one_update(scan):
     """With all emitters in one subset, nothing of the first hides from the last: seeds give the same."""
     first, other = (reconstruct(scan, plan(subset=64, seed=seed, iterations=1)).speed for seed in (0, 1))
@@ -117,3 +104,37 @@ def test_huber_makes_wrong_picks_count_less(scan):
         for spreads in (0.0, 3.0)
     )
     assert robust < 0.9 * plain
+
+
+@given(cuts=st.lists(st.integers(1, 40), min_size=1, max_size=8), subset=st.sampled_from([1, 5]))
+@settings(max_examples=8, deadline=None)
+def test_cutting_the_work_changes_no_bit(cuts, subset):
+    dataset = ring_scan(16, 0.08, np.random.default_rng(0).normal(0.0, 2e-7, (16, 16)), WATER)
+    wanted = Settings.from_values(method="sart", nodes=24, iterations=2, subset=subset)
+    problem = Problem.from_dataset(dataset, wanted)
+    start = begin(initial_slowness(problem, None))
+    whole, cut, before = start, start, start.slowness.copy()
+    while not whole.done:
+        whole = advance(problem, wanted, whole, 10**6)
+    for most in itertools.cycle(cuts):
+        cut = advance(problem, wanted, cut, most)
+        if cut.done:
+            break
+    for name in ("slowness", "coverage", "residuals"):
+        assert np.array_equal(getattr(whole, name), getattr(cut, name)), name
+    assert whole.history == cut.history
+    assert np.array_equal(start.slowness, before)
+
+
+def test_same_seed_same_bits_other_seed_other_order(scan):
+    a, b = reconstruct(scan, plan(iterations=1)), reconstruct(scan, plan(iterations=1))
+    c = reconstruct(scan, plan(iterations=1, seed=1))
+    assert np.array_equal(a.speed, b.speed)
+    assert not np.array_equal(a.speed, c.speed)
+
+
+def test_every_pass_slice_and_seed_has_an_order_of_its_own(scan):
+    problem = Problem.from_dataset(scan, plan())
+    orders = [emitter_order(problem, *which) for which in ((0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0))]
+    assert len({tuple(order) for order in orders}) == 4
+    assert all(sorted(order) == list(range(RING.elements)) for order in orders)

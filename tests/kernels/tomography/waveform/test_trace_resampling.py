@@ -1,10 +1,16 @@
-"""Resampling: what stays of a trace, and that the simulator's dispersion is put in."""
+"""Traces of a refinement: resampling with the dispersion of the grid, wavelet, phase of water, misfits."""
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.special import hankel2
 
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography.waveform import misfits
 from bentray_kernels.tomography.waveform.trace_resampling import Clock, Water, band_pass, resampler
+from bentray_kernels.tomography.waveform.water_phase import fit_water
+from bentray_kernels.tomography.waveform.wavelet import fit_wavelet
 from bentray_kernels.wave.medium import Medium
 from bentray_kernels.wave.simulation import simulate
 from bentray_kernels.wave.stencil import OPTIMISED, longest_step
@@ -70,3 +76,113 @@ def test_the_water_recorded_is_taken_over():
         return 1e-7 * float((np.arange(2300) * result**2).sum() / (result**2).sum())
 
     assert arrival(0.01) - arrival(0.0) == pytest.approx(0.01 * 1.2e-4, rel=0.05)
+
+
+def pulses(shift=0.0, width=4.0):
+    time = np.arange(200.0)
+    return np.exp(-(((time - 40.0 - shift) / width) ** 2))
+
+
+def test_wavelet_is_recovered():
+    rng = np.random.default_rng(0)
+    green = rng.standard_normal((5, 60)) * np.exp(-np.arange(60) / 10.0)
+    pulse = pulses()
+    true = pulses(3.0, 6.0) - 0.5 * pulses(9.0, 6.0)
+
+    def heard(wavelet):
+        return np.stack([np.convolve(row, wavelet)[:200] for row in green])
+
+    assert np.abs(fit_wavelet(pulse, heard(pulse), heard(true)) - true).max() < 0.02
+
+
+def test_rejects_silence():
+    with pytest.raises(InvalidInput, match="waveform/water"):
+        fit_wavelet(pulses(), np.ones((3, 200)), np.zeros((3, 200)))
+
+
+def test_a_thousandth_of_the_strongest_energy_counts_as_noise():
+    """An impulse has the same energy at all frequencies, so the factor is the same at all."""
+    simulated = np.zeros((1, 200))
+    simulated[0, 7] = 1.0
+    assert fit_wavelet(pulses(), simulated, 2.0 * simulated) == pytest.approx(
+        2.0 / 1.001 * pulses(), abs=1e-9
+    )
+
+
+STEP, STEPS = 2.5e-7, 600
+DISTANCE = np.linspace(0.04, 0.16, 40)
+
+
+def traces(water):
+    """Pulses after a path in such a water."""
+    frequency = np.fft.rfftfreq(STEPS, STEP)
+    number = 2.0 * np.pi * frequency / water.speed * (1.0 - water.lead - water.bend * frequency**2)
+    pulse = np.exp(-(((frequency - 3e5) / 1e5) ** 2)) * np.exp(-2j * np.pi * frequency * 1e-5)
+    return np.fft.irfft(pulse * np.exp(-1j * np.outer(DISTANCE, number)), STEPS, axis=1)
+
+
+@given(lead=st.floats(-0.01, 0.01), bend=st.floats(-3e-14, 3e-14))
+@settings(max_examples=20, deadline=None)
+def test_lead_and_bend_are_found(lead, bend):
+    plain, true = Water(1500.0), Water(1500.0, lead, bend)
+    fitted = fit_water(plain, DISTANCE, traces(plain), traces(true), STEP)
+    assert fitted.lead == pytest.approx(lead, abs=2e-4)
+    assert fitted.bend == pytest.approx(bend, abs=2e-15)
+
+
+def test_few_pairs_are_rejected():
+    with pytest.raises(InvalidInput, match="8 pairs"):
+        fit_water(Water(1500.0), DISTANCE[:5], np.ones((5, 20)), np.ones((5, 20)), STEP)
+
+
+MEASURES = (misfits.correlation, misfits.least_squares)
+
+
+@given(seed=st.integers(0, 2**32 - 1), measure=st.sampled_from(MEASURES))
+def test_derivative_is_that_of_finite_differences(seed, measure):
+    rng = np.random.default_rng(seed)
+    simulated, recorded, way = rng.standard_normal((3, 4, 20))
+    weight = rng.uniform(0.1, 1.0, (4, 20))
+    small = 1e-5
+    rise = (
+        measure(simulated + small * way, recorded, weight)[0]
+        - measure(simulated - small * way, recorded, weight)[0]
+    )
+    assert (measure(simulated, recorded, weight)[1] * way).sum() == pytest.approx(
+        rise / (2.0 * small), rel=1e-5, abs=1e-8
+    )
+
+
+@pytest.mark.parametrize("measure", MEASURES)
+def test_equal_traces_have_zero_misfit(measure):
+    traces = np.random.default_rng(1).standard_normal((3, 30))
+    value, slope = measure(traces, traces, np.ones((3, 1)))
+    assert value == pytest.approx(0.0, abs=1e-14)
+    assert np.abs(slope).max() < 1e-14
+
+
+def test_correlation_is_blind_to_the_size_of_each_trace():
+    rng = np.random.default_rng(2)
+    simulated, recorded = rng.standard_normal((2, 3, 30))
+    factor = np.array([[0.1], [3.0], [40.0]])
+    misfit = misfits.correlation(simulated, recorded, np.ones((3, 1)))[0]
+    assert misfits.correlation(simulated, factor * recorded, np.ones((3, 1)))[0] == pytest.approx(misfit)
+
+
+def test_silent_traces_have_zero_misfit():
+    traces = np.random.default_rng(3).standard_normal((3, 30))
+    silent = traces.copy()
+    silent[1] = 0.0
+    for a, b in ((traces, silent), (silent, traces)):
+        value, slope = misfits.correlation(a, b, np.ones((3, 1)))
+        assert np.isfinite(value)
+        assert np.isfinite(slope).all()
+        assert not slope[1].any()
+
+
+def test_window_holds_the_arrival_and_ends():
+    times = np.arange(100.0)
+    result = misfits.arrival_window(np.array([40.0]), times, 20.0, 30.0)[0]
+    assert (result[26:62] == 1.0).all()
+    assert not result[:20].any()
+    assert not result[71:].any()
