@@ -21,9 +21,6 @@ from .result import Reconstruction
 # True speeds within this of that of water are water, m/s.
 WATER_TOLERANCE_MPS = 1.0
 
-# Axis orders that can be permuted to x, y[, z]; any other text requires registration of the truth.
-ORDERS = {"x,y": (0, 1), "y,x": (1, 0), "x,y,z": (0, 1, 2), "z,y,x": (2, 1, 0), "y,x,z": (1, 0, 2)}
-
 # Nodes along a side of the windows of the structural similarity, and its constants (Wang et al., 2004).
 WINDOW, K1, K2 = 7, 0.01, 0.03
 
@@ -185,7 +182,7 @@ def on_grid(values: ArrayLike, truth: Truth, result: Reconstruction) -> Floats:
     Raises:
         NotComparable: for axes that do not match.
     """
-    order = ORDERS.get(truth.axes.replace(" ", ""))
+    order = truth.order
     if order is None:
         raise NotComparable("the truth must be registered with the image first")
     if not len(order) == truth.sound_speed_mps.ndim == result.speed.ndim:

@@ -56,9 +56,7 @@ def _sentences(dataset: Dataset, settings: Settings, problem: Problem) -> Iterat
             f"({100.0 * leaving.mean():.0f} %) leave {where}, outside which all is taken to be water: "
             "an object there changes the image inside."
         )
-    received = problem.receivers.reshape(-1, problem.receivers.shape[-1])
-    elements = np.unique(np.concatenate((problem.emitters, received)), axis=0)
-    coverage = angular_coverage(elements, start, end)
+    coverage = angular_coverage(problem.elements, start, end)
     if coverage is not None and coverage.limited:
         yield str(coverage)
 

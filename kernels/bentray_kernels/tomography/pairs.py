@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,8 +24,8 @@ class Pairs:
         emitters: (ntx, ndim).
         receivers: (rings, nrx, ndim).
         ring: (ntx,), index of the ring that receives an emitter.
-        delta_tof: (ntx, nrx), s; NaN where there is none.
-        log_ratio: as ``delta_tof``, Np, or None.
+        delta_tof: (ntx, nrx), s, object minus water; NaN where there is none.
+        log_ratio: as ``delta_tof``, ln(A_water / A_object), Np; None where no amplitudes were recorded.
         noise_s: standard deviation of a time, s, from pairs measured both ways; 0: there are none.
     """
 
@@ -33,7 +33,7 @@ class Pairs:
     receivers: Floats
     ring: Ints
     delta_tof: Floats
-    log_ratio: Floats | None
+    log_ratio: Floats | None = None
     noise_s: float = 0.0
 
     @property
@@ -108,14 +108,7 @@ def _ring(dataset: Dataset, settings: Settings, index: int) -> Pairs:
     # Each ring begins at its lowest element; the highest one of an uneven ring may be far above it.
     ring = np.searchsorted(np.asarray(z), height, side="right") - 1
     whole = _between(dataset, settings, dataset.tx, dataset.rx, np.flatnonzero(ring == index))
-    return Pairs(
-        whole.emitters[:, :2],
-        whole.receivers[..., :2],
-        whole.ring,
-        whole.delta_tof,
-        whole.log_ratio,
-        whole.noise_s,
-    )
+    return replace(whole, emitters=whole.emitters[:, :2], receivers=whole.receivers[..., :2])
 
 
 def _moved_ring(dataset: Dataset, settings: Settings) -> Pairs:

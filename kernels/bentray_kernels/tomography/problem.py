@@ -22,37 +22,25 @@ MARGIN_NODES = 3
 RIM_NODES = 2
 
 
-@dataclass(frozen=True)
-class Problem:
-    """Geometry and data of a reconstruction; ``ndim`` is 2 for a slice and 3 for a volume.
+@dataclass(frozen=True, kw_only=True)
+class Problem(pairs.Pairs):
+    """Pairs of a reconstruction, node 0 at 0, on a grid; ``ndim`` is 2 for a slice and 3 for a volume.
 
     Attributes:
-        emitters: (ntx, ndim), m, node 0 at 0.
-        receivers: (rings, nrx, ndim), as ``emitters``.
-        ring: (ntx,), index of the ring that receives an emitter.
-        delta_tof: (ntx, nrx), s, object minus water; NaN where there is none.
         region: (nodes, nodes[, heights]), nodes that may change.
         spacing: node spacing, m.
         origin: position of node 0 in the dataset's coordinates, m.
         water_speed: m/s.
-        log_ratio: as ``delta_tof``, ln(A_water / A_object), Np; None where no amplitudes were recorded.
         water_attenuation: Np/m.
         wavelength_m: in water, of the amplitudes; None if their frequency is unknown.
-        noise_s: standard deviation of a time, s, from pairs measured both ways; 0: there are none.
     """
 
-    emitters: Floats
-    receivers: Floats
-    ring: Ints
-    delta_tof: Floats
     region: Flags
     spacing: float
     origin: tuple[float, ...]
     water_speed: float
-    log_ratio: Floats | None = None
     water_attenuation: float = 0.0
     wavelength_m: float | None = None
-    noise_s: float = 0.0
 
     @classmethod
     def from_dataset(cls, dataset: Dataset, settings: Settings, index: int = 0) -> Problem:
@@ -111,18 +99,13 @@ class Problem:
                     "mask/roi", "no node of the image", "a region of interest with nodes inside the array"
                 )
         return cls(
-            emitters=data.emitters - origin,
-            receivers=data.receivers - origin,
-            ring=data.ring,
-            delta_tof=data.delta_tof,
+            **vars(replace(data, emitters=data.emitters - origin, receivers=data.receivers - origin)),
             region=region,
             spacing=spacing,
             origin=corner,
             water_speed=dataset.water_speed_mps,
-            log_ratio=data.log_ratio,
             water_attenuation=dataset.water_attenuation_np_m or 0.0,
             wavelength_m=None if frequency is None else dataset.water_speed_mps / frequency,
-            noise_s=data.noise_s,
         )
 
     @property

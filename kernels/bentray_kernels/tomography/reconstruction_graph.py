@@ -145,7 +145,7 @@ class ReconstructionGraph:
     def after(self, task: Task, result: Any) -> list[Task]:
         """See ``task_graph.TaskGraph``."""
         for evaluation in self._evaluations:
-            if task.function in (evaluation.trace, evaluation.evaluate):
+            if evaluation.owns(task):
                 return evaluation.after(task, result)
         following = self._stage.after(task, result)
         return following if following or not self._stage.state.done else self._next()
@@ -201,6 +201,10 @@ class Evaluation:
     def done(self) -> int:
         """Emitters whose rays are traced."""
         return sum(self.sizes) if self.value is not None else sum(self.sizes[batch] for batch in self._rows)
+
+    def owns(self, task: Task) -> bool:
+        """Whether it is one of these tasks."""
+        return task.function in (self.trace, self.evaluate) and task.arguments[0] == self._at[0]
 
     def first(self, image: Floats, rows: Sequence[Any] = ()) -> list[Task]:
         """Tasks to start with; the evaluation itself without emitters, or with the rows of all batches."""

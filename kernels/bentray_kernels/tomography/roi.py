@@ -10,8 +10,6 @@ from ..acquisition import Dataset
 from ..arrays import Flags
 from ..errors import InvalidInput
 
-ORDERS = {"x,y": (0, 1), "y,x": (1, 0), "x,y,z": (0, 1, 2), "z,y,x": (2, 1, 0), "y,x,z": (1, 0, 2)}
-
 
 def inside(
     dataset: Dataset,
@@ -35,7 +33,7 @@ def inside(
     roi, truth = dataset.roi, dataset.truth
     if roi is None:
         raise InvalidInput("mask/roi", "nothing", "a region of interest, since the setting roi is true")
-    order = None if truth is None else ORDERS.get(truth.axes.replace(" ", ""))
+    order = None if truth is None else truth.order
     if truth is None or order is None or len(order) != roi.ndim or roi.shape != truth.sound_speed_mps.shape:
         raise InvalidInput(
             "mask/roi", f"an image of shape {roi.shape}", "an image on the grid of the truth, with axes named"

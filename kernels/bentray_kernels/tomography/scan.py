@@ -99,17 +99,6 @@ class Scan(NamedTuple):
         return together
 
 
-class EchoScan(NamedTuple):
-    """The traces of one slice, for a reflection image."""
-
-    source: Source
-    slice: int
-
-    def open(self) -> AbstractContextManager[Dataset]:
-        """The slice with its traces, which may be read on access while the context is open."""
-        return self.source.traces(self.slice)
-
-
 def stages_of(scan: Scan) -> tuple[Settings, ...]:
     """The settings of each stage of a scan."""
     return stages(scan.source.dataset(), scan.settings)

@@ -14,6 +14,9 @@ from .. import rules
 
 Floats = NDArray[np.float64]
 
+# Axis orders that can be permuted to x, y[, z]; any other text requires registration of the truth.
+ORDERS = {"x,y": (0, 1), "y,x": (1, 0), "x,y,z": (0, 1, 2), "z,y,x": (2, 1, 0), "y,x,z": (1, 0, 2)}
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -43,3 +46,8 @@ class Truth:
         if self.attenuation_np_m is not None:
             rules.shape("truth/attenuation_np_m", self.attenuation_np_m, speed.shape)
             rules.no_infinity("truth/attenuation_np_m", self.attenuation_np_m)
+
+    @property
+    def order(self) -> tuple[int, ...] | None:
+        """Axes of the arrays in the order x, y[, z]; None for others."""
+        return ORDERS.get(self.axes.replace(" ", ""))

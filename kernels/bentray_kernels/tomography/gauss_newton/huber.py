@@ -40,6 +40,13 @@ def loss(residual: Floats, limit: float) -> float:
     return math.sqrt(float((inner * (inner + 2.0 * outer)).mean()))
 
 
+def weights(residual: Floats, limit: float) -> Floats:
+    """Weights of residuals in the loss: 1, less beyond the limit."""
+    if limit == math.inf:
+        return np.ones_like(residual)
+    return np.asarray(limit / np.maximum(np.abs(residual), limit))
+
+
 def clipped_rms(residual: Floats, limit: float) -> float:
     """Root mean square of the residuals clipped to the limit."""
     return math.sqrt(float((np.minimum(np.abs(residual), limit) ** 2).mean()))

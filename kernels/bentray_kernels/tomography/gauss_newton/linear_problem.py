@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.fft import dctn, idctn
 
 from ...arrays import Flags, Floats
 from ..finite_frequency import blurred
-from .linearisation import Rows, halves
+from . import huber
+from .linearisation import Map, Rows, halves, map_halves
 from .penalties import Penalty, adjoint, gradient, laplacian, length, roughness, shrink
 from .ray_matrix import normal_product
 
@@ -44,32 +42,6 @@ REWEIGHTINGS = 4
 def smoothing(wavenumber: float) -> float:
     """Strength of a ``laplacian`` that outweighs data from all sides beyond a wavenumber of 1/node."""
     return CURVATURE / wavenumber**5
-
-
-# Entries of the matrix that are worth a second thread.
-MIN_ENTRIES = 200_000
-
-
-@dataclass(frozen=True)
-class _Rays:
-    """The rows of all emitters in two halves, and a ``map`` that processes both at the same time.
-
-    An update waits for all emitters, so that the cores that traced their rays would be idle. Sums over the
-    halves have the same bits whether one thread or two compute them.
-    """
-
-    halves: Sequence[Sequence[Rows]]
-    map: Callable[..., Iterable[Any]]
-
-
-@contextmanager
-def _by_threads(blocks: Sequence[Rows]) -> Iterator[_Rays]:
-    """The rows for one solution."""
-    if sum(block.columns.size for block in blocks) < MIN_ENTRIES:
-        yield _Rays(halves(blocks), map)
-        return
-    with ThreadPoolExecutor(2, "update") as pool:
-        yield _Rays(halves(blocks), pool.map)
 
 
 @dataclass(frozen=True)
@@ -119,16 +91,20 @@ class Linearised:
         if not self.density > 0.0:
             return self.image, dual
         if self.penalty == "total-variation" and self.strength > 0.0:
-            with _by_threads(self.parts) as rays:
-                return self._split(rays, dual)
+            with map_halves(self.parts) as spread:
+                return self._split(spread, dual)
         image, steps = self.image, MAX_STEPS
-        with _by_threads(self.parts) as rays:
+        with map_halves(self.parts) as spread:
             for _ in range(REWEIGHTINGS if self.huber < math.inf else 1):
                 steepness = self._penalty_gradient(image)
-                image = self._descend(rays, image, steepness, self._penalty_hessian, steps)
+                image = self._descend(spread, image, steepness, self._penalty_hessian, steps)
         return image, dual
 
-    def _split(self, rays: _Rays, dual: Floats) -> tuple[Floats, Floats]:
+    @cached_property
+    def _halves(self) -> list[list[Rows]]:
+        return halves(self.parts)
+
+    def _split(self, spread: Map, dual: Floats) -> tuple[Floats, Floats]:
         """The alternating direction method of multipliers (Boyd et al. 2011, section 6.4.1).
 
         Alternates between a quadratic problem, by conjugate gradients, and soft thresholding of the
@@ -141,7 +117,7 @@ class Linearised:
             edges = shrink(slope, cost / SPLIT)
             dual = slope - edges
             steepness = SPLIT * adjoint(gradient(image) - edges + dual)
-            image = self._descend(rays, image, steepness, _slope_hessian, STEPS)
+            image = self._descend(spread, image, steepness, _slope_hessian, STEPS)
         return image, dual
 
     def _penalty_gradient(self, image: Floats) -> Floats:
@@ -157,7 +133,7 @@ class Linearised:
 
     def _descend(
         self,
-        rays: _Rays,
+        spread: Map,
         image: Floats,
         steepness: Floats,
         stiffness: Callable[[Floats], Floats],
@@ -169,7 +145,7 @@ class Linearised:
             steepness: gradient of the quadratic term at the image; stiffness: its second derivative.
         """
         change = blurred(image - self.image, self.width)
-        weights, downhill = zip(*rays.map(partial(self._back_projected, change), rays.halves), strict=True)
+        weights, downhill = zip(*spread(partial(self._back_projected, change), self._halves), strict=True)
         residual = self._on_image(np.sum(downhill, axis=0)) - np.where(self.region, steepness, 0.0)
         precondition = self._preconditioner()
         change, direction = np.zeros_like(residual), precondition(residual)
@@ -179,7 +155,7 @@ class Linearised:
             if square <= enough:
                 break
             wide = blurred(direction, self.width).ravel()
-            curved = np.sum(list(rays.map(partial(_curvature, wide), rays.halves, weights)), axis=0)
+            curved = np.sum(list(spread(partial(_curvature, wide), self._halves, weights)), axis=0)
             bent = self._on_image(curved) + np.where(self.region, stiffness(direction), 0.0)
             step = square / float((direction * bent).sum())
             change = change + step * direction
@@ -210,15 +186,9 @@ class Linearised:
         weights, into = [], np.zeros(change.size)
         for block in half:
             residual = block.residual - block.project(change)
-            weights.append(self._weights(residual))
+            weights.append(huber.weights(residual, self.huber))
             block.back_project(weights[-1] * residual, into)
         return weights, into
-
-    def _weights(self, residual_part: Floats) -> Floats:
-        """Weights of rows in the Huber loss: 1, less beyond its limit."""
-        if self.huber == math.inf:
-            return np.ones_like(residual_part)
-        return self.huber / np.maximum(np.abs(residual_part), self.huber)
 
 
 def _curvature(image: Floats, half: Sequence[Rows], weights: Sequence[Floats]) -> Floats:

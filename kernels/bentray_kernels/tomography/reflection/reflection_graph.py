@@ -14,7 +14,7 @@ from ...errors import InvalidInput
 from ...opencl.lost_device import computed
 from ...task_graph import Task
 from ..result import Iteration
-from ..scan import EchoScan
+from ..scan import Source
 from .delay_and_sum import PAIR_ANGLE_DEG, Signals, Sums, empty_sums, sum_echoes
 from .delay_and_sum_opencl import sum_echoes_opencl
 from .echoes import (
@@ -79,7 +79,7 @@ class ReflectionGraph:
     """Travel times of all elements, the pulse, and the emissions in batches, summed in their order.
 
     Args:
-        scan: see ``EchoScan``.
+        at: source of the traces, and the slice.
         plan: of the image.
         samples: of each trace.
         rate_hz: of the traces.
@@ -92,13 +92,13 @@ class ReflectionGraph:
 
     def __init__(
         self,
-        scan: EchoScan,
+        at: tuple[Source, int],
         plan: ReflectionPlan,
         samples: int,
         rate_hz: float,
         history: tuple[Iteration, ...] = (),
     ) -> None:
-        self._scan, self._plan = scan, plan
+        self._at, self._plan = at, plan
         self.history = history
         each = emissions_per_task(len(plan.receivers), samples * upsampling(rate_hz, plan.frequency_hz))
         emissions = plan.emissions
@@ -160,7 +160,7 @@ class ReflectionGraph:
             if len(self._times) < len(self._groups):
                 return []
             if self._state is None:
-                return [Task(measure_scan_pulse, (self._scan, self._plan, self._all_times))]
+                return [Task(measure_scan_pulse, (self._at, self._plan, self._all_times))]
             return self._summing()
         if task.function is measure_scan_pulse:
             self._state = ReflectionState(
@@ -188,7 +188,7 @@ class ReflectionGraph:
         return [
             Task(
                 sum_emissions,
-                (self._scan, self._plan, self._state.pulse, self._all_times, self._batches[number], number),
+                (self._at, self._plan, self._state.pulse, self._all_times, self._batches[number], number),
             )
             for number in range(self._state.batches, len(self._batches))
         ]
@@ -199,11 +199,11 @@ def solve_element_times(speed: Floats, spacing: float, elements: Floats, _number
     return solve_times(speed, spacing, elements)
 
 
-def measure_scan_pulse(scan: EchoScan, plan: ReflectionPlan, times: list[ElementTimes]) -> Pulse:
+def measure_scan_pulse(at: tuple[Source, int], plan: ReflectionPlan, times: list[ElementTimes]) -> Pulse:
     """Task: the pulse, from the water shot, else from waves transmitted through the object."""
     emissions = plan.emissions
     chosen = emissions[:: max(1, len(emissions) // PULSE_EMISSIONS)]
-    with scan.open() as dataset:
+    with at[0].traces(at[1]) as dataset:
         recorded, rate = dataset.traces, dataset.rate_hz
         if recorded.water is not None:
             shots, expected = recorded.water, _water_times(plan, chosen)
@@ -215,7 +215,7 @@ def measure_scan_pulse(scan: EchoScan, plan: ReflectionPlan, times: list[Element
 
 
 def sum_emissions(
-    scan: EchoScan,
+    at: tuple[Source, int],
     plan: ReflectionPlan,
     pulse: Pulse,
     times: list[ElementTimes],
@@ -224,7 +224,7 @@ def sum_emissions(
 ) -> Sums:
     """Task: the sums over one batch of emissions."""
     transmitted = _transmitted(plan, times, emissions)
-    with scan.open() as dataset:
+    with at[0].traces(at[1]) as dataset:
         signals = echo_signals(dataset, plan, pulse, transmitted, emissions)
     work = partial(
         sum_echoes_opencl if plan.engine == "opencl" else sum_echoes,

@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Floats
 from ..reconstruction_graph import Run
 from ..result import Reconstruction, Reflection
-from ..scan import EchoScan, Source
+from ..scan import Source
 from ..settings import Settings
 from .reflection_graph import ReflectionGraph
 from .reflection_image import envelope_of, in_decibels
@@ -41,9 +41,7 @@ def with_reflection(
     graphs, envelopes, plans = [], [], []
     for index, speed in enumerate(speeds):
         plan = plan_reflection(dataset.slice(index), settings, speed, result.spacing_m[0], origin)
-        graph = ReflectionGraph(
-            EchoScan(source, index), plan, source.samples, dataset.rate_hz, result.history
-        )
+        graph = ReflectionGraph((source, index), plan, source.samples, dataset.rate_hz, result.history)
         run_graphs([graph], before, graph.total * (len(speeds) - 1 - index))
         before += graph.total
         plans.append(plan)

@@ -7,12 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...arrays import Float32s, Floats, Ints
+from ...arrays import Floats, Ints
 from ...errors import InvalidInput
 from ...opencl.program import Program
 from ...opencl.session import DeviceKernel, Session
 from ...rays.vectorised import LONGEST
+from ..problem import Problem
 from ..result import RESIDUAL_EDGES_S
+from ..settings import Settings
+from .emitter_pass import gaussian
+from .sart_update import bounds_of
 
 SOURCES = ("tomography/fronts", "tomography/sart")
 
@@ -73,54 +77,6 @@ class SliceSize(NamedTuple):
         return max(self._buffers())
 
 
-class Emissions(NamedTuple):
-    """The emitters of one slice in a call, in the order of the updates.
-
-    Attributes:
-        emitters: (n, 2), nodes.
-        receivers: (rings, nrx, 2), nodes.
-        ring: (n,), whose receivers an emitter has.
-        delta_tof: (n, nrx), s beyond water; NaN where there is none.
-    """
-
-    emitters: Floats
-    receivers: Floats
-    ring: Ints
-    delta_tof: Floats
-
-
-class Update(NamedTuple):
-    """How the slices are updated.
-
-    Attributes:
-        curved: whether rays are bent.
-        spacing: m.
-        crossing_s: time of a node in water, s.
-        members: emitters in one update.
-        weights: of the Gaussian, from its middle outwards.
-        bounds: lowest and highest slowness, s/m.
-    """
-
-    curved: bool
-    spacing: float
-    crossing_s: float
-    members: int
-    weights: Float32s
-    bounds: tuple[float, float]
-
-
-class Residuals(NamedTuple):
-    """Residuals of one slice.
-
-    Attributes:
-        squares: (n,), sum of each emitter's squared residuals, s².
-        bins: histogram over ``RESIDUAL_EDGES_S``.
-    """
-
-    squares: Floats
-    bins: Ints
-
-
 def slices_in_flight(session: Session, size: SliceSize) -> int:
     """Slices that the device holds together.
 
@@ -161,46 +117,46 @@ class DeviceSlices:
 
     Args:
         session: the device.
+        problems: of the slices; all with as many nodes and receivers.
+        batches: emitters of each slice, in the order of the updates.
         slowness, coverage: (slices, nx, ny), s/m and m of ray.
-        region: as ``slowness``, nodes that may change.
-        emissions: of each slice; all with as many receivers.
-        update: what happens to all.
-        scales: (slices,), relaxation of each.
+        settings: of all slices.
     """
 
     def __init__(
         self,
         session: Session,
+        problems: Sequence[Problem],
+        batches: Sequence[Ints],
         slowness: Floats,
         coverage: Floats,
-        region: Any,
-        emissions: Sequence[Emissions],
-        update: Update,
-        scales: Floats,
+        settings: Settings,
     ) -> None:
-        self._session, self._update = session, update
+        first = problems[0]
+        self._session, self._settings, self._problem = session, settings, first
+        self._weights = gaussian(settings.numerics.smoothing_nodes)
         slices, nx, ny = slowness.shape
-        self._shape, self._nodes, self._passes = (nx, ny), nx * ny, slices * update.members
-        self._emitters = max(len(emission.emitters) for emission in emissions)
-        self._rings, self._receivers = emissions[0].receivers.shape[:2]
+        self._shape, self._nodes, self._passes = (nx, ny), nx * ny, slices * settings.numerics.subset
+        self._emitters = max(map(len, batches))
+        self._rings, self._receivers = first.receivers.shape[:2]
         self._most = LONGEST * (nx + ny)
         self._group = next(group for group in GROUPS if group <= session.handle.max_work_group_size)
-        self._numbers = np.array([len(emission.emitters) for emission in emissions], np.uint32)
-        up, reserve = session.upload, session.reserve
+        self._numbers = np.array([len(batch) for batch in batches], np.uint32)
+        up, reserve, each = session.upload, session.reserve, list(zip(problems, batches, strict=True))
         grids, rays = self._passes * self._nodes, self._passes * self._receivers
         fields = reserve(16 * grids)
         # By their names in the kernels.
         self._buffers = {
             "slowness": up(np.ascontiguousarray(slowness)),
             "coverage": up(np.ascontiguousarray(coverage)),
-            "region": up(np.ascontiguousarray(region, np.uint8)),
+            "region": up(np.stack([problem.region for problem in problems]).astype(np.uint8)),
             "numbers": up(self._numbers),
-            "sources": up(self._padded([emission.emitters for emission in emissions], 0.0)),
-            "times": up(self._padded([emission.delta_tof for emission in emissions], np.nan)),
-            "ring": up(self._padded([emission.ring for emission in emissions], 0).astype(np.int32)),
-            "receivers": up(np.stack([emission.receivers for emission in emissions])),
-            "scales": up(scales / update.spacing),
-            "weights": up(update.weights),
+            "sources": up(self._padded([p.emitters[batch] / p.spacing for p, batch in each], 0.0)),
+            "times": up(self._padded([p.delta_tof[batch] for p, batch in each], np.nan)),
+            "ring": up(self._padded([p.ring[batch] for p, batch in each], 0).astype(np.int32)),
+            "receivers": up(np.stack([problem.receivers / problem.spacing for problem in problems])),
+            "scales": up(np.full(slices, settings.numerics.relaxation / first.spacing)),
+            "weights": up(self._weights),
             "edges": up(RESIDUAL_EDGES_S),
             "crossings": reserve(8 * grids),
             "deviation": reserve(8 * grids),
@@ -221,7 +177,7 @@ class DeviceSlices:
     def run(self) -> None:
         """Enqueue the updates by all emitters."""
         kernels = self._kernels()
-        for step in range(-(-self._emitters // self._update.members)):
+        for step in range(-(-self._emitters // self._settings.numerics.subset)):
             for kernel, size, group in kernels:
                 kernel.set_from({"step": np.uint32(step)})
                 self._session.launch(kernel, size, group)
@@ -234,15 +190,17 @@ class DeviceSlices:
         self._session.download(coverage, self._buffers["coverage"])
         return slowness, coverage
 
-    def residuals(self) -> list[Residuals]:
-        """Residuals of each slice, before the updates."""
+    def residuals(self) -> list[tuple[Floats, Ints]]:
+        """Residuals of each slice before the updates.
+
+        Returns:
+            Sum of each emitter's squared residuals, s², and the histogram over ``RESIDUAL_EDGES_S``.
+        """
         squares = np.empty((len(self._numbers), self._emitters))
         bins = np.empty((len(self._numbers), RESIDUAL_EDGES_S.size - 1), np.uint32)
         self._session.download(squares, self._buffers["squares"])
         self._session.download(bins, self._buffers["bins"])
-        return [
-            Residuals(squares[k, :number], bins[k].astype(np.int64)) for k, number in enumerate(self._numbers)
-        ]
+        return [(squares[k, :number], bins[k].astype(np.int64)) for k, number in enumerate(self._numbers)]
 
     def _padded(self, rows: Sequence[Any], value: float) -> Any:
         """(slices, emitters, …) from the rows of each slice."""
@@ -253,28 +211,29 @@ class DeviceSlices:
 
     def _kernels(self) -> list[Launch]:
         """The launches of one update, in order; their argument ``step`` is the number of the update."""
-        (nx, ny), update, session = self._shape, self._update, self._session
+        (nx, ny), problem, session = self._shape, self._problem, self._session
         passes, nodes, slices, group = self._passes, self._nodes, len(self._numbers), self._group
         over_nodes, over_images = (_filled(nodes), passes), (_filled(nodes), slices)
         over_rays, rays_group = (_filled(self._receivers, RAYS_GROUP), passes), (RAYS_GROUP, 1)
+        curved = self._settings.rays == "curved"
         numbers = {
             "nx": np.int32(nx),
             "ny": np.int32(ny),
             "nj": np.int32(nx),
             "nk": np.int32(ny),
             "nodes": np.int32(nodes),
-            "reach": np.int32(update.weights.size - 1),
-            "members": np.uint32(update.members),
+            "reach": np.int32(self._weights.size - 1),
+            "members": np.uint32(self._settings.numerics.subset),
             "emitters": np.uint32(self._emitters),
             "count": np.uint32(self._receivers),
             "rings": np.uint32(self._rings),
             "most": np.uint32(self._most),
             "edge_count": np.uint32(RESIDUAL_EDGES_S.size),
-            "spacing": np.float64(update.spacing),
-            "water": np.float64(update.crossing_s),
-            "curved": np.int32(update.curved),
+            "spacing": np.float64(problem.spacing),
+            "water": np.float64(problem.spacing / problem.water_speed),
+            "curved": np.int32(curved),
             "step": np.uint32(0),
-            **dict(zip(("lowest", "highest"), map(np.float64, update.bounds), strict=True)),
+            **dict(zip(("lowest", "highest"), map(np.float64, bounds_of(self._settings)), strict=True)),
         }
 
         def kernel(name: str, **own: Any) -> DeviceKernel:
@@ -290,7 +249,7 @@ class DeviceSlices:
             (kernel("blur"), over_images, None),
             (kernel("apply"), over_images, None),
         ]
-        if update.curved:
+        if curved:
             front = kernel("front", ring=local_memory(ring_bytes(ny)))
             launches.insert(1, (front, (passes * group,), (group,)))
         return launches

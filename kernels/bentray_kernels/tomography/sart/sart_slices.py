@@ -14,10 +14,8 @@ from ...opencl.session import Session
 from ..problem import Problem
 from ..settings import Settings
 from ..solver_choice import sart_engine
-from .device_slices import DeviceSlices, Emissions, SliceSize, Update, slices_in_flight
-from .emitter_pass import gaussian
+from .device_slices import DeviceSlices, SliceSize, slices_in_flight
 from .sart_step import State, advance, advanced, batch_of
-from .sart_update import bounds_of
 
 
 class SliceCall(NamedTuple):
@@ -89,51 +87,27 @@ def slice_size(calls: Sequence[SliceCall], settings: Settings) -> SliceSize:
 
 
 def _advance(session: Session, calls: Sequence[SliceCall], settings: Settings) -> list[State]:
-    first, emissions, before = calls[0].problem, [], []
+    first, batches, before = calls[0].problem, [], []
     for call in calls:
         problem, state = call.problem, call.state
         if problem.region.shape != first.region.shape or problem.receivers.shape != first.receivers.shape:
             raise InvalidInput("slices", problem.region.shape, "slices with as many nodes and receivers")
-        batch = batch_of(problem, settings, state, call.emitters, call.slice_index)
-        emissions.append(
-            Emissions(
-                problem.emitters[batch] / problem.spacing,
-                problem.receivers / problem.spacing,
-                problem.ring[batch],
-                problem.delta_tof[batch],
-            )
-        )
+        batches.append(batch_of(problem, settings, state, call.emitters, call.slice_index))
         before.append(np.zeros_like(state.slowness) if state.emitter == 0 else state.coverage)
-    update = Update(
-        settings.rays == "curved",
-        first.spacing,
-        first.spacing / first.water_speed,
-        settings.numerics.subset,
-        gaussian(settings.numerics.smoothing_nodes),
-        bounds_of(settings),
-    )
+    begun = np.stack([call.state.slowness for call in calls]).astype(np.float64), np.stack(before)
     with session.lock:
-        slices = DeviceSlices(
-            session,
-            np.stack([call.state.slowness for call in calls]).astype(np.float64),
-            np.stack(before),
-            np.stack([call.problem.region for call in calls]),
-            emissions,
-            update,
-            np.full(len(calls), settings.numerics.relaxation),
-        )
+        slices = DeviceSlices(session, [call.problem for call in calls], batches, *begun, settings)
         slices.run()
         slowness, coverage = slices.images()
         residuals = slices.residuals()
     states = []
-    for k, (call, residual) in enumerate(zip(calls, residuals, strict=True)):
+    for call, *images, (of_emitters, bins) in zip(calls, slowness, coverage, residuals, strict=True):
         squares = call.state.squares
         # One by one, so that the sum does not depend on how the emitters are distributed over calls.
-        for value in residual.squares:
+        for value in of_emitters:
             squares += float(value)
-        images, number = (slowness[k], coverage[k]), len(residual.squares)
-        state = advanced(
-            call.problem, settings, call.state, number, images, squares, residual.bins, call.slice_index
+        number, both = len(of_emitters), (images[0], images[1])
+        states.append(
+            advanced(call.problem, settings, call.state, number, both, squares, bins, call.slice_index)
         )
-        states.append(state)
     return states

@@ -10,27 +10,22 @@ Bardsley et al. 2014); ξ = 0 and the residuals in place of ε give its mean.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 from scipy.fft import dctn, idctn
 from scipy.ndimage import gaussian_filter1d
 
 from ...arrays import Floats
-from ..gauss_newton.linear_problem import CURVATURE, MIN_ENTRIES
-from ..gauss_newton.linearisation import Rows, halves
+from ..gauss_newton.linear_problem import CURVATURE
+from ..gauss_newton.linearisation import Map, Rows, halves, map_halves
 from ..gauss_newton.penalties import roughness
 from .probe_product import LANES, back_projections, normal_products
 
 # Most conjugate gradient steps, and the relative gradient at which they end; more did not better the score.
 MAX_STEPS, TOLERANCE = 20, 1e-2
-
-Map = Callable[..., Iterable[Any]]
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,7 @@ class Posterior:
         into = np.zeros((self.deviation.size, LANES))
         for block, weight, values in zip(self.parts, self.weights, noise, strict=True):
             back_projections(block.pointers, block.columns, block.lengths, weight[:, None] * values, into)
-        with self._by_threads() as spread:
+        with map_halves(self.parts) as spread:
             return self._image(self._solved(prior + self._coefficients(into), spread))
 
     def _solved(self, right: Floats, spread: Map) -> Floats:
@@ -145,15 +140,6 @@ class Posterior:
         variance = float((self.deviation[self.deviation > 0.0] ** 2).mean())
         data = weight * variance * self.density * CURVATURE / np.sqrt(squares)
         return np.asarray(1.0 / (1.0 + self._root**2 * data))
-
-    @contextmanager
-    def _by_threads(self) -> Iterator[Map]:
-        """A ``map`` that computes both halves at the same time where that is worth a thread."""
-        if sum(block.columns.size for block in self.parts) < MIN_ENTRIES:
-            yield map
-            return
-        with ThreadPoolExecutor(2, "uncertainty") as pool:
-            yield pool.map
 
 
 def _products(probes: Floats, half: Sequence[Rows], weights: Sequence[Floats]) -> Floats:

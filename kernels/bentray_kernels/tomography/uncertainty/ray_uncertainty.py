@@ -91,7 +91,7 @@ def ray_uncertainty(
     limit = huber.limit(residual, settings.numerics.huber_scale)
     # Exact times of an image without error have no noise: a hundredth of a nanosecond is none.
     noise = max(huber.clipped_rms(residual, limit), problem.noise_s, 1e-11)
-    weights = [_huber_weights(block.residual, limit) / noise**2 for block in blocks]
+    weights = [huber.weights(block.residual, limit) / noise**2 for block in blocks]
     density = ray_density(problem, blocks)
     posterior = Posterior(
         blocks,
@@ -118,13 +118,6 @@ def ray_uncertainty(
     )
     deviation = np.where(region, np.sqrt(errors_of_model.added_to(squares)), 0.0)
     return Uncertainty(deviation, width * spacing, errors_of_model.caution)
-
-
-def _huber_weights(residual: Floats, limit: float) -> Floats:
-    """Less than 1 beyond the limit, as in a Gauss–Newton step."""
-    if limit == np.inf:
-        return np.ones_like(residual)
-    return np.asarray(limit / np.maximum(np.abs(residual), limit))
 
 
 def _prior(problem: Problem, slowness: Floats) -> Floats:

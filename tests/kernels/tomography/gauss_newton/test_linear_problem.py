@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csr_array, diags_array, eye_array, kron, random_array
 
-from bentray_kernels.tomography.gauss_newton import linear_problem
+from bentray_kernels.tomography.gauss_newton import linear_problem, linearisation
 from bentray_kernels.tomography.gauss_newton.linear_problem import Linearised, smoothing
 from bentray_kernels.tomography.gauss_newton.linearisation import Rows
 from bentray_kernels.tomography.gauss_newton.penalties import adjoint, gradient, laplacian, shrink
@@ -225,7 +225,7 @@ def test_two_threads_give_the_bits_of_one(penalty, monkeypatch):
         return curvature(*args)
 
     monkeypatch.setattr(linear_problem, "_curvature", seen)
-    monkeypatch.setattr(linear_problem, "MIN_ENTRIES", 0)
+    monkeypatch.setattr(linearisation, "MIN_ENTRIES", 0)
     both, both_dual = asked.solve(dual)
     assert names
     assert threading.current_thread().name not in names

@@ -33,7 +33,16 @@ def problem():
         times = rays.travel_times(tof, 1.0 / slowness, SPACING, ring[others], source)
         delta[k, others] = times - np.linalg.norm(ring[others] - source, axis=1) / WATER
     region = np.ones((NODES, NODES), dtype=bool)
-    return Problem(ring, ring[None], np.zeros(12, int), delta, region, SPACING, (0.0, 0.0), WATER)
+    return Problem(
+        ring,
+        ring[None],
+        np.zeros(12, int),
+        delta,
+        region=region,
+        spacing=SPACING,
+        origin=(0.0, 0.0),
+        water_speed=WATER,
+    )
 
 
 def dense(rows):
@@ -95,7 +104,16 @@ def test_rays_of_a_ring_in_a_volume_stay_at_its_height():
     )
     delta = np.where(np.eye(6, dtype=bool), np.nan, 0.0)
     region = np.ones((nodes, nodes, heights), dtype=bool)
-    volume = Problem(ring, ring[None], np.zeros(6, int), delta, region, SPACING, (0.0,) * 3, WATER)
+    volume = Problem(
+        ring,
+        ring[None],
+        np.zeros(6, int),
+        delta,
+        region=region,
+        spacing=SPACING,
+        origin=(0.0,) * 3,
+        water_speed=WATER,
+    )
     rows = linearise(
         volume, Settings(method="sart", rays="straight"), np.full(region.shape, 1 / WATER), np.arange(6)
     )

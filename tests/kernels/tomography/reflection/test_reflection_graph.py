@@ -21,7 +21,7 @@ from bentray_kernels.tomography.reflection.echoes import (
 from bentray_kernels.tomography.reflection.element_times import solve_times, times_between
 from bentray_kernels.tomography.reflection.reflection_graph import ReflectionGraph, echo_signals
 from bentray_kernels.tomography.reflection.reflection_plan import plan_reflection
-from bentray_kernels.tomography.scan import EchoScan, MemorySource
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.solver_choice import echo_engine, needs_device
 
 from ..graph_runs import run_in_random_order
@@ -56,7 +56,7 @@ def begun(dataset=None, settings=SETTINGS):
     corner = -1.1 * RADIUS
     speed = np.full((23, 23), WATER)
     plan = plan_reflection(dataset, settings, speed, -corner / 11.0, (corner, corner))
-    return ReflectionGraph(EchoScan(MemorySource(dataset), 0), plan, 400, RATE_HZ)
+    return ReflectionGraph((MemorySource(dataset), 0), plan, 400, RATE_HZ)
 
 
 @pytest.fixture

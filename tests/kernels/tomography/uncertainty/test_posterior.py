@@ -7,6 +7,7 @@ import pytest
 from scipy.sparse import random_array
 
 from bentray_kernels.tomography.finite_frequency import blurred
+from bentray_kernels.tomography.gauss_newton import linearisation
 from bentray_kernels.tomography.gauss_newton.linearisation import Rows
 from bentray_kernels.tomography.uncertainty import posterior as module
 from bentray_kernels.tomography.uncertainty.posterior import Posterior
@@ -91,7 +92,7 @@ def test_threads_do_not_change_the_bits():
     posterior = problem(0.0)
     noise = [np.ones((w.size, LANES)) for w in posterior.weights]
     alone = posterior.solutions(noise, np.ones((LANES, *SHAPE)))
-    with patch.object(module, "MIN_ENTRIES", 0):
+    with patch.object(linearisation, "MIN_ENTRIES", 0):
         assert np.array_equal(posterior.solutions(noise, np.ones((LANES, *SHAPE))), alone)
 
 

@@ -149,10 +149,10 @@ def row_sums(residual, noise_s=0.0):
         nowhere[None],
         np.zeros(1, np.int64),
         np.zeros((1, 1)),
-        np.ones((nodes, nodes), bool),
-        1e-3,
-        (0.0, 0.0),
-        WATER,
+        region=np.ones((nodes, nodes), bool),
+        spacing=1e-3,
+        origin=(0.0, 0.0),
+        water_speed=WATER,
         noise_s=noise_s,
     )
     pointers = nodes * np.arange(nodes + 1, dtype=np.int64)

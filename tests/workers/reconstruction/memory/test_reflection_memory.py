@@ -12,7 +12,7 @@ from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.reflection.reflection_graph import ReflectionGraph
 from bentray_kernels.tomography.reflection.reflection_plan import plan_reflection
-from bentray_kernels.tomography.scan import EchoScan, MemorySource
+from bentray_kernels.tomography.scan import MemorySource
 from bentray_workers.cluster.capacities import MIB
 from bentray_workers.files.dataset.counts import DatasetCounts
 from bentray_workers.reconstruction.memory.reflection_memory import (
@@ -70,7 +70,7 @@ def test_tasks_allocate_what_is_planned(elements, samples, water, changes):
     corner = -1.1 * RADIUS
     speed = np.full((nodes, nodes), WATER)
     plan = plan_reflection(dataset, settings, speed, -2.0 * corner / (nodes - 1), (corner, corner))
-    graph = ReflectionGraph(EchoScan(MemorySource(dataset), 0), plan, samples, RATE_HZ)
+    graph = ReflectionGraph((MemorySource(dataset), 0), plan, samples, RATE_HZ)
     summary = DatasetCounts.from_dataset(dataset).summary(settings)
     planned = reflection_task_bytes(summary, settings)
     tasks, taken = graph.first(), {}
