@@ -12,7 +12,7 @@ from distributed import Client
 
 from bentray_kernels.meshes.example_surfaces import sphere
 from bentray_kernels.tomography import Settings
-from bentray_workers.files.dataset.summary import summary_of
+from bentray_workers.files.dataset.scan import counts_in
 from bentray_workers.files.export.registry import EXPORTED
 from bentray_workers.files.geometry_field_folder import FieldFiles, read_json
 from bentray_workers.files.mesh import StoredMesh, write_mesh
@@ -79,7 +79,7 @@ def by_traces(asked: dict[str, Any], client: Client, folder: Path, elements: int
 def _reconstructed(client: Client, path: Path, asked: dict[str, Any]) -> Bytes:
     settings = Settings.from_values(**{"method": "sart", "decomposition": "slices", **asked})
     reconstruct(client, path, settings)
-    return dict(plan(summary_of(path, settings), settings, ()).call_bytes)
+    return dict(plan(counts_in(path).summary(settings), settings, ()).call_bytes)
 
 
 def by_phantom(asked: dict[str, Any], client: Client, folder: Path, size: dict[str, Any]) -> Bytes:

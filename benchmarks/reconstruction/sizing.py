@@ -13,7 +13,7 @@ from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.cluster.capacities import MIB, WARM_BYTES
 from bentray_workers.cluster.connection import open_cluster
-from bentray_workers.files.dataset.summary import summary_of
+from bentray_workers.files.dataset.scan import counts_in
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction.planning import plan
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
@@ -74,7 +74,7 @@ def measured(folder: Path, size: Size) -> Iterable[Row]:
         result = reconstruct(cluster.client, path, settings, work_dir=work, on_saved=saved)
         peak, after = (of_worker(cluster.client, figure) for figure in (peak_bytes, process_time))
     write_reconstruction(volume, result)
-    planned = plan(summary_of(path, settings), settings, ())
+    planned = plan(counts_in(path).summary(settings), settings, ())
     files = {"scan": path.stat().st_size, "checkpoints": stored, "volume": volume.stat().st_size}
     figures = {
         "elements": size.elements,

@@ -18,7 +18,7 @@ from bentray_service.cli.output.benchmark_row import Row
 from bentray_workers.cluster.capacities import MIB
 from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.files.dataset.summary import summary_of
+from bentray_workers.files.dataset.scan import counts_in
 from bentray_workers.reconstruction.planning import plan
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
 
@@ -73,8 +73,8 @@ def rows(context: BenchmarkContext) -> Iterable[Row]:
 def compared(path: Path, settings: Settings, divided: Run, runs: dict[str, Run]) -> Iterable[Row]:
     """Rows of one number of blocks."""
     whole, default = runs["whole"], runs["accurate"]
-    planned = plan(summary_of(path, settings), settings, ())
-    undivided = plan(summary_of(path, settings), settings.changed(blocks=1), ())
+    planned = plan(counts_in(path).summary(settings), settings, ())
+    undivided = plan(counts_in(path).summary(settings), settings.changed(blocks=1), ())
     shape = " x ".join(str(n) for n in whole.result.speed.shape)
     name = f"SART of a volume of {shape} in {settings.numerics.blocks} blocks"
     yield Row(

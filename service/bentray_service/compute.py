@@ -13,7 +13,7 @@ from bentray_workers.cluster.connected import connected_workers
 from bentray_workers.cluster.scheduler_load import SchedulerLoad, load_of
 from bentray_workers.cluster.worker_health import WorkerHealth, health_of
 from bentray_workers.files.dataset.counts import DatasetCounts
-from bentray_workers.files.dataset.summary import counts_in
+from bentray_workers.files.dataset.scan import counts_in
 from bentray_workers.reconstruction import planning
 from bentray_workers.rendering import turntable_planning
 from bentray_workers.rendering.refraction_view import check_even
@@ -100,7 +100,7 @@ class Compute:
         """Plan the reconstruction of a dataset on the connected workers.
 
         Args:
-            counts: from ``files.dataset.record.record_of``; None, or without a centre frequency: they
+            counts: from ``files.dataset.counts.record_of``; None, or without a centre frequency: they
                 are read from the file.
             path: of the file.
             settings: of the reconstruction.

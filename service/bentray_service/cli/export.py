@@ -54,14 +54,14 @@ def export(
     check_apart({"output": target}, {"result": source})
 
     from bentray_workers.files.atomic import atomic_replace
-    from bentray_workers.files.hdf5_reading import Limits, opened
+    from bentray_workers.files.hdf5_reading import opened
     from bentray_workers.files.volume_export import Selection, export_volume
 
     selection = Selection(quantity, attenuation, frequency)
     if name == "hdf5":
         if selection.attenuation != "Np/m":
             raise InvalidInput("attenuation", attenuation, "Np/m, which HDF5 results hold, or another format")
-        with opened(source, Limits()), atomic_replace(target) as partial:
+        with opened(source), atomic_replace(target) as partial:
             shutil.copyfile(source, partial)
     else:
         export_volume(source, target=target, name=name, selection=selection)

@@ -18,7 +18,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bentray_workers.files.dataset.record import record_of, text
+from bentray_workers.files.dataset.counts import record_of, text
 
 if TYPE_CHECKING:
     from bentray_workers.files.volume import Volume

@@ -16,7 +16,7 @@ from bentray_kernels.acquisition import Dataset, Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.atomic import atomic_replace
 from bentray_workers.files.dataset import read_dataset
-from bentray_workers.files.dataset.traces import trace_samples
+from bentray_workers.files.dataset.scan import trace_samples
 
 from ..html_tables import figures_html
 

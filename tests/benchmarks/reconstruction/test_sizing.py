@@ -9,7 +9,7 @@ from benchmarks.reconstruction.sizing import SIZES, Size, measured, settings_of
 from benchmarks.shared._synthetic_scan import made_up_scan
 
 from bentray_workers.cluster.capacities import MIB
-from bentray_workers.files.dataset.summary import summary_of
+from bentray_workers.files.dataset.scan import counts_in
 from bentray_workers.reconstruction.planning import plan
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -24,7 +24,7 @@ RECORDED = {row["target"]: row for row in json.loads(ROWS.read_text())}
 def test_present_plans_cover_what_was_measured(size: Size, tmp_path: Path) -> None:
     settings = settings_of(size)
     scan = made_up_scan(tmp_path / "scan.h5", size.elements, size.slices)
-    planned = plan(summary_of(scan, settings), settings, ())
+    planned = plan(counts_in(scan).summary(settings), settings, ())
     memory, disk = RECORDED[f"sizing {size}{MEMORY}"], RECORDED[f"sizing {size}{DISK}"]
     assert memory["value"] <= planned.largest[1] / MIB
     assert disk["value"] <= planned.stored_bytes / MIB

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentray_service.ingest import ingest_process
-from bentray_workers.files.dataset.record import LONGEST_TEXT
+from bentray_workers.files.dataset.counts import LONGEST_TEXT
 
 
 def test_summary_of_a_good_file(scan, tmp_path):

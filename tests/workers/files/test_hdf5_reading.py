@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.dataset import Limits, read_dataset, write_dataset
-from bentray_workers.files.hdf5_reading import opened
+from bentray_workers.files.dataset import read_dataset, write_dataset
+from bentray_workers.files.dataset.read import dataset_of, waveform_in
+from bentray_workers.files.hdf5_reading import Limits, opened
 
 from .datasets import small
 
@@ -70,8 +71,8 @@ def test_unknown_members_are_not_opened(tmp_path):
 def test_the_limits_are_the_callers(tmp_path, limits, field):
     path = tmp_path / "d.h5"
     write_dataset(path, small())
-    with pytest.raises(InvalidInput) as refused:
-        read_dataset(path, limits=limits)
+    with pytest.raises(InvalidInput) as refused, opened(path, limits) as reader:
+        dataset_of(reader, waveform_in)
     assert refused.value.field == field
 
 
@@ -88,7 +89,7 @@ def test_text_is_made_printable(tmp_path):
 def test_the_file_is_closed_again(tmp_path):
     path = tmp_path / "d.h5"
     write_dataset(path, small())
-    with opened(path, Limits()) as reader:
+    with opened(path) as reader:
         assert reader.has("geometry")
         assert not reader.has("geometry/nothing")
     with h5py.File(path, "a"):
@@ -105,5 +106,5 @@ def test_a_file_that_is_deleted_while_it_is_opened_is_rejected(tmp_path, monkeyp
         return whole(name, *mode, **how)
 
     monkeypatch.setattr(h5py, "File", delete_first)
-    with pytest.raises(InvalidInput, match="accepted: a whole HDF5 file"), opened(path, Limits()):
+    with pytest.raises(InvalidInput, match="accepted: a whole HDF5 file"), opened(path):
         pass

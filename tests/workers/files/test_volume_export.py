@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_kernels.tomography import Reconstruction
 from bentray_workers.files import volume_export
 from bentray_workers.files.export import npy_writing
 from bentray_workers.files.export.content import Content
@@ -46,13 +47,13 @@ def test_a_volume_deleted_during_its_export_is_named(
 def test_a_volume_deleted_after_it_was_read_is_named(
     stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    read = volume_export.read_volume
+    read = volume_export.read_image
 
-    def read_and_delete(path: Path) -> Volume:
+    def read_and_delete(path: Path) -> Reconstruction | Volume:
         result = read(path)
         path.unlink()
         return result
 
-    monkeypatch.setattr(volume_export, "read_volume", read_and_delete)
+    monkeypatch.setattr(volume_export, "read_image", read_and_delete)
     with pytest.raises(InvalidInput, match="volume: found one that was deleted during its export"):
         export_volume(stored, target=tmp_path / "volume.npy", name="npy")

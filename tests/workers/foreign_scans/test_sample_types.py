@@ -10,7 +10,7 @@ from scipy.io import savemat
 
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset
-from bentray_workers.files.hdf5_reading import Limits, opened
+from bentray_workers.files.hdf5_reading import opened
 from bentray_workers.foreign_scans import convert_dataset
 
 from .hdf5_scans import EMITTERS, openusct_fields, write_fields, zea_fields
@@ -121,7 +121,7 @@ def test_complex_numbers_in_hdf5_are_no_records(tmp_path: Path, names: tuple[str
     with h5py.File(tmp_path / "v.h5", "w") as file:
         file["values"], file["records"] = parts, np.zeros(3, [("x", "f4"), ("y", "f4")])
         file.attrs["rate"] = parts[0]
-    with opened(tmp_path / "v.h5", Limits()) as reader:
+    with opened(tmp_path / "v.h5") as reader:
         for read in (lambda: reader.array("values", "f", "numbers"), lambda: reader.attribute("", "rate")):
             with pytest.raises(InvalidInput, match=r"found complex numbers \(complex64\)"):
                 read()

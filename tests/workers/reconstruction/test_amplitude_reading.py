@@ -10,7 +10,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.files.dataset import write_dataset
-from bentray_workers.files.dataset.summary import summary_of
+from bentray_workers.files.dataset.scan import counts_in
 from bentray_workers.reconstruction import reconstruction_run
 from bentray_workers.reconstruction.memory import picking_memory
 
@@ -42,10 +42,10 @@ def test_jobs_read_the_same_amplitudes_as_in_memory(lossy, tmp_path, monkeypatch
         np.testing.assert_array_equal(found.attenuation, expected.attenuation)
         np.testing.assert_array_equal(found.speed, expected.speed)
         for settings, reads in ((plan, True), (PLAN, False)):
-            summary = summary_of(path, settings)
+            summary = counts_in(path).summary(settings)
             assert summary.amplitudes is reads
             # Those of a scan with times are examined.
-            assert summary_of(path, settings.changed(examine=True)).traces_bytes > 0
+            assert counts_in(path).summary(settings.changed(examine=True)).traces_bytes > 0
             assert (summary.traces_bytes > 0) is (reads or name == "traces")
     assert reconstruction_run.reconstruct(None, tmp_path / "times.h5", PLAN).attenuation is None
 

@@ -25,7 +25,7 @@ from bentray_kernels.tomography import Settings
 from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import DatasetCounts
-from bentray_workers.files.dataset.summary import counts_in
+from bentray_workers.files.dataset.scan import counts_in
 from bentray_workers.reconstruction.planning import plan
 from bentray_workers.simulation.parts import count_of, parts_of
 from bentray_workers.simulation.request import PhantomScan

@@ -11,7 +11,7 @@ from bentray_kernels.wave import time_blocks
 from bentray_workers.cluster.job_cancellation import JobEnded
 from bentray_workers.cluster.task_retries import ResultsLostError
 from bentray_workers.files.dataset import read_dataset
-from bentray_workers.files.dataset.record import record_of
+from bentray_workers.files.dataset.counts import record_of
 from bentray_workers.simulation import parts
 from bentray_workers.simulation.parts import folder_of, make_part, parts_of
 from bentray_workers.simulation.request import PhantomScan

@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 from bentray_kernels.meshes.mesh import Chart, TriangleMesh
 
 from .atomic import atomic_replace, write_bytes
-from .hdf5_reading import Limits, opened
+from .hdf5_reading import opened
 from .hdf5_writing import atomic_hdf5
 from .npy_headers import PARSING, read_header
 
@@ -54,7 +54,7 @@ def read_chart(path: Path) -> Chart:
     Raises:
         InvalidInput: naming the missing array.
     """
-    with opened(path, Limits()) as reader:
+    with opened(path) as reader:
         vertices, faces, uv = (
             reader.required(name, "fi", "an array") for name in ("vertices", "faces", "uv")
         )

@@ -14,7 +14,7 @@ from bentray_kernels.arrays import Flags, Floats
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.image.geometry_image import GeometryImage
 
-from .hdf5_reading import Limits, Reader, opened
+from .hdf5_reading import Reader, opened
 from .hdf5_writing import atomic_hdf5
 
 FORMAT = "bentray-geometry-image"
@@ -63,13 +63,13 @@ def write_geometry_image(path: Path, maps: GeometryMaps) -> None:
             file.create_dataset(name, data=values, compression="gzip", shuffle=True, track_times=False)
 
 
-def read_geometry_image(path: Path, limits: Limits | None = None) -> GeometryMaps:
+def read_geometry_image(path: Path) -> GeometryMaps:
     """Read what ``write_geometry_image`` wrote.
 
     Raises:
         InvalidInput: naming the first field that is missing or wrong.
     """
-    with opened(path, limits or Limits()) as reader:
+    with opened(path) as reader:
         reader.check_format(FORMAT, VERSION)
         positions = _map(reader, "positions")
         normals = _map(reader, "normals")

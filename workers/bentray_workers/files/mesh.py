@@ -13,7 +13,7 @@ from bentray_kernels.arrays import Floats
 from bentray_kernels.meshes.defects import SoundMesh
 from bentray_kernels.meshes.mesh import TriangleMesh
 
-from .hdf5_reading import Limits, opened
+from .hdf5_reading import opened
 from .hdf5_writing import atomic_hdf5
 
 FORMAT = "bentray-mesh"
@@ -100,7 +100,7 @@ def load_mesh(path: Path) -> StoredMesh:
     Raises:
         InvalidInput: naming the first field that is missing or wrong.
     """
-    with opened(path, Limits()) as reader:
+    with opened(path) as reader:
         reader.check_format(FORMAT, VERSION)
         vertices = reader.required("vertices", "f", "(vertices, 3) numbers")
         faces = reader.required("faces", "i", "(faces, 3) rows of the vertices")

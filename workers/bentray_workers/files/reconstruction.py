@@ -24,7 +24,7 @@ from bentray_kernels.tomography.result import Reflection
 from bentray_kernels.tomography.stored_settings import from_stored
 
 from .dataset.write import write_array
-from .hdf5_reading import Limits, Reader, opened
+from .hdf5_reading import Reader, opened
 from .hdf5_writing import atomic_hdf5
 from .quantities import IMAGES, REFLECTION
 from .reconstruction_format import FORMAT, VERSION
@@ -90,41 +90,46 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
             write_array(residuals, "edge_s", RESIDUAL_EDGES_S)
 
 
-def read_reconstruction(path: Path, *, limits: Limits | None = None) -> Reconstruction:
+def read_reconstruction(path: Path) -> Reconstruction:
     """Read a reconstruction.
 
     Raises:
         InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.
     """
-    with opened(Path(path), limits or Limits()) as reader:
-        reader.check_format(FORMAT, VERSION)
-        speed = _image(reader, "speed_mps", None)
-        coverage = _image(reader, "coverage_m", speed.shape)
-        extra = {
-            name: _image(reader, IMAGES[name], speed.shape) if reader.has(IMAGES[name]) else None
-            for name in IMAGES
-            if name not in ("speed", "coverage")
-        }
-        water = reader.number("", "water_speed_mps", "m/s")
-        if water is None:
-            raise InvalidInput("@water_speed_mps", "nothing", "a speed in m/s")
-        provenance = {str(k): str(v) for k, v in _json(reader, "provenance").items()}
-        return Reconstruction(
-            speed=speed,
-            coverage=coverage,
-            **extra,
-            resolution_width_m=_widths(reader),
-            reflection=_reflection(reader, speed.shape[2:]),
-            spacing_m=_per_axis(reader, "spacing_m", speed.ndim),
-            origin_m=_per_axis(reader, "origin_m", speed.ndim),
-            water_speed_mps=water,
-            settings=_settings(_json(reader, "settings"), provenance),
-            history=_history(reader),
-            residuals=_residuals(reader),
-            trials=_trials(reader),
-            cautions=_cautions(reader, provenance.pop("uncertainty", "")),
-            provenance=provenance,
-        )
+    with opened(Path(path)) as reader:
+        return reconstruction_in(reader)
+
+
+def reconstruction_in(reader: Reader) -> Reconstruction:
+    """The reconstruction in an open file; raises InvalidInput as ``read_reconstruction``."""
+    reader.check_format(FORMAT, VERSION)
+    speed = _image(reader, "speed_mps", None)
+    coverage = _image(reader, "coverage_m", speed.shape)
+    extra = {
+        name: _image(reader, IMAGES[name], speed.shape) if reader.has(IMAGES[name]) else None
+        for name in IMAGES
+        if name not in ("speed", "coverage")
+    }
+    water = reader.number("", "water_speed_mps", "m/s")
+    if water is None:
+        raise InvalidInput("@water_speed_mps", "nothing", "a speed in m/s")
+    provenance = {str(k): str(v) for k, v in _json(reader, "provenance").items()}
+    return Reconstruction(
+        speed=speed,
+        coverage=coverage,
+        **extra,
+        resolution_width_m=_widths(reader),
+        reflection=_reflection(reader, speed.shape[2:]),
+        spacing_m=_per_axis(reader, "spacing_m", speed.ndim),
+        origin_m=_per_axis(reader, "origin_m", speed.ndim),
+        water_speed_mps=water,
+        settings=_settings(_json(reader, "settings"), provenance),
+        history=_history(reader),
+        residuals=_residuals(reader),
+        trials=_trials(reader),
+        cautions=_cautions(reader, provenance.pop("uncertainty", "")),
+        provenance=provenance,
+    )
 
 
 def shape_of_quantity(path: Path, quantity: str, shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -140,7 +145,7 @@ def shape_of_quantity(path: Path, quantity: str, shape: tuple[int, ...]) -> tupl
     """
     if quantity != "reflection":
         return shape
-    with opened(Path(path), Limits()) as reader:
+    with opened(Path(path)) as reader:
         stored = reader.checked(REFLECTION, "f", "(nx, ny) or (nx, ny, nz) numbers")
         if stored is None:
             raise InvalidInput("quantity", "reflection of a result without it", "a quantity of this result")

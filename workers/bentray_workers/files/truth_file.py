@@ -15,9 +15,9 @@ from bentray_kernels.tomography import Reconstruction
 
 from .damage import rejecting_damage
 from .dataset.format import FORMAT as DATASET
-from .dataset.read import read_dataset
-from .hdf5_reading import SIGNATURE, Limits, opened
-from .reconstruction import read_reconstruction
+from .dataset.read import dataset_of
+from .hdf5_reading import SIGNATURE, opened
+from .reconstruction import reconstruction_in
 from .reconstruction_format import FORMAT as RECONSTRUCTION
 from .volume import check_shape
 from .volume_axes import PositionedImage, check_aligned
@@ -122,14 +122,14 @@ def _on_nodes(values: NDArray[Any], image: Reconstruction, spacing_m: Sequence[f
 
 def _hdf5(path: Path) -> KnownTruth | None:
     """The truth in a dataset or a reconstruction; None for other files, which ``import_volume`` reads."""
-    with opened(path, Limits()) as reader:
+    with opened(path) as reader:
         kind = reader.text("", "format")
-    if kind == DATASET:
-        dataset = read_dataset(path, traces=False)
-        if dataset.truth is None:
-            raise InvalidInput("truth", f"{path.name}, a dataset without truth", ACCEPTED)
-        return KnownTruth(dataset.truth, dataset.roi)
-    if kind == RECONSTRUCTION:
-        own = read_reconstruction(path)
-        return KnownTruth(_truth(own.speed, own.spacing_m, own.origin_m, own.attenuation))
+        if kind == DATASET:
+            dataset = dataset_of(reader, None)
+            if dataset.truth is None:
+                raise InvalidInput("truth", f"{path.name}, a dataset without truth", ACCEPTED)
+            return KnownTruth(dataset.truth, dataset.roi)
+        if kind == RECONSTRUCTION:
+            own = reconstruction_in(reader)
+            return KnownTruth(_truth(own.speed, own.spacing_m, own.origin_m, own.attenuation))
     return None

@@ -17,7 +17,7 @@ from bentray_kernels.requests.limits import SPACING_M
 from bentray_kernels.requests.ranges import Range
 
 from .complex_numbers import check_real
-from .hdf5_reading import Limits, Reader, opened, printable
+from .hdf5_reading import Reader, opened, printable
 from .hdf5_writing import atomic_hdf5
 from .volume_axes import MAX_SHEAR, Grid, PositionedImage
 
@@ -183,11 +183,11 @@ def volume_in(reader: Reader) -> Volume:
     return Volume.from_values(values, spacing, origin, reader.text("", "title") or "", direction)
 
 
-def read_volume(path: Path, limits: Limits | None = None) -> Volume:
+def read_volume(path: Path) -> Volume:
     """Read a volume.
 
     Raises:
         InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.
     """
-    with opened(Path(path), limits or Limits()) as reader:
+    with opened(Path(path)) as reader:
         return volume_in(reader)

@@ -13,10 +13,10 @@ from bentray_kernels.tomography import Reconstruction
 
 from .export.content import Content
 from .export.registry import EXPORTED, FormatName
-from .hdf5_reading import Limits, opened
+from .hdf5_reading import opened
 from .quantities import ATTENUATION_DB, IMAGES, QUANTITIES, REFLECTION
-from .reconstruction import read_reconstruction
-from .volume import FORMAT, Volume, read_volume
+from .reconstruction import reconstruction_in
+from .volume import FORMAT, Volume, volume_in
 from .volume_axes import Grid
 
 ATTENUATION = IMAGES["attenuation"]
@@ -105,9 +105,9 @@ def read_image(path: Path) -> Reconstruction | Volume:
     Raises:
         InvalidInput: naming the first field that is missing or wrong, as ``read_dataset`` does.
     """
-    with opened(path, Limits()) as reader:
+    with opened(path) as reader:
         uploaded = reader.text("", "format") == FORMAT
-    return read_volume(path) if uploaded else read_reconstruction(path)
+        return volume_in(reader) if uploaded else reconstruction_in(reader)
 
 
 def export_image(

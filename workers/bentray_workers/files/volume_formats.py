@@ -164,8 +164,7 @@ def _npz(file: IO[bytes], check: ShapeCheck) -> NDArray[Any]:
 
 
 def _hdf5(path: Path, check: ShapeCheck) -> Volume:
-    limits = Limits(total_bytes=LARGEST_BYTES)
-    with opened(path, limits) as reader:
+    with opened(path, Limits(total_bytes=LARGEST_BYTES)) as reader:
         kind = reader.text("", "format")
         array_path = "values" if kind == FORMAT else "speed_mps"
         values = reader.checked(array_path, "buif", "(nx, ny, nz) numbers")
@@ -173,12 +172,12 @@ def _hdf5(path: Path, check: ShapeCheck) -> Volume:
             check(values.shape)
         if kind == FORMAT:
             return volume_in(reader)
-    if kind != RECONSTRUCTION:
-        raise InvalidInput("@format", repr(kind), f'"{FORMAT}" or "{RECONSTRUCTION}"')
-    # Imported here, since it loads compiled code and each upload starts a process.
-    from .reconstruction import read_reconstruction
+        if kind != RECONSTRUCTION:
+            raise InvalidInput("@format", repr(kind), f'"{FORMAT}" or "{RECONSTRUCTION}"')
+        # Imported here, since it loads compiled code and each upload starts a process.
+        from .reconstruction import reconstruction_in
 
-    result = read_reconstruction(path, limits=limits)
+        result = reconstruction_in(reader)
     return Volume.from_values(result.speed, result.spacing_m, result.origin_m, "Sound speed (m/s)")
 
 

@@ -12,7 +12,6 @@ from bentray_kernels.errors import InvalidInput
 from ..files.dataset.copy import copy_dataset
 from ..files.dataset.read import kept_traces
 from ..files.dataset.write import Piece, bytes_of, write_dataset
-from ..files.hdf5_reading import Limits
 from .arrays import Arrays
 from .layouts import named_layout
 from .matlab73 import Matlab73
@@ -25,7 +24,6 @@ from .scan_reader import Layout
 def convert_dataset(
     source: Path,
     target: Path,
-    limits: Limits | None = None,
     on_size: Callable[[int], None] = lambda size: None,
     given: ScanMetadata | None = None,
 ) -> Dataset:
@@ -37,7 +35,6 @@ def convert_dataset(
     Args:
         source: of the scan.
         target: replaced atomically.
-        limits: of HDF5 files; None: the defaults of ``Limits``.
         on_size: called before writing with the largest size of ``target`` without headers, bytes.
         given: stated by the user: own names of variables, units, water and frequency.
 
@@ -49,7 +46,7 @@ def convert_dataset(
         OSError: where the folder cannot be written to or the disk is full.
     """
     given = given or ScanMetadata()
-    with open_scan(source, target.parent, limits) as scan:
+    with open_scan(source, target.parent) as scan:
         if not scan.claims_upload_format() and not (scan.is_upload_format() and not given.variables):
             arrays, layout = _read(scan, given)
             return _write(arrays, layout, target, on_size)
@@ -59,7 +56,7 @@ def convert_dataset(
                 "water_temperature_c (--water-temperature) replaces the water, bentray correct the others"
             )
             raise InvalidInput(given.words(), "given for this file", accepted)
-    return copy_dataset(source, target, limits, on_size)
+    return copy_dataset(source, target, on_size)
 
 
 def is_upload_format(path: Path) -> bool:

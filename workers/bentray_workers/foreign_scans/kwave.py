@@ -23,7 +23,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..files.bounded_reading import LARGEST_ROW, LARGEST_TOTAL
 from ..files.damage import rejecting_damage
-from ..files.hdf5_reading import Limits, Reader, opened, rejecting_hdf5_damage
+from ..files.hdf5_reading import Reader, opened, rejecting_hdf5_damage
 from ..files.npz import Npz
 from ..files.zip_checks import WHOLE, check_zip, member_file, naming, read_member
 from .arrays import LARGEST_WHOLE
@@ -126,7 +126,7 @@ class KWave:
     @contextmanager
     def _output(self, name: str) -> Iterator[Reader]:
         member = member_file(self._zip, name, LARGEST_ROW, self._scratch)
-        with member as path, _of(name), opened(path, Limits()) as reader:
+        with member as path, _of(name), opened(path) as reader:
             yield reader
 
 

@@ -16,7 +16,7 @@ from bentray_kernels.errors import InvalidInput
 from ..files import npz
 from ..files.damage import first_bytes, rejecting_damage
 from ..files.dataset.format import FORMAT
-from ..files.hdf5_reading import SIGNATURE, Limits, Reader, opened
+from ..files.hdf5_reading import SIGNATURE, Reader, opened
 from . import matlab5
 from .arrays import Arrays
 from .matlab73 import Matlab73
@@ -103,13 +103,12 @@ class OpenScan:
 
 
 @contextmanager
-def open_scan(path: Path, scratch: Path, limits: Limits | None = None) -> Iterator[OpenScan]:
+def open_scan(path: Path, scratch: Path) -> Iterator[OpenScan]:
     """Open a file or a folder.
 
     Args:
         path: of the scan.
         scratch: folder for temporary files.
-        limits: of HDF5 files; None: the defaults of ``Limits``.
 
     Raises:
         InvalidInput: for a damaged file, and for one of another kind.
@@ -130,7 +129,7 @@ def open_scan(path: Path, scratch: Path, limits: Limits | None = None) -> Iterat
         with archive:
             yield OpenScan(scratch, archive=archive)
     elif start.startswith(SIGNATURE) or (start.startswith(MATLAB73) and start[USER_BLOCK:] == SIGNATURE):
-        with opened(path, limits or Limits()) as reader:
+        with opened(path) as reader:
             yield OpenScan(scratch, hdf5=reader, is_matlab=not start.startswith(SIGNATURE))
     elif start and not h5py.is_hdf5(path):
         raise InvalidInput("file", f"a file that is not HDF5 ({first_bytes(start)})", SCANS)

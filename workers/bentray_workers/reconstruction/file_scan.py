@@ -14,8 +14,7 @@ from bentray_kernels.tomography.scan import problem_of, problems_of, stages_of
 from bentray_kernels.tomography.waveform.wave_scan import wave_problem_of
 
 from ..cluster.job_cancellation import check_job_active
-from ..files.dataset.scan import ScanHeader, read_header
-from ..files.dataset.traces import open_slice
+from ..files.dataset.scan import ScanHeader, open_slice, read_header
 from ..files.findings import read_findings
 from ..files.reference import reference_path, with_reference
 from .memory.ray_memory import PROBLEMS_KEPT

@@ -44,8 +44,7 @@ from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Progress
 
 from ..cluster.job_cancellation import check_job_active
-from ..files.dataset.scan import ScanHeader
-from ..files.dataset.traces import open_slice
+from ..files.dataset.scan import ScanHeader, open_slice
 from ..files.dataset.write import write_dataset
 from ..files.findings import ScanFindings, write_findings
 from ..files.reference import reference_path, with_reference, write_reference

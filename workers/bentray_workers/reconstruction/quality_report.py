@@ -11,6 +11,7 @@ from typing import Any
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.calibration import Calibration, calibrate, water_times
+from bentray_kernels.acquisition.pulse_spectrum import PulseSpectrum
 from bentray_kernels.acquisition.quality import Examined, Finding, Report, examine_slices
 from bentray_kernels.acquisition.quality.correction import apply
 from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED
@@ -20,10 +21,8 @@ from bentray_kernels.requests.limits import MAX_LEFT_OUT
 from bentray_kernels.requests.names import DEFAULT_PICKER
 
 from ..cluster.task_cancellation import cancellation_check
-from ..files.dataset import Limits, read_dataset
 from ..files.dataset.read import NUMERIC, TRACES
-from ..files.dataset.scan import read_scan, spectrum_of
-from ..files.dataset.traces import open_slice
+from ..files.dataset.scan import open_slice, read_header
 from ..files.hdf5_reading import opened
 
 # Called with the number of examined emissions, and of all.
@@ -75,8 +74,9 @@ def calibrate_file(
     Raises:
         InvalidInput: as ``examine_file``, and for a scan without a water shot.
     """
-    whole = read_scan(path)
-    quality = _examined(path, whole, picker, progress, max_left_out=max_left_out)
+    header = read_header(path)
+    whole = header.dataset
+    quality = _examined(path, whole, header.spectrum, picker, progress, max_left_out=max_left_out)
     if quality.picked is None:
         return quality, None
     with open_slice(path, whole, 0) as dataset:
@@ -111,13 +111,15 @@ def examine_file(
     """
     if largest_bytes is not None:
         _check_size(path, largest_bytes)
-    scan = read_scan(path).in_water_of(water_temperature_c)
-    return _examined(path, scan, picker, progress, draw=draw, max_left_out=max_left_out)
+    header = read_header(path)
+    whole, spectrum = header.dataset.in_water_of(water_temperature_c), header.spectrum
+    return _examined(path, whole, spectrum, picker, progress, draw=draw, max_left_out=max_left_out)
 
 
 def _examined(
     path: Path,
     whole: Dataset,
+    spectrum: PulseSpectrum | None,
     picker: str,
     progress: OnEmission | None,
     *,
@@ -125,8 +127,8 @@ def _examined(
     max_left_out: float,
 ) -> Quality:
     examined = examine_slices(whole, _slices(path, whole), picker, progress, max_left_out)
-    if frequency := _estimated_frequency(path):
-        findings = (frequency, *examined.report.findings)
+    if spectrum is not None:
+        findings = (_estimated_frequency(spectrum), *examined.report.findings)
         examined = replace(examined, report=replace(examined.report, findings=findings))
     page = _drawn(path, whole, examined) if draw else b""
     return Quality(_plain(examined.report), page, examined.picked, examined.report)
@@ -153,11 +155,8 @@ def _drawn(path: Path, whole: Dataset, examined: Examined) -> bytes:
         return quality_png(dataset, examined, worst if whole.slice_z_m is not None else None)
 
 
-def _estimated_frequency(path: Path) -> Finding | None:
-    """A finding if the file has no centre frequency, and it was estimated."""
-    spectrum = spectrum_of(path, read_dataset(path, traces=False))
-    if spectrum is None:
-        return None
+def _estimated_frequency(spectrum: PulseSpectrum) -> Finding:
+    """The finding that the file has no centre frequency, and it was estimated."""
     accepted, value = "acquisition@center_frequency_hz", spectrum.center_frequency_hz
     return Finding("centre frequency", spectrum.summary, accepted, "reported", value=value, unit="Hz")
 
@@ -188,7 +187,7 @@ def _cancellable(path: Path, picker: str, water_temperature_c: float | None, *, 
 
 
 def _check_size(path: Path, largest_bytes: int) -> None:
-    with opened(path, Limits()) as reader:
+    with opened(path) as reader:
         stored = [reader.checked(f"waveform/{name}", NUMERIC, TRACES) for name in ("object", "water")]
         size = sum(math.prod(array.shape) * array.dtype.itemsize for array in stored if array is not None)
     if size > largest_bytes:

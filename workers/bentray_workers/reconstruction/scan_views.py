@@ -19,8 +19,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.names import DEFAULT_PICKER
 
 from ..files.dataset import read_dataset
-from ..files.dataset.scan import measured_spectrum
-from ..files.dataset.traces import lacks_water, open_slice, trace_samples
+from ..files.dataset.scan import lacks_water, measured_spectrum, open_slice, trace_samples
 from ..files.dataset.units import propose
 
 # Elements of a drawing, and receivers and samples of the traces of a view; of more, every n-th is taken.

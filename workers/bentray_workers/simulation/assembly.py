@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.acquisition import Dataset, Waveform
 
-from ..files.dataset.record import record_of
+from ..files.dataset.counts import record_of
 from ..files.dataset.write import Piece, write_dataset
 from . import plane, volume, waves
 from .cost import Timed
@@ -30,7 +30,7 @@ def write_scan(settings: Simulated, folder: Path, target: Path) -> dict[str, Any
         target: replaced whole or not touched.
 
     Returns:
-        ``dataset.record.record_of``, and ``bytes`` and ``sha256`` of the file.
+        ``dataset.counts.record_of``, and ``bytes`` and ``sha256`` of the file.
     """
     if isinstance(settings, WaveSimulationSettings):
         dataset = _write_waves(settings, folder, target)

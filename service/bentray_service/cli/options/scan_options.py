@@ -83,7 +83,7 @@ def checked_dataset(scan: Path, settings: Settings) -> Dataset:
     """A dataset file without its traces; raises InvalidInput unless it has what the settings require."""
     from bentray_kernels.tomography.requirements import check_scan
     from bentray_workers.files.dataset import read_dataset
-    from bentray_workers.files.dataset.traces import trace_samples
+    from bentray_workers.files.dataset.scan import trace_samples
 
     dataset = read_dataset(scan, traces=False)
     check_scan(dataset, settings, trace_samples(scan))

@@ -11,7 +11,7 @@ from typing import Any
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import SPACING_M
 from bentray_kernels.requests.ranges import Range
-from bentray_workers.files.dataset.record import text
+from bentray_workers.files.dataset.counts import text
 
 from ...ingest.ingest_process import ACCEPTED, FILE_NAME
 

@@ -9,7 +9,7 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import Correction, correct_dataset, read_dataset, write_dataset
 from bentray_workers.files.dataset.copy import copy_dataset
-from bentray_workers.files.dataset.record import record_of
+from bentray_workers.files.dataset.counts import record_of
 from bentray_workers.reconstruction.scan_views import scan_geometry
 
 from ....kernels.acquisition.test_arrangement import kind_of, on_ring, scan

@@ -9,8 +9,8 @@ import pytest
 from bentray_kernels.acquisition import Waveform
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset, write_dataset
-from bentray_workers.files.dataset import traces as trace_reading
-from bentray_workers.files.dataset.traces import open_slice
+from bentray_workers.files.dataset import scan as trace_reading
+from bentray_workers.files.dataset.scan import open_slice
 
 from ....kernels.acquisition.traces import scan
 

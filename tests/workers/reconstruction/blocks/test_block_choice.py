@@ -14,8 +14,7 @@ from bentray_kernels.tomography import reconstruct as reconstruct_here
 from bentray_workers.cluster.capacities import MIB, USABLE, WARM_BYTES, WorkerCapacity
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import Summary
-from bentray_workers.files.dataset.scan import read_scan
-from bentray_workers.files.dataset.summary import counts_in
+from bentray_workers.files.dataset.scan import counts_in, read_header
 from bentray_workers.reconstruction import job_machine, reconstruction_run
 from bentray_workers.reconstruction.blocks.block_choice import fitting_blocks, largest_bytes
 from bentray_workers.reconstruction.planning import plan
@@ -106,7 +105,7 @@ def test_a_run_is_in_blocks_where_memory_is_short_and_stays_so(path, tmp_path, m
     result = reconstruction_run.reconstruct(None, path, settings, work_dir=work)
     blocks = result.settings.numerics.blocks
     assert blocks > 1
-    expected = reconstruct_here(read_scan(path), settings.changed(eikonal="fsm"))
+    expected = reconstruct_here(read_header(path).dataset, settings.changed(eikonal="fsm"))
     assert np.allclose(result.speed, expected.speed, rtol=1e-12, atol=0.0)
     memory(10.0)
     again = reconstruction_run.reconstruct(None, path, settings, work_dir=work)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bentray_kernels.tomography import Settings
-from bentray_workers.files.dataset.summary import summary_of
+from bentray_workers.files.dataset.scan import counts_in
 from bentray_workers.reconstruction.memory.picking_memory import parts_of, picking_task_bytes
 
 from ....memory_program import measured, wrong
@@ -24,7 +24,7 @@ def test_tasks_stay_within_the_plan_and_never_load_all_traces(tmp_path, picker, 
     taken = measured(PROGRAM, str(tmp_path), picker, elements, samples, shots)
     traces = taken.pop("traces")
     settings = Settings.from_values(method="sart", picker=picker)
-    scan = summary_of(tmp_path / "scan.h5", settings)
+    scan = counts_in(tmp_path / "scan.h5").summary(settings)
     told = picking_task_bytes(scan.traces, scan.pairs, settings)
     assert not wrong(told, taken, 1.5, 8 * MIB)
     if (picker, shots) == ("aic", "water"):

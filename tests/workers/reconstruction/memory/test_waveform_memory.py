@@ -20,7 +20,7 @@ from bentray_kernels.wave.simulation import place_elements
 from bentray_workers.cluster.capacities import MIB
 from bentray_workers.files.dataset import write_dataset
 from bentray_workers.files.dataset.counts import Traces
-from bentray_workers.files.dataset.summary import summary_of
+from bentray_workers.files.dataset.scan import counts_in
 from bentray_workers.reconstruction.memory.waveform_memory import wave_task_bytes, wave_tasks
 
 from ....kernels.tomography.waveform.scans import CENTRE_HZ, ELEMENTS, RADIUS, RATE_HZ, WATER, scan
@@ -111,9 +111,9 @@ def test_plan_covers_every_automatic_choice():
 
 def test_traces_are_summed_up_with_and_without_a_water_shot(tmp_path):
     write_dataset(tmp_path / "scan.h5", scan())
-    found = summary_of(tmp_path / "scan.h5", Settings(method="sart")).traces
+    found = counts_in(tmp_path / "scan.h5").summary(Settings(method="sart")).traces
     assert found == Traces(12, ELEMENTS, 120, 4, RATE_HZ, CENTRE_HZ, WATER)
     alone = replace(scan().waveform, water=None)
     write_dataset(tmp_path / "alone.h5", replace(scan(), waveform=alone))
     expected = replace(found, water_shot=False)
-    assert summary_of(tmp_path / "alone.h5", Settings(method="sart")).traces == expected
+    assert counts_in(tmp_path / "alone.h5").summary(Settings(method="sart")).traces == expected

@@ -1,9 +1,8 @@
 """Dataset files in the upload format ``uct-transmission`` 1.0."""
 
-from ..hdf5_reading import Limits
 from .copy import copy_dataset
 from .correct import Correction, correct_dataset
 from .read import read_dataset
 from .write import write_dataset
 
-__all__ = ["Correction", "Limits", "copy_dataset", "correct_dataset", "read_dataset", "write_dataset"]
+__all__ = ["Correction", "copy_dataset", "correct_dataset", "read_dataset", "write_dataset"]

@@ -11,7 +11,7 @@ import h5py
 
 from bentray_kernels.acquisition import Dataset
 
-from ..hdf5_reading import Limits, opened, rejecting_hdf5_damage
+from ..hdf5_reading import opened, rejecting_hdf5_damage
 from .read import NUMERIC, TRACES, dataset_of, kept_traces, placeholder_traces
 from .write import Piece, bytes_of, write_dataset
 
@@ -22,7 +22,6 @@ PIECE_BYTES = 16 * 2**20
 def copy_dataset(
     source: Path,
     target: Path,
-    limits: Limits | None = None,
     on_size: Callable[[int], None] = lambda size: None,
     change: Callable[[Dataset], Dataset] | None = None,
 ) -> Dataset:
@@ -31,7 +30,6 @@ def copy_dataset(
     Args:
         source: of the HDF5 file.
         target: replaced atomically.
-        limits: of reading; None: the defaults of ``Limits``.
         on_size: called before writing with the largest size of ``target`` without headers, bytes.
         change: returns the dataset to be written, with the same traces, and checks its units, which are not
             checked before.
@@ -43,7 +41,7 @@ def copy_dataset(
         InvalidInput: as ``read_dataset``, and for damaged traces.
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with opened(source, limits or Limits()) as reader:
+    with opened(source) as reader:
         dataset = dataset_of(reader, placeholder_traces, plausible=change is None)
         if change is not None:
             dataset = change(dataset)

@@ -13,7 +13,6 @@ from bentray_kernels.acquisition.plausibility import ImplausibleUnit, WrongArran
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import FREQUENCY_HZ, SAMPLING_HZ
 
-from ..hdf5_reading import Limits
 from .copy import copy_dataset
 from .units import POSITION_UNITS, TIME_UNITS
 
@@ -103,7 +102,6 @@ def correct_dataset(
     correction: Correction,
     *,
     origin: str = "",
-    limits: Limits | None = None,
     on_size: Callable[[int], None] = lambda size: None,
 ) -> Dataset:
     """Write a corrected copy of a dataset file, with one piece of its traces in memory at a time.
@@ -115,7 +113,7 @@ def correct_dataset(
         target: replaced atomically.
         correction: what was wrong.
         origin: name of the scan for the statement; empty: the name of the file.
-        limits, on_size: as for ``copy_dataset``.
+        on_size: as for ``copy_dataset``.
 
     Returns:
         The corrected dataset, with placeholders for traces.
@@ -129,7 +127,7 @@ def correct_dataset(
     def change(dataset: Dataset) -> Dataset:
         return corrected(dataset, correction, origin)
 
-    return copy_dataset(source, target, limits, on_size, change)
+    return copy_dataset(source, target, on_size, change)
 
 
 def corrected(dataset: Dataset, correction: Correction, origin: str) -> Dataset:

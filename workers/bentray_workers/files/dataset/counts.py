@@ -1,4 +1,4 @@
-"""Counts and sizes of a dataset for plans, in plain values, stored at upload."""
+"""Counts and sizes of a dataset for plans, and its record for the database, in plain values."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentray_kernels.acquisition.element_pitch import element_pitch
+from bentray_kernels.acquisition.impossible_times import impossible_words
 from bentray_kernels.arrays import Floats, Ints
 from bentray_kernels.tomography.decomposition import automatic_decomposition
 from bentray_kernels.tomography.image_grid import automatic_nodes
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 # Largest size of emissions in the same chunks.
 BLOCK_BYTES = 32 * 2**20
+# Characters of a text in a record.
+LONGEST_TEXT = 200
 
 
 @dataclass(frozen=True)
@@ -235,3 +238,33 @@ def array_counts(position: Floats, tx: Ints, rx: Ints, heights: Floats | None) -
         "pitch_m": element_pitch(position),
         "decomposition": automatic_decomposition(position),
     }
+
+
+def record_of(dataset: Dataset) -> dict[str, Any]:
+    """Fields of the record by name; ``counts`` is for plans."""
+    return {
+        "title": text(dataset.title),
+        "source": text("; ".join(note for note in (left_out(dataset), dataset.source) if note)),
+        "license": text(dataset.license),
+        "dimension": int(dataset.element_position_m.shape[1]),
+        "elements": len(dataset.element_position_m),
+        "ntx": len(dataset.tx),
+        "nrx": len(dataset.rx),
+        "slices": dataset.slices,
+        "has_traces": dataset.waveform is not None,
+        "has_travel_times": dataset.picked,
+        "has_truth": dataset.truth is not None,
+        "water_speed_mps": float(dataset.water_speed_mps),
+        "counts": DatasetCounts.from_dataset(dataset).to_dict(),
+    }
+
+
+def left_out(dataset: Dataset) -> str:
+    """Values that became missing, in words; empty for none."""
+    words = impossible_words(dataset.impossible_times)
+    return f"impossible times left out: {words}" if words else ""
+
+
+def text(value: str) -> str:
+    """A text of a file, printable and truncated."""
+    return "".join(c for c in value if c.isprintable())[:LONGEST_TEXT]

@@ -22,7 +22,7 @@ from bentray_kernels.acquisition.plausibility import ImplausibleUnit, WrongArran
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import COUNTED, OVER_NODES, OVER_PAIRS, check_size
 
-from ..hdf5_reading import Limits, Reader, opened
+from ..hdf5_reading import Reader, opened
 from .format import FORMAT, IMPOSSIBLE, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
 from .units import POSITION_UNITS, TIME_UNITS
 
@@ -32,22 +32,19 @@ SIZED = (*(path for path in COUNTED if path not in OVER_PAIRS), *OVER_PAIRS, *OV
 TRACES = "real numbers, traces over (ntx, nrx, nt)"
 
 
-def read_dataset(
-    path: Path, *, traces: bool = True, limits: Limits | None = None, plausible: bool = True
-) -> Dataset:
+def read_dataset(path: Path, *, traces: bool = True, plausible: bool = True) -> Dataset:
     """Read and check a dataset file.
 
     Args:
         path: of the HDF5 file.
         traces: false: leave the traces, which may be large, in the file; they are checked but not read.
-        limits: of reading; None: the defaults of ``Limits``.
         plausible: false: units and order of the elements may be wrong, to be corrected.
 
     Raises:
         InvalidInput: naming the first missing or wrong field by its path in the file (``file`` for the file
             as a whole), the value found and the accepted values; and as ``check_plausible``.
     """
-    with opened(Path(path), limits or Limits()) as reader:
+    with opened(Path(path)) as reader:
         return dataset_of(reader, waveform_in if traces else None, plausible=plausible)
 
 
