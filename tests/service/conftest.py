@@ -57,11 +57,15 @@ def npy(values: np.ndarray) -> bytes:
 
 
 def signed(
-    http: TestClient, tenant: str = "local", scopes: tuple[str, ...] = ("read", "write")
+    http: TestClient,
+    tenant: str = "local",
+    scopes: tuple[str, ...] = ("read", "write"),
+    expires: float | None = None,
 ) -> dict[str, str]:
     """Headers with a new key of a tenant."""
     token = ApiKey.new()
-    Keys(http.app.state.stores.database).add(token, Tenant(tenant), f"scanner of {tenant}", scopes)
+    keys = Keys(http.app.state.stores.database)
+    keys.add(token, Tenant(tenant), f"scanner of {tenant}", scopes, expires)
     return {"Authorization": f"Bearer {token.shown()}"}
 
 

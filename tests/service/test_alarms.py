@@ -12,8 +12,8 @@ import yaml
 from prometheus_client.parser import text_string_to_metric_families
 
 from bentray_service.backup.back_up import back_up
-from bentray_service.rows.ids import LOCAL
-from bentray_service.rows.keys import ApiKey, Keys
+
+from .conftest import signed
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"
@@ -122,10 +122,8 @@ def test_every_metric_and_label_of_alarms_and_dashboard_exists(
     until(http, submitted(http, dataset)["id"])
     work.hold.clear()
     submitted(http, dataset)
-    state, token = http.app.state, ApiKey.new()
-    back_up(state.access.settings, tmp_path / "backup")
-    Keys(state.stores.database).add(token, LOCAL, "metrics", ["metrics"], time.time() + 99.0)
-    http.headers["Authorization"] = f"Bearer {token.shown()}"
+    back_up(http.app.state.access.settings, tmp_path / "backup")
+    http.headers.update(signed(http, scopes=("metrics",), expires=time.time() + 99.0))
     there = exported(http) | ITS_OWN
     work.hold.set()
     assert len(selectors()) > 30

@@ -5,14 +5,11 @@ import time
 
 import numpy as np
 import pytest
-from fastapi.testclient import TestClient
 from sqlalchemy import update
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.app import create_app
 from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.tables import JobRow
-from bentray_service.settings import ServiceSettings
 
 
 def test_dataset_in_image_out(http, uploaded, submitted, until, work):
@@ -50,47 +47,33 @@ def test_an_injected_cluster_stays_open(http, cluster):
     assert not cluster.closed
 
 
-def test_clean_stop_puts_a_running_job_back(tmp_path, cluster, uploaded, submitted, until, work):
-    settings = ServiceSettings(data_dir=tmp_path / "data")
-    work.hold.clear()
-    with TestClient(create_app(settings, cluster), base_url="http://localhost") as http:
-        job = submitted(http, uploaded(http))
-        until(http, job["id"], "running")
+def test_clean_stop_puts_a_running_job_back(start, running, until, work):
+    http = start()
+    job = running(http)
+    http.__exit__()
     work.hold.set()
-    app = create_app(settings, cluster)
-    with TestClient(app, base_url="http://localhost") as http:
-        assert until(http, job["id"])["state"] == "succeeded"
-        states = [event.state for event in app.state.stores.jobs.events(LOCAL, job["id"])]
+    http = start()
+    assert until(http, job["id"])["state"] == "succeeded"
+    states = [event.state for event in http.app.state.stores.jobs.events(LOCAL, job["id"])]
     assert states[:3] == ["queued", "running", "queued"]
     # On a loaded machine the workers may be away for a moment, after which the job runs once more.
     assert states[-2:] == ["running", "succeeded"]
     assert len(work.calls) >= 2
 
 
-def left_running(app, job_id, state="running", attempts=1):
-    with app.state.stores.database.write() as connection:
-        connection.execute(
-            update(JobRow)
-            .where(JobRow.id == job_id)
-            .values(state=state, attempts=attempts, started=time.time(), finished=None)
-        )
-
-
 @pytest.mark.parametrize(
     ("state", "attempts", "end"),
     [("running", 1, "succeeded"), ("cancelling", 1, "cancelled"), ("running", 3, "failed")],
 )
-def test_jobs_of_a_dead_process(tmp_path, cluster, uploaded, submitted, until, work, state, attempts, end):
-    settings = ServiceSettings(data_dir=tmp_path / "data")
-    work.hold.clear()
-    app = create_app(settings, cluster)
-    with TestClient(app, base_url="http://localhost") as http:
-        job = submitted(http, uploaded(http))
-        until(http, job["id"], "running")
-    left_running(app, job["id"], state, attempts)
+def test_jobs_of_a_dead_process(start, running, until, work, state, attempts, end):
+    http = start()
+    job = running(http)
+    http.__exit__()
+    left = {"state": state, "attempts": attempts, "started": time.time(), "finished": None}
+    with http.app.state.stores.database.write() as connection:
+        connection.execute(update(JobRow).where(JobRow.id == job["id"]).values(**left))
     work.hold.set()
-    with TestClient(create_app(settings, cluster), base_url="http://localhost") as http:
-        done = until(http, job["id"])
+    done = until(start(), job["id"])
     assert done["state"] == end
     if end == "failed":
         assert "crashed" in done["error"]["detail"]

@@ -1,6 +1,5 @@
 """Extreme numbers wherever a request takes one: refused by name, or answered; never a 500."""
 
-import io
 import json
 from itertools import product
 
@@ -15,8 +14,8 @@ from bentray_workers.rendering.turntable import Turntable
 from bentray_workers.simulation.request import PhantomScan
 
 from ..extremes import EXTREMES
+from .conftest import STREAM, npy
 
-STREAM = {"Content-Type": "application/octet-stream"}
 JSON = {"Content-Type": "application/json"}
 KINDS = {
     "reconstruction": Settings,
@@ -39,9 +38,8 @@ def http(start):
 
 @pytest.fixture
 def volume(http):
-    buffer = io.BytesIO()
-    np.save(buffer, np.arange(60, dtype=np.uint8).reshape(3, 4, 5))
-    return http.post("/v1/volumes", content=buffer.getvalue(), headers=STREAM).json()
+    content = npy(np.arange(60, dtype=np.uint8).reshape(3, 4, 5))
+    return http.post("/v1/volumes", content=content, headers=STREAM).json()
 
 
 def numbers_of(kind):

@@ -14,6 +14,8 @@ from bentray_service.rows import usage
 from bentray_service.rows.ids import LOCAL, Tenant
 from bentray_service.rows.keys import ApiKey, Keys
 
+from .conftest import signed
+
 pytestmark = pytest.mark.usefixtures("work")
 
 NAME = re.compile(r"bentray_[a-z]+(_[a-z]+)*")
@@ -63,20 +65,30 @@ def test_bytes_of_uploads(http, uploaded):
     assert after > 1000.0
 
 
-def test_the_queue(http, uploaded, submitted, until, work, cluster):
+def test_the_queue_who_waits_and_how_long_it_takes(http, uploaded, submitted, until, work, cluster):
     dataset = uploaded(http)
     work.hold.clear()
     jobs = [submitted(http, dataset)["id"] for _ in range(3)]
     for job in jobs[:2]:
         until(http, job, "running")
+    local = {"tenant": "local", "state": "queued"}
     assert value(http, "bentray_jobs", state="running") == 2
-    assert value(http, "bentray_jobs", state="queued") == 1
+    assert value(http, "bentray_jobs", state="queued") == value(http, "bentray_tenant_jobs", **local) == 1
     assert value(http, "bentray_jobs_oldest_queued_seconds") > 0.0
+    used, most = (
+        value(http, "bentray_tenant_used_bytes", tenant="local"),
+        value(http, "bentray_tenant_quota_bytes"),
+    )
+    assert 0 < used < most
     work.hold.set()
     for job in jobs:
         until(http, job)
+    ended = {"kind": "reconstruction", "state": "succeeded"}
     assert value(http, "bentray_jobs", state="succeeded") == 3
-    assert value(http, "bentray_jobs_oldest_queued_seconds") == 0.0
+    assert value(http, "bentray_job_duration_seconds_count", **ended) == 3
+    assert (
+        value(http, "bentray_jobs_oldest_queued_seconds") == value(http, "bentray_tenant_jobs", **local) == 0
+    )
     assert value(http, "bentray_workers") == 1
     cluster.workers = 3
     assert value(http, "bentray_workers_lost_total") == 0
@@ -86,28 +98,8 @@ def test_the_queue(http, uploaded, submitted, until, work, cluster):
     assert value(http, "bentray_disk_free_bytes") > 0
 
 
-def test_an_operator_sees_who_waits_what_repeats_and_how_long_it_takes(
-    http, uploaded, submitted, until, work
-):
-    dataset = uploaded(http)
-    work.hold.clear()
-    jobs = [submitted(http, dataset)["id"] for _ in range(3)]
-    for job in jobs[:2]:
-        until(http, job, "running")
-    assert value(http, "bentray_tenant_jobs", tenant="local", state="queued") == 1
-    assert (
-        0
-        < value(http, "bentray_tenant_used_bytes", tenant="local")
-        < value(http, "bentray_tenant_quota_bytes")
-    )
-    work.hold.set()
-    for job in jobs:
-        until(http, job)
-    ended = {"kind": "reconstruction", "state": "succeeded"}
-    assert value(http, "bentray_job_duration_seconds_count", **ended) == 3
-    assert value(http, "bentray_tenant_jobs", tenant="local", state="queued") == 0
+def test_database_connections_and_the_end_of_keys(http):
     state = http.app.state
-    state.background.runner.queue.load()
     assert 1 <= value(http, "bentray_database_connections_limit") <= 32
     with state.stores.database.read() as connection:
         connection.execute(text("SELECT 1"))
@@ -115,9 +107,7 @@ def test_an_operator_sees_who_waits_what_repeats_and_how_long_it_takes(
     assert value(http, "bentray_keys_next_expiry_timestamp_seconds") == 0, "no key expires"
     for number, expires in enumerate((9e9, 8e9, 1.0, None)):
         Keys(state.stores.database).add(ApiKey.new(), LOCAL, f"key {number}", ["metrics"], expires)
-    token = ApiKey.new()
-    Keys(state.stores.database).add(token, LOCAL, "metrics", ["metrics"])
-    http.headers["Authorization"] = f"Bearer {token.shown()}"
+    http.headers.update(signed(http, scopes=("metrics",)))
     assert value(http, "bentray_keys_next_expiry_timestamp_seconds") == 8e9
 
 

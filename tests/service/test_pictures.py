@@ -4,18 +4,17 @@ import asyncio
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from types import SimpleNamespace
 
 import httpx
-import numpy as np
 import pytest
 
-from bentray_kernels.phantoms import ONE_HOLE, sampled
 from bentray_service.app import create_app
-from bentray_service.rows.ids import Tenant, new_id
+from bentray_service.rows.ids import Tenant
 from bentray_service.settings import ServiceSettings
-from bentray_workers.files.volume import Volume, write_volume
 
-from .conftest import FakeCluster
+from .conftest import FakeCluster, refused
+from .stored_volumes import store_volume
 
 SMALL = {"width": 32, "height": 24, "iso": 0.5}
 # More than the threads that requests share.
@@ -65,23 +64,6 @@ class HeldCluster(FakeCluster):
         return self.futures[-1]
 
 
-def put(state, tenant, values, shape=None):
-    """A volume as an upload leaves it; its row may tell of another shape."""
-    volume, volume_id = Volume.from_values(values, (1e-3,) * 3), new_id("volume")
-    path = state.stores.files.of(tenant).volume(volume_id)
-    write_volume(path, volume)
-    nodes = int(np.prod(shape or values.shape))
-    summary = {
-        "title": "a ball",
-        "shape": list(shape or values.shape),
-        "spacing_m": [1e-3] * 3,
-        "origin_m": [0.0] * 3,
-        "value_range": list(volume.range()),
-    }
-    state.stores.volumes.uploaded.add(tenant, volume_id, size=4 * nodes, sha256="0" * 64, summary=summary)
-    return f"/v1/volumes/{volume_id}"
-
-
 @pytest.fixture
 def held():
     made = HeldCluster()
@@ -95,19 +77,16 @@ async def service(folder, cluster):
     """The application, clients of two tenants, and the address of a volume of each."""
     settings = ServiceSettings(data_dir=folder, trusted_proxies="127.0.0.1", renders_per_minute=0)
     app = create_app(settings, cluster)
-    async with app.router.lifespan_context(app):
+
+    def client(user):
         transport = httpx.ASGITransport(app, client=("127.0.0.1", 1))
-        async with (
-            httpx.AsyncClient(
-                transport=transport, base_url="http://localhost", headers={"X-Forwarded-User": "anna"}
-            ) as anna,
-            httpx.AsyncClient(
-                transport=transport, base_url="http://localhost", headers={"X-Forwarded-User": "bert"}
-            ) as bert,
-        ):
-            who = [(await one.get("/v1/access")).json()["tenant"] for one in (anna, bert)]
-            there = [put(app.state, Tenant(name), sampled(ONE_HOLE, 12)) for name in who]
-            yield app, (anna, there[0]), (bert, there[1])
+        who = {"X-Forwarded-User": user}
+        return httpx.AsyncClient(transport=transport, base_url="http://localhost", headers=who)
+
+    async with app.router.lifespan_context(app), client("anna") as anna, client("bert") as bert:
+        who = [(await one.get("/v1/access")).json()["tenant"] for one in (anna, bert)]
+        there = [store_volume(SimpleNamespace(app=app), tenant=Tenant(name)) for name in who]
+        yield app, (anna, f"/v1/volumes/{there[0]}"), (bert, f"/v1/volumes/{there[1]}")
 
 
 async def until(happens):
@@ -193,24 +172,20 @@ def test_a_picture_ends_with_its_client(tmp_path, held):
 def test_rejects_pictures_larger_than_worker_memory(http, cluster, what):
     """Tasks of 128 MiB, and a volume of 150 MiB."""
     cluster.memory_bytes = 2**29 + 2**27
-    shape = (340, 340, 340)
-    here = put(http.app.state, Tenant("local"), sampled(ONE_HOLE, 12), shape)
-    answer = http.get(f"{here}/{what}")
+    volume = store_volume(http, shape=(340, 340, 340))
+    answer = http.get(f"/v1/volumes/{volume}/{what}")
     body = answer.json()
     assert (answer.status_code, body["type"]) == (422, "/problems/invalid-input"), body
     assert "bytes of a worker" in body["found"]
     assert "at most 134217728 bytes" in body["accepted"]
     assert not cluster.submitted
-    asked = {"kind": "refraction", "volume": here.rpartition("/")[2], "settings": {"iso": [0.5]}}
-    refused = http.post("/v1/jobs", json=asked)
-    assert (refused.status_code, refused.json()["field"]) == (422, "volume")
+    asked = {"kind": "refraction", "volume": volume, "settings": {"iso": [0.5]}}
+    refused(http.post("/v1/jobs", json=asked), "volume")
 
 
 def test_a_large_picture_has_its_worker_to_itself(http, cluster):
     cluster.memory_bytes = 2**30
-    here = put(http.app.state, Tenant("local"), sampled(ONE_HOLE, 12), (180, 180, 180))
-    assert http.get(f"{here}/refraction.png", params=SMALL).status_code == 200
-    assert cluster.submitted[-1]["resources"] == {"render": 1, "recon": 1}
-    small = put(http.app.state, Tenant("local"), sampled(ONE_HOLE, 12))
-    assert http.get(f"{small}/refraction.png", params=SMALL).status_code == 200
-    assert cluster.submitted[-1]["resources"] == {"render": 1}
+    for shape, lanes in (((180, 180, 180), {"render": 1, "recon": 1}), (None, {"render": 1})):
+        here = f"/v1/volumes/{store_volume(http, shape=shape)}/refraction.png"
+        assert http.get(here, params=SMALL).status_code == 200
+        assert cluster.submitted[-1]["resources"] == lanes

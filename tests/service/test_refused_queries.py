@@ -1,6 +1,5 @@
 """Each parameter of a GET request is refused outside its description: by name, with what is accepted."""
 
-import io
 import json
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -10,6 +9,8 @@ import pytest
 
 from bentray_service.openapi import description
 from bentray_service.rows.ids import new_id
+
+from .conftest import STREAM, npy
 
 Schema = dict[str, Any]
 
@@ -47,13 +48,10 @@ def parameters() -> Iterator[tuple[str, str, Schema]]:
 @pytest.fixture
 def places(start: Callable[..., Any], uploaded: Callable[[Any], str]) -> tuple[Any, dict[str, str]]:
     """A service, and an id for each placeholder of a path."""
-    http, buffer = start(), io.BytesIO()
-    np.save(buffer, np.arange(60, dtype=np.uint8).reshape(3, 4, 5))
-    answer = http.post(
-        "/v1/volumes", content=buffer.getvalue(), headers={"Content-Type": "application/octet-stream"}
-    )
-    ids = {"dataset_id": uploaded(http), "volume_id": answer.json()["id"], "field_id": new_id("field")}
-    return http, ids
+    http = start()
+    content = npy(np.arange(60, dtype=np.uint8).reshape(3, 4, 5))
+    volume = http.post("/v1/volumes", content=content, headers=STREAM).json()["id"]
+    return http, {"dataset_id": uploaded(http), "volume_id": volume, "field_id": new_id("field")}
 
 
 def test_every_parameter_is_refused_outside_its_description(places, cluster) -> None:

@@ -1,6 +1,5 @@
 """The whole API against its own description: schemathesis makes the requests, right ones and wrong ones."""
 
-import io
 import json
 import os
 import secrets
@@ -18,8 +17,8 @@ from bentray_service.openapi import description
 from bentray_service.rows.keys import ApiKey
 
 from ..effort import effort
+from .conftest import STREAM, npy
 
-STREAM = {"Content-Type": "application/octet-stream"}
 HERE = Path(__file__).parent
 
 # Every check of schemathesis is on but two, in whose place ours of schema_checks stand.
@@ -80,15 +79,14 @@ def attack(serve, scan, tmp_path) -> Callable[..., tuple[int, str]]:
         max_queued_jobs=100_000,
         min_free_bytes=2**60,
     )
-    values = io.BytesIO()
-    np.save(values, np.arange(60, dtype=np.uint8).reshape(3, 4, 5))
+    values = npy(np.arange(60, dtype=np.uint8).reshape(3, 4, 5))
     found = {}
     with httpx.Client(
         base_url=address, timeout=60.0, headers={"Authorization": f"Bearer {token.shown()}"}
     ) as http:
         for name, path, content in (
             ("dataset_id", "/v1/datasets", scan().read_bytes()),
-            ("volume_id", "/v1/volumes", values.getvalue()),
+            ("volume_id", "/v1/volumes", values),
             ("mesh_id", "/v1/meshes", trimesh.creation.box().export(file_type="ply")),
         ):
             answer = http.post(path, content=content, headers=STREAM)

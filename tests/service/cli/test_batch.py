@@ -1,4 +1,4 @@
-"""`bentray submit --batch`: results as of `reconstruct`, finished ones left out, failures by themselves."""
+"""`bentray submit --batch` on workers and on a service: results, finished ones left out, failures alone."""
 
 import json
 import os
@@ -11,19 +11,21 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from bentray_workers.cluster.connection import Cluster, open_cluster
+from bentray_workers.cluster.connection import open_cluster
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.files.reconstruction import read_reconstruction
+
+from .conftest import Run
 
 QUICK = ("--method", "sart", "--nodes", 24, "--iterations", 1, "--rays", "straight")
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    """Workers in this process, by their scheduler's address."""
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The scheduler of workers in this process."""
     folder = tmp_path_factory.mktemp("dask")
     with open_cluster(workers=1, local_directory=folder, processes=False) as found:
-        yield found
+        yield found.client.scheduler.address
 
 
 @pytest.fixture(autouse=True)
@@ -51,13 +53,10 @@ def scans(scan_file: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def submit(
-    bentray: Callable[..., Result], cluster: Cluster, scans: Path
-) -> Callable[..., tuple[Result, Any]]:
+def submit(bentray: Run, address: str, scans: Path) -> Callable[..., tuple[Result, Any]]:
     """Give the batch and read what it prints."""
 
     def run(*words: object) -> tuple[Result, Any]:
-        address = cluster.client.scheduler.address
         result = bentray("submit", "--batch", scans, "--scheduler", address, "--json", *QUICK, *words)
         return result, json.loads(result.stdout)
 
@@ -69,7 +68,7 @@ def states(said: Any) -> dict[str, str]:
 
 
 def test_each_gets_the_files_of_reconstruct_and_a_broken_one_fails_alone(
-    submit: Callable[..., tuple[Result, Any]], bentray: Callable[..., Result], scans: Path, tmp_path: Path
+    submit: Callable[..., tuple[Result, Any]], bentray: Run, scans: Path, tmp_path: Path
 ) -> None:
     result, said = submit("--out", tmp_path / "out")
     assert result.exit_code == 1
@@ -112,10 +111,7 @@ def test_only_finished_entries_are_skipped(
     assert set(states(submit("--penalty-strength", 2)[1]).values()) == {"succeeded"}
 
 
-def test_without_json_it_ends_with_a_table_and_the_reasons(
-    bentray: Callable[..., Result], cluster: Cluster, scans: Path
-) -> None:
-    address = cluster.client.scheduler.address
+def test_without_json_it_ends_with_a_table_and_the_reasons(bentray: Run, address: str, scans: Path) -> None:
     result = bentray("submit", "--batch", scans, "--scheduler", address, "--at-once", 1, *QUICK)
     assert result.exit_code == 1
     assert result.stdout.splitlines()[0].rstrip() == "Batch of scans"
@@ -126,39 +122,46 @@ def test_without_json_it_ends_with_a_table_and_the_reasons(
 
 
 def test_scans_of_other_programs_are_converted(
-    bentray: Callable[..., Result], cluster: Cluster, scan_file: Path, tmp_path: Path
+    bentray: Run, address: str, scan_file: Path, tmp_path: Path
 ) -> None:
     scan, folder = read_dataset(scan_file), tmp_path / "scans"
     folder.mkdir()
     position = 1e3 * scan.element_position_m
     np.savez(folder / "own.npz", pos=position, tx=scan.tx, rx=scan.rx, dtof=scan.delta_tof_s)
-    words = (
-        "--map",
-        "element_position=pos",
-        "--map",
-        "delta_tof=dtof",
-        "--unit",
-        "mm",
-        "--sound-speed",
-        1500,
-    )
-    address = cluster.client.scheduler.address
-    batch = ("submit", "--batch", folder, "--scheduler", address, "--json", *QUICK)
-    assert states(json.loads(bentray(*batch, *words).stdout)) == {"own": "succeeded"}
+    words = ("--map", "element_position=pos", "--map", "delta_tof=dtof", "--unit", "mm", "--sound-speed")
+    batch = ("submit", "--batch", folder, "--scheduler", address, "--json", *QUICK, *words)
+    assert states(json.loads(bentray(*batch, 1500).stdout)) == {"own": "succeeded"}
     found = read_reconstruction(folder / "results" / "own" / "reconstruction.h5")
-    alone = bentray("reconstruct", folder / "own.npz", *words, *QUICK, "-o", tmp_path / "alone")
+    alone = bentray("reconstruct", folder / "own.npz", *words, 1500, *QUICK, "-o", tmp_path / "alone")
     assert alone.exit_code == 0
     expected = read_reconstruction(tmp_path / "alone" / "reconstruction.h5")
     np.testing.assert_array_equal(found.speed, expected.speed)
     assert not list((folder / "results" / "own").glob(".converted*"))
     # The same file with other options is another request.
-    assert states(json.loads(bentray(*batch, *words).stdout)) == {"own": "skipped"}
-    slower = (*words[:-1], 1490)
-    assert states(json.loads(bentray(*batch, *slower).stdout)) == {"own": "succeeded"}
+    for speed, state in ((1500, "skipped"), (1490, "succeeded")):
+        assert states(json.loads(bentray(*batch, speed).stdout)) == {"own": state}
 
 
-def test_two_scans_of_the_same_name_are_rejected(bentray: Callable[..., Result], scans: Path) -> None:
+def test_two_scans_of_the_same_name_are_rejected(bentray: Run, scans: Path) -> None:
     (scans / "one.mat").write_bytes(b"")
     result = bentray("submit", "--batch", scans, "--scheduler", "tcp://127.0.0.1:1")
     assert result.exit_code == 2
     assert "found one.h5 and one.mat; accepted: names that differ" in result.stderr
+
+
+def test_a_folder_of_scans_on_a_service(bentray: Run, serve: Any, work: Any, scans: Path) -> None:
+    words = ("submit", "--batch", scans, "--url", serve(), "--json", *QUICK)
+    first = bentray(*words)
+    assert first.exit_code == 1
+    assert states(json.loads(first.stdout)) == {"broken": "failed", "one": "succeeded", "two": "succeeded"}
+    for name in ("one", "two"):
+        assert read_reconstruction(scans / "results" / name / "reconstruction.h5").speed.shape == (24, 24)
+    # Equal files are one scan on the service, and one job.
+    assert len(work.calls) == 1
+    (scans / "broken.h5").unlink()
+    again = bentray(*words)
+    assert again.exit_code == 0, again.stderr
+    assert json.loads(again.stdout)["skipped"] == 2
+    assert len(work.calls) == 1
+    shutil.rmtree(scans / "results")
+    assert json.loads(bentray(*words, "--no-wait").stdout)["size"] == 1

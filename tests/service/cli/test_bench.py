@@ -2,12 +2,10 @@
 
 import json
 import sys
-from collections.abc import Callable
 from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.cli import bench as module
@@ -16,6 +14,8 @@ from bentray_service.cli.output.benchmark_context import BenchmarkContext
 from bentray_service.cli.output.benchmark_row import Row
 from bentray_service.cli.output.exit_codes import WorkFailed
 from bentray_workers.cluster.connection import open_cluster
+
+from .conftest import Run
 
 FAKE = """
 from bentray_service.cli.output.benchmark_context import BenchmarkContext
@@ -47,7 +47,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize(("options", "value", "met"), [([], 1.0, False), (["--quick"], 2.5, True)])
 def test_the_rows_are_written_and_shown(
-    bentray: Callable[..., Result], folder: Path, tmp_path: Path, options: list[str], value: float, met: bool
+    bentray: Run, folder: Path, tmp_path: Path, options: list[str], value: float, met: bool
 ) -> None:
     file = tmp_path / "rows.json"
     result = bentray("bench", "fake", *options, "--json", file)
@@ -65,9 +65,7 @@ def test_the_rows_are_written_and_shown(
 
 
 @pytest.mark.parametrize("name", ["nothing", "../fake", "_hidden", "fake.py"])
-def test_an_unknown_name_lists_the_known_ones(
-    bentray: Callable[..., Result], folder: Path, name: str
-) -> None:
+def test_an_unknown_name_lists_the_known_ones(bentray: Run, folder: Path, name: str) -> None:
     result = bentray("bench", name, "--json", folder / "rows.json")
     assert result.exit_code == 2
     assert result.stderr == f"bentray: name: found {name!r}; accepted: one of empty, fake\n"
@@ -93,7 +91,7 @@ def test_a_benchmark_without_rows_is_named(folder: Path) -> None:
 
 
 def test_the_file_for_the_rows_is_checked_before_anything_runs(
-    bentray: Callable[..., Result], folder: Path, tmp_path: Path
+    bentray: Run, folder: Path, tmp_path: Path
 ) -> None:
     (folder / "table" / "fake.py").write_text("raise SystemError('ran')")
     result = bentray("bench", "fake", "--json", tmp_path / "absent" / "rows.json")
@@ -102,7 +100,7 @@ def test_the_file_for_the_rows_is_checked_before_anything_runs(
 
 
 def test_pictures_are_written_only_to_the_folder_that_is_given(
-    bentray: Callable[..., Result], folder: Path, tmp_path: Path
+    bentray: Run, folder: Path, tmp_path: Path
 ) -> None:
     before = sorted(tmp_path.rglob("*.png"))
     assert bentray("bench", "fake", "--json", tmp_path / "rows.json").exit_code == 0
@@ -129,7 +127,7 @@ def rows(context):
 
 
 def test_a_scheduler_is_used_where_a_benchmark_computes_on_workers(
-    bentray: Callable[..., Result], folder: Path, tmp_path: Path
+    bentray: Run, folder: Path, tmp_path: Path
 ) -> None:
     (folder / "table" / "on_workers.py").write_text(ON_WORKERS)
     with open_cluster(workers=1, local_directory=tmp_path, processes=False) as cluster:

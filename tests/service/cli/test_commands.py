@@ -2,15 +2,15 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import pytest
 import typer
-from typer.testing import Result
 
 from bentray_service.cli import app
+
+from .conftest import Run
 
 
 @cache
@@ -26,13 +26,9 @@ def named() -> dict[str, Any]:
 COMMANDS = sorted(named())
 
 
-def test_the_commands_of_the_design_are_there() -> None:
-    assert {"serve", "demo", "reconstruct", "submit", "simulate", "render", "bench"} <= set(COMMANDS)
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_fits_a_narrow_terminal_and_gives_an_example_that_parses(
-    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, command: str
+    bentray: Run, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     words = command.split()
@@ -56,7 +52,7 @@ def test_help_fits_a_narrow_terminal_and_gives_an_example_that_parses(
     ],
 )
 def test_summaries_of_commands_stand_in_groups_and_are_not_cut(
-    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, group: str, panels: list[str]
+    bentray: Run, monkeypatch: pytest.MonkeyPatch, group: str, panels: list[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     said = bentray(*group.split(), "--help").stdout
@@ -80,7 +76,7 @@ def test_summaries_of_commands_stand_in_groups_and_are_not_cut(
     ],
 )
 def test_choices_are_shown_as_choices(
-    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, command: str, choices: str
+    bentray: Run, monkeypatch: pytest.MonkeyPatch, command: str, choices: str
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     said = bentray(command, "--help").stdout

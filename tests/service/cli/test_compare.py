@@ -1,17 +1,16 @@
 """`bentray compare`: figures, statistics of regions, picture, and input that is refused."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import Result
 
 from bentray_kernels.tomography import rmse, structural_similarity
 from bentray_workers.files.reconstruction import write_reconstruction
 
 from ...workers.files.reconstructions import made, truth
+from .conftest import Run
 
 
 @pytest.fixture
@@ -21,7 +20,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_figures_and_regions_are_printed_and_drawn(bentray: Callable[..., Result], folder: Path) -> None:
+def test_figures_and_regions_are_printed_and_drawn(bentray: Run, folder: Path) -> None:
     picture = folder / "comparison.png"
     words = (folder, folder / "truth.npy", "--region", "9.4,0,18", "-o", picture)
     result = bentray("compare", *words, "--json")
@@ -43,7 +42,7 @@ def test_figures_and_regions_are_printed_and_drawn(bentray: Callable[..., Result
     assert "(9.4, 0) mm" in table
 
 
-def test_a_volume_has_balls(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_volume_has_balls(bentray: Run, tmp_path: Path) -> None:
     from dataclasses import replace
 
     solid = replace(made(nodes=10, slices=5), spacing_m=(2e-3, 2e-3, 3e-3))
@@ -52,31 +51,3 @@ def test_a_volume_has_balls(bentray: Callable[..., Result], tmp_path: Path) -> N
     record = json.loads(result.stdout)
     assert (record["rmse"], record["correlation"]) == (0.0, pytest.approx(1.0))
     assert record["regions"][0]["image"] == record["regions"][0]["truth"]
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--region", "1,2"), "X,Y,RADIUS"),
-        (("--region", "1,2,-3"), "X,Y,RADIUS"),
-        (("--region", "90,90,3"), "between all nodes"),
-        (("--quantity", "coverage"), "one of speed"),
-        (("-o", "picture.jpg"), "a name ending in .png"),
-    ],
-)
-def test_bad_input_is_named(
-    bentray: Callable[..., Result], folder: Path, words: tuple[str, ...], said: str
-) -> None:
-    result = bentray("compare", folder, folder / "truth.npy", *words)
-    assert result.exit_code == 2
-    assert said in result.stderr
-
-
-def test_missing_files_are_named(bentray: Callable[..., Result], folder: Path) -> None:
-    for words, said in (
-        ((folder / "none.h5", folder / "truth.npy"), "no such file"),
-        ((folder, folder / "none.npy"), "No such file"),
-    ):
-        result = bentray("compare", *words)
-        assert result.exit_code == 2
-        assert said in result.stderr

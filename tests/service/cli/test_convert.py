@@ -1,19 +1,18 @@
 """`bentray convert`: a scan of another program becomes a dataset file, or the field at fault is named."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from scipy.io import savemat
-from typer.testing import Result
 
 from bentray_workers.files.dataset import read_dataset
 
 from ...workers.foreign_scans.scans import delta_tof, positions, travel_times
+from .conftest import Run
 
 
-def test_a_matlab_file_is_converted(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_matlab_file_is_converted(bentray: Run, tmp_path: Path) -> None:
     savemat(tmp_path / "scan.mat", travel_times())
     result = bentray("convert", tmp_path / "scan.mat", "-o", tmp_path / "scan.h5", "--json")
     assert result.exit_code == 0
@@ -28,7 +27,7 @@ def test_a_matlab_file_is_converted(bentray: Callable[..., Result], tmp_path: Pa
     assert forced.stdout.split()[-1].endswith("scan.h5")
 
 
-def test_the_field_at_fault_is_named(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_the_field_at_fault_is_named(bentray: Run, tmp_path: Path) -> None:
     savemat(tmp_path / "scan.mat", {"delta_tof": delta_tof()})
     result = bentray("convert", tmp_path / "scan.mat", "-o", tmp_path / "scan.h5")
     assert result.exit_code == 2
@@ -36,7 +35,7 @@ def test_the_field_at_fault_is_named(bentray: Callable[..., Result], tmp_path: P
     assert not (tmp_path / "scan.h5").exists()
 
 
-def test_a_file_is_not_converted_into_itself(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_file_is_not_converted_into_itself(bentray: Run, tmp_path: Path) -> None:
     savemat(tmp_path / "scan.h5", travel_times(), appendmat=False)
     before = (tmp_path / "scan.h5").read_bytes()
     result = bentray("convert", tmp_path / "scan.h5", "-o", tmp_path / "scan.h5", "--force")
@@ -44,7 +43,7 @@ def test_a_file_is_not_converted_into_itself(bentray: Callable[..., Result], tmp
     assert (tmp_path / "scan.h5").read_bytes() == before
 
 
-def test_a_dataset_file_is_corrected(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_dataset_file_is_corrected(bentray: Run, tmp_path: Path) -> None:
     savemat(tmp_path / "scan.mat", travel_times())
     assert bentray("convert", tmp_path / "scan.mat", "-o", tmp_path / "scan.h5").exit_code == 0
     words = ("correct", tmp_path / "scan.h5", "-o", tmp_path / "new.h5")
@@ -68,7 +67,7 @@ def own_variables(path: Path) -> tuple[object, ...]:
     return ("--map", "element_position=pos", "--map", "delta_tof=dtof", "--unit", "mm", "--unit", "us")
 
 
-def test_own_variables_are_named_on_the_command_line(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_own_variables_are_named_on_the_command_line(bentray: Run, tmp_path: Path) -> None:
     options = own_variables(tmp_path / "scan.mat")
     words = ("convert", tmp_path / "scan.mat", "-o", tmp_path / "scan.h5")
     assert "own names of variables: --map element_position=NAME" in bentray(*words).stderr
@@ -80,9 +79,7 @@ def test_own_variables_are_named_on_the_command_line(bentray: Callable[..., Resu
     assert (dataset.water_temperature_c, dataset.center_frequency_hz) == (24.0, 1e6)
 
 
-def test_a_foreign_scan_is_reconstructed_and_its_assumption_comes_first(
-    bentray: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_foreign_scan_is_reconstructed_and_its_assumption_comes_first(bentray: Run, tmp_path: Path) -> None:
     options = own_variables(tmp_path / "scan.mat")
     quick = ("--nodes", 32, "--iterations", 1, "--rays", "straight", "--method", "sart", "--workers", 1)
     words = ("reconstruct", tmp_path / "scan.mat", "-o", tmp_path / "out", *options, *quick)

@@ -2,16 +2,16 @@
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
-from typer.testing import Result
 
 from bentray_service.cli import demo as module
 from bentray_workers.simulation.request import SAMPLE
+
+from .conftest import Run
 
 # Half the frequency and half the elements of the sample: a sixteenth of the work.
 SMALL = {**SAMPLE, "nodes": 64, "elements": 36, "emissions": 12, "frequency_hz": 1.25e5}
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("sample", [SMALL, pytest.param(SAMPLE, marks=pytest.mark.nightly)])
 def test_the_whole_path_ends_with_full_waveforms_ahead_and_a_picture(
-    bentray: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sample: dict[str, Any]
+    bentray: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sample: dict[str, Any]
 ) -> None:
     monkeypatch.setattr(module, "SAMPLE", sample)
     result = bentray("demo", "-o", tmp_path / "out", "--json")
@@ -48,7 +48,7 @@ def test_the_whole_path_ends_with_full_waveforms_ahead_and_a_picture(
 
 @pytest.mark.nightly
 def test_it_fails_in_one_line_when_full_waveforms_do_not_win(
-    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    bentray: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(module, "SAMPLE", SMALL)
     monkeypatch.setattr(module, "JOBS", {name: {"method": "sart"} for name in module.JOBS})

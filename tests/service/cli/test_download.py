@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import Result
+
+from .conftest import Run
 
 SCAN, VOLUME = "ds-" + "0" * 20, "vol-" + "0" * 20
 
@@ -40,7 +41,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return results
 
 
-def test_a_scan_and_a_volume(bentray: Callable[..., Result], tmp_path: Path, asked: list[Any]) -> None:
+def test_a_scan_and_a_volume(bentray: Run, tmp_path: Path, asked: list[Any]) -> None:
     result = bentray("download", SCAN, "-o", tmp_path / "scan.h5", "--url", "http://lab:1", "--json")
     assert result.exit_code == 0
     assert json.loads(result.stdout) == {"id": SCAN, "output": str(tmp_path / "scan.h5"), "bytes": 4}
@@ -51,7 +52,7 @@ def test_a_scan_and_a_volume(bentray: Callable[..., Result], tmp_path: Path, ask
     assert (asked[0], told) == ("http://lab:1", [SCAN, (VOLUME, "nifti"), (VOLUME, "metaimage")])
 
 
-def test_a_format_by_its_name(bentray: Callable[..., Result], tmp_path: Path, asked: list[Any]) -> None:
+def test_a_format_by_its_name(bentray: Run, tmp_path: Path, asked: list[Any]) -> None:
     for form in ("h5", "hdf5", "npy"):
         result = bentray("download", VOLUME, "-o", tmp_path / f"image-{form}", "--format", form)
         assert result.exit_code == 0

@@ -1,17 +1,17 @@
 """`bentray geometry-field`: a mesh in, a field and three pictures out, reused and resumed."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 import trimesh
 from PIL import Image
-from typer.testing import Result
 
 from bentray_kernels.meshes.example_surfaces import torus
 from bentray_workers.rendering import geometry_field
+
+from .conftest import Run
 
 SMALL = ("--samples", 6, "--inner-samples", 4, "--divisions", 4, "--image-size", 33)
 PICTURE = ("--width", 32, "--height", 24)
@@ -25,7 +25,7 @@ def mesh(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_field_and_its_pictures(bentray: Callable[..., Result], mesh: Path, tmp_path: Path) -> None:
+def test_a_field_and_its_pictures(bentray: Run, mesh: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     result = bentray("geometry-field", mesh, "-o", out, *SMALL, *PICTURE, "--mode", "refract")
     assert result.exit_code == 0, result.stderr
@@ -42,7 +42,7 @@ def test_a_field_and_its_pictures(bentray: Callable[..., Result], mesh: Path, tm
 
 
 def test_a_field_is_made_once(
-    bentray: Callable[..., Result], mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bentray: Run, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
 
@@ -61,7 +61,7 @@ def test_a_field_is_made_once(
 
 
 def test_interrupted_field_is_resumed(
-    bentray: Callable[..., Result], mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bentray: Run, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*given: object) -> None:
         raise KeyboardInterrupt
@@ -73,11 +73,3 @@ def test_interrupted_field_is_resumed(
     result = bentray("geometry-field", mesh, "-o", tmp_path / "out", *SMALL, *PICTURE)
     assert result.exit_code == 0, result.stderr
     assert not list((tmp_path / "out").glob("*-unfinished"))
-
-
-def test_no_mesh_is_one_line(bentray: Callable[..., Result], tmp_path: Path) -> None:
-    (tmp_path / "notes.ply").write_text("only text")
-    for path in (tmp_path / "notes.ply", tmp_path / "absent.ply"):
-        result = bentray("geometry-field", path, "-o", tmp_path / "out")
-        assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
-        assert "PLY, OBJ" in result.stderr

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import Result
 
 from bentray_service.files.folder_database import GUARDED
 from bentray_service.rows.keys import ApiKey
 
-Run = Callable[..., Result]
+from .conftest import Run
 
 
 def made(bentray: Run, data: Path, *words: object) -> dict[str, Any]:

@@ -1,16 +1,16 @@
 """`bentray reconstruct` and `quality` of an arc: limited angle and opening angle are stated first."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import Result
 
 from bentray_kernels.acquisition import Dataset
 from bentray_workers.files.dataset import write_dataset
+
+from .conftest import Run
 
 QUICK = ("--nodes", 32, "--iterations", 2, "--method", "gauss-newton", "--no-attenuation")
 
@@ -32,9 +32,7 @@ def arc(scan: Dataset) -> Dataset:
     )
 
 
-def test_an_arc_has_an_image_and_a_sentence(
-    bentray: Callable[..., Result], arc: Dataset, tmp_path: Path
-) -> None:
+def test_an_arc_has_an_image_and_a_sentence(bentray: Run, arc: Dataset, tmp_path: Path) -> None:
     write_dataset(tmp_path / "arc.h5", arc)
     shown = bentray(
         "reconstruct", tmp_path / "arc.h5", "-o", tmp_path / "out", *QUICK, "--opening-angle", 120
@@ -63,7 +61,7 @@ def test_an_arc_has_an_image_and_a_sentence(
     ],
 )
 def test_what_has_no_image_is_refused_at_once(
-    bentray: Callable[..., Result],
+    bentray: Run,
     arc: Dataset,
     tmp_path: Path,
     change: dict[str, object],

@@ -1,19 +1,18 @@
 """`bentray quality`: report, page and exit codes; an unusable scan fails with a reason."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from typer.testing import Result
 
 from bentray_workers.files.dataset import read_dataset, write_dataset
 
 from ...kernels.acquisition.traces import blob_delay, scan
+from .conftest import Run
 
 
-def test_faults_are_reported_and_the_rest_continues(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_faults_are_reported_and_the_rest_continues(bentray: Run, tmp_path: Path) -> None:
     faulty = scan(blob_delay(24), elements=24, noise=0.01)
     faulty.waveform.object[:, 5] = faulty.waveform.water[:, 5] = 0.0
     faulty.waveform.object[9] *= -1.0
@@ -36,9 +35,7 @@ def test_faults_are_reported_and_the_rest_continues(bentray: Callable[..., Resul
     assert "picked.h5" in table.stdout
 
 
-def test_a_refused_scan_fails_with_the_reason_and_leaves_its_report(
-    bentray: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_refused_scan_fails_with_the_reason_and_leaves_its_report(bentray: Run, tmp_path: Path) -> None:
     write_dataset(tmp_path / "scan.h5", replace(scan(elements=16), sampling_rate_hz=4.0e6))
     result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out")
     assert result.exit_code == 1
@@ -48,9 +45,7 @@ def test_a_refused_scan_fails_with_the_reason_and_leaves_its_report(
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["quality.json", "quality.png"]
 
 
-def test_a_scan_without_findings_is_told_what_was_checked(
-    bentray: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_scan_without_findings_is_told_what_was_checked(bentray: Run, tmp_path: Path) -> None:
     times = scan(elements=16)
     write_dataset(tmp_path / "scan.h5", replace(times, waveform=None, delta_tof_s=np.zeros((16, 16))))
     result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out")
@@ -61,9 +56,7 @@ def test_a_scan_without_findings_is_told_what_was_checked(
     assert second.startswith(first)
 
 
-def test_a_calibration_puts_the_elements_where_the_water_shot_has_them(
-    bentray: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_calibration_puts_the_elements_where_the_water_shot_has_them(bentray: Run, tmp_path: Path) -> None:
     drawn = scan(blob_delay(24), elements=24, noise=0.01)
     # The drawing is wrong, the traces are right.
     wrong = 3e-4 * np.random.default_rng(2).standard_normal((24, 2))
@@ -83,7 +76,7 @@ def test_a_calibration_puts_the_elements_where_the_water_shot_has_them(
     assert np.sqrt((off**2).mean()) < 0.2 * np.sqrt((wrong**2).mean())
 
 
-def test_a_calibration_needs_a_water_shot(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_calibration_needs_a_water_shot(bentray: Run, tmp_path: Path) -> None:
     times = replace(scan(elements=16), waveform=None, delta_tof_s=blob_delay(16))
     write_dataset(tmp_path / "scan.h5", times)
     result = bentray("quality", tmp_path / "scan.h5", "-o", tmp_path / "out", "--calibrate", "fitted")

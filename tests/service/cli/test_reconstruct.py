@@ -4,15 +4,12 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
-from typer.testing import Result
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.errors import InvalidInput
@@ -21,6 +18,8 @@ from bentray_kernels.tomography.requirements import check_scan
 from bentray_service.cli.reconstruct import useful_workers
 from bentray_workers.cluster import connection
 from bentray_workers.files.reconstruction import read_reconstruction
+
+from .conftest import Run
 
 QUICK = ("--nodes", 32, "--iterations", 2)
 
@@ -32,7 +31,7 @@ def workers_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_it_writes_volume_picture_and_figures(
-    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path, drawn: Any
+    bentray: Run, scan_file: Path, tmp_path: Path, drawn: Any
 ) -> None:
     result = bentray(
         "reconstruct", scan_file, "-o", tmp_path / "new" / "out", *QUICK, "--rays", "straight", "--json"
@@ -62,7 +61,7 @@ def caption(errors: dict[str, Any]) -> str:
 
 
 def test_without_json_it_ends_with_a_table_and_the_paths(
-    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
+    bentray: Run, scan_file: Path, tmp_path: Path
 ) -> None:
     result = bentray("reconstruct", scan_file, "-o", tmp_path, *QUICK)
     assert result.exit_code == 0
@@ -73,9 +72,7 @@ def test_without_json_it_ends_with_a_table_and_the_paths(
     assert result.stderr == ""
 
 
-def test_auto_prints_its_choice_and_reason_in_one_line(
-    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path
-) -> None:
+def test_auto_prints_its_choice_and_reason_in_one_line(bentray: Run, scan_file: Path, tmp_path: Path) -> None:
     words = ("--method", "auto", "--resolution-check", "--workers", 1)
     result = bentray("reconstruct", scan_file, "-o", tmp_path, *QUICK, *words)
     assert result.exit_code == 0
@@ -150,56 +147,3 @@ def test_that_check_needs_no_compiled_code() -> None:
         check=True,
     )
     assert not {"numba", "scipy", "distributed"} & set(result.stdout.split())
-
-
-def spoil(path: Path, change: Callable[[h5py.File], None]) -> Path:
-    with h5py.File(path, "r+") as file:
-        change(file)
-    return path
-
-
-def no_geometry(file: h5py.File) -> None:
-    del file["geometry"]
-
-
-def tx_out_of_range(file: h5py.File) -> None:
-    file["acquisition/tx"][2] = 9999
-
-
-def nan_position(file: h5py.File) -> None:
-    file["geometry/element_position_m"][3, 0] = np.nan
-
-
-@pytest.mark.parametrize(
-    ("change", "field"),
-    [
-        (no_geometry, "geometry"),
-        (tx_out_of_range, "acquisition/tx"),
-        (nan_position, "geometry/element_position_m"),
-    ],
-)
-def test_a_bad_dataset_is_one_line_that_names_the_field(
-    bentray: Callable[..., Result],
-    scan_file: Path,
-    tmp_path: Path,
-    change: Callable[[h5py.File], None],
-    field: str,
-) -> None:
-    path = tmp_path / "bad.h5"
-    path.write_bytes(scan_file.read_bytes())
-    result = bentray("reconstruct", spoil(path, change), "-o", tmp_path / "out")
-    assert result.exit_code == 2
-    assert result.stderr.startswith(f"bentray: {field}")
-    assert "accepted: " in result.stderr
-    assert result.stderr.count("\n") == 1
-
-
-@pytest.mark.parametrize("kept", [0, 20, 3000])
-def test_incomplete_hdf5_file_gives_a_one_line_error(
-    bentray: Callable[..., Result], scan_file: Path, tmp_path: Path, kept: int
-) -> None:
-    path = tmp_path / "bad.h5"
-    path.write_bytes(scan_file.read_bytes()[:kept])
-    result = bentray("reconstruct", path, "-o", tmp_path / "out")
-    assert result.exit_code == 2
-    assert result.stderr.count("\n") == 1

@@ -1,19 +1,19 @@
 """`bentray reproduce`: the same bits from a result's own record; differences are located."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
 from bentray_workers.reconstruction.reconstruction_run import reconstruct
+
+from .conftest import Run
 
 WAYS = {
     "gauss-newton": {"method": "gauss-newton"},
@@ -31,13 +31,13 @@ def made(request: pytest.FixtureRequest, scan_file: Path, tmp_path: Path) -> Pat
     return path
 
 
-def test_result_is_reproduced(bentray: Callable[..., Result], made: Path, scan_file: Path) -> None:
+def test_result_is_reproduced(bentray: Run, made: Path, scan_file: Path) -> None:
     ended = bentray("reproduce", made, scan_file)
     assert ended.exit_code == 0, ended.stderr
     assert ended.stdout.count("identical") >= 4
 
 
-def test_a_single_bit_is_seen(bentray: Callable[..., Result], made: Path, scan_file: Path) -> None:
+def test_a_single_bit_is_seen(bentray: Run, made: Path, scan_file: Path) -> None:
     with h5py.File(made, "r+") as file:
         file["speed_mps"][3, 4] = np.nextafter(file["speed_mps"][3, 4], 0.0)
     ended = bentray("reproduce", made, scan_file, "--json")
@@ -48,9 +48,7 @@ def test_a_single_bit_is_seen(bentray: Callable[..., Result], made: Path, scan_f
     assert "was not reproduced" in ended.stderr
 
 
-def test_other_scan_or_version_is_reported(
-    bentray: Callable[..., Result], made: Path, scan_file: Path, tmp_path: Path
-) -> None:
+def test_other_scan_or_version_is_reported(bentray: Run, made: Path, scan_file: Path, tmp_path: Path) -> None:
     scan = read_dataset(scan_file)
     write_dataset(tmp_path / "other.h5", replace(scan, delta_tof_s=0.5 * scan.delta_tof_s))
     assert "the scan may be another one" in bentray("reproduce", made, tmp_path / "other.h5").stderr
@@ -61,9 +59,7 @@ def test_other_scan_or_version_is_reported(
     assert (ended.exit_code, "numpy: 1.0.0 then, " in ended.stdout) == (0, True)
 
 
-def test_result_without_an_array_is_reported(
-    bentray: Callable[..., Result], made: Path, scan_file: Path
-) -> None:
+def test_result_without_an_array_is_reported(bentray: Run, made: Path, scan_file: Path) -> None:
     with h5py.File(made, "r+") as file:
         del file["residuals"]
     ended = bentray("reproduce", made, scan_file)

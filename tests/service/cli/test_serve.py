@@ -1,15 +1,16 @@
 """`bentray serve`: prints its address and reachability, and rejects bad settings in one line."""
 
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.cli import serve as module
 from bentray_service.web.server import listen
+
+from .conftest import Run
 
 
 @pytest.fixture
@@ -19,9 +20,7 @@ def busy() -> Iterator[int]:
         yield server.getsockname()[1]
 
 
-def test_a_busy_port_is_rejected_before_anything_starts(
-    bentray: Callable[..., Result], busy: int, tmp_path: Path
-) -> None:
+def test_a_busy_port_is_rejected_before_anything_starts(bentray: Run, busy: int, tmp_path: Path) -> None:
     result = bentray("serve", "--port", busy, "--data", tmp_path / "data")
     assert result.exit_code == 2
     assert result.stderr.startswith(f"bentray: port: found {busy} on 127.0.0.1 (Address already in use)")
@@ -29,9 +28,7 @@ def test_a_busy_port_is_rejected_before_anything_starts(
     assert not (tmp_path / "data").exists()
 
 
-def test_a_host_that_is_not_of_this_machine_is_rejected(
-    bentray: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_host_that_is_not_of_this_machine_is_rejected(bentray: Run, tmp_path: Path) -> None:
     # 192.0.2.0/24 is reserved for documentation (RFC 5737), so no machine has it.
     result = bentray("serve", "--host", "192.0.2.1", "--port", 0, "--data", tmp_path)
     assert result.exit_code == 2
@@ -53,29 +50,18 @@ def test_an_unknown_host_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
         listen("nowhere", 0)
 
 
-@pytest.mark.parametrize(
-    ("words", "environment", "line"),
-    [
-        ([], {"BENTRAY_PORT": "http"}, "BENTRAY_PORT: found 'http'"),
-        (["--workers", "2"], {"BENTRAY_PORT": "http"}, "BENTRAY_PORT: found 'http'"),
-    ],
-)
+@pytest.mark.parametrize("words", [(), ("--workers", 2)])
 def test_a_bad_setting_is_named_as_it_was_given(
-    bentray: Callable[..., Result],
-    monkeypatch: pytest.MonkeyPatch,
-    words: list[str],
-    environment: dict[str, str],
-    line: str,
+    bentray: Run, monkeypatch: pytest.MonkeyPatch, words: tuple[object, ...]
 ) -> None:
-    for name, value in environment.items():
-        monkeypatch.setenv(name, value)
+    monkeypatch.setenv("BENTRAY_PORT", "http")
     result = bentray("serve", *words)
     assert result.exit_code == 2
-    assert result.stderr.startswith(f"bentray: {line}; accepted: ")
+    assert result.stderr.startswith("bentray: BENTRAY_PORT: found 'http'; accepted: ")
 
 
 def test_an_option_wins_over_the_environment(
-    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    bentray: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("BENTRAY_WORKERS", "7")
     monkeypatch.setenv("BENTRAY_JOBS_AT_ONCE", "3")
@@ -100,7 +86,7 @@ def test_reachability_is_shown() -> None:
     ],
 )
 def test_remote_access_needs_a_proxy_and_keys(
-    bentray: Callable[..., Result], tmp_path: Path, words: tuple[str, ...], found: str, accepted: str
+    bentray: Run, tmp_path: Path, words: tuple[str, ...], found: str, accepted: str
 ) -> None:
     result = bentray("serve", "--host", "0.0.0.0", *words, "--port", 0, "--data", tmp_path)
     assert result.exit_code == 2
@@ -111,9 +97,7 @@ def test_remote_access_needs_a_proxy_and_keys(
     assert (module.BARE in result.stderr) == ("--bare" in words)
 
 
-def test_start_failure_is_one_line(
-    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_start_failure_is_one_line(bentray: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def unreachable(*given: object, **more: object) -> None:
         raise InvalidInput("scheduler_address", "tcp://127.0.0.1:1", "a running scheduler")
 

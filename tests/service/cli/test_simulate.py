@@ -1,20 +1,20 @@
 """`bentray simulate`: a dataset file with its truth, the same for the same words."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import Result
 
 from bentray_workers.files.dataset import read_dataset
+
+from .conftest import Run
 
 SOLID = ("--phantom", "table7", "--nodes", 16, "--elements", 8, "--slices", 2)
 SMALL = ("--nodes", 24, "--elements", 12, "--coupling", 1400)
 
 
-def test_file_holds_the_requested_scan(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_file_holds_the_requested_scan(bentray: Run, tmp_path: Path) -> None:
     path = tmp_path / "phantom.h5"
     result = bentray("simulate", "-o", path, *SMALL, "--json")
     assert result.exit_code == 0
@@ -38,7 +38,7 @@ def test_file_holds_the_requested_scan(bentray: Callable[..., Result], tmp_path:
     ],
 )
 def test_a_scan_in_space(
-    bentray: Callable[..., Result],
+    bentray: Run,
     tmp_path: Path,
     words: tuple[object, ...],
     shape: tuple[int, ...],
@@ -60,7 +60,7 @@ def test_a_scan_in_space(
     assert dataset.truth.sound_speed_mps.shape == (16, 16, 2)
 
 
-def test_table_shows_how_the_scan_was_simulated(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_table_shows_how_the_scan_was_simulated(bentray: Run, tmp_path: Path) -> None:
     told = bentray("simulate", "-o", tmp_path / "solid.h5", *SOLID, "--snr", 20).stdout
     assert "2, one moving ring, 2-D wave fronts" in told
     assert "1/20 of the signal" in told
@@ -69,7 +69,7 @@ def test_table_shows_how_the_scan_was_simulated(bentray: Callable[..., Result], 
     assert "slices" not in told
 
 
-def test_noise_has_the_requested_size_and_seed(bentray: Callable[..., Result], tmp_path: Path) -> None:
+def test_noise_has_the_requested_size_and_seed(bentray: Run, tmp_path: Path) -> None:
     times = {}
     for name, words in {
         "clean": (),
@@ -84,23 +84,8 @@ def test_noise_has_the_requested_size_and_seed(bentray: Callable[..., Result], t
     assert np.nanmax(np.abs(times["noisy"] - times["other"])) > 1e-9
 
 
-def test_a_file_that_exists_is_kept_without_force(bentray: Callable[..., Result], tmp_path: Path) -> None:
-    path = tmp_path / "phantom.h5"
-    path.write_text("mine")
-    refused = bentray("simulate", "-o", path, *SMALL)
-    assert refused.exit_code == 2
-    assert "--force" in refused.stderr
-    assert path.read_text() == "mine"
-    forced = bentray("simulate", "-o", path, *SMALL, "--force")
-    assert forced.exit_code == 0
-    assert forced.stdout.splitlines()[-1] == str(path)
-    assert read_dataset(path).water_speed_mps == 1400.0
-
-
 @pytest.mark.parametrize("as_json", [True, False])
-def test_waves_are_simulated_with_their_traces(
-    bentray: Callable[..., Result], tmp_path: Path, as_json: bool
-) -> None:
+def test_waves_are_simulated_with_their_traces(bentray: Run, tmp_path: Path, as_json: bool) -> None:
     small = ("--nodes", 24, "--elements", 12, "--emissions", 3, "--frequency", 2e5, "--side", 0.04)
     path = tmp_path / "waves.h5"
     result = bentray("simulate", "-o", path, "--waveform", *small, *(["--json"] if as_json else []))

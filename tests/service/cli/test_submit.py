@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 import pytest
 from scipy.io import savemat
-from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
 from bentray_service.client import ClientError
@@ -20,6 +19,7 @@ from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.reconstruction import reconstruction_run
 
 from ...workers.foreign_scans.scans import delta_tof, positions
+from .conftest import Run
 
 
 class StandIn:
@@ -98,7 +98,7 @@ def client(monkeypatch: pytest.MonkeyPatch) -> type[StandIn]:
 
 
 def test_it_sends_the_scan_and_fetches_three_files(
-    bentray: Callable[..., Result], client: type[StandIn], scan_file: Path, tmp_path: Path
+    bentray: Run, client: type[StandIn], scan_file: Path, tmp_path: Path
 ) -> None:
     result = bentray(
         "submit", scan_file, "--url", "http://lab:8000", "-o", tmp_path, "--iterations", 1, "--json"
@@ -116,7 +116,7 @@ def test_it_sends_the_scan_and_fetches_three_files(
 
 
 def test_a_scan_of_another_program_is_converted_before_it_is_sent(
-    bentray: Callable[..., Result], client: type[StandIn], tmp_path: Path
+    bentray: Run, client: type[StandIn], tmp_path: Path
 ) -> None:
     savemat(tmp_path / "own.mat", {"pos": 1e3 * positions(), "dtof": delta_tof()})
     out = tmp_path / "out"
@@ -131,7 +131,7 @@ def test_a_scan_of_another_program_is_converted_before_it_is_sent(
 
 @pytest.mark.parametrize(("words", "state"), [((), "succeeded"), (("--no-wait",), "queued")])
 def test_without_a_folder_it_prints_the_job_and_its_address(
-    bentray: Callable[..., Result], client: type[StandIn], scan_file: Path, words: tuple[str, ...], state: str
+    bentray: Run, client: type[StandIn], scan_file: Path, words: tuple[str, ...], state: str
 ) -> None:
     result = bentray("submit", scan_file, "--url", "http://lab:8000/", *words)
     assert result.exit_code == 0
@@ -139,9 +139,7 @@ def test_without_a_folder_it_prints_the_job_and_its_address(
     assert json.loads(bentray("submit", scan_file, *words, "--json").stdout)["state"] == state
 
 
-def test_a_webhook_goes_along_without_waiting(
-    bentray: Callable[..., Result], client: type[StandIn], scan_file: Path
-) -> None:
+def test_a_webhook_goes_along_without_waiting(bentray: Run, client: type[StandIn], scan_file: Path) -> None:
     words = ("--webhook", "https://hooks.example.org/x")
     assert bentray("submit", scan_file, "--no-wait", *words).exit_code == 0
     assert words[1] in client.asked
@@ -161,7 +159,7 @@ def test_a_webhook_goes_along_without_waiting(
     ],
 )
 def test_a_refusal_is_one_line(
-    bentray: Callable[..., Result],
+    bentray: Run,
     client: type[StandIn],
     monkeypatch: pytest.MonkeyPatch,
     scan_file: Path,
@@ -178,7 +176,7 @@ def test_a_refusal_is_one_line(
     assert client.asked[-1] == "closed"
 
 
-def test_refused_connection_exits_with_failure(bentray: Callable[..., Result], scan_file: Path) -> None:
+def test_refused_connection_exits_with_failure(bentray: Run, scan_file: Path) -> None:
     # Port 1 of loopback: reserved, and nothing listens on it.
     result = bentray("submit", scan_file, "--url", "http://127.0.0.1:1")
     assert result.exit_code == 1

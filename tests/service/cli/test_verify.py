@@ -1,12 +1,10 @@
 """`bentray verify`: names damaged files, adds missing checksums, removes orphans."""
 
 import json
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
 
 from bentray_service.files.checked_store import CheckedStore
 from bentray_service.files.data_folder import Files
@@ -16,7 +14,8 @@ from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.stored_tables import Datasets
 
-Run = Callable[..., Result]
+from .conftest import Run
+
 SUMMARY = {"title": "", "source": "", "license": "", "dimension": 2, "elements": 3, "ntx": 3, "nrx": 3}
 SUMMARY |= {"slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": False}
 

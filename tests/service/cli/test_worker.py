@@ -5,13 +5,12 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
-from typer.testing import Result
 
 from bentray_kernels.tomography import Settings
 from bentray_service.healthcheck import check_worker
@@ -21,6 +20,7 @@ from bentray_workers.reconstruction.reconstruction_run import reconstruct
 from ...free_ports import free_port
 from ...listening import beyond_loopback, listening, pages
 from ...waiting import wait_until
+from .conftest import Run
 
 PATIENCE_S = 240.0
 Process = subprocess.Popen[str]
@@ -117,7 +117,7 @@ def test_it_joins_works_comes_back_and_leaves(machine: Machine, scan_file: Path)
 
 
 def test_the_lane_of_opencl_is_offered_where_a_device_passed(
-    bentray: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+    bentray: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from bentray_kernels import opencl
     from bentray_workers.cluster import local_workers

@@ -6,7 +6,6 @@ import zipfile
 import pytest
 from PIL import Image
 
-from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.defects import sound
 from bentray_kernels.meshes.example_surfaces import torus
 from bentray_kernels.phantoms import TWO_HOLES, sampled
@@ -20,6 +19,7 @@ from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
 from bentray_workers.rendering import field_settings, geometry_field
 
 from ...waiting import wait_until
+from ..conftest import refused
 from ..stored_volumes import store_volume
 
 SMALL = {"width": 24, "height": 16, "iso": [0.5], "frames": 3}
@@ -113,42 +113,23 @@ def test_a_stopped_job_runs_again_at_the_next_start(on_workers, until, monkeypat
     assert states[-1] == "succeeded"
 
 
-def test_worker_rejection_fails_the_job_with_a_message(on_workers, until, monkeypatch):
-    def refuse(*given, **control):
-        raise InvalidInput("iso", "0.5", "what the filter leaves")
-
-    monkeypatch.setattr(kinds, "draw_turntable", refuse)
-    with on_workers() as http:
-        done = until(http, ask(http, put(http)).json()["id"])
-    assert (done["state"], done["error"]["field"]) == ("failed", "iso")
-
-
-@pytest.mark.parametrize(
-    ("settings", "field"),
-    [
+def test_other_refusals(http):
+    volume = put(http)
+    for settings, field in (
         ({"iso": [7.0]}, "iso"),
         ({"iso": 0.5}, "settings.iso"),
         ({"frames": 720, "width": 2048, "height": 2048}, "settings.frames"),
-    ],
-)
-def test_wrong_settings(http, settings, field):
-    answer = ask(http, put(http), **settings)
-    body = answer.json()
-    assert (answer.status_code, body["field"].removesuffix(".0")) == (422, field), body
-    assert body["accepted"]
-    assert http.get("/v1/jobs").json()["jobs"] == []
-
-
-def test_other_refusals(http):
-    volume = put(http)
+    ):
+        answer = ask(http, volume, **settings)
+        assert refused(answer, answer.json()["field"])["field"].removesuffix(".0") == field
     for asked, field in (
         ({"kind": "refraction"}, "volume"),
         ({"kind": "refraction", "volume": volume, "dataset": "ds-1"}, "dataset"),
         ({"kind": "miracle"}, "kind"),
         ({}, "kind"),
     ):
-        body = http.post("/v1/jobs", json=asked).json()
-        assert (body["status"], body["field"]) == (422, field), body
+        refused(http.post("/v1/jobs", json=asked), field)
+    assert http.get("/v1/jobs").json()["jobs"] == []
     assert ask(http, "vol-" + "0" * 20).status_code == 404
 
 
@@ -223,10 +204,9 @@ def test_other_refusals_of_a_field(http, monkeypatch):
     assert ask_field(http, "mesh-" + "0" * 20).status_code == 404
     mesh = put_mesh(http)
     both = {"kind": "geometry-field", "mesh": mesh, "volume": "vol-1"}
-    assert http.post("/v1/jobs", json=both).json()["field"] == "volume"
+    refused(http.post("/v1/jobs", json=both), "volume")
     monkeypatch.setattr(field_settings, "MAX_FACES", 100)
-    body = ask_field(http, mesh).json()
-    assert (body["status"], body["field"]) == (422, "mesh")
+    refused(ask_field(http, mesh), "mesh")
 
 
 @pytest.mark.parametrize(
@@ -243,7 +223,7 @@ def test_a_title_says_what_made_the_image(settings, made_by, title):
     assert kinds.KINDS["reconstruction"].title(row) == title
 
 
-def test_task_rejection_fails_the_field_with_a_message(on_workers, until):
+def test_task_rejection_fails_the_job_with_a_message(on_workers, until):
     with on_workers() as http:
         done = until(http, ask_field(http, put_mesh(http), image_threshold=1e-12).json()["id"])
     assert (done["state"], done["error"]["field"]) == ("failed", "threshold")

@@ -1,11 +1,16 @@
-"""The reporter: a few writes a second, and the last report always."""
+"""The reporter: a few writes a second, the last report always, and why a job failed."""
 
+import errno
 import json
+import logging
 
+import pytest
+from distributed import KilledWorker
 from sqlalchemy.exc import OperationalError
 
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.result import Iteration, Progress
-from bentray_service.jobs.reporter import MEASURE_SECONDS, Reporter
+from bentray_service.jobs.reporter import MEASURE_SECONDS, Reporter, explain
 
 from ...clock import Clock
 
@@ -146,3 +151,29 @@ def test_the_record_of_a_long_job_does_not_grow():
         clock.now += 0.3
         reporter.report(Progress(count, 600_001, history))
     assert len(jobs.written) - written == 1, "a long record is written more seldom"
+
+
+def test_bad_input_keeps_its_fields():
+    problem = explain("job-1", InvalidInput("speed", -1, "more than 0"))
+    assert (problem.field, problem.found, problem.accepted) == ("speed", "-1", "more than 0")
+    assert problem.instance == "/v1/jobs/job-1"
+
+
+@pytest.mark.parametrize(
+    ("error", "word"),
+    [
+        (MemoryError(), "memory"),
+        (OSError(errno.ENOSPC, "full"), "disk"),
+        (KilledWorker("task", None, 3), "workers"),
+    ],
+)
+def test_known_causes(error, word):
+    assert word in explain("job-1", error).detail
+
+
+def test_unexpected_errors_are_logged(caplog):
+    with caplog.at_level(logging.ERROR, "bentray.jobs"):
+        problem = explain("job-1", RuntimeError("the secret inside"))
+    assert "secret" not in problem.detail
+    assert problem.correlation_id in caplog.text
+    assert "the secret inside" in caplog.text

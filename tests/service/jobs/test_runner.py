@@ -123,10 +123,8 @@ def test_a_job_that_begins_while_the_service_stops_is_put_back(http, uploaded, s
     assert state.background.runner.queue.state(job["id"]) == "queued"
 
 
-def test_cancel_a_running_job(http, uploaded, submitted, until, work):
-    work.hold.clear()
-    job = submitted(http, uploaded(http))
-    until(http, job["id"], "running")
+def test_cancel_a_running_job(http, running, until):
+    job = running(http)
     answer = http.post(f"/v1/jobs/{job['id']}/cancel")
     assert answer.status_code == 202
     assert answer.json()["state"] in ("cancelling", "cancelled")
@@ -135,10 +133,23 @@ def test_cancel_a_running_job(http, uploaded, submitted, until, work):
     assert not list((http.app.state.stores.files.of(LOCAL).root / "volumes").iterdir())
 
 
-def test_a_refused_job_says_why(http, uploaded, submitted, until, work):
-    work.error = InvalidInput("traveltime", "every pair missing", "at least one pair")
+@pytest.mark.parametrize(
+    ("error", "spoil", "field", "found"),
+    [
+        (
+            InvalidInput("traveltime", "every pair missing", "a pair"),
+            None,
+            "traveltime",
+            "every pair missing",
+        ),
+        (None, np.nan, "settings", "no finite speed at 1 nodes"),
+    ],
+)
+def test_a_refused_job_says_why(http, uploaded, submitted, until, work, error, spoil, field, found):
+    work.error, work.spoil = error, spoil
     done = until(http, submitted(http, uploaded(http))["id"])
-    assert (done["state"], done["error"]["field"]) == ("failed", "traveltime")
+    assert (done["state"], done["error"]["field"]) == ("failed", field)
+    assert found in done["error"]["found"]
     assert done["progress"] == {"done": 24, "total": 24, "phase": ""}
 
 
@@ -167,10 +178,8 @@ def test_the_end_is_stored_once_the_database_is_back(http, uploaded, submitted, 
     assert len(tries) == 2
 
 
-def test_progress_is_seen_while_it_runs(http, uploaded, submitted, until, work):
-    work.hold.clear()
-    job = submitted(http, uploaded(http))
-    until(http, job["id"], "running")
+def test_progress_is_seen_while_it_runs(http, running, until, work):
+    job = running(http)
     wait_until(lambda: http.get(f"/v1/jobs/{job['id']}").json()["progress"]["total"])
     work.hold.set()
     assert until(http, job["id"])["progress"]["done"] == 24
@@ -206,12 +215,10 @@ def test_a_full_disk_is_waited_for(start, uploaded, submitted, until, work, monk
 
 
 @pytest.mark.parametrize("error", [CommClosedError("gone"), FutureCancelledError("key", "lost")])
-def test_lost_scheduler_fails_no_job(start, uploaded, submitted, until, work, error):
+def test_lost_scheduler_fails_no_job(start, running, until, work, error):
     http = start(jobs_at_once=1)
     work.error = error
-    work.hold.clear()
-    job = submitted(http, uploaded(http))
-    until(http, job["id"], "running")
+    job = running(http)
     work.hold.set()
     until(http, job["id"], "queued")
     work.error = None
@@ -232,11 +239,9 @@ def test_finished_jobs_leave_no_temporary_files(http, uploaded, submitted, until
     wait_until(lambda: not list(folder.iterdir()))
 
 
-def test_a_full_queue_is_a_429(start, uploaded, submitted, until, work):
+def test_a_full_queue_is_a_429(start, running, submitted, work):
     http = start(jobs_at_once=1, max_queued_jobs=1)
-    dataset = uploaded(http)
-    work.hold.clear()
-    until(http, submitted(http, dataset)["id"], "running")
+    dataset = running(http)["dataset"]
     submitted(http, dataset)
     answer = http.post("/v1/jobs", json={"kind": "reconstruction", "dataset": dataset})
     assert (answer.status_code, answer.json()["type"]) == (429, "/problems/queue-full")
@@ -257,10 +262,3 @@ def test_unrecordable_result_fails_the_job(start, uploaded, submitted, until, wo
         done = until(http, submitted(http, dataset)["id"])
     assert (done["state"], done["error"]["type"]) == ("failed", "/problems/internal")
     assert until(http, submitted(http, dataset)["id"])["state"] == "succeeded", "the slot is free again"
-
-
-def test_an_image_that_is_not_finite_is_rejected(http, uploaded, submitted, until, work):
-    work.spoil = np.nan
-    done = until(http, submitted(http, uploaded(http))["id"])
-    assert (done["state"], done["error"]["field"]) == ("failed", "settings")
-    assert "no finite speed at 1 nodes" in done["error"]["found"]

@@ -15,21 +15,9 @@ from bentray_service.rows.jobs import NewJob
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.stored_tables import Volumes
 
+from .conftest import volume_row
+
 PROBLEM = {"type": "/problems/x", "title": "t", "status": 500, "detail": "why"}
-
-
-def volume(job_id):
-    return {
-        "id": volume_of(job_id),
-        "bytes": 1,
-        "axes": "x,y",
-        "shape": [2, 2],
-        "spacing_m": [1.0, 1.0],
-        "origin_m": [0.0, 0.0],
-        "speed_range_mps": [1.0, 2.0],
-        "water_speed_mps": 1500.0,
-        "provenance": {},
-    }
 
 
 def test_claimed_in_order(jobs, queue, dataset):
@@ -59,7 +47,7 @@ def test_success_comes_with_its_volume(database, jobs, queue, dataset):
     job = jobs.add(LOCAL, NewJob("reconstruction", {"nodes": 16}, dataset))
     queue.claim()
     queue.progress(job.id, 4, 4, [{"slice": 0, "sweep": 1, "residual_rms_s": None, "emitters": 4}])
-    assert queue.succeed(job.id, volume(job.id))
+    assert queue.succeed(job.id, volume_row(job.id))
     row = jobs.get(LOCAL, job.id)
     assert (row.state, row.done, row.history[0]["emitters"]) == ("succeeded", 4, 4)
     assert row.finished >= row.started
@@ -71,7 +59,7 @@ def test_a_cancelled_job_cannot_succeed(database, jobs, queue, dataset):
     job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
     queue.claim()
     assert jobs.request_cancel(LOCAL, job.id).state == "cancelling"
-    assert not queue.succeed(job.id, volume(job.id))
+    assert not queue.succeed(job.id, volume_row(job.id))
     with pytest.raises(UnknownId):
         Volumes(database).get(LOCAL, volume_of(job.id))
     queue.mark_cancelled(job.id)
@@ -169,10 +157,10 @@ def test_second_service_claims_only_expired_jobs(database, jobs, queue, dataset,
     other.progress(job.id, 7, 9, [])
     other.fail(job.id, PROBLEM)
     other.release(job.id, "late")
-    assert not other.succeed(job.id, volume(job.id))
+    assert not other.succeed(job.id, volume_row(job.id))
     row = jobs.get(LOCAL, job.id)
     assert (row.state, row.done, queue.held_state(job.id)) == ("running", 0, "running")
-    assert queue.succeed(job.id, volume(job.id))
+    assert queue.succeed(job.id, volume_row(job.id))
 
 
 def test_lost_claim_is_reclaimed(jobs, queue, dataset, monkeypatch):
@@ -229,7 +217,7 @@ def test_a_job_on_a_volume_ends_without_one(jobs, queue, database):
 def test_a_result_with_numbers_that_json_has_not_is_null_there(jobs, queue, dataset, database):
     job = jobs.add(LOCAL, NewJob("reconstruction", {"weight": math.inf}, dataset))
     queue.claim()
-    result = volume(job.id)
+    result = volume_row(job.id)
     result |= {"speed_range_mps": [math.nan, 1500.0], "provenance": {"fit": {"rms": -math.inf, "n": 3}}}
     queue.progress(job.id, 1, 2, [{"residual_rms_s": math.nan}])
     assert queue.succeed(job.id, result)

@@ -1,9 +1,11 @@
-"""The rows of keys: a digest in place of the secret, and an end that holds at once."""
+"""Keys: one form for owners, a digest in place of the secret in rows, and an end that holds at once."""
 
 import time
 from types import SimpleNamespace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from sqlalchemy import select
 
 from bentray_kernels.errors import InvalidInput
@@ -64,3 +66,27 @@ def test_its_last_use_is_known_to_the_minute(keys, monkeypatch):
         monkeypatch.setattr("bentray_service.rows.keys.time", SimpleNamespace(time=lambda at=now + later: at))
         keys.owner(token)
         assert keys.all()[0].used == pytest.approx(now + expected, abs=1e-3)
+
+
+def test_there_and_back():
+    token = ApiKey.new()
+    assert ApiKey.from_text(token.shown()) == token
+    assert ApiKey.new().shown() != token.shown()
+    secret = token.shown().rpartition("_")[2]
+    assert len(secret) == 40
+    assert secret not in f"{token} {token!r} {token.digest()}"
+
+
+@given(st.text(max_size=80))
+def test_rejects_invalid_keys(text):
+    assert ApiKey.from_text(text) is None
+    assert ApiKey.from_text(ApiKey.new().shown() + text[:1]) is None or not text
+
+
+@pytest.mark.parametrize("spoil", [str.upper, lambda t: f"{t}\n", lambda t: t[:-1], lambda t: f" {t}"])
+def test_a_slip_is_rejected_and_not_repeated(spoil):
+    spoiled = spoil(ApiKey.new().shown())
+    assert ApiKey.from_text(spoiled) is None
+    with pytest.raises(InvalidInput) as refusal:
+        ApiKey.given("key", spoiled)
+    assert spoiled[-20:-2] not in str(refusal.value)

@@ -1,8 +1,6 @@
 """Simultaneous writes on every database: one job per key and one end per job."""
 
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
-from threading import Barrier
 
 import pytest
 
@@ -14,6 +12,8 @@ from bentray_service.rows.ids import LOCAL
 from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.tables import JobRow
 
+from .conftest import at_once
+
 AT_ONCE = 50
 
 
@@ -24,19 +24,8 @@ def patient(monkeypatch):
     monkeypatch.setattr(admission, "SLOW_SECONDS", 60.0)
 
 
-def at_once(ask):
-    """What each of many simultaneous calls gave: its result, or the refusal that it raised."""
-    begin = Barrier(AT_ONCE)
-
-    def call(number):
-        begin.wait()
-        try:
-            return ask(number)
-        except (JobFinished, InUse, KeyReused, UnknownId) as refusal:
-            return refusal
-
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        return list(pool.map(call, range(AT_ONCE)))
+def together(ask):
+    return at_once(ask, AT_ONCE, JobFinished, InUse, KeyReused, UnknownId)
 
 
 def states(jobs, job_id):
@@ -44,7 +33,7 @@ def states(jobs, job_id):
 
 
 def test_one_key_makes_one_job(jobs, dataset):
-    made = at_once(
+    made = together(
         lambda _: jobs.add(LOCAL, NewJob("reconstruction", {"nodes": 16}, dataset), Submission(key="once"))
     )
     assert len({job.id for job in made}) == 1
@@ -53,7 +42,7 @@ def test_one_key_makes_one_job(jobs, dataset):
 
 
 def test_a_key_for_several_requests_is_the_firsts(jobs, dataset):
-    made = at_once(
+    made = together(
         lambda n: jobs.add(
             LOCAL, NewJob("reconstruction", {"nodes": 16 + n % 2}, dataset), Submission(key="once")
         )
@@ -64,7 +53,7 @@ def test_a_key_for_several_requests_is_the_firsts(jobs, dataset):
 
 
 def test_without_keys_each_makes_its_own(jobs, dataset):
-    made = at_once(lambda _: jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)))
+    made = together(lambda _: jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)))
     assert len({job.id for job in made}) == AT_ONCE
 
 
@@ -78,7 +67,7 @@ def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
             return deletion.delete(StoredItem(LOCAL, "dataset", dataset))
         return jobs.add(LOCAL, NewJob("reconstruction", {}, dataset))
 
-    told = at_once(ask)
+    told = together(ask)
     deleted = told.pop(AT_ONCE // 2) is None
     assert {type(one) for one in told} == ({UnknownId} if deleted else {JobRow})
     assert len(jobs.newest(LOCAL, AT_ONCE)) == (0 if deleted else AT_ONCE - 1)
@@ -86,7 +75,7 @@ def test_a_scan_is_deleted_or_has_jobs(jobs, database, dataset, tmp_path):
 
 def test_a_queued_job_is_cancelled_once(jobs, dataset):
     job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id
-    told = Counter(type(one) for one in at_once(lambda _: jobs.request_cancel(LOCAL, job)))
+    told = Counter(type(one) for one in together(lambda _: jobs.request_cancel(LOCAL, job)))
     assert told == {JobRow: 1, JobFinished: AT_ONCE - 1}
     assert states(jobs, job) == ["queued", "cancelled"]
 
@@ -94,7 +83,7 @@ def test_a_queued_job_is_cancelled_once(jobs, dataset):
 def test_running_job_is_cancelled_once(jobs, queue, dataset):
     job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset)).id
     assert queue.claim().id == job
-    told = at_once(lambda _: jobs.request_cancel(LOCAL, job).state)
+    told = together(lambda _: jobs.request_cancel(LOCAL, job).state)
     assert told == ["cancelling"] * AT_ONCE
     assert states(jobs, job) == ["queued", "running", "cancelling"]
 
@@ -109,7 +98,7 @@ def test_a_job_that_ends_while_it_is_cancelled_has_one_end(jobs, queue, dataset,
             return jobs.request_cancel(LOCAL, job)
         return queue.succeed(job, None) if end == "succeed" else queue.mark_cancelled(job)
 
-    at_once(ask)
+    together(ask)
     if jobs.get(LOCAL, job).state == "cancelling":
         queue.mark_cancelled(job)
     told = states(jobs, job)

@@ -1,53 +1,45 @@
-"""Storage use and reservations on every database: simultaneous requests stay within the quota."""
+"""Storage use and reservations on every database: by kind, and within the quota for simultaneous requests."""
 
 import asyncio
 import time
-from concurrent.futures import ThreadPoolExecutor
-from threading import Barrier
 
 import pytest
+from sqlalchemy import insert
 
 from bentray_service.access.quota import LEASE_S, Quota
 from bentray_service.errors import DatabaseUnavailable, QuotaExceeded, RateLimited
 from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion, StoredItem
 from bentray_service.rows import uploads as uploading
+from bentray_service.rows import usage
 from bentray_service.rows.database import open_database
-from bentray_service.rows.ids import LOCAL, Tenant, new_id
+from bentray_service.rows.ids import LOCAL, Tenant, new_id, volume_of
 from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.stored_tables import Datasets
+from bentray_service.rows.tables import ResultVolumeRow, StorageRow
 from bentray_service.rows.uploads import Uploads
-from bentray_service.rows.usage import Usage
+from bentray_service.rows.usage import Usage, usage_by_kind
 
-from .conftest import SUMMARY
+from .conftest import SUMMARY, at_once, volume_row
 
 # Fewer than a slow database lets wait.
 AT_ONCE = 8
+
+
 OTHER = Tenant("other")
 
 
-def at_once(ask):
-    """Whether each of many simultaneous calls was allowed."""
-    begin = Barrier(AT_ONCE)
-
-    def call(number):
-        begin.wait()
-        try:
-            ask(number)
-        except (QuotaExceeded, RateLimited):
-            return False
-        return True
-
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        return list(pool.map(call, range(AT_ONCE)))
+def allowed(ask):
+    """How many of simultaneous calls were allowed."""
+    told = at_once(ask, AT_ONCE, QuotaExceeded, RateLimited)
+    return sum(not isinstance(one, Exception) for one in told)
 
 
 def test_of_many_at_once_as_many_are_allowed_as_fit(database, address):
     """Through two services, as far as the database is one that they can share."""
     second = database if address.startswith("sqlite") else open_database(address)
     quotas = Quota(database, 100), Quota(second, 100)
-    allowed = at_once(lambda n: quotas[n % 2].resize(LOCAL, f"ds-{n}", 15))
-    assert allowed.count(True) == 6
+    assert allowed(lambda n: quotas[n % 2].resize(LOCAL, f"ds-{n}", 15)) == 6
     assert quotas[0].of(LOCAL) == quotas[1].of(LOCAL) == Usage(0, 90)
     quotas[0].resize(OTHER, "ds-0", 100)
     if second is not database:
@@ -56,8 +48,7 @@ def test_of_many_at_once_as_many_are_allowed_as_fit(database, address):
 
 def test_of_many_uploads_begun_at_once_as_many_are_allowed_as_fit(database):
     uploads = Uploads(database)
-    allowed = at_once(lambda n: uploads.add(LOCAL, "dataset", 15, {}, "", 60.0, 100))
-    assert allowed.count(True) == 6
+    assert allowed(lambda n: uploads.add(LOCAL, "dataset", 15, {}, "", 60.0, 100)) == 6
     assert len(uploads.receiving()) == 6
     assert Quota(database, 100).of(LOCAL) == Usage(0, 90)
 
@@ -65,7 +56,7 @@ def test_of_many_uploads_begun_at_once_as_many_are_allowed_as_fit(database):
 def test_simultaneous_uploads_stay_within_the_limit(database, monkeypatch):
     monkeypatch.setattr(uploading, "MAX_INCOMPLETE", 5)
     uploads = Uploads(database)
-    assert at_once(lambda n: uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)).count(True) == 5
+    assert allowed(lambda n: uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)) == 5
     with pytest.raises(RateLimited, match="5 incomplete uploads; accepted: fewer than 5") as refused:
         uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)
     assert refused.value.wait_s > 0.0
@@ -76,12 +67,8 @@ def test_simultaneous_uploads_stay_within_the_limit(database, monkeypatch):
 
 def test_of_many_jobs_at_once_as_many_are_allowed_as_fit(database, jobs, dataset, queue):
     Quota(database, 100).stored(LOCAL, dataset, 10)
-    allowed = at_once(
-        lambda n: jobs.add(
-            LOCAL, NewJob("reconstruction", {}, dataset, reserved=15), Submission(most_bytes=100)
-        )
-    )
-    assert allowed.count(True) == 6
+    new, how = NewJob("reconstruction", {}, dataset, reserved=15), Submission(most_bytes=100)
+    assert allowed(lambda n: jobs.add(LOCAL, new, how)) == 6
     assert len(jobs.newest(LOCAL, 99)) == 6
     assert Quota(database, 100).of(LOCAL) == Usage(10, 90)
     jobs.request_cancel(LOCAL, jobs.newest(LOCAL, 1)[0].id)
@@ -156,26 +143,14 @@ def test_a_job_has_its_room_until_its_end(database, jobs, queue, dataset, end):
     before = quota.of(LOCAL).stored
     job = jobs.add(LOCAL, NewJob("reconstruction", {}, dataset, reserved=60), Submission(most_bytes=100)).id
     assert queue.claim().id == job
-    queue.record_size(job, 50)
-    assert quota.of(LOCAL) == Usage(before, 60)
-    queue.record_size(job, 80)
-    assert quota.of(LOCAL) == Usage(before, 80)
+    for size, reserved in ((50, 60), (80, 80)):
+        queue.record_size(job, size)
+        assert quota.of(LOCAL) == Usage(before, reserved)
     queue.release(job, "the workers were away")
     queue.claim()
     assert quota.of(LOCAL).reserved == 80
-    volume = {
-        "id": "vol" + job[3:],
-        "bytes": 9,
-        "axes": "x,y",
-        "shape": [2, 2],
-        "spacing_m": [1, 1],
-        "origin_m": [0, 0],
-        "speed_range_mps": [1, 2],
-        "water_speed_mps": 1500.0,
-        "provenance": {},
-    }
     {
-        "succeed": lambda: queue.succeed(job, volume),
+        "succeed": lambda: queue.succeed(job, volume_row(job, 9)),
         "animation": lambda: queue.succeed(job, None, size=9),
         "fail": lambda: queue.fail(job, {"detail": "odd"}),
         "cancelled": lambda: queue.mark_cancelled(job),
@@ -230,3 +205,47 @@ def test_at_the_start_the_sizes_are_those_of_the_files(database, dataset, tmp_pa
     for _ in range(2):
         quota.begin(files, alone=True)
         assert quota.of(LOCAL) == Usage(278, 0)
+
+
+def kinds(database, tenant=LOCAL):
+    return {one.kind: (one.items, one.stored, one.reserved) for one in usage_by_kind(database, tenant)}
+
+
+def test_every_kind_is_counted_once(database, jobs):
+    scan = new_id("dataset")
+    job = jobs.add(LOCAL, NewJob("refraction", {})).id
+    result = volume_of(job)
+    cube = {"axes": "x", "shape": [1], "spacing_m": [1.0], "origin_m": [0.0], "speed_range_mps": [1.0, 1.0]}
+    row = {"id": result, "job_id": job, "created": 1.0, "bytes": 20, "water_speed_mps": 1.0, "provenance": {}}
+    sizes = {scan: 10, result: 20, f"{result}.nii": 30, new_id("volume"): 40, new_id("mesh"): 50}
+    sizes |= {new_id("field"): 60, job: 70}
+    with database.write() as connection:
+        connection.execute(insert(ResultVolumeRow).values(tenant=LOCAL, **row, **cube))
+        for name, size in sizes.items():
+            usage.store(connection, LOCAL, name, size)
+        usage.store(connection, OTHER, new_id("dataset"), 1000)
+        usage.reserve(connection, LOCAL, new_id("upload"), 80, 10**6)
+        usage.reserve(connection, LOCAL, new_id("dataset"), 5, 10**6)
+    found = kinds(database)
+    assert found == {
+        "scans": (1, 10, 5),
+        "results": (1, 20, 0),
+        "volumes": (1, 40, 0),
+        "meshes": (1, 50, 0),
+        "geometry-fields": (1, 60, 0),
+        "exports": (1, 30, 0),
+        "jobs": (1, 70, 0),
+        "uploads": (0, 0, 80),
+    }
+    used = Quota(database, 10**6).of(LOCAL)
+    assert used.stored == sum(stored for _, stored, _ in found.values())
+    assert used.reserved == sum(reserved for *_, reserved in found.values())
+    assert kinds(database, OTHER) == {"scans": (1, 1000, 0)}
+
+
+def test_reservations_of_dead_processes_do_not_count(database):
+    with database.write() as connection:
+        late = {"lease_owner": "dead", "lease_until": 1.0}
+        row = {"tenant": LOCAL, "name": new_id("job"), "bytes": 7, "reserved": True}
+        connection.execute(insert(StorageRow).values(**row, **late))
+    assert kinds(database) == {}

@@ -1,16 +1,16 @@
 """Options of a reconstruction set the settings of the same name, and their help shows the true defaults."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import typer
-from typer.testing import Result
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.settings import PLACES, Settings
 from bentray_service.cli import app
 from bentray_service.cli.options.settings_options import OPTIONS, settings_from
+
+from ..conftest import Run
 
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 
@@ -56,7 +56,7 @@ def received(monkeypatch: pytest.MonkeyPatch) -> list[Settings]:
 
 @pytest.mark.parametrize(("words", "name", "value"), CHOICES)
 def test_each_option_sets_its_own_setting_and_no_other(
-    bentray: Callable[..., Result],
+    bentray: Run,
     received: list[Settings],
     tmp_path: Path,
     words: list[str],
@@ -69,9 +69,7 @@ def test_each_option_sets_its_own_setting_and_no_other(
     assert received == [Settings.from_values(**{name: value})]
 
 
-def test_several_are_taken_together(
-    bentray: Callable[..., Result], received: list[Settings], tmp_path: Path
-) -> None:
+def test_several_are_taken_together(bentray: Run, received: list[Settings], tmp_path: Path) -> None:
     (tmp_path / "scan.h5").touch()
     words = ("--iterations", 2, "--nodes", 64, "--penalty-strength", 2)
     bentray("reconstruct", tmp_path / "scan.h5", "-o", tmp_path / "out", *words)
@@ -84,32 +82,6 @@ def test_every_setting_has_its_option() -> None:
 
 def test_no_options_give_default_settings() -> None:
     assert settings_from({}) == Settings()
-
-
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        (["--rays", "bent"], "rays: found 'bent'; accepted: 'curved' or 'straight'"),
-        (
-            ["--speed-bounds", "1600", "1400"],
-            "speed_bounds_mps: found (1600.0, 1400.0); accepted: (lowest, highest)",
-        ),
-        (["--seed", "-1"], "seed: found '-1'; accepted: no such setting: the random order"),
-        (["--edge", "7"], "edge_mps: found '7'; accepted: no such setting: method auto tries sharp edges"),
-        (["--no-coherence-factor"], "coherence_factor: found False; accepted: no such setting: the"),
-    ],
-)
-@pytest.mark.parametrize("command", ["reconstruct", "submit"])
-def test_a_bad_setting_is_one_line_with_field_found_and_accepted(
-    bentray: Callable[..., Result], tmp_path: Path, command: str, words: list[str], line: str
-) -> None:
-    scan = tmp_path / "scan.h5"
-    scan.touch()
-    result = bentray(command, scan, "-o", tmp_path / "out", *words)
-    assert result.exit_code == 2
-    assert result.stderr.startswith(f"bentray: {line}")
-    assert result.stderr.count("\n") == 1
-    assert result.stdout == ""
 
 
 @pytest.mark.parametrize("command", ["reconstruct", "submit"])

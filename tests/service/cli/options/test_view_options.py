@@ -1,9 +1,11 @@
-"""The options of views and of a geometry field: one for each field, with its default and its choices."""
+"""The options of views and of a geometry field: one for each field; rows of numbers repeat an option."""
 
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bentray_kernels.requests.request_fields import choices_of
 from bentray_kernels.splines import FILTERS
@@ -12,6 +14,7 @@ from bentray_service.cli.options.view_options import (
     FIELD_VIEW,
     VIEW,
     field_of,
+    repeat_option,
     view_of,
 )
 from bentray_workers.rendering.field_settings import FieldSettings
@@ -54,3 +57,25 @@ def test_a_backdrop_may_be_a_file() -> None:
 
 def test_the_names_of_filters_are_those_of_the_splines() -> None:
     assert choices_of(RefractionView)["filter"] == tuple(FILTERS)
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        ("-s 1", "-s 1"),
+        ("-s 1 2 3", "-s 1 -s 2 -s 3"),
+        ("-s 1 2 3 4", "-s 1 -s 2 -s 3 4"),
+        ("a -s 1e-3 v.raw 5", "a -s 1e-3 v.raw 5"),
+        ("-s 1 -s 2 -s 3", "-s 1 -s 2 -s 3"),
+        ("-s many 2", "-s many -s 2"),
+        ("-s 1 -2 -o p", "-s 1 -s -2 -o p"),
+        ("-s", "-s"),
+    ],
+)
+def test_rows(words: str, meant: str) -> None:
+    assert list(repeat_option("-s", words.split())) == meant.split()
+
+
+@given(st.lists(st.text(max_size=4).filter(lambda word: word != "-s")))
+def test_without_the_option_nothing_changes(words: list[str]) -> None:
+    assert list(repeat_option("-s", words)) == words

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
 
 import pytest
 import typer
@@ -13,6 +12,8 @@ from bentray_service.cli.output.exit_codes import Commands, DoubtfulResult, Work
 from bentray_service.client import ClientError
 from bentray_service.client.errors import from_problem
 from bentray_service.web.problem import Problem
+
+from ..conftest import Run
 
 
 def ending(raised: BaseException | None) -> Result:
@@ -87,9 +88,7 @@ def test_service_responses_map_to_exit_codes(
         (["simulate", "--colour"], "No such option: --colour"),
     ],
 )
-def test_invalid_arguments_exit_with_code_2_and_one_line(
-    bentray: Callable[..., Result], words: list[str], line: str
-) -> None:
+def test_invalid_arguments_exit_with_code_2_and_one_line(bentray: Run, words: list[str], line: str) -> None:
     result = bentray(*words)
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1

@@ -1,21 +1,44 @@
-"""The rows of geometry fields: one per content, whichever jobs requested it."""
+"""Rows of meshes and geometry fields: kept as given, one field per content, closed to invented ids."""
 
 import pytest
 
 from bentray_service.errors import UnknownId
-from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, Tenant, field_of, new_id
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs, NewJob
-from bentray_service.rows.stored_tables import GeometryFields
+from bentray_service.rows.stored_tables import GeometryFields, Meshes
 from bentray_service.rows.tables import FieldRow
 
+MESH = {
+    "title": "a ball",
+    "format": "ply",
+    "vertices": 6,
+    "faces": 8,
+    "genus": 0,
+    "holes": 0,
+    "coloured": False,
+    "repairs": {"merged": 18},
+    "content": "c" * 64,
+}
 
-@pytest.fixture
-def database(tmp_path):
-    opened = open_database(f"sqlite:///{tmp_path / 'a.sqlite'}")
-    yield opened
-    opened.close()
+
+def test_meshes_are_kept_as_given_and_newest_first(database):
+    meshes = Meshes(database)
+    made = [meshes.add(LOCAL, new_id("mesh"), size=9, sha256="f" * 64, summary=MESH) for _ in range(3)]
+    row = made[0]
+    assert MESH.items() <= row.values().items()
+    assert (row.bytes, row.volume_id, row.iso) == (9, None, None)
+    assert meshes.get(LOCAL, row.id).values() == row.values()
+    assert [found.id for found in meshes.newest(LOCAL, 2)] == [one.id for one in made[:0:-1]]
+
+
+@pytest.mark.parametrize(
+    ("table", "name", "listed"),
+    [(Meshes, new_id("mesh"), "meshes"), (GeometryFields, field_of("a" * 64), "geometry-fields")],
+)
+def test_missing_objects_are_not_found(database, table, name, listed):
+    with pytest.raises(UnknownId, match=f"GET /v1/{listed}"):
+        table(database).get(LOCAL, name)
 
 
 def finished(database, mesh, content, size, tenant=LOCAL):
@@ -38,11 +61,6 @@ def test_the_same_content_is_one_field(database):
     row = fields.get(LOCAL, field_of("a" * 64))
     assert (row.job_id, row.bytes, row.figures) == (first, 7, {"faces": 1})
     assert [one.id for one in fields.newest(LOCAL, 9)] == [field_of("b" * 64), field_of("a" * 64)]
-
-
-def test_missing_objects_are_not_found(database):
-    with pytest.raises(UnknownId, match="GET /v1/geometry-fields"):
-        GeometryFields(database).get(LOCAL, field_of("a" * 64))
 
 
 def test_tenants_have_fields_of_the_same_content_and_do_not_see_each_others(database):
