@@ -54,7 +54,7 @@ def rows_of(timed: Comparison, device: Device) -> Iterable[Row]:
     if timed.compiled_s is None or timed.device_s is None:
         reason = f"{device.label} computes it wrong"
         yield Row(speed, None, WORTH_OTHER, ">=", "", reason)
-        yield Row(difference, None, engine.bound, "<=", engine.error_unit, reason)
+        yield Row(difference, None, engine.bound, "<=", engine.error.unit, reason)
         return
     share = timed.bandwidth_share
     threads = f"{engine.threads} thread{'s' if engine.threads > 1 else ''}"
@@ -65,4 +65,4 @@ def rows_of(timed: Comparison, device: Device) -> Iterable[Row]:
     )
     worth = WORTH_SAME if device.kind == "cpu" else WORTH_OTHER
     yield Row(speed, timed.compiled_s / timed.device_s, worth, ">=", "", detail)
-    yield Row(difference, timed.difference, engine.bound, "<=", engine.error_unit, device.label)
+    yield Row(difference, timed.difference, engine.bound, "<=", engine.error.unit, device.label)

@@ -27,7 +27,7 @@ def answer(engine: str) -> dict[str, Any]:
         if comparison.compiled_s is None or comparison.device_s is None:
             return _fault(engine, "it computes wrong results")
         if not comparison.right:
-            reason = f"{problem.name} differs by {comparison.difference:.3g} {problem.error_unit}"
+            reason = f"{problem.name} differs by {comparison.difference:.3g} {problem.error.unit}"
             return _fault(engine, f"{reason}, {problem.bound:g} is allowed")
         timings.append((problem.size, comparison.compiled_s, comparison.device_s))
     return {"engine": engine, "fault": "", "timings": timings}

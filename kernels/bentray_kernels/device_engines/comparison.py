@@ -72,7 +72,7 @@ def measured(engine: Engine, bandwidth: float | None, repeats: int) -> Compariso
     share = None
     if engine.least_bytes is not None and bandwidth is not None:
         share = engine.least_bytes / least[1] / bandwidth
-    return Comparison(engine, least[0], least[1], engine.error(computed, expected), share)
+    return Comparison(engine, least[0], least[1], engine.error.of(computed, expected), share)
 
 
 def copy_bytes_per_s(session: Session) -> float:

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats
+
+
+class Difference(NamedTuple):
+    """A measure of the difference between two results, and its unit."""
+
+    of: Callable[[Floats, Floats], float]
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -23,7 +31,7 @@ class Engine:
         unit: what is counted, for example node updates.
         least_bytes: that one solve reads and writes at the least, each array once a pass; None where memory
             does not bound it.
-        error: largest difference of the two results, in ``error_unit``.
+        error: measure of the difference of the two results.
         bound: of that difference.
         threads: of compiled code.
     """
@@ -35,22 +43,20 @@ class Engine:
     size: float
     unit: str
     least_bytes: float | None
-    error: Callable[[Floats, Floats], float]
-    error_unit: str
+    error: Difference
     bound: float
     threads: int = 1
 
 
-def relative(computed: Floats, expected: Floats) -> float:
-    """Largest difference over the largest value."""
-    return float(np.abs(computed - expected).max() / np.abs(expected).max())
+# Largest difference over the largest value.
+RELATIVE = Difference(
+    lambda one, other: float(np.abs(one - other).max() / np.abs(other).max()), "of the largest"
+)
 
+# Root of the mean squared difference of two images of speed.
+RMS = Difference(lambda one, other: float(np.sqrt(((one - other) ** 2).mean())), "m/s rms")
 
-def rms_difference(computed: Floats, expected: Floats) -> float:
-    """Root of the mean squared difference."""
-    return float(np.sqrt(((computed - expected) ** 2).mean()))
-
-
-def odd_pixels(computed: Floats, expected: Floats) -> float:
-    """Fraction of pixels that differ by more than one of 255."""
-    return float((np.abs(computed - expected).max(axis=2) > 1.0).mean())
+# Fraction of pixels that differ by more than one of 255.
+ODD_PIXELS = Difference(
+    lambda one, other: float((np.abs(one - other).max(axis=2) > 1.0).mean()), "of the pixels"
+)

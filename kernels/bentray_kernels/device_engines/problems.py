@@ -47,7 +47,7 @@ from ..tomography.sart.sart_step import begin
 from ..wave.emissions import Emissions, misfit_gradients, simulate_emissions
 from ..wave.emissions import Engine as WaveEngine
 from ..wave.medium import Medium
-from .engine import Engine, odd_pixels, relative, rms_difference
+from .engine import ODD_PIXELS, RELATIVE, RMS, Engine
 
 WATER_MPS = 1500.0
 
@@ -114,32 +114,15 @@ def projection(nodes: int, sources: int) -> Engine:
         float(sources * nodes**2),
         "nodes",
         16.0 * sources * nodes**2,
-        relative,
-        "of the largest",
+        RELATIVE,
         1e-9,
     )
 
 
 def traces(nodes: int, steps: int, emitters: int) -> Engine:
     """Traces of emitters on a ring, float32."""
-    medium, emissions = wave_scan(nodes, steps, emitters)
-    work = float(emitters * steps * medium.keep.size)
-
-    def simulated(engine: WaveEngine) -> Floats:
-        return np.stack(list(simulate_emissions(medium, emissions, engine=engine)))
-
-    return Engine(
-        "traces",
-        f"waves forwards, {emitters} of {nodes}², {steps} steps",
-        lambda: simulated("compiled"),
-        lambda: simulated("opencl"),
-        work,
-        "node updates",
-        STEP_BYTES * work,
-        relative,
-        "of the largest",
-        1e-5,
-    )
+    name = f"waves forwards, {emitters} of {nodes}², {steps} steps"
+    return _simulated(name, *wave_scan(nodes, steps, emitters), STEP_BYTES)
 
 
 def traces_in_space(nodes: int, steps: int) -> Engine:
@@ -151,22 +134,26 @@ def traces_in_space(nodes: int, steps: int) -> Engine:
     points = np.array([[middle, middle, middle], [middle, middle, middle + 4.0 * spacing]])
     pulse = np.exp(-(((np.arange(steps) - 0.5 * steps) * 6.0 / steps) ** 2))
     emissions = Emissions(points[:1], points, [np.arange(2)], pulse)
-    work = float(steps * medium.keep.size)
+    name = f"3-D waves forwards, {medium.keep.shape[0]}³ with edges, {steps} steps"
+    # With one emitter the factors of the medium are read from memory, too.
+    return _simulated(name, medium, emissions, 2.0 * STEP_BYTES)
+
+
+def _simulated(name: str, medium: Medium, emissions: Emissions, step_bytes: float) -> Engine:
+    work = float(len(emissions.emitters) * emissions.wavelet.size * medium.keep.size)
 
     def simulated(engine: WaveEngine) -> Floats:
         return np.stack(list(simulate_emissions(medium, emissions, engine=engine)))
 
     return Engine(
         "traces",
-        f"3-D waves forwards, {medium.keep.shape[0]}³ with edges, {steps} steps",
+        name,
         lambda: simulated("compiled"),
         lambda: simulated("opencl"),
         work,
         "node updates",
-        # With one emitter the factors of the medium are read from memory, too.
-        2.0 * STEP_BYTES * work,
-        relative,
-        "of the largest",
+        step_bytes * work,
+        RELATIVE,
         1e-5,
     )
 
@@ -192,8 +179,7 @@ def gradients(nodes: int, steps: int, emitters: int) -> Engine:
         "node updates",
         # A stored field is written and read, the adjoint read, image and illumination read and written.
         2.0 * STEP_BYTES * updates + 7.0 * 4.0 * stored,
-        relative,
-        "of the largest",
+        RELATIVE,
         1e-4,
     )
 
@@ -227,8 +213,7 @@ def sart(nodes: int, slices: int) -> Engine:
         float(TRIAL_EMITTERS * slices * nodes**2),
         "nodes",
         None,
-        rms_difference,
-        "m/s rms",
+        RMS,
         0.05,
     )
 
@@ -282,8 +267,7 @@ def echoes(pixels: int, elements: int, emissions: int) -> Engine:
         float(emissions * elements * inside.sum()),
         "pairs",
         None,
-        relative,
-        "of the largest",
+        RELATIVE,
         1e-3,
     )
 
@@ -305,8 +289,7 @@ def refraction(pixels: int) -> Engine:
         float(pixels**2),
         "rays",
         None,
-        odd_pixels,
-        "of the pixels",
+        ODD_PIXELS,
         5e-3,
         DRAWING_THREADS,
     )
@@ -327,8 +310,7 @@ def field(pixels: int) -> Engine:
         float(pixels**2),
         "rays with lookups",
         None,
-        odd_pixels,
-        "of the pixels",
+        ODD_PIXELS,
         1e-3,
         DRAWING_THREADS,
     )

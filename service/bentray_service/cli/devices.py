@@ -128,7 +128,7 @@ def _figures(
                 "device_s": one.device_s,
                 "difference": one.difference,
                 "bound": one.engine.bound,
-                "difference_unit": one.engine.error_unit,
+                "difference_unit": one.engine.error.unit,
                 "bandwidth_share": one.bandwidth_share,
             }
             for one in compared
@@ -163,7 +163,7 @@ def _print_compared(compared: list[Comparison], device: Device) -> None:
             "" if one.bandwidth_share is None else f"{one.bandwidth_share:.1%}",
             ""
             if one.difference is None
-            else f"{one.difference:.2g} of {one.engine.bound:g} {one.engine.error_unit}",
+            else f"{one.difference:.2g} of {one.engine.bound:g} {one.engine.error.unit}",
         )
         for one in compared
     ]
