@@ -95,7 +95,7 @@ def measured(name: str, nodes: int) -> Figures:
     angle = 2.0 * np.pi * np.arange(SOURCES) / SOURCES
     ring = TABLE6_SIDE_M * (0.5 + 0.475 * np.column_stack((np.cos(angle), np.sin(angle))))
     alone = least_seconds(lambda: eikonal.solve(speed, spacing, ring[0], name))
-    if eikonal.METHODS[name].run_many is None:
+    if not eikonal.METHODS[name].batched:
         return Figures(alone, None)
     together = least_seconds(lambda: eikonal.solve_many(speed[None], spacing, ring, name))
     return Figures(alone, together / SOURCES)

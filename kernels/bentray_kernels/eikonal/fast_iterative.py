@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..compilation.compiled import int64, kernel
-from ..errors import InvalidInput
-from .problem import PointSource
+from .problem import PointSource, check_tolerance
 from .updates import first_order_2d, first_order_3d
 
 OUT = 0
@@ -34,8 +33,7 @@ def fast_iterative(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
     Raises:
         InvalidInput: for a negative tolerance.
     """
-    if not tolerance >= 0.0:
-        raise InvalidInput("tolerance", tolerance, "a number >= 0")
+    check_tolerance(tolerance)
     seeds, times = problem.seeds()
     # The border counts as listed, so that it is never added.
     listed = problem.places(OUT, LISTED)

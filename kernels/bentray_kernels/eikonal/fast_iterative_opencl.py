@@ -7,20 +7,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Floats
-from ..errors import InvalidInput
+from ..opencl import computing_on, session_or_warning
+from ..opencl.blocks import travel_times
 from .fast_iterative import fast_iterative
-from .problem import PointSource
+from .problem import PointSource, check_tolerance
 
 
-def fast_iterative_opencl(problem: PointSource, *, tolerance: float = 1e-12) -> Floats:
-    """Travel time by blocks of points advanced in an OpenCL device's local memory (chapter 7.2.2).
+def fast_iterative_opencl(
+    problems: Sequence[PointSource], times: Floats, *, tolerance: float = 1e-12
+) -> None:
+    """Travel times by blocks of points advanced in an OpenCL device's local memory (chapter 7.2.2).
 
     Args:
-        problem: the checked problem.
+        problems: as many checked problems of one shape and spacing as the batch of ``times``; they share the
+            launches, and each result is bit-for-bit that of a single solve.
+        times: (batch, nx, ny[, nz]), s, C order; filled, equal to ``fim`` up to the tolerance.
         tolerance: as in ``fim``.
-
-    Returns:
-        (nx, ny[, nz]), s; equal to ``fim`` up to the tolerance.
 
     Raises:
         InvalidInput: for a negative tolerance, or a ``BENTRAY_OPENCL_DEVICE`` that does not match one device.
@@ -29,28 +31,7 @@ def fast_iterative_opencl(problem: PointSource, *, tolerance: float = 1e-12) -> 
     Warns:
         OpenCLFallbackWarning: once, where no device passes its self-test and ``fim`` computes instead.
     """
-    times = np.empty((1, *problem.slowness.shape))
-    fast_iterative_opencl_many([problem], times, tolerance=tolerance)
-    return np.asarray(times[0])
-
-
-def fast_iterative_opencl_many(
-    problems: Sequence[PointSource], times: Floats, *, tolerance: float = 1e-12
-) -> None:
-    """Like ``fast_iterative_opencl`` for several problems of one shape and spacing, in the same launches.
-
-    Args:
-        problems: as many as the batch of ``times``; each result is bit-for-bit that of a single solve.
-        times: (batch, nx, ny[, nz]), s, C order; filled.
-        tolerance: as in ``fim``.
-    """
-    if not tolerance >= 0.0:
-        raise InvalidInput("tolerance", tolerance, "a number >= 0")
-    # Imported here, so that OpenCL is loaded only when it is used.
-    from ..opencl.blocks import travel_times
-    from ..opencl.device_selection import session_or_warning
-    from ..opencl.lost_device import computing_on
-
+    check_tolerance(tolerance)
     session = session_or_warning(instead="fim")
     if session is None:
         for problem, into in zip(problems, times, strict=True):

@@ -44,18 +44,6 @@ def fast_marching(problem: PointSource, *, order: int = 2) -> Floats:
     return problem.interior(time)
 
 
-def first_order_fast_marching(problem: PointSource) -> Floats:
-    """``fast_marching`` with first-order differences, the FMM of chapter 6.
-
-    Args:
-        problem: the checked problem.
-
-    Returns:
-        (nx, ny[, nz]), s.
-    """
-    return fast_marching(problem, order=1)
-
-
 def high_accuracy_fast_marching(problem: PointSource) -> Floats:
     """Second-order fast marching that is accurate at the source too (HAFMM, chapter 6.2.2).
 

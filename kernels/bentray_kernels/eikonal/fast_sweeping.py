@@ -23,7 +23,7 @@ from ..compilation.float32 import higher, lower
 from ..compilation.thread_team import SINGLE_THREAD, ThreadTeam, thread_team
 from ..errors import InvalidInput
 from .diagonals import FIRST, NONE, RUN, Columns, Diagonals, include
-from .problem import PointSource
+from .problem import PointSource, check_tolerance
 
 MOST_THREADS = 64
 
@@ -62,40 +62,27 @@ class Grid(NamedTuple):
     stored: tuple[int, int]
 
 
-def fast_sweeping(problem: PointSource, *, tolerance: float = 1e-12, threads: int = 1) -> Floats:
-    """Travel time by sweeps in all 4 (2-D) or 8 (3-D) orders until nothing changes.
+def fast_sweeping(
+    problems: Iterable[PointSource], times: Floats, *, tolerance: float = 1e-12, threads: int = 1
+) -> None:
+    """Travel times by sweeps in all 4 (2-D) or 8 (3-D) orders until nothing changes.
+
+    The problems are solved one after the other in the same working arrays. Sixteen solves in lockstep, one
+    vector lane each, took twice the time at 256²: their arrays do not fit the cache, and no lane can skip
+    updates that another one needs.
 
     Args:
-        problem: the checked problem.
+        problems: as many checked problems of one shape as the batch of ``times``.
+        times: (batch, nx, ny[, nz]), s, C order; filled, equal to first-order fast marching up to the
+            tolerance.
         tolerance: sweeps in all orders that lower no time by more than this part of a node's own
             crossing time end the iteration.
         threads: that share a 3-D grid; a 2-D grid is swept by one. From 2 on their number does not change
             the result; that of 1, in an order that reads the memory half as often, is equal up to the
             tolerance.
 
-    Returns:
-        (nx, ny[, nz]), s; equal to first-order fast marching up to the tolerance.
-
     Raises:
         InvalidInput: for a negative tolerance, or threads that are no whole number from 1 to 64.
-    """
-    times = np.empty((1, *problem.slowness.shape))
-    fast_sweeping_many([problem], times, tolerance=tolerance, threads=threads)
-    return np.asarray(times[0])
-
-
-def fast_sweeping_many(
-    problems: Iterable[PointSource], times: Floats, *, tolerance: float = 1e-12, threads: int = 1
-) -> None:
-    """Like ``fast_sweeping`` for problems of one shape, in the same working arrays one after the other.
-
-    Sixteen solves in lockstep, one vector lane each, took twice the time at 256²: their arrays do not fit the
-    cache, and no lane can skip updates that another one needs.
-
-    Args:
-        problems: as many as the batch of ``times``.
-        times: (batch, nx, ny[, nz]), s, C order; filled.
-        tolerance, threads: as for ``fast_sweeping``.
     """
     check_options(tolerance, threads)
     shape = times.shape[1:]
@@ -107,8 +94,7 @@ def fast_sweeping_many(
 
 def check_options(tolerance: float, threads: int) -> None:
     """Raise ``InvalidInput`` for options that sweeps do not accept."""
-    if not tolerance >= 0.0:
-        raise InvalidInput("tolerance", tolerance, "a number >= 0")
+    check_tolerance(tolerance)
     if isinstance(threads, bool) or threads not in range(1, MOST_THREADS + 1):
         raise InvalidInput("threads", threads, f"a whole number from 1 to {MOST_THREADS}")
 

@@ -176,6 +176,12 @@ class PointSource:
         return cell_of(self.source, self.slowness.shape, self.spacing)
 
 
+def check_tolerance(tolerance: float) -> None:
+    """Raise ``InvalidInput`` for a negative tolerance."""
+    if not tolerance >= 0.0:
+        raise InvalidInput("tolerance", tolerance, "a number >= 0")
+
+
 def placed(position: ArrayLike, shape: tuple[int, ...], spacing: float) -> Floats:
     """A source, (ndim,), m, clipped to the grid within rounding.
 

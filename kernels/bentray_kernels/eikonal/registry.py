@@ -16,10 +16,10 @@ from ..arrays import Floats, refuse_mask
 from ..errors import InvalidInput
 from .accurate import accurate
 from .fast_iterative import fast_iterative
-from .fast_iterative_opencl import fast_iterative_opencl, fast_iterative_opencl_many
-from .fast_marching import fast_marching, first_order_fast_marching, high_accuracy_fast_marching
+from .fast_iterative_opencl import fast_iterative_opencl
+from .fast_marching import fast_marching, high_accuracy_fast_marching
 from .fast_marching_untidy import fast_marching_untidy
-from .fast_sweeping import fast_sweeping, fast_sweeping_many
+from .fast_sweeping import fast_sweeping
 from .problem import PointSource, SlownessGrid
 from .simultaneous_sweeps import simultaneous_sweeps
 
@@ -30,106 +30,100 @@ class Method:
 
     Attributes:
         name: of the method in requests.
-        run: takes a ``PointSource`` and keyword options, gives the travel time in the grid's shape.
+        solver: takes a ``PointSource`` and keyword options, gives the travel time in the grid's shape; with
+            ``batched`` it takes problems of one shape and spacing, and an array (batch, nx, ny[, nz]) to
+            fill.
         order: order of accuracy away from shocks; the singularity of the point source limits it to 1 unless
             it is factored out.
         differences: order of the finite differences.
         factored: whether the source's singularity is factored out.
         summary: one line for help texts.
-        run_many: as ``run`` for problems of one shape and spacing, into an array (batch, nx, ny[, nz]); None
-            where the method runs each problem alone.
+        batched: whether it solves several problems in a call.
         swept_grids: grids of ``diagonals.Diagonals`` that a solve takes, in two and in three dimensions.
-        on_device: whether ``run_many`` parallelises a sequence itself; threads must not share it.
+        on_device: whether it parallelises a batch itself; threads must not share it.
     """
 
     name: str
-    run: Callable[..., Floats]
+    solver: Callable[..., Any]
     order: int
     differences: int
     factored: bool
     summary: str
-    run_many: Callable[..., None] | None = None
+    batched: bool = False
     swept_grids: tuple[int, int] = (0, 0)
     on_device: bool = False
 
     def options(self) -> tuple[str, ...]:
-        """Names of the keyword options that ``run`` takes."""
-        kinds = inspect.signature(self.run).parameters.values()
+        """Names of the keyword options that the solver takes."""
+        kinds = inspect.signature(self.solver).parameters.values()
         return tuple(p.name for p in kinds if p.kind is inspect.Parameter.KEYWORD_ONLY)
 
+    def run(self, problem: PointSource, **options: Any) -> Floats:
+        """Travel time of one problem, (nx, ny[, nz]), s."""
+        if not self.batched:
+            return np.asarray(self.solver(problem, **options))
+        times = np.empty((1, *problem.slowness.shape))
+        self.solver([problem], times, **options)
+        return np.asarray(times[0])
 
-METHODS: Mapping[str, Method] = MappingProxyType(
-    {
-        method.name: method
-        for method in (
-            Method(
-                "accurate",
-                accurate,
-                2,
-                2,
-                True,
-                "factored second order in the order of a first-order sweep (default); option supersample",
-                # Two of times and crossings, and the mask of known nodes or a copy for each order.
-                swept_grids=(5, 5),
-            ),
-            Method(
-                "fmm",
-                fast_marching,
-                1,
-                2,
-                False,
-                "fast marching, binary heap, second-order differences; option order=1 or 2 of them",
-            ),
-            Method("hafmm", high_accuracy_fast_marching, 2, 2, True, "fast marching, factored second order"),
-            Method(
-                "fsm",
-                fast_sweeping,
-                1,
-                1,
-                False,
-                "fast sweeping, first order; options tolerance, threads",
-                fast_sweeping_many,
-                swept_grids=(5, 5),
-            ),
-            Method(
-                "fsm-simultaneous",
-                simultaneous_sweeps,
-                1,
-                1,
-                False,
-                "fsm with all orders at the same time, as published; options tolerance, threads",
-                swept_grids=(8, 12),
-            ),
-            Method("fim", fast_iterative, 1, 1, False, "fast iterative, first order; option tolerance"),
-            Method(
-                "fim-opencl",
-                fast_iterative_opencl,
-                1,
-                1,
-                False,
-                "fim in blocks on an OpenCL device (BENTRAY_OPENCL_DEVICE); option tolerance",
-                fast_iterative_opencl_many,
-                on_device=True,
-            ),
-            Method(
-                "fmm-untidy",
-                fast_marching_untidy,
-                1,
-                2,
-                False,
-                "fast marching, O(N), error bounded; options order=1 or 2 of differences, width of a bucket",
-            ),
-            Method(
-                "fmm-first-order",
-                first_order_fast_marching,
-                1,
-                1,
-                False,
-                "fast marching, binary heap, first-order differences (chapter 6)",
-            ),
-        )
-    }
+
+# Order of accuracy and of the differences, and whether the singularity is factored out.
+FIRST, PLAIN, FACTORED = (1, 1, False), (1, 2, False), (2, 2, True)
+
+_METHODS = (
+    Method(
+        "accurate",
+        accurate,
+        *FACTORED,
+        "factored second order in the order of a first-order sweep (default); option supersample",
+        # Two of times and crossings, and the mask of known nodes or a copy for each order.
+        swept_grids=(5, 5),
+    ),
+    Method(
+        "fmm",
+        fast_marching,
+        *PLAIN,
+        "fast marching, binary heap, second-order differences; option order=1 or 2 of them",
+    ),
+    Method("hafmm", high_accuracy_fast_marching, *FACTORED, "fast marching, factored second order"),
+    Method(
+        "fsm",
+        fast_sweeping,
+        *FIRST,
+        "fast sweeping, first order; options tolerance, threads",
+        batched=True,
+        swept_grids=(5, 5),
+    ),
+    Method(
+        "fsm-simultaneous",
+        simultaneous_sweeps,
+        *FIRST,
+        "fsm with all orders at the same time, as published; options tolerance, threads",
+        swept_grids=(8, 12),
+    ),
+    Method("fim", fast_iterative, *FIRST, "fast iterative, first order; option tolerance"),
+    Method(
+        "fim-opencl",
+        fast_iterative_opencl,
+        *FIRST,
+        "fim in blocks on an OpenCL device (BENTRAY_OPENCL_DEVICE); option tolerance",
+        batched=True,
+        on_device=True,
+    ),
+    Method(
+        "fmm-untidy",
+        fast_marching_untidy,
+        *PLAIN,
+        "fast marching, O(N), error bounded; options order=1 or 2 of differences, width of a bucket",
+    ),
+    Method(
+        "fmm-first-order",
+        lambda problem: fast_marching(problem, order=1),
+        *FIRST,
+        "fast marching, binary heap, first-order differences (chapter 6)",
+    ),
 )
+METHODS: Mapping[str, Method] = MappingProxyType({method.name: method for method in _METHODS})
 
 
 def methods() -> tuple[str, ...]:
@@ -211,13 +205,13 @@ def solve_many(
         return medium.source(points[k % len(points)])
 
     def solve_part(part: range) -> None:
-        if chosen.run_many is None:
-            for k in part:
-                times[k] = chosen.run(problem(k), **options)
-        else:
+        if chosen.batched:
             problems = map(problem, part)
             into = times[part.start : part.stop]
-            chosen.run_many(list(problems) if chosen.on_device else problems, into, **options)
+            chosen.solver(list(problems) if chosen.on_device else problems, into, **options)
+        else:
+            for k in part:
+                times[k] = chosen.run(problem(k), **options)
 
     count = min(batch, 1 if chosen.on_device else threads)
     parts = [range(batch * k // count, batch * (k + 1) // count) for k in range(count)]
