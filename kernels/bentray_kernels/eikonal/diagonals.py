@@ -93,41 +93,21 @@ class Diagonals:
     def stored(self) -> tuple[int, int]:
         return self.rows, self.width
 
-    def store(
-        self,
-        plain: Floats,
-        into: Floats,
-        flipped: bool,
-        *,
-        scale: float = 1.0,
-        border: bool = True,
-        team: ThreadTeam = SINGLE_THREAD,
-    ) -> None:
-        """Copy a flat grid into its diagonals, times ``scale``; with its border, or without one."""
-        self._move(plain, into, flipped, scale, border, False, team)
-
-    def load(
-        self,
-        plain: Floats,
-        source: Floats,
-        flipped: bool,
-        *,
-        border: bool = True,
-        team: ThreadTeam = SINGLE_THREAD,
-    ) -> None:
-        """Copy the diagonals into a flat grid with or without its border."""
-        self._move(plain, source, flipped, 1.0, border, True, team)
-
-    def _move(
+    def copy(
         self,
         plain: Floats,
         diagonals: Floats,
         flipped: bool,
-        scale: float,
-        border: bool,
-        back: bool,
-        team: ThreadTeam,
+        *,
+        scale: float = 1.0,
+        border: bool = True,
+        back: bool = False,
+        team: ThreadTeam = SINGLE_THREAD,
     ) -> None:
+        """Copy a flat grid, with its border or without one, into its diagonals, times ``scale``.
+
+        With ``back`` the diagonals are copied into the grid.
+        """
         planes, nj, nk = self.shape
         rim = 2 if border else 0
         layer = (nj + rim) * (nk + rim)
@@ -158,21 +138,23 @@ class Diagonals:
         _exchange(nodes, values, self.shape, self.stored, source, flipped, True)
         return values
 
-    def mirror(self, source: Floats, into: Floats, team: ThreadTeam = SINGLE_THREAD) -> None:
-        """Copy the diagonals of a grid into those of the grid whose j is flipped."""
-        team.map_blocks(lambda first, end: self._mirror(source, into, first, end), self._padded_planes, 3)
-
-    def mirror_changed(
-        self, source: Floats, into: Floats, changed: Columns, team: ThreadTeam = SINGLE_THREAD
+    def mirror(
+        self, source: Floats, into: Floats, team: ThreadTeam = SINGLE_THREAD, changed: Columns | None = None
     ) -> None:
-        """Like ``mirror`` where no other nodes than ``changed`` differ."""
+        """Copy the diagonals of a grid into those of the grid whose j is flipped.
+
+        Args:
+            source, into: diagonals.
+            team: that copies.
+            changed: the only nodes that differ; None: all may.
+        """
         plane = self.rows * self.width
 
         def some(first: int, end: int) -> None:
             # Copying single nodes costs more per node than copying tiles.
             stored = slice(first + 1, end + 1) if self.shape[0] else slice(None)
             begin = stored.start or 0
-            few = _mirror_nodes(
+            if changed is None or not _mirror_nodes(
                 source[begin * plane :],
                 into[begin * plane :],
                 changed.low[stored],
@@ -180,19 +162,11 @@ class Diagonals:
                 self.shape,
                 self.stored,
                 (end - first) * plane // FEW,
-            )
-            if not few:
-                self._mirror(source, into, first, end)
+            ):
+                part, shape = self._group(source, first, end - 2)
+                mirror(part, self._group(into, first, end - 2)[0], shape, self.stored)
 
-        team.map_blocks(some, self._padded_planes, 3)
-
-    def _mirror(self, source: Floats, into: Floats, first: int, end: int) -> None:
-        part, shape = self._group(source, first, end - 2)
-        mirror(part, self._group(into, first, end - 2)[0], shape, self.stored)
-
-    @property
-    def _padded_planes(self) -> int:
-        return self.shape[0] + 2 if self.shape[0] else 1
+        team.map_blocks(some, self.shape[0] + 2 if self.shape[0] else 1, 3)
 
     def empty_ranges(self) -> Columns:
         """An empty set of nodes."""
@@ -225,7 +199,7 @@ def move(
     border: bool,
     back: bool,
 ) -> None:
-    """Like ``store`` or, with ``back``, ``load``, for numbers of any width."""
+    """Like ``Diagonals.copy``, for numbers of any width."""
     planes, nj, nk = shape
     rows, width = stored
     step = np.uint64(width + 1)

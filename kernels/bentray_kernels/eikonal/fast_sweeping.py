@@ -117,7 +117,7 @@ class Sweeper:
         self._unknown = arrays[2]
         unknown = np.empty(math.prod(n + 2 for n in shape))
         team.fill(unknown, math.inf)
-        self._grid.store(unknown, self._unknown, False, team=team)
+        self._grid.copy(unknown, self._unknown, False, team=team)
         self._crossings = arrays[3], arrays[4]
         # Nodes to update, in either grid, and nodes changed by the last sweeps.
         self._active_in_plane = self._grid.empty_ranges(), self._grid.empty_ranges()
@@ -148,25 +148,27 @@ class Sweeper:
             times: of these nodes, s.
         """
         self._team.copy(self._unknown, self._times[0])
-        self._side, self._equal = 0, False
-        for columns in (self._active_in_plane[0], self._active_across_planes[0]):
-            columns.clear()
+        self._forget()
         self._put(nodes, times)
 
     def restart_from(self, times: Floats) -> None:
         """Begin with the times of all nodes, (nx, ny[, nz]), s, after sweeps that have ended."""
         padded = np.full(tuple(n + 2 for n in times.shape), math.inf)
         padded[(slice(1, -1),) * times.ndim] = times
-        self._grid.store(padded.ravel(), self._times[0], False, team=self._team)
+        self._grid.copy(padded.ravel(), self._times[0], False, team=self._team)
+        self._forget()
+
+    def _forget(self) -> None:
+        """The times are in the first grid, and no node is active."""
         self._side, self._equal = 0, False
-        for columns in (self._active_in_plane[0], self._active_across_planes[0]):
-            columns.clear()
+        self._active_in_plane[0].clear()
+        self._active_across_planes[0].clear()
 
     def lower_times(self, nodes: Ints, times: Floats) -> None:
         """Go on from the present times with earlier ones of some nodes; as ``start``."""
         grid, side = self._grid, self._side
         if self._equal:
-            grid.mirror_changed(self._times[side], self._times[1 - side], self._changed, self._team)
+            grid.mirror(self._times[side], self._times[1 - side], self._team, self._changed)
         if side == 1:
             grid.mirror_mask(self._active_in_plane[1], self._active_in_plane[0], self._team)
             grid.mirror_mask(self._active_across_planes[1], self._active_across_planes[0], self._team)
@@ -194,10 +196,7 @@ class Sweeper:
             quiet = 0 if self._sweep(swept, tolerance) else quiet + 1
             if quiet == 2 or not (active_in_plane.any() or across.any()):
                 return
-            if self._equal:
-                grid.mirror_changed(here, there, self._changed, team)
-            else:
-                grid.mirror(here, there, team)
+            grid.mirror(here, there, team, self._changed if self._equal else None)
             self._equal = True
             grid.mirror_mask(active_in_plane, self._active_in_plane[1 - side], team)
             grid.mirror_mask(across, self._active_across_planes[1 - side], team)
@@ -206,7 +205,7 @@ class Sweeper:
     def load(self, into: Floats, *, border: bool = False) -> None:
         """Write the times, s, into a C-ordered array (nx, ny[, nz]), or into a padded one with ``border``."""
         times, flipped = self._times[self._side], self._side == 1
-        self._grid.load(into.reshape(-1), times, flipped, border=border, team=self._team)
+        self._grid.copy(into.reshape(-1), times, flipped, border=border, back=True, team=self._team)
 
     def times_at(self, nodes: Ints) -> Floats:
         """Times of flat padded ``nodes``, s."""
@@ -238,7 +237,7 @@ class Sweeper:
             or not (stored[0] is slowness or np.array_equal(stored[0], slowness))
         ):
             plain, into = slowness.reshape(-1), self._crossings[side]
-            self._grid.store(plain, into, side == 1, scale=spacing, border=False, team=self._team)
+            self._grid.copy(plain, into, side == 1, scale=spacing, border=False, team=self._team)
         self._stored[side] = slowness, spacing
         crossing: Floats = self._crossings[side]
         return crossing

@@ -37,7 +37,6 @@ class Method:
             it is factored out.
         differences: order of the finite differences.
         factored: whether the source's singularity is factored out.
-        summary: one line for help texts.
         batched: whether it solves several problems in a call.
         swept_grids: grids of ``diagonals.Diagonals`` that a solve takes, in two and in three dimensions.
         on_device: whether it parallelises a batch itself; threads must not share it.
@@ -48,7 +47,6 @@ class Method:
     order: int
     differences: int
     factored: bool
-    summary: str
     batched: bool = False
     swept_grids: tuple[int, int] = (0, 0)
     on_device: bool = False
@@ -71,57 +69,17 @@ class Method:
 FIRST, PLAIN, FACTORED = (1, 1, False), (1, 2, False), (2, 2, True)
 
 _METHODS = (
-    Method(
-        "accurate",
-        accurate,
-        *FACTORED,
-        "factored second order in the order of a first-order sweep (default); option supersample",
-        # Two of times and crossings, and the mask of known nodes or a copy for each order.
-        swept_grids=(5, 5),
-    ),
-    Method(
-        "fmm",
-        fast_marching,
-        *PLAIN,
-        "fast marching, binary heap, second-order differences; option order=1 or 2 of them",
-    ),
-    Method("hafmm", high_accuracy_fast_marching, *FACTORED, "fast marching, factored second order"),
-    Method(
-        "fsm",
-        fast_sweeping,
-        *FIRST,
-        "fast sweeping, first order; options tolerance, threads",
-        batched=True,
-        swept_grids=(5, 5),
-    ),
-    Method(
-        "fsm-simultaneous",
-        simultaneous_sweeps,
-        *FIRST,
-        "fsm with all orders at the same time, as published; options tolerance, threads",
-        swept_grids=(8, 12),
-    ),
-    Method("fim", fast_iterative, *FIRST, "fast iterative, first order; option tolerance"),
-    Method(
-        "fim-opencl",
-        fast_iterative_opencl,
-        *FIRST,
-        "fim in blocks on an OpenCL device (BENTRAY_OPENCL_DEVICE); option tolerance",
-        batched=True,
-        on_device=True,
-    ),
-    Method(
-        "fmm-untidy",
-        fast_marching_untidy,
-        *PLAIN,
-        "fast marching, O(N), error bounded; options order=1 or 2 of differences, width of a bucket",
-    ),
-    Method(
-        "fmm-first-order",
-        lambda problem: fast_marching(problem, order=1),
-        *FIRST,
-        "fast marching, binary heap, first-order differences (chapter 6)",
-    ),
+    # Two of times and crossings, and the mask of known nodes or a copy for each order.
+    Method("accurate", accurate, *FACTORED, swept_grids=(5, 5)),
+    Method("fmm", fast_marching, *PLAIN),
+    Method("hafmm", high_accuracy_fast_marching, *FACTORED),
+    Method("fsm", fast_sweeping, *FIRST, batched=True, swept_grids=(5, 5)),
+    Method("fsm-simultaneous", simultaneous_sweeps, *FIRST, swept_grids=(8, 12)),
+    Method("fim", fast_iterative, *FIRST),
+    Method("fim-opencl", fast_iterative_opencl, *FIRST, batched=True, on_device=True),
+    Method("fmm-untidy", fast_marching_untidy, *PLAIN),
+    # The fast marching of chapter 6.
+    Method("fmm-first-order", lambda problem: fast_marching(problem, order=1), *FIRST),
 )
 METHODS: Mapping[str, Method] = MappingProxyType({method.name: method for method in _METHODS})
 

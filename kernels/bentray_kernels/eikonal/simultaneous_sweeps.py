@@ -43,10 +43,10 @@ def simultaneous_sweeps(problem: PointSource, *, tolerance: float = 1e-12, threa
     orders: list[Order] = list(itertools.product((0, 1), (1, -1) if len(shape) == 3 else (0,), (1, -1)))
     crossing, time = np.full((2, grid.size), math.inf), np.full((2, grid.size), -math.inf)
     for side in (0, 1):
-        grid.store(
+        grid.copy(
             problem.slowness.reshape(-1), crossing[side], side == 1, scale=problem.spacing, border=False
         )
-        grid.store(np.full(math.prod(problem.padded_shape), math.inf), time[side], side == 1)
+        grid.copy(np.full(math.prod(problem.padded_shape), math.inf), time[side], side == 1)
         grid.put(*problem.seeds(), time[side], side == 1)
     copies = np.empty((len(orders), grid.size))
     every = _all_columns(grid)
@@ -76,7 +76,7 @@ def simultaneous_sweeps(problem: PointSource, *, tolerance: float = 1e-12, threa
             np.minimum(time[0], copies[0], out=time[0])
             grid.mirror(time[0], time[1], team)
     times = np.empty(shape)
-    grid.load(times.reshape(-1), time[0], False, border=False)
+    grid.copy(times.reshape(-1), time[0], False, border=False, back=True)
     return times
 
 

@@ -24,15 +24,15 @@ def test_a_grid_comes_back_whole(shape, flipped):
     grid = Diagonals.from_shape(shape)
     plain = numbered(shape)
     stored = np.full(grid.size, -1.0)
-    grid.store(plain, stored, flipped)
+    grid.copy(plain, stored, flipped)
     back = np.full(plain.size, -1.0)
-    grid.load(back, stored, flipped)
+    grid.copy(back, stored, flipped, back=True)
     assert np.array_equal(back, plain)
     assert np.count_nonzero(stored >= 0.0) == plain.size
     turned = np.full(grid.size, -1.0)
     grid.mirror(stored, turned)
     other = np.full(grid.size, -1.0)
-    grid.store(plain, other, not flipped)
+    grid.copy(plain, other, not flipped)
     assert np.array_equal(turned, other)
 
 
@@ -40,7 +40,7 @@ def test_neighbours_lie_in_the_rows_before_and_after():
     shape = (5, 6)
     grid = Diagonals.from_shape(shape)
     stored = np.full(grid.size, np.nan)
-    grid.store(numbered(shape), stored, False)
+    grid.copy(numbered(shape), stored, False)
     rows = stored.reshape(grid.stored)
     j, k = 3, 4
     column = k - 1 + FIRST
@@ -55,15 +55,15 @@ def test_the_border_can_be_left_out_and_values_scaled(shape, flipped):
     grid = Diagonals.from_shape(shape)
     inside = np.arange(np.prod(shape), dtype=float)
     stored = np.full(grid.size, np.inf)
-    grid.store(inside, stored, flipped, scale=3.0, border=False)
+    grid.copy(inside, stored, flipped, scale=3.0, border=False)
     assert np.count_nonzero(np.isfinite(stored)) == inside.size
     whole = np.full(numbered(shape).size, -1.0)
-    grid.load(whole, stored, flipped)
+    grid.copy(whole, stored, flipped, back=True)
     assert np.array_equal(
         whole.reshape([n + 2 for n in shape])[(slice(1, -1),) * len(shape)].ravel(), 3 * inside
     )
     back = np.empty(inside.size)
-    grid.load(back, stored, flipped, border=False)
+    grid.copy(back, stored, flipped, border=False, back=True)
     assert np.array_equal(back, 3 * inside)
 
 
@@ -76,7 +76,7 @@ def test_nodes_are_put_where_storing_puts_them(shape, seed):
     stored, put = np.full((2, grid.size), -1.0)
     only = np.full(plain.size, -1.0)
     only[nodes] = plain[nodes]
-    grid.store(only, stored, False)
+    grid.copy(only, stored, False)
     grid.put(nodes, plain[nodes], put)
     assert np.array_equal(put, stored)
 
@@ -87,7 +87,7 @@ def test_turning_what_changed_turns_the_whole(shape, seed, many):
     grid = Diagonals.from_shape(shape)
     rng = np.random.default_rng(seed)
     stored, turned, expected = np.full((3, grid.size), -1.0)
-    grid.store(numbered(shape), stored, False)
+    grid.copy(numbered(shape), stored, False)
     grid.mirror(stored, turned)
     inside = np.flatnonzero(np.pad(np.ones(shape), 1).ravel())
     nodes = rng.choice(inside, inside.size if many else 1, replace=False)
@@ -98,7 +98,7 @@ def test_turning_what_changed_turns_the_whole(shape, seed, many):
         row, k = divmod(int(node), nk + 2)
         plane, j = divmod(row, nj + 2)
         include(*changed, plane + 1 if grid.shape[0] else 0, j + k, k, k, grid.shape)
-    grid.mirror_changed(stored, turned, changed)
+    grid.mirror(stored, turned, changed=changed)
     grid.mirror(stored, expected)
     assert np.array_equal(turned, expected)
 
