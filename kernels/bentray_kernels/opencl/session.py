@@ -29,8 +29,10 @@ class Session:
     """
 
     def __init__(self, device: Device) -> None:
+        # Imported here, so that pyopencl is loaded only with a device.
         import pyopencl as cl
 
+        self._cl: Any = cl
         self.device = device
         self.lost = ""
         self.lock = threading.RLock()
@@ -49,67 +51,51 @@ class Session:
 
     def own_kernel(self, program: Program, name: str) -> DeviceKernel:
         """Like ``kernel``, but a new one of the caller's own, whose arguments nobody else sets."""
-        import pyopencl as cl
-
         if program not in self._programs:
             with warnings.catch_warnings():
                 # Compiler remarks about programs that pass the self-test.
-                warnings.simplefilter("ignore", cl.CompilerWarning)
+                warnings.simplefilter("ignore", self._cl.CompilerWarning)
                 # Drivers cache programs themselves; pyopencl's own cache warns under load.
-                self._programs[program] = cl.Program(self.context, program.text).build(
+                self._programs[program] = self._cl.Program(self.context, program.text).build(
                     [f"-D{define}" for define in program.defines], cache_dir=False
                 )
-        return DeviceKernel(cl.Kernel(self._programs[program], name), program.positions(name))
+        return DeviceKernel(self._cl.Kernel(self._programs[program], name), program.positions(name))
 
     def upload(self, array: Any) -> Any:
         """A buffer on the device with a copy of a C-ordered array."""
-        import pyopencl as cl
-
-        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-        return cl.Buffer(self.context, flags, hostbuf=array)
+        flags = self._cl.mem_flags.READ_WRITE | self._cl.mem_flags.COPY_HOST_PTR
+        return self._cl.Buffer(self.context, flags, hostbuf=array)
 
     def reserve(self, size_bytes: int) -> Any:
         """A buffer on the device, its content undefined."""
-        import pyopencl as cl
-
-        return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size_bytes)
+        return self._cl.Buffer(self.context, self._cl.mem_flags.READ_WRITE, size_bytes)
 
     def zeros(self, count: int, dtype: Any) -> Any:
         """A buffer on the device with ``count`` zeros of a type."""
-        import pyopencl as cl
-
         zero = np.zeros(1, dtype)
         buffer = self.reserve(count * zero.itemsize)
-        cl.enqueue_fill_buffer(self.queue, buffer, zero, 0, count * zero.itemsize)
+        self._cl.enqueue_fill_buffer(self.queue, buffer, zero, 0, count * zero.itemsize)
         return buffer
 
     def copied(self, buffer: Any) -> Any:
         """A copy of a buffer on the device."""
-        import pyopencl as cl
-
         copy = self.reserve(buffer.size)
-        cl.enqueue_copy(self.queue, copy, buffer, byte_count=buffer.size)
+        self._cl.enqueue_copy(self.queue, copy, buffer, byte_count=buffer.size)
         return copy
 
     def mark(self) -> Any:
         """The event that all launched kernels have finished; the device begins with them."""
-        import pyopencl as cl
-
-        marker = cl.enqueue_marker(self.queue)
+        marker = self._cl.enqueue_marker(self.queue)
         self.queue.flush()
         return marker
 
     def download(self, array: Any, buffer: Any, offset_bytes: int = 0) -> None:
         """Fill ``array`` from a buffer after all launched kernels have finished."""
-        import pyopencl as cl
-
-        cl.enqueue_copy(self.queue, array, buffer, src_offset=offset_bytes, is_blocking=True)
+        self._cl.enqueue_copy(self.queue, array, buffer, src_offset=offset_bytes, is_blocking=True)
 
     def launch(self, kernel: DeviceKernel, size: tuple[int, ...], group: tuple[int, ...] | None) -> None:
         """Enqueue a kernel whose arguments are set."""
-        import pyopencl as cl
-
-        cl.enqueue_nd_range_kernel(self.queue, kernel.handle, size, group)
+        self._cl.enqueue_nd_range_kernel(self.queue, kernel.handle, size, group)
 
     def doubles_at_once(self) -> int:
         """How many doubles a pair of buffers may hold together without filling the device."""
