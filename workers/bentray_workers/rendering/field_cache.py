@@ -14,8 +14,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables.inner_field import InnerField
 from bentray_kernels.geometry_field.tables.outer_field import OuterField
 from bentray_kernels.geometry_field.tables.reference_field import ReferenceField, reference_field
-from bentray_kernels.geometry_field.tracing.moving import moved
-from bentray_kernels.geometry_field.tracing.packed_scene import World, world_of
+from bentray_kernels.geometry_field.tracing.packed_scene import World, moved, world_of
 from bentray_kernels.geometry_field.tracing.scene import Shape
 from bentray_kernels.meshes.surface import surface_of
 

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from ...arrays import Flags, Floats, Ints
 from ...meshes.opening import cut_open
 from ...meshes.topology import Topology, topology_of
-from .handles import edge_graph, edges_between
+from .handles import edge_graph, edges_between, way_back
 
 
 def joined_boundaries(topology: Topology, lengths: Floats, cut: Flags) -> Flags:
@@ -43,10 +43,7 @@ def joined_boundaries(topology: Topology, lengths: Floats, cut: Flags) -> Flags:
     for edge in _tree(nearest[after.edges], distance[after.edges].sum(axis=1) + lengths[same], len(loops)):
         result[same[edge]] = True
         for end in after.edges[edge]:
-            way = [int(end)]
-            while before[way[-1]] >= 0:
-                way.append(int(before[way[-1]]))
-            path = opened.origin[way]
+            path = opened.origin[way_back(int(end), before)]
             result[edges_between(topology, path[:-1], path[1:])] = True
     return result
 

@@ -13,7 +13,7 @@ from ...meshes.mesh import TriangleMesh
 from ...meshes.topology import Topology
 from .boundary_joining import joined_boundaries
 from .conformal import corner_angles, factor, stiffness
-from .handles import edge_graph, edges_between, handle_cut
+from .handles import edge_graph, edges_between, handle_cut, way_back
 
 # Logarithm of the scale that is as good as none.
 MIN_SCALE = 1e-3
@@ -84,10 +84,7 @@ class Cutter:
         _, before, _ = dijkstra(
             self.graph, indices=np.flatnonzero(cut.vertices), min_only=True, return_predecessors=True
         )
-        way = [target]
-        while before[way[-1]] >= 0:
-            way.append(int(before[way[-1]]))
-        path = np.array(way)
+        path = way_back(target, before)
         edges, vertices = cut.edges.copy(), cut.vertices.copy()
         edges[edges_between(self.topology, path[:-1], path[1:])] = True
         vertices[path] = True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
@@ -58,6 +59,14 @@ def edges_between(topology: Topology, first: Ints, other: Ints) -> Ints:
     return np.searchsorted(keys, np.minimum(first, other) * span + np.maximum(first, other))
 
 
+def way_back(end: int, before: NDArray[np.integer]) -> Ints:
+    """The vertices from one to the root of its tree, given the vertex before each one; below 0: none."""
+    way = [end]
+    while before[way[-1]] >= 0:
+        way.append(int(before[way[-1]]))
+    return np.array(way)
+
+
 def _loops(topology: Topology, lengths: Floats, distance: Floats, parent: Ints) -> Flags:
     edges = topology.edges
     used = np.unique(edges)
@@ -88,10 +97,7 @@ def _loops(topology: Topology, lengths: Floats, distance: Floats, parent: Ints) 
     for edge in np.flatnonzero(~in_tree & ~crossed):
         cut[edge] = True
         for end in edges[edge]:
-            way = [int(end)]
-            while parent[way[-1]] >= 0:
-                way.append(int(parent[way[-1]]))
-            path = np.array(way)
+            path = way_back(int(end), parent)
             cut[edges_between(topology, path[:-1], path[1:])] = True
     return _in_one_piece(topology, pruned(topology, cut) & ~topology.on_boundary)
 

@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 
 from ...arrays import Flags, Float32s, Int32s
 from ...compilation.compiled import kernel
-from ...compilation.float32 import higher, lower, real, whole
+from ...compilation.float32 import real, whole
 from ...errors import InvalidInput
-from ...meshes.face_plane import meet_plane
 from ...meshes.surface import Surface
 from ...requests.rendering_limits import MAX_REFERENCE_SAMPLES
 from .cube import samples
 from .inner_field import InnerField
 from .outer_field import OuterField
 from .quadrilinear import Corner, lerp4
-from .reference_inner_field import inner_uv_table
+from .reference_inner_field import inner_uv_table, uv_at_ends
 
 # Numbers of a pixel: position and normal.
 CHANNELS = 6
@@ -88,26 +87,8 @@ def uv_table(surface: Surface, field: OuterField) -> Float32s:
         surface: ``surface_of``.
         field: its outer field, whose entries are the faces of the same hits.
     """
-    table = np.empty((*field.faces.shape, 2), dtype=np.float32)
-    _fill_uv(surface, field, samples(field.samples).astype(np.float32), table)
-    return table
-
-
-@kernel
-def _fill_uv(surface: Surface, field: OuterField, places: Float32s, table: Float32s) -> None:
-    for i in range(len(places)):
-        for j in range(len(places)):
-            face = field.faces[i, j]
-            if face < 0:
-                table[i, j] = np.nan
-                continue
-            sx, sy, sz = places[i, 0], places[i, 1], places[i, 2]
-            dx, dy, dz = places[j, 0] - sx, places[j, 1] - sy, places[j, 2] - sz
-            _, first, second, third, _ = meet_plane(surface.triangles, face, sx, sy, sz, dx, dy, dz)
-            for c in range(2):
-                corners = surface.uv[face, 0, c], surface.uv[face, 1, c], surface.uv[face, 2, c]
-                inside = first * corners[0] + second * corners[1] + third * corners[2]
-                table[i, j, c] = lower(higher(inside, real(0.0)), real(1.0))
+    places = samples(field.samples).astype(np.float32)
+    return uv_at_ends(surface, field.faces, places, places)
 
 
 @kernel(inline="always")

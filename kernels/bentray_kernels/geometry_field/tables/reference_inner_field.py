@@ -20,6 +20,8 @@ from .cube import samples
 from .inner_field import InnerField
 from .quadrilinear import corner_of
 
+Places = Floats | Float32s
+
 # 512 MB.
 MAX_INNER_ENTRIES = 2**26
 
@@ -40,28 +42,42 @@ def inner_uv_table(surface: Surface, field: InnerField, points: Int32s) -> Float
     if field.faces.size > MAX_INNER_ENTRIES:
         accepted = f"at most {MAX_INNER_ENTRIES} entries of the inner field, for lookups of (u, v)"
         raise InvalidInput("divisions", f"{field.faces.size} entries", accepted)
-    table = np.empty((*field.faces.shape, 2), dtype=np.float32)
-    _fill_uv(surface, field.faces, points, samples(field.samples), table)
+    corners = surface.triangles[points]
+    starts = (corners[:, :3] + corners[:, 3:6] + corners[:, 6:9]).astype(np.float64) / 3.0
+    return uv_at_ends(surface, field.faces, starts, samples(field.samples))
+
+
+def uv_at_ends(
+    surface: Surface, faces: Int32s, starts: Floats | Float32s, exits: Floats | Float32s
+) -> Float32s:
+    """The (u, v) where rays meet faces, (starts, exits, 2) float32; NaN where a ray meets none.
+
+    Args:
+        surface: ``surface_of``.
+        faces: (starts, exits) rows of its triangles, below 0 for none.
+        starts, exits: (starts, 3) and (exits, 3) between which the rays run, edges of the cube; in their
+            precision everything is computed.
+    """
+    table = np.empty((*faces.shape, 2), dtype=np.float32)
+    _fill_uv(surface, faces, starts, exits, table)
     return table
 
 
 @kernel
-def _fill_uv(surface: Surface, faces: Int32s, points: Int32s, places: Floats, table: Float32s) -> None:
-    for row in range(len(points)):
-        corners = surface.triangles[points[row]]
-        sx = (corners[0] + corners[3] + corners[6]) / 3.0
-        sy = (corners[1] + corners[4] + corners[7]) / 3.0
-        sz = (corners[2] + corners[5] + corners[8]) / 3.0
-        for exit_ in range(len(places)):
-            face = faces[row, exit_]
+def _fill_uv(surface: Surface, faces: Int32s, starts: Places, exits: Places, table: Float32s) -> None:
+    for i in range(len(starts)):
+        sx, sy, sz = starts[i, 0], starts[i, 1], starts[i, 2]
+        for j in range(len(exits)):
+            face = faces[i, j]
             if face < 0:
-                table[row, exit_] = np.nan
+                table[i, j] = np.nan
                 continue
-            dx, dy, dz = places[exit_, 0] - sx, places[exit_, 1] - sy, places[exit_, 2] - sz
+            dx, dy, dz = exits[j, 0] - sx, exits[j, 1] - sy, exits[j, 2] - sz
             _, first, second, third, _ = meet_plane(surface.triangles, face, sx, sy, sz, dx, dy, dz)
             for c in range(2):
-                u = first * surface.uv[face, 0, c] + second * surface.uv[face, 1, c]
-                table[row, exit_, c] = lower(higher(u + third * surface.uv[face, 2, c], 0.0), 1.0)
+                corners = surface.uv[face, 0, c], surface.uv[face, 1, c], surface.uv[face, 2, c]
+                inside = first * corners[0] + second * corners[1] + third * corners[2]
+                table[i, j, c] = lower(higher(inside, real(0.0)), real(1.0))
 
 
 @kernel(inline="always")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...arrays import Vector
+from ...arrays import Floats, Vector
 from ...compilation.compiled import kernel
 from .packed_scene import World
 
@@ -14,6 +14,16 @@ def unit(a: Vector) -> Vector:
     """The unit vector along another."""
     over = 1.0 / math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     return (a[0] * over, a[1] * over, a[2] * over)
+
+
+@kernel(inline="always")
+def transformed(m: Floats, a: Vector, place: float) -> Vector:
+    """A place, or with ``place`` 0 a direction, by an affine transform (3, 4)."""
+    return (
+        m[0, 0] * a[0] + m[0, 1] * a[1] + m[0, 2] * a[2] + place * m[0, 3],
+        m[1, 0] * a[0] + m[1, 1] * a[1] + m[1, 2] * a[2] + place * m[1, 3],
+        m[2, 0] * a[0] + m[2, 1] * a[1] + m[2, 2] * a[2] + place * m[2, 3],
+    )
 
 
 @kernel(inline="always")

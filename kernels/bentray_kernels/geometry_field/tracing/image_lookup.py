@@ -14,7 +14,7 @@ from ..tables.cube import number_at
 from ..tables.quadrilinear import corner_of, nearest_of
 from ..tables.reference_field import image_at, linear_uv_at
 from ..tables.reference_inner_field import linear_exit_uv
-from .appearance import to_world_normal, uv_of
+from .appearance import to_world_normal, transformed, uv_of
 from .packed_scene import Hit, World
 
 # Channels of the image.
@@ -122,13 +122,8 @@ def on_the_image(world: World, shape: int, hit: Hit) -> Hit:
 def image_point(world: World, k: int, u: float, v: float) -> Vector:
     """Position of an instance at (u, v), m, in the world."""
     reference = world.references[world.instances[k, 0]]
-    x, y, z = image_at(world.images, reference[1], reference[2], u, v, POSITION)
-    m = world.to_world[k]
-    return (
-        m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3],
-        m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3],
-        m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3],
-    )
+    place = image_at(world.images, reference[1], reference[2], u, v, POSITION)
+    return transformed(world.to_world[k], place, 1.0)
 
 
 @kernel(inline="always")

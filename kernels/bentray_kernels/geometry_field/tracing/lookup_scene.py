@@ -56,9 +56,7 @@ def from_outside(
         origin, direction: in the shape's unit cube.
     """
     none = (-1, np.inf, 0.0, 0.0, False)
-    near, far, s, sx, sy, t, tx, ty = line_of(
-        origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]
-    )
+    near, far, s, sx, sy, t, tx, ty = line_of(*origin, *direction)
     if not (near < far and far > 0.0):
         return none
     n, start = world.shapes[shape, 1], world.shapes[shape, 2]
@@ -121,9 +119,7 @@ def from_the_surface(
     """
     published = way > EXACT and world.references[shape, 2] > 0
     if published and world.references[shape, 3] >= 0:
-        _, _, _, _, _, t, tx, ty = line_of(
-            origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]
-        )
+        _, _, _, _, _, t, tx, ty = line_of(*origin, *direction)
         linear = way == UV_LINEAR
         return next_on_the_image(world, shape, linear, origin, direction, left, (t, tx, ty))
     known = EXACT if way > EXACT and not published else way
@@ -146,9 +142,7 @@ def _next_face(
     n, start = world.shapes[shape, 3], world.shapes[shape, 4]
     if way == EXACT or n == 0:
         return intersect_exactly(world, shape, waiting, origin, direction, left)
-    _, _, _, _, _, t, tx, ty = line_of(
-        origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]
-    )
+    _, _, _, _, _, t, tx, ty = line_of(*origin, *direction)
     face = int64(world.inner_faces[start + world.starts[left] * (6 * n * n) + number_at(t, tx, ty, n)])
     if face >= 0:
         face, distance, first, second = settle(world.surface, face, side, STEPS, *origin, *direction)

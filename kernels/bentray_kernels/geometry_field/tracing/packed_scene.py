@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Float32s, Floats, Int32s, Ints
+from ...errors import InvalidInput
 from ...meshes.surface import Surface
 from ..tables.agreement import agreement
 from .scene import Scene, Shape
@@ -74,6 +75,10 @@ def world_of(scene: Scene) -> World:
     shapes = list({id(instance.shape): instance.shape for instance in scene.instances}.values())
     first_face = np.cumsum([0] + [len(shape.surface.triangles) for shape in shapes])
     first_node = np.cumsum([0] + [len(shape.surface.nodes) for shape in shapes])
+    # Of the shapes that have them: their fields, with the number of their first face.
+    outers = [(shape.outer, k) for shape, k in zip(shapes, first_face, strict=False) if shape.outer]
+    inners = [(shape.inner, k) for shape, k in zip(shapes, first_face, strict=False) if shape.inner]
+    recorded = [shape.reference for shape in shapes if shape.reference]
     table, outer, inner = [], 0, 0
     references, of_uv, of_images, of_inner_uv = [], 0, 0, 0
     for shape, node in zip(shapes, first_node, strict=False):
@@ -88,74 +93,77 @@ def world_of(scene: Scene) -> World:
         of_uv += shape.reference.uv.size if shape.reference else 0
         of_images += shape.reference.image.size if shape.reference else 0
         of_inner_uv += 0 if within is None else within.size
+    starts = [
+        shape.inner.starts if shape.inner else np.zeros(len(shape.surface.triangles), np.int32)
+        for shape in shapes
+    ]
     numbers = {id(shape): number for number, shape in enumerate(shapes)}
     textures: list[Any] = []
-    instances = []
+    first_number = [0]
+    instances, looks = [], []
     for instance in scene.instances:
         material = instance.material
         number = -1
         if material.texture is not None:
             number = len(textures)
             textures.append(np.asarray(material.texture, dtype=np.float32))
+            first_number.append(first_number[-1] + textures[-1].size)
         flags = SEES_ITSELF * material.self_reflection + SINGLE * (material.refraction == "single")
         instances.append((numbers[id(instance.shape)], number, flags))
-    starts = np.cumsum([0] + [texture.size for texture in textures])
-    to_world = np.array([instance.to_world for instance in scene.instances], dtype=np.float64)
-    back = np.linalg.inv(to_world[:, :, :3])
-    ground = scene.ground
+        looks.append((*material.colour, material.mirror, material.glass, material.index))
+    places = [(start, *texture.shape[:2]) for start, texture in zip(first_number, textures, strict=False)]
+    to_local, to_world = _transforms(scene)
     light = np.asarray(scene.light) / np.linalg.norm(scene.light)
+    ground = np.zeros(9)
+    if scene.ground:
+        ground[:2], ground[8] = (scene.ground.height_m, scene.ground.square_m), scene.ground.radius_m
+        ground[2:8] = np.ravel(scene.ground.colours)
     return World(
         surface=_together(shapes, first_face, first_node),
         shapes=np.array(table, dtype=np.int64),
-        faces=_shifted(
-            [(shape.outer.faces, k) for shape, k in zip(shapes, first_face, strict=False) if shape.outer]
-        ),
-        fractions=_joined([shape.outer.fractions for shape in shapes if shape.outer], np.float32),
-        known=_joined([agreement(shape.outer) for shape in shapes if shape.outer], np.uint8),
-        inner_faces=_shifted(
-            [(shape.inner.faces, k) for shape, k in zip(shapes, first_face, strict=False) if shape.inner]
-        ),
-        starts=np.concatenate(
-            [
-                shape.inner.starts if shape.inner else np.zeros(len(shape.surface.triangles), np.int32)
-                for shape in shapes
-            ]
-        ),
+        faces=_shifted([(field.faces, k) for field, k in outers]),
+        fractions=_joined([field.fractions for field, _ in outers], np.float32),
+        known=_joined([agreement(field) for field, _ in outers], np.uint8),
+        inner_faces=_shifted([(field.faces, k) for field, k in inners]),
+        starts=np.concatenate(starts),
         references=np.array(references, dtype=np.int64),
-        uv=_joined([shape.reference.uv for shape in shapes if shape.reference], np.float32),
-        images=_joined([shape.reference.image for shape in shapes if shape.reference], np.float32),
-        inner_uv=_joined(
-            [
-                shape.reference.inner_uv
-                for shape in shapes
-                if shape.reference and shape.reference.inner_uv is not None
-            ],
-            np.float32,
-        ),
-        to_local=np.concatenate([back, -back @ to_world[:, :, 3:]], axis=2),
+        uv=_joined([field.uv for field in recorded], np.float32),
+        images=_joined([field.image for field in recorded], np.float32),
+        inner_uv=_joined([field.inner_uv for field in recorded if field.inner_uv is not None], np.float32),
+        to_local=to_local,
         to_world=to_world,
         instances=np.array(instances, dtype=np.int64),
-        looks=np.array(
-            [
-                (*i.material.colour, i.material.mirror, i.material.glass, i.material.index)
-                for i in scene.instances
-            ],
-            dtype=np.float64,
-        ),
+        looks=np.array(looks, dtype=np.float64),
         pictures=_joined(textures, np.float32),
-        textures=np.array(
-            [(start, *texture.shape[:2]) for start, texture in zip(starts, textures, strict=False)],
-            dtype=np.int64,
-        ).reshape(-1, 3),
+        textures=np.array(places, dtype=np.int64).reshape(-1, 3),
         sky=np.ascontiguousarray(scene.environment, dtype=np.float32),
-        ground=np.array(
-            [ground.height_m, ground.square_m, *np.ravel(ground.colours), ground.radius_m]
-            if ground
-            else [0.0] * 9,
-            dtype=np.float64,
-        ),
+        ground=ground,
         light=np.array([*light, scene.ambient]),
     )
+
+
+def moved(world: World, scene: Scene) -> World:
+    """The packed scene with its instances where those of another scene are; all tables are shared.
+
+    Args:
+        world: ``world_of`` a scene with the same shapes and materials in the same order.
+        scene: where its instances are.
+
+    Raises:
+        InvalidInput: for another number of instances.
+    """
+    number = len(world.to_world)
+    if len(scene.instances) != number:
+        raise InvalidInput("instances", len(scene.instances), f"{number}, as in the packed scene")
+    to_local, to_world = _transforms(scene)
+    return world._replace(to_local=to_local, to_world=to_world)
+
+
+def _transforms(scene: Scene) -> tuple[Floats, Floats]:
+    """``to_local`` and ``to_world`` of a scene's instances."""
+    to_world = np.array([instance.to_world for instance in scene.instances], dtype=np.float64)
+    back = np.linalg.inv(to_world[:, :, :3])
+    return np.concatenate([back, -back @ to_world[:, :, 3:]], axis=2), to_world
 
 
 def _joined(arrays: Sequence[Any], kind: Any) -> Any:

@@ -7,7 +7,7 @@ last depth the rest of the weight gets the environment.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ from ...meshes.intersector import WAITING
 from ...refraction.backdrop import Colours
 from ...refraction.camera import Camera, affine
 from ...refraction.optics import refracted
-from .appearance import ground_at, normal_at, shading, sky_at, unit, uv_of
+from .appearance import ground_at, normal_at, shading, sky_at, transformed, unit, uv_of
 from .image_lookup import image_normal, image_point
 from .lookup_scene import WAYS, from_outside, from_the_surface
 from .packed_scene import SEES_ITSELF, SINGLE, World
@@ -82,18 +82,14 @@ def trace(
     views = camera.origin, camera.direction
     ways = WAYS[settings.eye], WAYS[settings.way]
 
-    def tile(rows: slice) -> None:
+    def tile(first: int) -> None:
         pause()
-        _trace_rows(world, views[0], views[1], *ways, settings.depth, rows.start, image.shape[0], image[rows])
+        own = image[first : first + TILE_ROWS]
+        _trace_rows(world, *views, *ways, settings.depth, first, settings.rows, own)
 
     with ThreadPoolExecutor(settings.threads) as pool:
-        list(pool.map(tile, _tiles(settings.rows)))
+        list(pool.map(tile, range(0, settings.rows, TILE_ROWS)))
     return image
-
-
-def _tiles(rows: int) -> Iterator[slice]:
-    for first in range(0, rows, TILE_ROWS):
-        yield slice(first, min(first + TILE_ROWS, rows))
 
 
 @kernel
@@ -201,7 +197,8 @@ def _nearest(
         if k == own and (left == UNSEEN or (within == NOTHING and not world.instances[k, 2] & SEES_ITSELF)):
             continue
         shape = world.instances[k, 0]
-        o, d = _to_local(world, k, origin, 1.0), _to_local(world, k, direction, 0.0)
+        m = world.to_local[k]
+        o, d = transformed(m, origin, 1.0), transformed(m, direction, 0.0)
         if k == own:
             hit = from_the_surface(world, shape, way, waiting, o, d, left, 1.0 if within == NOTHING else -1.0)
         else:
@@ -214,16 +211,6 @@ def _nearest(
         if 1e-9 < down < distance and x * x + y * y <= world.ground[8] ** 2:
             met, distance = GROUND, down
     return met, face, distance, first, second, on_image
-
-
-@kernel(inline="always")
-def _to_local(world: World, k: int, a: Vector, place: float) -> Vector:
-    m = world.to_local[k]
-    return (
-        m[0, 0] * a[0] + m[0, 1] * a[1] + m[0, 2] * a[2] + place * m[0, 3],
-        m[1, 0] * a[0] + m[1, 1] * a[1] + m[1, 2] * a[2] + place * m[1, 3],
-        m[2, 0] * a[0] + m[2, 1] * a[1] + m[2, 2] * a[2] + place * m[2, 3],
-    )
 
 
 @kernel(inline="always")
