@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -250,3 +250,10 @@ def _mixed(pictures: Colours, a: int, b: int, c: int, d: int, t: float, w: float
     upper = (1.0 - t) * pictures[a] + t * pictures[b]
     lower = (1.0 - t) * pictures[c] + t * pictures[d]
     return float((1.0 - w) * upper + w * lower)
+
+
+@kernel(inline="always")
+def paint(image: Colours, i: int, j: int, colour: Any, scale: float) -> None:
+    """Set a pixel to a colour, three numbers, times ``scale``; rounded."""
+    for c in range(3):
+        image[i, j, c] = np.uint8(colour[c] * scale + 0.5)

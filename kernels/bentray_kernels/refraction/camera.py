@@ -39,6 +39,14 @@ def affine(basis: Floats, u: float, v: float) -> Vector:
     )
 
 
+@kernel(inline="always")
+def ray_at(camera: tuple[Floats, Floats], u: float, v: float) -> tuple[Vector, Vector]:
+    """Origin and unit direction of a ray; ``camera`` as ``Camera.origin`` and ``Camera.direction``."""
+    ahead = affine(camera[1], u, v)
+    length = math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
+    return affine(camera[0], u, v), (ahead[0] / length, ahead[1] / length, ahead[2] / length)
+
+
 def orthographic(
     centre: ArrayLike, forward: ArrayLike, up: ArrayLike, width_m: float, aspect: float = 1.0
 ) -> Camera:

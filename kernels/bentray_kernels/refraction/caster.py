@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from ..isosurface.crossing import MAX_HALVINGS, Search, leave_interval
 from ..isosurface.octree import Octree
 from ..isosurface.roots import Ray, field_at, point_at, ray_of
 from ..splines.sampler import Sampler, sampled_value_and_gradient, sampler_of
-from .camera import affine
+from .camera import ray_at
 from .optics import refracted
 from .scene import Scene
 
@@ -95,14 +95,8 @@ class Traced(NamedTuple):
 
     def part(self, rays: slice) -> Traced:
         """A view of some of the rays."""
-        return Traced(
-            self.point[rays],
-            self.direction[rays],
-            self.fate[rays],
-            self.crossed[rays],
-            self.weight[rays],
-            self.vertices[rays],
-        )
+        every: tuple[Any, ...] = self
+        return Traced(*(array[rays] for array in every))
 
 
 def allocate_results(rays: int, depth: int, paths: bool) -> Traced:
@@ -136,12 +130,8 @@ def cast(
         depth: most interfaces that a ray may meet.
         traced: filled in.
     """
-    origin, direction = camera
     for n in range(len(places)):
-        start = affine(origin, places[n, 0], places[n, 1])
-        ahead = affine(direction, places[n, 0], places[n, 1])
-        length = math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
-        ahead = (ahead[0] / length, ahead[1] / length, ahead[2] / length)
+        start, ahead = ray_at(camera, places[n, 0], places[n, 1])
         _trace_ray(medium, search, start, ahead, depth, traced, n)
 
 

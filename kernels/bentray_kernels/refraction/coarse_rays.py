@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..compilation.compiled import kernel
 
-Planes = NDArray[np.int8]
-Fates = NDArray[np.uint8]
-Crossed = NDArray[np.int16]
+
+class Hits(NamedTuple):
+    """Where rays or pixels end, (n, m) each, as in ``render.Picture``; ``where`` in edges of the plane."""
+
+    plane: NDArray[np.int8]
+    where: Floats
+    fate: NDArray[np.uint8]
+    crossed: NDArray[np.int16]
+    weight: Floats
 
 
 @kernel
-def interpolate_rays(
-    spacing: int,
-    planes: Planes,
-    places: Floats,
-    fates: Fates,
-    crossed: Crossed,
-    weights: Floats,
-    pixel_planes: Planes,
-    pixel_places: Floats,
-    pixel_fates: Fates,
-    pixel_crossed: Crossed,
-    pixel_weights: Floats,
-) -> None:
+def interpolate_rays(spacing: int, rays: Hits, pixels: Hits) -> None:
     """The results of all pixels from those of every ``spacing``-th ray along both sides.
 
     A ray is at the centre of a square of ``spacing`` × ``spacing`` pixels. A pixel takes place and weight
@@ -35,13 +31,11 @@ def interpolate_rays(
 
     Args:
         spacing: pixels between rays, at least 1.
-        planes, fates, crossed, weights: (n, m) of the rays.
-        places: (n, m, 2) of the rays.
-        pixel_planes, pixel_fates, pixel_crossed, pixel_weights: (rows, columns), at most (n, m)·spacing;
-            filled.
-        pixel_places: (rows, columns, 2), filled.
+        rays: (n, m).
+        pixels: (rows, columns), at most (n, m)·spacing; filled.
     """
-    rows, columns = pixel_planes.shape
+    planes, places, fates, crossed, weights = rays
+    rows, columns = pixels.plane.shape
     for i in range(rows):
         p = i // spacing
         y = (i + 0.5) / spacing - 0.5
@@ -50,8 +44,8 @@ def interpolate_rays(
             q = j // spacing
             x = (j + 0.5) / spacing - 0.5
             left = int(np.floor(x))
-            pixel_planes[i, j], pixel_fates[i, j] = planes[p, q], fates[p, q]
-            pixel_crossed[i, j] = crossed[p, q]
+            pixels.plane[i, j], pixels.fate[i, j] = planes[p, q], fates[p, q]
+            pixels.crossed[i, j] = crossed[p, q]
             total = u = v = weight = 0.0
             for down in range(2):
                 for right in range(2):
@@ -64,5 +58,5 @@ def interpolate_rays(
                     u += share * places[a, b, 0]
                     v += share * places[a, b, 1]
                     weight += share * weights[a, b]
-            pixel_places[i, j, 0], pixel_places[i, j, 1] = u / total, v / total
-            pixel_weights[i, j] = weight / total
+            pixels.where[i, j, 0], pixels.where[i, j, 1] = u / total, v / total
+            pixels.weight[i, j] = weight / total

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..compilation.compiled import kernel
-from .backdrop import Backdrop, Colours
+from .backdrop import Backdrop, Colours, paint
 from .texels import STEP_BITS, STEPS, WHOLE, Texels, between_texels, reduced, unpacked
 
 Planes = NDArray[np.int8]
@@ -92,11 +92,8 @@ def filter_picture(
         for j in range(columns):
             common = state[0, j] & state[0, j + 1] & state[1, j] & state[1, j + 1]
             if degree == 1 and common == ALONE:
-                red, green, blue = unpacked(_nine(texture, thirds, np.uint64(j)))
-                scale = weights[i, j] / (9 * WHOLE)
-                image[i, j, 0] = np.uint8(red * scale + 0.5)
-                image[i, j, 1] = np.uint8(green * scale + 0.5)
-                image[i, j, 2] = np.uint8(blue * scale + 0.5)
+                colour = unpacked(_nine(texture, thirds, np.uint64(j)))
+                paint(image, i, j, colour, weights[i, j] / (9 * WHOLE))
             elif planes[i, j] == plane:
                 _sample_evenly(texture, places, i, j, state[above], state[below], degree, weights, image)
 
@@ -216,7 +213,4 @@ def _sample_evenly(
                     )
                 channels = unpacked(total)
                 red, green, blue = red + channels[0], green + channels[1], blue + channels[2]
-    scale = weights[i, j] * step * step / WHOLE
-    image[i, j, 0] = np.uint8(red * scale + 0.5)
-    image[i, j, 1] = np.uint8(green * scale + 0.5)
-    image[i, j, 2] = np.uint8(blue * scale + 0.5)
+    paint(image, i, j, (red, green, blue), weights[i, j] * step * step / WHOLE)

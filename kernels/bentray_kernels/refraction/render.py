@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from .backdrop import Backdrop, Colours, locate
 from .camera import Camera
 from .caster import LOST, allocate_results, cast, medium_of
 from .caster_opencl import OpenCLCaster
-from .coarse_rays import interpolate_rays
+from .coarse_rays import Hits, interpolate_rays
 from .scene import Scene
 from .supersampling import averaged, point_colours, post_refraction_colours
 
@@ -137,13 +137,8 @@ def render(
     shape = (rows, columns)
     lost = traced.fate == LOST
     plane[lost], where[lost] = -1, np.nan
-    hits = _Found(
-        plane.reshape(shape),
-        where.reshape(*shape, 2),
-        traced.fate.reshape(shape),
-        traced.crossed.reshape(shape),
-        traced.weight.reshape(shape),
-    )
+    found: tuple[Any, ...] = (plane, where, traced.fate, traced.crossed, traced.weight)
+    hits = Hits(*(array.reshape(*shape, *array.shape[1:]) for array in found))
     if spacing > 1:
         hits = _of_pixels(hits, settings)
     image = np.empty((*hits.plane.shape, 3), dtype=np.uint8)
@@ -155,37 +150,15 @@ def render(
         point_colours(*grid, light, image)
     # Where there is no plane, any edge leaves NaN what it is.
     position = hits.where * backdrop.edges[hits.plane]
-    return Picture(
-        image if times == 1 else averaged(image, times),
-        position,
-        hits.plane,
-        hits.fate,
-        hits.crossed,
-        hits.weight,
-    )
+    image = image if times == 1 else averaged(image, times)
+    return Picture(image, position, hits.plane, hits.fate, hits.crossed, hits.weight)
 
 
-class _Found(NamedTuple):
-    """Hits of rays, as in ``Picture``; ``where`` in edges of the plane."""
-
-    plane: NDArray[np.int8]
-    where: Floats
-    fate: NDArray[np.uint8]
-    crossed: NDArray[np.int16]
-    weight: Floats
-
-
-def _of_pixels(rays: _Found, settings: RenderSettings) -> _Found:
+def _of_pixels(rays: Hits, settings: RenderSettings) -> Hits:
     """Hits of all pixels, interpolated between the rays."""
     shape = settings.rows, settings.columns
-    pixels = _Found(
-        np.empty(shape, dtype=np.int8),
-        np.empty((*shape, 2)),
-        np.empty(shape, dtype=np.uint8),
-        np.empty(shape, dtype=np.int16),
-        np.empty(shape),
-    )
-    interpolate_rays(settings.ray_spacing, *rays, *pixels)
+    pixels = Hits(*(np.empty((*shape, *array.shape[2:]), array.dtype) for array in rays))
+    interpolate_rays(settings.ray_spacing, rays, pixels)
     return pixels
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from ..compilation.compiled import kernel
 from ..errors import InvalidInput
 from ..isosurface.crossing import MAX_HALVINGS, Search, leave_interval
 from .backdrop import Colours
-from .camera import Camera, affine
+from .camera import Camera, ray_at
 from .caster import (
     RefractiveMedium,
     gradient_at,
@@ -121,9 +120,7 @@ def _shade(
     for i in range(len(distances)):
         for j in range(columns):
             u, v = (j + 0.5) / columns - 0.5, (first + i + 0.5) / rows - 0.5
-            origin, ahead = affine(camera[0], u, v), affine(camera[1], u, v)
-            length = math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
-            direction = (ahead[0] / length, ahead[1] / length, ahead[2] / length)
+            origin, direction = ray_at(camera, u, v)
             ray = in_nodes(medium, origin, direction)
             near, far, _, _ = through_box(ray, medium.low, medium.high)
             near = max(near, 0.0)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Flags, Floats, Ints
 from ..compilation.compiled import kernel
-from .backdrop import Backdrop, Colours, colour_at
+from .backdrop import Backdrop, Colours, colour_at, paint
 from .picture_supersampling import filter_picture
 
 Planes = NDArray[np.int8]
@@ -60,9 +60,7 @@ def point_colours(
 def _point(
     backdrop: Backdrop, planes: Planes, places: Floats, weights: Floats, image: Colours, i: int, j: int
 ) -> None:
-    colour = colour_at(backdrop, planes[i, j], places[i, j, 0], places[i, j, 1])
-    for c in range(3):
-        image[i, j, c] = np.uint8(colour[c] * weights[i, j] + 0.5)
+    paint(image, i, j, colour_at(backdrop, planes[i, j], places[i, j, 0], places[i, j, 1]), weights[i, j])
 
 
 @kernel
@@ -167,15 +165,10 @@ def _filter_patterns(
                 continue
             joined = same_piece[here, j] & same_piece[here, j + 1]
             if degree == 1 and joined & same_piece[after, j] & same_piece[after, j + 1]:
-                red, green, blue = _nine(backdrop, planes[i, j], thirds, np.uint64(j))
+                colour = _nine(backdrop, planes[i, j], thirds, np.uint64(j))
             else:
-                red, green, blue = _sample_evenly(
-                    backdrop, planes, places, i, j, same_square, same_piece, degree
-                )
-            scale = share * weights[i, j]
-            image[i, j, 0] = np.uint8(red * scale + 0.5)
-            image[i, j, 1] = np.uint8(green * scale + 0.5)
-            image[i, j, 2] = np.uint8(blue * scale + 0.5)
+                colour = _sample_evenly(backdrop, planes, places, i, j, same_square, same_piece, degree)
+            paint(image, i, j, colour, share * weights[i, j])
 
 
 @kernel(inline="always")
