@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,8 +69,8 @@ class Result:
     values: Mapping[str, NDArray[Any]]
     coordinates: Mapping[str, Floats]
     units: Mapping[str, str]
-    attributes: Mapping[str, str] = field(default_factory=dict)
-    image: Reconstruction | Volume | None = None
+    attributes: Mapping[str, str]
+    image: Reconstruction | Volume
     truth: Truth | None = None
     roi: Bools | None = None
 
@@ -119,12 +119,12 @@ class Result:
     @property
     def spacing_m(self) -> tuple[float, ...]:
         """Node spacing along each axis, m; z is NaN for slices with non-uniform heights."""
-        return tuple(self._image().spacing_m)
+        return tuple(self.image.spacing_m)
 
     @property
     def origin_m(self) -> tuple[float, ...]:
         """Position of node 0 along each axis, m."""
-        return tuple(self._image().origin_m)
+        return tuple(self.image.origin_m)
 
     @property
     def settings(self) -> Settings:
@@ -279,7 +279,7 @@ class Result:
         from bentray_workers.files.volume import write_volume
         from bentray_workers.files.volume_export import Selection, export_image
 
-        target, image = Path(path), self._image()
+        target, image = Path(path), self.image
         name = format_of(target)
         chosen = Selection(quantity, attenuation, frequency_hz)
         if not target.absolute().parent.is_dir():
@@ -298,8 +298,6 @@ class Result:
         return target
 
     def __repr__(self) -> str:
-        if not self.values:
-            return "<bentray.Result without arrays>"
         name, array = next(iter(self.values.items()))
         size = " x ".join(map(str, array.shape))
         spread = f"{np.nanmin(array):.6g} to {np.nanmax(array):.6g} {self.units[name]}".rstrip()
@@ -359,22 +357,15 @@ class Result:
 
     def _grid(self, quantity: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Spacing and position of node 0 of a quantity, m."""
-        image = self._image()
-        held = None if isinstance(image, Volume) else image.image(quantity)
+        held = None if isinstance(self.image, Volume) else self.image.image(quantity)
         if held is None:
             return self.spacing_m, self.origin_m
         return tuple(held.spacing_m), tuple(held.origin_m)
 
-    def _image(self) -> Reconstruction | Volume:
-        if self.image is None:
-            raise InvalidInput("image", "none", "a result of bentray.reconstruct or of a client")
-        return self.image
-
     def _reconstruction(self) -> Reconstruction:
-        image = self._image()
-        if isinstance(image, Volume):
+        if isinstance(self.image, Volume):
             raise InvalidInput("image", "an uploaded volume", "a reconstruction")
-        return image
+        return self.image
 
     def _draw(
         self,
@@ -383,13 +374,24 @@ class Result:
         cut: tuple[str, int | None],
         limits: tuple[float | None, float | None],
     ) -> None:
-        from .plotting import draw_quantity
+        from bentray_workers.images.captions import LABELS, NAMES
+        from bentray_workers.images.maps import SPEED
+        from bentray_workers.images.plane import plane_of
+        from bentray_workers.images.report import COLORMAPS
+        from bentray_workers.images.slice import requested_limits, usual_limits
+
+        from .plotting import draw_plane
 
         name = next(iter(self.values)) if quantity is None else quantity
-        coverage = None if name == "reflection" else self.values.get("coverage")
-        title = self.attributes.get("title", "")
-        images = self._of(name), coverage
-        draw_quantity(axes, name, images, self._grid(name), cut, limits, unit=self.units[name], title=title)
+        grid = self._grid(name)
+        plane = plane_of(self._of(name), *grid, *cut)
+        # Nodes without rays do not count for the limits.
+        crossed = None if name == "reflection" else self.values.get("coverage")
+        coverage = None if crossed is None else plane_of(crossed, *grid, *cut).image
+        chosen = requested_limits(usual_limits(name, plane.image, coverage), *limits)
+        label = LABELS.get(name) or f"value ({self.units[name]})".replace(" ()", "")
+        title = NAMES.get(name) or self.attributes.get("title", "")
+        draw_plane(axes, plane, chosen, colormap=COLORMAPS.get(name, SPEED), title=title, label=label)
 
     def _compared(self, other: Result, quantity: str) -> Comparison:
         from bentray_kernels.tomography.comparison import at_nodes
@@ -419,14 +421,9 @@ class Result:
                 region, choice = region & both, "nodes that rays of both images cross"
         if not region.any():
             raise InvalidInput("other", "an image without a common node", "one that overlaps with this one")
-        names, unit, deviation = (
-            ("this image", "the other"),
-            self.units[quantity],
-            self._uncertainty(quantity),
-        )
-        return Comparison(
-            image, there, region, choice, *nodes, deviation, names=names, quantity=quantity, unit=unit
-        )
+        compared = image, there, region, choice, *nodes, self._uncertainty(quantity)
+        names = ("this image", "the other")
+        return Comparison(*compared, names=names, quantity=quantity, unit=self.units[quantity])
 
     def _against_truth(self, truth: Truth, roi: Bools | None, quantity: str) -> Comparison:
         from bentray_kernels.tomography.comparison import NotComparable, compare, on_grid
@@ -445,18 +442,11 @@ class Result:
                 true = on_grid(known[quantity], truth, self._reconstruction())
         except NotComparable as reason:
             raise InvalidInput("truth", str(reason), "a truth on the axes of the image") from None
-        return Comparison(
-            np.asarray(self._of(quantity), np.float64),
-            true,
-            compared.region,
-            compared.region_choice,
-            self.spacing_m,
-            self.origin_m,
-            self._uncertainty(quantity),
-            names=("reconstruction", "truth"),
-            quantity=quantity,
-            unit=self.units[quantity],
-        )
+        image, nodes = np.asarray(self._of(quantity), np.float64), (self.spacing_m, self.origin_m)
+        region = compared.region, compared.region_choice
+        names, unit = ("reconstruction", "truth"), self.units[quantity]
+        deviation = self._uncertainty(quantity)
+        return Comparison(image, true, *region, *nodes, deviation, names=names, quantity=quantity, unit=unit)
 
 
 def result_of(
