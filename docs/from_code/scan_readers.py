@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bentray_workers.foreign_scans.readers import READERS
+from bentray_workers.foreign_scans.conversion import READERS
 
 from .tables import table
 

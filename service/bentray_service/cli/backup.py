@@ -10,7 +10,7 @@ import typer
 
 from .keys import Data, service_settings
 from .output.exit_codes import WorkFailed
-from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
+from .output.terminal import AsJson, print_result, progress_bar, remark
 
 
 def backup(
@@ -39,11 +39,10 @@ def backup(
 
     with progress_bar("Backing up", shown=not as_json) as step:
         made = back_up(service_settings(data), folder, link, step)
-    if as_json:
-        print_json({"folder": str(folder.resolve()), **asdict(made)})
-    else:
+    if not as_json:
         remark(f"{made.items} stored items, {made.bytes} bytes with database and audit log")
-        print_lines([str(folder), *(f"missing: {path}" for path in made.missing)])
+    lines = [str(folder), *(f"missing: {path}" for path in made.missing)]
+    print_result({"folder": str(folder.resolve()), **asdict(made)}, lines, as_json=as_json)
     if made.missing:
         count = len(made.missing)
         raise WorkFailed(f"{count} damaged or missing items are not in the backup; see `bentray verify`")
@@ -68,8 +67,8 @@ def restore(
     with progress_bar("Restoring", shown=not as_json) as step:
         restored = restore_backup(folder, settings, step)
     target = settings.data_dir.resolve()
-    if as_json:
-        print_json({"data": str(target), **asdict(restored)})
-        return
-    remark(f"{restored.items} stored items of a backup by Bentray {restored.bentray}; start the service with")
-    print_lines([f"bentray serve --data {target}"])
+    if not as_json:
+        stored = f"{restored.items} stored items of a backup by Bentray {restored.bentray}"
+        remark(f"{stored}; start the service with")
+    figures = {"data": str(target), **asdict(restored)}
+    print_result(figures, [f"bentray serve --data {target}"], as_json=as_json)

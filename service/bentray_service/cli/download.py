@@ -13,7 +13,7 @@ from bentray_workers.files.export.registry import FORMATS, SUFFIXES, FormatName
 from .export import AttenuationFrequency, AttenuationUnit, Quantity
 from .options.paths import output_file
 from .output.exit_codes import client_errors
-from .output.terminal import AsJson, print_json, print_lines, progress_bar, remark
+from .output.terminal import AsJson, print_result, progress_bar, remark
 
 DOWNLOADED = "; ".join(
     f"{form.title} {', '.join(suffix for suffix in form.suffixes if suffix not in form.local)}"
@@ -70,7 +70,5 @@ def download(
             client.download(stored, chosen, target, **how)
         else:
             client.download_dataset(stored, target, step)
-    if as_json:
-        print_json({"id": stored, "output": str(target), "bytes": target.stat().st_size})
-    else:
-        print_lines([str(target)])
+    figures = {"id": stored, "output": str(target), "bytes": target.stat().st_size}
+    print_result(figures, [str(target)], as_json=as_json)

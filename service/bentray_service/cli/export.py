@@ -12,7 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.export.registry import FORMATS, SINGLE_SUFFIXES, format_of
 
 from .options.paths import check_apart, input_file, output_file
-from .output.terminal import AsJson, print_json, print_lines
+from .output.terminal import AsJson, print_result
 
 WRITTEN = "; ".join(f"{form.title} {', '.join(form.suffixes)}" for form in FORMATS.values())
 ACCEPTED = "a reconstruction.h5, its folder, or a volume of Bentray in HDF5"
@@ -65,7 +65,5 @@ def export(
             shutil.copyfile(source, partial)
     else:
         export_volume(source, target=target, name=name, selection=selection)
-    if as_json:
-        print_json({"result": str(source), "output": str(target), "format": name})
-    else:
-        print_lines([str(target)])
+    figures = {"result": str(source), "output": str(target), "format": name}
+    print_result(figures, [str(target)], as_json=as_json)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +15,7 @@ from .options.option_tables import with_options
 from .options.paths import input_file, output_folder
 from .options.view_options import FIELD_SETTINGS, FIELD_VIEW, field_of
 from .output.terminal import AsJson, Step, print_json, print_lines, print_table, progress_bar, progress_shown
+from .render import tiles_in_threads
 
 if TYPE_CHECKING:
     from bentray_workers.files.mesh_formats import ReadMesh
@@ -72,20 +74,12 @@ def geometry_field(
 
 def _draw(field: Path, view: FieldView, folder: Path, step: Step) -> dict[str, str]:
     """Render the three images; returns their paths by name."""
-    from concurrent.futures import ThreadPoolExecutor
-
     from bentray_workers.files.atomic import write_bytes
     from bentray_workers.rendering.field_picture import map_png, tile_image
     from bentray_workers.rendering.tiles import stack_png
 
     rows = max(1, 2**16 // (view.width * view.rays**2))
-    firsts = range(0, view.height, rows)
-    strips = []
-    with ThreadPoolExecutor() as pool:
-        drawn = pool.map(lambda first: tile_image(field, view, first, min(first + rows, view.height)), firsts)
-        for strip in drawn:
-            strips.append(strip)
-            step(len(strips), len(firsts))
+    strips = tiles_in_threads(partial(tile_image, field, view), view.height, rows, step)
     draw: dict[str, Callable[[], bytes]] = {
         "image": lambda: stack_png(strips),
         "geometry-image": lambda: map_png(field, "positions"),

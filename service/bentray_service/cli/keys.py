@@ -15,7 +15,7 @@ import typer
 from bentray_kernels.errors import InvalidInput
 
 from .output.exit_codes import CommandList
-from .output.terminal import AsJson, print_json, print_lines, print_result, print_table, remark
+from .output.terminal import AsJson, print_json, print_result, print_table, remark
 
 if TYPE_CHECKING:
     from ..rows.database import Database
@@ -69,14 +69,12 @@ def create(
     with opened_database(data) as database:
         row = Keys(database).add(token, whose, name, requested, until)
         remember_authentication(service_settings(data).data_dir)
-    if as_json:
-        print_json({**_shown(row), "key": token.shown()})
-    else:
+    if not as_json:
         remark(
             f"A key of the tenant {whose}; it is not shown again. Set BENTRAY_KEY to it, or send the header"
         )
         remark("Authorization: Bearer …")
-        print_lines([token.shown()])
+    print_result({**_shown(row), "key": token.shown()}, [token.shown()], as_json=as_json)
 
 
 @keys.command("list")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
@@ -32,7 +32,7 @@ ROWS, RAYS = 16, 2**15
 # Side of the cube of a phantom.
 PHANTOM_SIDE_M = 0.1
 
-
+T = TypeVar("T")
 SampledPhantom = Literal["sphere", "one-hole", "two-holes", "marschner-lobb"]
 
 
@@ -153,18 +153,23 @@ def _drawn(
     from bentray_workers.rendering.drawing_device import caster_for
     from bentray_workers.rendering.refraction import draw_tile
 
-    tiles: list[Tile] = []
     rows = min(ROWS, max(1, RAYS // (view.width * view.times**2)))
     rays = view.width * view.height * (view.times / view.ray_spacing) ** 2
     if view.mode == "refract" and computed(lambda: caster_for(scene, int(rays), view.device))[0] is not None:
         # A device casts all rays together.
         rows = view.height
-    pool = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
+    return tiles_in_threads(
+        lambda first, last: draw_tile(scene, view, first, last, card), view.height, rows, step
+    )
+
+
+def tiles_in_threads(
+    draw: Callable[[int, int], T], height: int, rows: int, step: Callable[[int, int], None]
+) -> list[T]:
+    """Tiles of a picture from top to bottom, one thread per core; ``draw`` draws rows from first to last."""
+    pool, tiles = ThreadPoolExecutor(len(os.sched_getaffinity(0))), []
     try:
-        drawn = [
-            pool.submit(draw_tile, scene, view, first, min(first + rows, view.height), card)
-            for first in range(0, view.height, rows)
-        ]
+        drawn = [pool.submit(draw, first, min(first + rows, height)) for first in range(0, height, rows)]
         for future in drawn:
             tiles.append(future.result())
             step(len(tiles), len(drawn))

@@ -16,7 +16,7 @@ from .options.settings_options import settings_from, with_settings_options
 from .output.batch_view import report
 from .output.exit_codes import AcceptDoubtful, client_errors, end_doubtful
 from .output.results import show_results, write_results
-from .output.terminal import AsJson, Step, phase_note, print_json, print_lines, progress_bar, remark
+from .output.terminal import AsJson, Step, phase_note, print_result, progress_bar, remark
 from .worker import Tls
 
 if TYPE_CHECKING:
@@ -173,11 +173,10 @@ def _submit(
         result, seconds = read_reconstruction(volume), job.seconds or 0.0
         record = write_results(folder, result, dataset, seconds, file=str(source), job=job.id)
         show_results(f"Reconstruction of {source.name}", record, as_json=as_json)
-    elif as_json:
-        print_json(job.model_dump(mode="json"))
     else:
         # Without a download, the doubts about the result and its notes are those of the job.
-        print_lines(filter(None, [job.advice, f"{job.id} {job.state}", f"{client.url}{job.links['self']}"]))
+        lines = filter(None, [job.advice, f"{job.id} {job.state}", f"{client.url}{job.links['self']}"])
+        print_result(job.model_dump(mode="json"), lines, as_json=as_json)
     return job
 
 

@@ -10,7 +10,7 @@ from bentray_kernels.errors import InvalidInput
 
 from .keys import Data, opened_database, shown_time
 from .output.exit_codes import CommandList
-from .output.terminal import AsJson, print_json, print_lines, print_result, print_table, remark
+from .output.terminal import AsJson, print_json, print_result, print_table, remark
 
 COLUMNS = ("id", "tenant", "job", "state", "attempts", "created", "last")
 
@@ -41,11 +41,9 @@ def create_secret(
     whose = checked_tenant(tenant)
     with opened_database(data) as database:
         secret = WebhookSecrets(database).create(whose)
-    if as_json:
-        print_json({"tenant": whose, "secret": secret})
-    else:
+    if not as_json:
         remark(f"A secret of the tenant {whose}; it is not shown again. Receivers check messages with it.")
-        print_lines([secret])
+    print_result({"tenant": whose, "secret": secret}, [secret], as_json=as_json)
 
 
 @webhooks.command("list")

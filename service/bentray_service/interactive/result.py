@@ -25,7 +25,7 @@ from bentray_kernels.tomography import (
     region_statistics,
     round_nodes,
 )
-from bentray_workers.files.export.optional_library import import_optional
+from bentray_workers.files.export.content import import_optional
 from bentray_workers.files.quantities import QUANTITIES
 from bentray_workers.files.volume import Volume
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from bentray_workers.files import mesh_formats, volume_formats
-from bentray_workers.foreign_scans.readers import READERS
+from bentray_workers.foreign_scans.conversion import READERS
 from bentray_workers.foreign_scans.scan_reader import Variable
 
 from .documents import document, table

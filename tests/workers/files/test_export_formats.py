@@ -20,7 +20,7 @@ from scipy.io import loadmat
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
-from bentray_workers.files.export import optional_library
+from bentray_workers.files.export import content
 from bentray_workers.files.export.registry import EXPORTED
 from bentray_workers.files.reconstruction import write_reconstruction
 from bentray_workers.files.volume import Volume, write_volume
@@ -215,7 +215,7 @@ def test_rejects_unsupported_exports(tmp_path, monkeypatch):
     def missing(name):
         raise ImportError(name)
 
-    monkeypatch.setattr(optional_library, "import_module", missing)
+    monkeypatch.setattr(content, "import_module", missing)
     for name in ("ome-zarr", "dicom"):
         with pytest.raises(InvalidInput, match=r'pip install "bentray\[export\]"'):
             exported(tmp_path / "plain.h5", tmp_path, name)

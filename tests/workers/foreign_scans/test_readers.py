@@ -11,7 +11,7 @@ from scipy.io import savemat
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.foreign_scans import ScanMetadata, convert_dataset, is_upload_format
-from bentray_workers.foreign_scans.readers import READERS
+from bentray_workers.foreign_scans.conversion import READERS
 
 from .hdf5_scans import openusct_fields, write_fields, zea_fields
 from .scans import delta_tof, positions, travel_times, write_matlab73

@@ -10,7 +10,7 @@ import numpy as np
 
 from bentray_kernels.errors import InvalidInput
 
-from .complex_numbers import check_real
+from .damage import check_real
 from .volume import check_shape, check_type
 
 # Declared values of one volume, uncompressed.

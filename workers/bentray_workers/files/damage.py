@@ -1,9 +1,12 @@
-"""Exceptions of file readers on damaged data, converted to InvalidInput."""
+"""What readers refuse in files of any format: damaged data, as InvalidInput, and complex numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
 
 from bentray_kernels.errors import InvalidInput
 
@@ -30,3 +33,16 @@ def rejecting_damage(
 def first_bytes(data: bytes) -> str:
     """The beginning of a file of another kind in words, for a message."""
     return f"it begins with {repr(data[:8])[1:]}"
+
+
+# Names of the parts in HDF5: of h5py, of MATLAB 7.3, and of other writers.
+PARTS = (("r", "i"), ("real", "imag"), ("re", "im"), ("real", "imaginary"))
+ACCEPTED = "of complex traces the real part; of IQ data the real part after modulation to the carrier"
+
+
+def check_real(field: str, dtype: np.dtype[Any], accepted: str) -> None:
+    """Raise InvalidInput for a complex type, also for one that is stored as a pair of parts."""
+    names = tuple(name.lower() for name in dtype.names or ())
+    if dtype.kind == "c" or names in PARTS:
+        shown = f"complex{8 * dtype.itemsize}"
+        raise InvalidInput(field, f"complex numbers ({shown})", f"{accepted}; {ACCEPTED}")

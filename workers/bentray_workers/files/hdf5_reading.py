@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
-from .complex_numbers import check_real
-from .damage import first_bytes, rejecting_damage
+from .damage import check_real, first_bytes, rejecting_damage
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 

@@ -18,9 +18,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.defects import SoundMesh, sound
 
 from .damage import first_bytes, rejecting_damage
-from .gltf_checks import check_gltf
-from .obj_checks import plain_obj
-from .off_checks import HEADERS, plain_off
+from .mesh_checks import OFF_HEADERS, check_gltf, plain_obj, plain_off
 
 ACCEPTED = "a triangle mesh as PLY, OBJ, OFF, STL, glTF or GLB"
 
@@ -89,7 +87,7 @@ def _kind(data: bytes) -> str:
         return "gltf"
     if data.startswith(b"ply"):
         return "ply"
-    if start.split(maxsplit=1)[:1] and start.split(maxsplit=1)[0] in HEADERS:
+    if start.split(maxsplit=1)[:1] and start.split(maxsplit=1)[0] in OFF_HEADERS:
         return "off"
     # Binary STL begins with any 80 bytes, even with "solid"; it is detected by its length.
     as_stl = 84 + 50 * struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0

@@ -16,7 +16,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import SPACING_M
 from bentray_kernels.requests.ranges import Range
 
-from .complex_numbers import check_real
+from .damage import check_real
 from .hdf5_reading import Reader, opened, printable
 from .hdf5_writing import atomic_hdf5
 from .volume_axes import MAX_SHEAR, Grid, PositionedImage

@@ -12,13 +12,32 @@ from bentray_kernels.errors import InvalidInput
 from ..files.dataset.copy import copy_dataset
 from ..files.dataset.read import kept_traces
 from ..files.dataset.write import Piece, bytes_of, write_dataset
+from ..files.zip_checks import plain_name
+from . import kit, kwave, layouts, openusct, zea
 from .arrays import Arrays
 from .layouts import named_layout
 from .matlab73 import Matlab73
 from .open_scan import OpenScan, open_scan
-from .readers import reader_of
 from .scan_metadata import POSITION, ArraysWithMetadata, ScanMetadata
-from .scan_reader import Layout
+from .scan_reader import Layout, ScanReader
+
+# A new format is one file and one entry; the first that detects a file reads it.
+READERS: tuple[ScanReader, ...] = (
+    zea.READER,
+    openusct.READER,
+    kit.READER,
+    kwave.READER,
+    layouts.FULL_DATASET,
+    layouts.DELTA_TOF,
+    layouts.NAMED,
+)
+
+# Names of arrays or files that an error repeats.
+SHOWN = 8
+ACCEPTED = (
+    "the names of a documented format of scans, or own names of variables: --map element_position=NAME "
+    "--map delta_tof=NAME (map in Python and REST)"
+)
 
 
 def convert_dataset(
@@ -105,3 +124,18 @@ def _write(arrays: Arrays, layout: Layout, target: Path, on_size: Callable[[int]
 
     write_dataset(target, layout.dataset, pieces)
     return layout.dataset
+
+
+def reader_of(scan: OpenScan) -> ScanReader:
+    """The reader of an open file.
+
+    Raises:
+        InvalidInput: naming the arrays of a file in no known format.
+    """
+    for reader in READERS:
+        if reader.detect(scan):
+            return reader
+    names = sorted(filter(plain_name, scan.names or scan.members))
+    shown = ", ".join([*names[:SHOWN], *["…"][: len(names) > SHOWN]]) or "none"
+    kind = "a folder with the files" if scan.arrays is None else f"{scan.arrays.kind} with the arrays"
+    raise InvalidInput("file", f"{kind} {shown}", ACCEPTED)

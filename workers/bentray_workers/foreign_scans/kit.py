@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 
 from ..files.bounded_reading import LARGEST_ROW
-from .arrays import read_small
+from .arrays import StreamedScan, Traces, read_small
 from .kit_signals import RATE_HZ, UNDERSAMPLING, compress, decode_float16, reconstruct_undersampled
 from .layouts import named_layout
 from .matlab5 import Matlab5
 from .measurement_folder import MeasurementFolder
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
-from .streamed_scan import StreamedScan, Traces
 
 # The path of the A-scans of an emission; the aperture position is ``TASRotation``.
 EMISSION = re.compile(

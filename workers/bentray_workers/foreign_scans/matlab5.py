@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 
 from ..files.bounded_reading import check_declared, check_row
-from ..files.complex_numbers import ACCEPTED
-from ..files.damage import rejecting_damage
+from ..files.damage import ACCEPTED, rejecting_damage
 
 START = b"MATLAB 5.0 MAT-file"
 

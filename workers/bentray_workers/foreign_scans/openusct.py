@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
+from .arrays import StreamedScan, Traces
 from .layouts import named_layout
 from .matlab73 import rows_of
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
-from .streamed_scan import StreamedScan, Traces
 
 POSITION, DATA, EMITTERS = "geometry/element_pos", "acquisition/data", "acquisition/tx_elements"
 DATA_SHAPE = "(n_tx, n_samples, n_rx) numbers"

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import check_size
 
-from ..files.complex_numbers import ACCEPTED
+from ..files.damage import ACCEPTED
 from ..files.hdf5_reading import Reader
+from .arrays import StreamedScan, Traces
 from .layouts import named_layout
 from .matlab73 import rows_of
 from .open_scan import OpenScan
 from .scan_reader import ScanReader, Variable
-from .streamed_scan import StreamedScan, Traces
 
 # Place of the groups ``data`` and ``scan``: of files of one track, and of files with several.
 TRACKS = ("", "tracks/track_0/")

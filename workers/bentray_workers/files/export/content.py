@@ -1,9 +1,11 @@
-"""The content of an exported file: images on one grid."""
+"""The content of an exported file, images on one grid; and what several writers share."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from bentray_kernels.errors import InvalidInput
 
+from ..atomic import atomic_replace
 from ..volume_axes import Grid
 
 
@@ -43,3 +46,40 @@ class Content:
         if not np.isfinite(spacing).all():
             given = f"uneven slices (spacing {tuple(float(step) for step in spacing)} m)"
             raise InvalidInput("volume", given, f"even spacing for {title}; hdf5 holds any")
+
+
+def import_optional(library: str, extra: str, what: str) -> Any:
+    """A library of an extra of the package.
+
+    Raises:
+        InvalidInput: naming the command that installs it.
+    """
+    try:
+        return import_module(library)
+    except ImportError:
+        accepted = f'another format, or an installation with pip install "bentray[{extra}]"'
+        raise InvalidInput("format", f"{what} without the library {library}", accepted) from None
+
+
+def write_header_and_values(path: Path, header: str, values: NDArray[Any]) -> None:
+    """Write the header, then little-endian values with x varying fastest; ``path`` is replaced atomically.
+
+    Args:
+        path: of the file.
+        header: text up to the first value.
+        values: (nx, ny[, nz]).
+
+    Raises:
+        OSError: where the folder cannot be written to or the disk is full.
+    """
+    stored = np.asarray(values, dtype=values.dtype.newbyteorder("<"))
+    with atomic_replace(path) as partial, partial.open("wb") as file:
+        file.write(header.encode())
+        # One slice at a time, since transposing the whole would double the memory.
+        for k in range(stored.shape[-1]):
+            file.write(stored[..., k].tobytes(order="F"))
+
+
+def type_name(values: NDArray[Any], names: Mapping[str, str]) -> str:
+    """Name of the type of the values in a format, by its NumPy code without byte order, e.g. ``f4``."""
+    return names[values.dtype.str[1:]]

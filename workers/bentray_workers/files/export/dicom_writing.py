@@ -19,8 +19,7 @@ from ..atomic import atomic_replace
 from ..bounded_reading import UNITS_M
 from ..quantities import ATTENUATION_DB
 from ..volume_axes import LPS
-from .content import Content
-from .optional_library import import_optional
+from .content import Content, import_optional
 
 # UCUM code and meaning of each quantity: name of the image, label, explanation.
 QUANTITIES = {

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..bounded_reading import UNITS_M
 from ..volume_axes import LPS
-from .content import Content
-from .header_and_values import type_name, write_header_and_values
+from .content import Content, type_name, write_header_and_values
 
 # Names of the types of volumes.
 ELEMENTS = {"u1": "MET_UCHAR", "u2": "MET_USHORT", "f4": "MET_FLOAT", "f8": "MET_DOUBLE"}

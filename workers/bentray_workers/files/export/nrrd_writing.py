@@ -8,8 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ..bounded_reading import UNITS_M
-from .content import Content
-from .header_and_values import type_name, write_header_and_values
+from .content import Content, type_name, write_header_and_values
 
 TYPES = {"u1": "uint8", "u2": "uint16", "f4": "float", "f8": "double"}
 

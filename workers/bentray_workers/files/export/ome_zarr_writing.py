@@ -12,8 +12,7 @@ from bentray_kernels.errors import InvalidInput
 from ..atomic import atomic_replace
 from ..quantities import UNITS
 from ..volume_axes import check_aligned
-from .content import Content
-from .optional_library import import_optional
+from .content import Content, import_optional
 
 VERSION = "0.5"
 ROOT = "zarr.json"

@@ -1,9 +1,10 @@
-"""Checks of glTF files for what trimesh reads without an error, but as another mesh."""
+"""Checks of glTF, OBJ and OFF files for what trimesh reads without an error, but as another mesh."""
 
 from __future__ import annotations
 
 import json
 import math
+import re
 import struct
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
@@ -102,3 +103,91 @@ def _check_tree(nodes: Sequence[Json], scenes: Sequence[Json]) -> None:
             raise InvalidInput(
                 f"nodes/{number}", given, "a mesh in nodes of its own; export it without cameras"
             )
+
+
+# Length of a line in an error message.
+SHOWN = 60
+
+# Continued lines; faces of fewer than three corners; vertices of fewer than three numbers.
+OBJ_CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
+OBJ_SHORT = re.compile(rb"^[ \t]*([vf])(?:[ \t]+[^\s#]+){0,2}[ \t]*(?:#.*)?\r?$", re.MULTILINE)
+OBJ_ACCEPTED = {b"v": ("vertices", "three numbers, x y z"), b"f": ("faces", "three corners or more")}
+# Vertices, and faces with their corners; a corner is a vertex, and after a slash texture and normal.
+OBJ_RECORD = re.compile(rb"^[ \t]*(?:(v)[ \t]|f[ \t]+([^\r\n#]*))", re.MULTILINE)
+# A corner that counts vertices back from its face, or from 0.
+OBJ_RELATIVE = re.compile(rb"^[ \t]*f[^\r\n#]*[ \t](?:-|0+(?![0-9]))", re.MULTILINE)
+
+
+def plain_obj(data: bytes) -> bytes:
+    """An OBJ whose faces count vertices from 1, without what readers take for other vertices.
+
+    Args:
+        data: the whole file.
+
+    Returns:
+        The same text, where faces count vertices back from their line (-1: the last one so far) with the
+        vertices alone: readers count back from the end of the file.
+
+    Raises:
+        InvalidInput: ``faces`` or ``vertices``, with the line: an incomplete face, which readers skip, an
+            incomplete vertex, or a face of a vertex that is not there.
+    """
+    text = OBJ_CONTINUED.sub(b" ", data)
+    if (match := OBJ_SHORT.search(text)) is not None:
+        field, accepted = OBJ_ACCEPTED[match[1]]
+        raise InvalidInput(field, _shown(text, match), accepted)
+    return _absolute(text) if OBJ_RELATIVE.search(text) else data
+
+
+def _absolute(text: bytes) -> bytes:
+    """Replace relative indices of vertices."""
+    before = 0
+
+    def replaced(record: re.Match[bytes]) -> bytes:
+        nonlocal before
+        if record[1]:
+            before += 1
+            return record[0]
+        numbers = [int(corner.partition(b"/")[0]) for corner in record[2].split()]
+        if 0 in numbers or -min(numbers) > before:
+            raise InvalidInput(
+                "faces", _shown(text, record), f"vertices from 1, or from -1 to -{before} back from the face"
+            )
+        return b"f " + b" ".join(b"%d" % (n if n > 0 else before + 1 + n) for n in numbers)
+
+    return OBJ_RECORD.sub(replaced, text)
+
+
+def _shown(text: bytes, line: re.Match[bytes]) -> str:
+    number = text.count(b"\n", 0, line.start()) + 1
+    return f"{line[0].strip()[:SHOWN].decode(errors='replace')!r} in line {number}"
+
+
+OFF_HEADERS = (b"OFF", b"COFF", b"NOFF", b"CNOFF")
+
+
+def plain_off(data: bytes) -> bytes:
+    """An OFF without comments, with which trimesh loses lines; one that it would read in part is rejected.
+
+    Args:
+        data: the whole file, which begins with one of ``OFF_HEADERS``.
+
+    Returns:
+        The same text without comments.
+
+    Raises:
+        InvalidInput: ``file`` for missing lines; ``faces`` for the first one without its corners.
+        ValueError, IndexError: for counts that are no numbers.
+    """
+    plain = re.sub(rb"#[^\n]*", b"", data)
+    lines = [words for words in (line.split() for line in plain.splitlines()) if words]
+    counts, *rows = [lines[0][1:], *lines[1:]] if lines[0][1:] else lines[1:]
+    vertices, faces = int(counts[0]), int(counts[1])
+    if min(vertices, faces) < 0 or len(rows) < vertices + faces:
+        given = f"{len(rows)} lines of the {vertices} vertices and {faces} faces of its counts"
+        raise InvalidInput("file", f"an OFF file that ends too soon: {given}", "a whole OFF file")
+    for number, words in enumerate(rows[vertices : vertices + faces]):
+        if not 3 <= int(words[0]) < len(words):
+            given = f"{b' '.join(words)[:SHOWN].decode(errors='replace')!r} as face {number}"
+            raise InvalidInput("faces", given, "the number of corners, 3 or more, and their vertices")
+    return plain
