@@ -1,21 +1,20 @@
 """Wrong orders of elements are found and named; arrays, objects, noise and other faults raise no alarm."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.io
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.arrangement import find_mismatch, rearranged
 from bentray_kernels.acquisition.plausibility import WrongArrangement, check_plausible
+from bentray_kernels.acquisition.simulation.array_shapes import bowl, facing_lines
 from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset
 
 from ...effort import effort
+from ..straight_scans import DATA, chords_m, radar, trunk
 
-DATA = Path(__file__).parents[4] / "shared" / "data"
 WATER = 1480.0
 RADIUS = 0.08
 # Centre (x, y) and radius, m, and speed, m/s.
@@ -37,20 +36,9 @@ def scan(position, tx=None, rx=None, of="small"):
     every = np.arange(len(position))
     tx, rx = (every if side is None else np.asarray(side) for side in (tx, rx))
     x, y, radius, speed = OBJECTS[of]
-    start, way = position[tx][:, None], position[rx][None] - position[tx][:, None]
-    length = np.linalg.norm(way, axis=-1)
-    unit = way / np.maximum(length, 1e-12)[..., None]
-    to = np.array([x, y, 0.0])[: position.shape[1]] - start
-    off = np.linalg.norm(to - (to * unit).sum(axis=-1)[..., None] * unit, axis=-1)
-    delta = 2.0 * np.sqrt(np.maximum(radius**2 - off**2, 0.0)) * (1.0 / speed - 1.0 / WATER)
-    return Dataset(
-        element_position_m=position,
-        tx=tx,
-        rx=rx,
-        water_speed_mps=WATER,
-        tof_s=length / WATER + delta,
-        delta_tof_s=delta,
-    )
+    bare = Dataset(position, tx, rx, WATER, delta_tof_s=np.zeros((len(tx), len(rx))))
+    delta = chords_m(bare, radius, (x, y)) * (1.0 / speed - 1.0 / WATER)
+    return replace(bare, tof_s=bare.distance_m() / WATER + delta, delta_tof_s=delta)
 
 
 def kind_of(dataset, kind):
@@ -159,22 +147,9 @@ def test_an_unknown_name_is_refused():
         rearranged(scan(on_ring(8)), "receivers-upside-down")
 
 
-def _lines():
-    x = np.linspace(-0.08, 0.08, 24)
-    return np.concatenate((np.stack((x, np.full(24, -0.08)), 1), np.stack((x, np.full(24, 0.08)), 1)))
-
-
-def _bowl():
-    i = np.arange(60) + 0.5
-    theta, phi = np.arccos(1.0 - i / 60), np.pi * (1.0 + np.sqrt(5.0)) * i
-    return 0.1 * np.stack((np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), -np.cos(theta)), 1)
-
-
-def _planes():
-    grid = np.stack(np.meshgrid(*2 * [np.linspace(-0.05, 0.05, 6)]), -1).reshape(-1, 2)
-    return np.concatenate([np.column_stack((grid, np.full(36, z))) for z in (-0.06, 0.06)])
-
-
+LEVELS = np.linspace(-0.05, 0.05, 6)
+LINES = facing_lines(24, 0.16, 0.16).position_m
+PLANES = np.array([(x, y, z) for z in (-0.06, 0.06) for y in LEVELS for x in LEVELS])
 # Positions, emitters and receivers.
 ARRAYS = {
     "ring of 8": (on_ring(8), None, None),
@@ -183,11 +158,11 @@ ARRAYS = {
     "every fourth emits": (on_ring(64), range(0, 64, 4), None),
     "arc": (on_ring(40, arc=1.2 * np.pi), None, None),
     "uneven ring": (on_ring(40, jitter=0.3), None, None),
-    "facing lines": (_lines(), range(24), range(24, 48)),
-    "lines, all elements": (_lines(), None, None),
+    "facing lines": (LINES, range(24), range(24, 48)),
+    "lines, all elements": (LINES, None, None),
     "one element inside": (np.concatenate((on_ring(48), [[0.001, 0.002]])), [48], range(48)),
-    "bowl": (_bowl(), range(0, 60, 2), None),
-    "planes": (_planes(), range(36), range(36, 72)),
+    "bowl": (bowl(60, 0.1).position_m, range(0, 60, 2), None),
+    "planes": (PLANES, range(36), range(36, 72)),
 }
 
 
@@ -227,38 +202,6 @@ def test_no_alarm_for_scans_in_the_right_order(number):
         if (mismatch := find_mismatch(kind_of(dataset, kind))) is not None
     }
     assert alarms == {}
-
-
-def radar():
-    """Crosshole radar, scaled to water."""
-    stored = scipy.io.loadmat(DATA / "arrenaes_am13.mat")
-    times = stored["d_obs"].ravel() * 1e-9 * 0.1 * 1.4e8 / 1500.0
-    sides = [np.unique(stored[name], axis=0, return_inverse=True) for name in "SR"]
-    (sent, e), (heard, r) = sides
-    result = np.full((len(sent), len(heard)), np.nan)
-    result[e.ravel(), r.ravel()] = times
-    position = 0.1 * np.concatenate((sent, heard))
-    every = np.arange(len(position))
-    return Dataset(
-        element_position_m=position - position.mean(axis=0),
-        tx=every[: len(sent)],
-        rx=every[len(sent) :],
-        water_speed_mps=1500.0,
-        tof_s=result,
-    )
-
-
-def trunk():
-    """Sonic times of a decayed trunk: apparent speeds of 458 to 2,272 m/s."""
-    position = scipy.io.loadmat(DATA / "tree_markers.mat")["Markers"].astype(float)
-    every = np.arange(24)
-    return Dataset(
-        element_position_m=position - position.mean(axis=0),
-        tx=every,
-        rx=every,
-        water_speed_mps=1500.0,
-        tof_s=1e-6 * scipy.io.loadmat(DATA / "tree_runtimes.mat")["Runtimes"].astype(float),
-    )
 
 
 @pytest.mark.real

@@ -15,15 +15,11 @@ SPACING, NODES = 0.002, 48
 ORIGIN = (-0.5 * SPACING * (NODES - 1),) * 2
 AXIS = ORIGIN[0] + SPACING * np.arange(NODES)
 X, Y = np.meshgrid(AXIS, AXIS, indexing="ij")
+LINES = facing_lines(16, 0.05, 0.06).position_m
 
 
 def region(position):
     return inside_array(np.asarray(position), (NODES, NODES), SPACING, ORIGIN, RIM_NODES)
-
-
-def lines(gap=0.06, length=0.05, elements=16):
-    y = np.linspace(-0.5 * length, 0.5 * length, elements)
-    return np.concatenate([np.column_stack((np.full(elements, side * 0.5 * gap), y)) for side in (-1, 1)])
 
 
 def test_of_a_ring_it_is_the_circle_less_the_rim():
@@ -34,7 +30,7 @@ def test_of_a_ring_it_is_the_circle_less_the_rim():
 def test_of_facing_lines_it_is_the_rectangle_between_them():
     rim = RIM_NODES * SPACING - 1e-9
     between = (np.abs(X) <= 0.03 - rim) & (np.abs(Y) <= 0.025 - rim)
-    assert np.array_equal(region(lines()), between)
+    assert np.array_equal(region(LINES), between)
 
 
 def test_an_element_inside_a_ring_removes_only_the_nodes_near_it():
@@ -101,7 +97,7 @@ def test_elements_without_extent_are_refused(position, words):
 
 def test_depth_is_the_distance_from_the_nearest_face():
     points = np.array([[0.0, 0.0], [0.02, 0.01], [0.0, 0.03]])
-    assert depth_inside(lines(), points) == pytest.approx([0.025, 0.01, -0.005])
+    assert depth_inside(LINES, points) == pytest.approx([0.025, 0.01, -0.005])
 
 
 @pytest.mark.parametrize("highest", [1, 2, 3, 6])

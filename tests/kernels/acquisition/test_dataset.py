@@ -14,6 +14,7 @@ from bentray_kernels.errors import InvalidInput
 from .traces import ring
 
 EVERY = np.arange(8)
+TRACES = np.zeros((2, 2, 2), np.int16)
 
 
 def made(**fields) -> Dataset:
@@ -61,6 +62,7 @@ def test_a_slice_is_a_plain_dataset():
     np.testing.assert_array_equal(slice_data.delta_tof_s, delta[1])
     np.testing.assert_array_equal(slice_data.waveform.object, traces[1])
     assert slice_data.waveform.object_scale.shape == (8, 8)
+    assert slice_data.waveform.scale == 1.0, "counts are pascals"
     with pytest.raises(InvalidInput, match="0 to 1"):
         volume.slice(2)
 
@@ -97,12 +99,17 @@ def test_each_rule_names_its_field(fields, field):
         (lambda: Truth(np.zeros((3, 3)), (1.0, 1.0), (0.0, 0.0)), "truth/sound_speed_mps"),
         (lambda: Truth(np.ones((3, 3)), (1.0,), (0.0, 0.0)), "truth@spacing_m"),
         (lambda: Truth(np.ones((3, 3)), (1.0, 0.0), (0.0, 0.0)), "truth@spacing_m"),
+        (lambda: Truth(np.ones((3, 3)), (-1.0, 1.0), (0.0, 0.0)), "truth@spacing_m"),
         (lambda: Truth(np.ones((3, 3)), (1.0, 1.0), (0.0, np.nan)), "truth@origin_m"),
         (lambda: Waveform(np.zeros((2, 2), np.int16)), "waveform/object"),
         (lambda: Waveform(np.zeros((2, 2, 0), np.int16)), "waveform/object"),
-        (lambda: Waveform(np.zeros((2, 2, 2), np.int16), np.zeros((2, 2, 3), np.int16)), "waveform/water"),
-        (lambda: Waveform(np.zeros((2, 2, 2), np.int16), scale=np.nan), "waveform@scale"),
-        (lambda: Waveform(np.zeros((2, 2, 2), np.int16), water_scale=np.ones(2)), "waveform/water_scale"),
+        (lambda: Waveform(np.zeros((2, 0, 2), np.int16)), "waveform/object"),
+        (lambda: Waveform(TRACES, np.zeros((2, 2, 3), np.int16)), "waveform/water"),
+        (lambda: Waveform(TRACES, scale=np.nan), "waveform@scale"),
+        (lambda: Waveform(TRACES, scale=0.0), "waveform@scale"),
+        (lambda: Waveform(TRACES, object_scale=np.ones((2, 1))), "waveform/object_scale"),
+        (lambda: Waveform(TRACES, water_scale=np.full((2, 2), np.inf)), "waveform/water_scale"),
+        (lambda: Waveform(TRACES, water_scale=np.ones(2)), "waveform/water_scale"),
     ],
 )
 def test_truth_and_traces_keep_rules_too(build, field):

@@ -5,23 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.plausibility import check_plausible
 from bentray_kernels.errors import InvalidInput
+
+from ..straight_scans import ring_scan
 
 POSITION, ABSOLUTE, DELTA = "geometry/element_position_m", "traveltime/tof_s", "traveltime/delta_tof_s"
 
 
 def ring(elements=32, radius_m=0.1, **changes):
-    angle = 2.0 * np.pi * np.arange(elements) / elements
-    every = np.arange(elements)
-    made = Dataset(
-        element_position_m=radius_m * np.column_stack((np.cos(angle), np.sin(angle))),
-        tx=every,
-        rx=every,
-        water_speed_mps=1500.0,
-        delta_tof_s=np.zeros((elements, elements)),
-    )
+    made = ring_scan(elements, radius_m)
     distance = made.distance_m()
     return replace(
         made, tof_s=distance / 1520.0, delta_tof_s=distance / 1520.0 - distance / 1500.0, **changes

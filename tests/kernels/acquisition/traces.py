@@ -3,6 +3,7 @@
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Waveform
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 
 WATER_MPS = 1480.0
 FREQUENCY_HZ = 1.0e6
@@ -17,8 +18,7 @@ def ricker(time_s: np.ndarray, frequency_hz: float) -> np.ndarray:
 
 
 def ring(elements: int = 32) -> np.ndarray:
-    angle = 2.0 * np.pi * np.arange(elements) / elements
-    return RADIUS_M * np.column_stack((np.cos(angle), np.sin(angle)))
+    return Ring(elements, RADIUS_M).positions()
 
 
 def scan(
@@ -84,3 +84,10 @@ def absorbed(traces: np.ndarray, loss_np: np.ndarray, rate_hz: float, frequency_
     part = np.fft.rfftfreq(length, 1.0 / rate_hz) / frequency_hz
     left = np.fft.rfft(traces, length) * np.exp(-loss_np[..., None] * part)
     return np.asarray(np.fft.irfft(left, length)[..., : traces.shape[-1]])
+
+
+def later(traces: np.ndarray, seconds: np.ndarray | float, rate_hz: float) -> np.ndarray:
+    """float32 traces moved by any time, of each where there are several; their ends are as good as silent."""
+    turn = -2j * np.pi * np.fft.rfftfreq(traces.shape[-1], 1.0 / rate_hz)
+    spectra = np.fft.rfft(traces, axis=-1) * np.exp(turn * np.asarray(seconds)[..., None])
+    return np.fft.irfft(spectra, traces.shape[-1], axis=-1).astype(np.float32)

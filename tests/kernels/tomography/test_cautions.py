@@ -1,33 +1,27 @@
 """A result says that it is doubtful: cut off at a bound, above the noise, or no better than a constant."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.io import loadmat
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.noise import with_noise
 from bentray_kernels.tomography import Caution, Reconstruction, Settings, reconstruct
 from bentray_kernels.tomography.cautions import bound_cautions
 
+from ..straight_scans import DATA, chords_m, radar, ring_scan, trunk
+
 ELEMENTS, RADIUS, WATER = 32, 0.08, 1480.0
-DATA = Path(__file__).parents[4] / "shared" / "data"
-ANGLE = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
 ORDER = np.random.default_rng(3).permutation(ELEMENTS)
 
 
 def ring(speed: float = 1520.0, radius: float = 0.02) -> Dataset:
     """Times along straight rays through a disc off the centre."""
-    position = RADIUS * np.column_stack((np.cos(ANGLE), np.sin(ANGLE)))
-    way = position[None] - position[:, None]
-    towards = np.array([0.02, 0.01]) - position[:, None]
-    length = np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
-    beside = np.abs(towards[..., 0] * way[..., 1] - towards[..., 1] * way[..., 0]) / length
-    chord = 2.0 * np.sqrt(np.maximum(radius**2 - beside**2, 0.0))
-    everyone = np.arange(ELEMENTS)
-    return Dataset(position, everyone, everyone, WATER, delta_tof_s=chord * (1.0 / speed - 1.0 / WATER))
+    chord = chords_m(ring_scan(ELEMENTS, RADIUS), radius, (0.02, 0.01))
+    # A pair of one element holds a wrong time, which another order brings to other pairs.
+    np.fill_diagonal(chord, 2.0 * radius)
+    return ring_scan(ELEMENTS, RADIUS, chord * (1.0 / speed - 1.0 / WATER), WATER)
 
 
 def noisy(scan: Dataset, snr: float, seed: int = 0) -> Dataset:
@@ -130,19 +124,7 @@ def test_the_measured_trunk_and_the_small_radar_profile_are_doubted() -> None:
     """Apparent speeds of 430 to 2,270 m/s, and radar scaled to a tenth, within bounds of tissue."""
     if not DATA.is_dir():
         pytest.skip(f"no measured scans: {DATA} is absent")
-    points = loadmat(DATA / "tree_markers.mat")["Markers"]
-    everyone = np.arange(len(points))
-    times = 1e-6 * loadmat(DATA / "tree_runtimes.mat")["Runtimes"]
-    trunk = Dataset(points - points.mean(axis=0), everyone, everyone, 1500.0, tof_s=times)
-    assert codes(image(trunk, "gauss-newton", rays="straight", decomposition="volume", nodes=20))
-
-    radar = loadmat(DATA / "arrenaes_am13.mat")
-    ends = 0.1 * np.stack([radar["S"], radar["R"]])
-    points, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
-    (tx, rows), (rx, columns) = (np.unique(side, return_inverse=True) for side in index.reshape(2, -1))
-    times = np.full((tx.size, rx.size), np.nan)
-    times[rows, columns] = 0.1 * 1e-9 * 1.4e8 / 1500.0 * radar["d_obs"].ravel()
-    profile = Dataset(points - points.mean(axis=0), tx, rx, 1500.0, tof_s=times)
+    assert codes(image(trunk(), "gauss-newton", rays="straight", decomposition="volume", nodes=20))
     thin = {"penalty_strength": 0.1, "nodes": 48}
-    assert codes(image(profile, "gauss-newton", **thin)) == ["bounds"]
-    assert codes(image(profile, "gauss-newton", speed_bounds_mps=(1000.0, 2500.0), **thin)) == []
+    assert codes(image(radar(), "gauss-newton", **thin)) == ["bounds"]
+    assert codes(image(radar(), "gauss-newton", speed_bounds_mps=(1000.0, 2500.0), **thin)) == []

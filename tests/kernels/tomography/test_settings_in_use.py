@@ -14,6 +14,8 @@ from bentray_kernels.requests.request_fields import check_used, declared, unused
 from bentray_kernels.tomography import Reconstruction, Settings, reconstruct
 from bentray_kernels.tomography.device_choice import ScanSize, device_work
 
+from ..straight_scans import chords_m, ring_scan
+
 # Another value of each setting. A new setting must have one here.
 SAMPLES: Mapping[str, Any] = {
     "rays": "straight", "eikonal": "fmm", "opening_angle_deg": 60.0, "water_temperature_c": 30.0,
@@ -38,14 +40,8 @@ ELEMENTS, RADIUS, WATER, MIDDLE_HZ, SAMPLING_HZ = 12, 0.03, 1500.0, 3e5, 3e6
 @cache
 def scan() -> Dataset:
     """A disc in a ring: travel times, amplitudes, traces, directions of elements and a region of interest."""
-    angle = 2.0 * np.pi * np.arange(ELEMENTS) / ELEMENTS
-    outwards = np.column_stack((np.cos(angle), np.sin(angle)))
-    place, everyone = RADIUS * outwards, np.arange(ELEMENTS)
-    way = place[None] - place[:, None]
-    length = np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
-    towards = np.array([0.006, 0.003]) - place[:, None]
-    beside = np.abs(towards[..., 0] * way[..., 1] - towards[..., 1] * way[..., 0]) / length
-    chord = 2.0 * np.sqrt(np.maximum(0.012**2 - beside**2, 0.0))
+    water = ring_scan(ELEMENTS, RADIUS)
+    chord, length = chords_m(water, 0.012, (0.006, 0.003)), water.distance_m()
     noise = np.random.default_rng(0).normal(0.0, 2e-9, chord.shape)
     delta, loss = chord * (1.0 / 1580.0 - 1.0 / WATER) + noise, 12.0 * chord
     time = np.arange(192) / SAMPLING_HZ - (length / WATER)[..., None]
@@ -58,10 +54,10 @@ def scan() -> Dataset:
     roi[10:25, 10:25] = True
     truth = Truth(np.full((30, 30), WATER), (0.002, 0.002), (-0.029, -0.029), axes="x,y")
     traces = Waveform(pulses(delta, loss), pulses(0.0 * delta, 0.0 * loss))
-    return Dataset(
-        place, everyone, everyone, WATER, delta_tof_s=delta, log_ratio_np=loss, waveform=traces, roi=roi,
-        truth=truth, element_normal=-outwards, center_frequency_hz=MIDDLE_HZ, sampling_rate_hz=SAMPLING_HZ,
-        radius_m=RADIUS, amplitude_frequency_hz=MIDDLE_HZ, water_temperature_c=26.0,
+    return ring_scan(
+        ELEMENTS, RADIUS, delta, WATER, log_ratio_np=loss, waveform=traces, roi=roi, truth=truth,
+        element_normal=-water.element_position_m / RADIUS, center_frequency_hz=MIDDLE_HZ, radius_m=RADIUS,
+        sampling_rate_hz=SAMPLING_HZ, amplitude_frequency_hz=MIDDLE_HZ, water_temperature_c=26.0,
     )  # fmt: skip
 
 

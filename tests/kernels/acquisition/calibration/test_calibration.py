@@ -12,6 +12,7 @@ from bentray_kernels.acquisition import Dataset, Waveform
 from bentray_kernels.acquisition.calibration import calibrate, water_times
 from bentray_kernels.errors import InvalidInput
 
+from ...straight_scans import ring_scan
 from ..traces import FREQUENCY_HZ, RADIUS_M, RATE_HZ, WATER_MPS, ring, scan
 
 ELEMENTS = 32
@@ -19,17 +20,15 @@ COMMON_S = 1.3e-6
 
 
 def drawn(speed: float = WATER_MPS) -> Dataset:
-    every = np.arange(ELEMENTS)
-    return Dataset(ring(ELEMENTS), every, every, speed, delta_tof_s=np.zeros((ELEMENTS, ELEMENTS)))
+    return ring_scan(ELEMENTS, RADIUS_M, water_mps=speed)
 
 
 def without_gauge(change: np.ndarray, *, size: bool = False) -> np.ndarray:
     """A displacement less its shift and turn, which no water shot tells."""
-    position = ring(ELEMENTS) - ring(ELEMENTS).mean(axis=0)
+    position = ring(len(change)) - ring(len(change)).mean(axis=0)
     turn = np.column_stack((-position[:, 1], position[:, 0]))
-    modes = [np.tile([1.0, 0.0], (ELEMENTS, 1)), np.tile([0.0, 1.0], (ELEMENTS, 1)), turn]
-    if size:
-        modes.append(position)
+    shifts = (np.broadcast_to(axis, change.shape) for axis in np.eye(2))
+    modes = [*shifts, turn, *([position] if size else [])]
     for mode in modes:
         change = change - mode * (change * mode).sum() / (mode * mode).sum()
     return change
@@ -178,10 +177,7 @@ def test_traces_calibrate_the_array():
     dataset, _, change = displaced(noise=0.02)
     calibrated = calibrate(dataset, water_times(dataset))
     before = np.sqrt((change**2).mean())
-    off = calibrated.element_position_m - dataset.element_position_m - change
-    off -= off.mean(axis=0)
-    turn = np.column_stack((-dataset.element_position_m[:, 1], dataset.element_position_m[:, 0]))
-    off -= turn * (off * turn).sum() / (turn * turn).sum()
+    off = without_gauge(calibrated.element_position_m - dataset.element_position_m - change)
     assert np.sqrt((off**2).mean()) < 0.15 * before
     assert np.abs(calibrated.element_position_m).max() < RADIUS_M + 2e-3
 

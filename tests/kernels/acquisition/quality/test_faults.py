@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -14,10 +13,8 @@ from bentray_kernels.acquisition.quality.estimated_water import estimate_water
 from bentray_kernels.acquisition.quality.recording import Measured, check_traces
 from bentray_kernels.acquisition.quality.shadow import find_scatterer
 
-from ..reference.object_scans import disc_delay_s, without_water
-from ..traces import RADIUS_M, WATER_MPS, scan
-
-ELEMENTS = 64
+from ..reference.object_scans import ELEMENTS, half_disc, without_water
+from ..traces import WATER_MPS, later
 
 # What is found in every scan without a water shot.
 ALWAYS = "water shot"
@@ -25,25 +22,12 @@ ALWAYS = "water shot"
 Traces = Callable[[np.ndarray], np.ndarray]
 
 
-@cache
-def recorded() -> Dataset:
-    """A slow disc of half the radius."""
-    return scan(disc_delay_s(0.5 * RADIUS_M), elements=ELEMENTS, noise=0.02)
-
-
 def with_traces(change: Traces, *, water: bool) -> Dataset:
     """The scan with changed traces, with its water shot or without."""
-    traces = recorded().waveform
+    traces = half_disc().waveform
     assert traces is not None
-    whole = replace(recorded(), waveform=Waveform(change(traces.object), change(traces.water)))
+    whole = replace(half_disc(), waveform=Waveform(change(traces.object), change(traces.water)))
     return whole if water else without_water(whole)
-
-
-def later(traces: np.ndarray, seconds: np.ndarray) -> np.ndarray:
-    """Traces of each pair moved by (ntx, nrx) s."""
-    turn = -2j * np.pi * np.fft.rfftfreq(traces.shape[-1], 1.0 / recorded().sampling_rate_hz)
-    spectra = np.fft.rfft(traces, axis=-1) * np.exp(turn * np.asarray(seconds)[..., None])
-    return np.fft.irfft(spectra, traces.shape[-1], axis=-1).astype(np.float32)
 
 
 def found(dataset: Dataset) -> list[Finding]:
@@ -66,12 +50,12 @@ def test_no_fault_is_found_where_none_is_planted(water):
 
 def test_an_element_off_among_receivers_alone():
     """Every fourth element emits; element 17 only receives."""
-    position = recorded().element_position_m.copy()
+    position = half_disc().element_position_m.copy()
     position[17] += 4e-4
     some = np.arange(0, ELEMENTS, 4)
-    traces = recorded().waveform
+    traces = half_disc().waveform
     emitted = Waveform(traces.object[some], traces.water[some])
-    (finding,) = found(replace(recorded(), tx=some, waveform=emitted, element_position_m=position))
+    (finding,) = found(replace(half_disc(), tx=some, waveform=emitted, element_position_m=position))
     assert (finding.check, finding.elements) == ("displaced elements", (17,))
 
 
@@ -113,7 +97,9 @@ def test_saturated_traces(water):
 def test_a_clock_offset_of_a_module(water):
     late = np.zeros((ELEMENTS, ELEMENTS))
     late[:, 16:24] = 3e-7
-    (finding,) = found(with_traces(lambda traces: later(traces, late), water=water))
+    (finding,) = found(
+        with_traces(lambda traces: later(traces, late, half_disc().sampling_rate_hz), water=water)
+    )
     assert (finding.check, finding.elements, finding.role) == (
         "clock offset",
         tuple(range(16, 24)),
@@ -128,7 +114,9 @@ def test_times_are_right_in_spite_of_it():
     late = np.zeros((ELEMENTS, ELEMENTS))
     late[:, 16:24] = 3e-7
     times = [
-        examine(with_traces(lambda traces: later(traces, late), water=water)).picked.differential_tof()
+        examine(
+            with_traces(lambda traces: later(traces, late, half_disc().sampling_rate_hz), water=water)
+        ).picked.differential_tof()
         for water in (True, False)
     ]
     off = (times[1] - times[0])[:, 16:24]
@@ -139,7 +127,7 @@ def test_times_are_right_in_spite_of_it():
 @both
 @pytest.mark.parametrize("off_m", [(5e-4, 0.0), pytest.param((0.0, 5e-4), marks=pytest.mark.nightly)])
 def test_an_element_half_a_millimetre_off(water, off_m):
-    position = recorded().element_position_m.copy()
+    position = half_disc().element_position_m.copy()
     position[17] += off_m
     (finding,) = found(replace(with_traces(lambda traces: traces, water=water), element_position_m=position))
     assert (finding.check, finding.elements) == ("displaced elements", (17,))
@@ -149,13 +137,13 @@ def test_an_element_half_a_millimetre_off(water, off_m):
 @both
 def test_a_bubble(water):
     position, radius = np.array([0.012, -0.004]), 0.002
-    start = recorded().element_position_m[:, None]
-    along = recorded().element_position_m[None] - start
+    start = half_disc().element_position_m[:, None]
+    along = half_disc().element_position_m[None] - start
     part = ((position - start) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), 1e-30)
     nearest = start + np.clip(part, 0.0, 1.0)[..., None] * along - position
     left = 1.0 - 0.8 * np.exp(-((np.linalg.norm(nearest, axis=-1) / radius) ** 2))
-    shadowed = (recorded().waveform.object * left[..., None]).astype(np.float32)
-    dataset = replace(recorded(), waveform=Waveform(shadowed, recorded().waveform.water))
+    shadowed = (half_disc().waveform.object * left[..., None]).astype(np.float32)
+    dataset = replace(half_disc(), waveform=Waveform(shadowed, half_disc().waveform.water))
     (finding,) = found(dataset if water else without_water(dataset))
     assert finding.check == "strong scatterer"
     assert "(12, -4) mm" in finding.found
@@ -165,7 +153,7 @@ def test_a_bubble(water):
 @pytest.mark.parametrize(("half_waves", "seen"), [(1.5, True), (9.0, False)])
 def test_a_scatterer_is_small_against_the_dark_chords_around_it(half_waves, seen):
     """A wide object, such as dense tissue, is no bubble, although all chords through it are dark."""
-    dataset = replace(recorded(), waveform=None, delta_tof_s=np.zeros((ELEMENTS, ELEMENTS)))
+    dataset = replace(half_disc(), waveform=None, delta_tof_s=np.zeros((ELEMENTS, ELEMENTS)))
     start, end = (dataset.element_position_m[elements] for elements in np.indices((ELEMENTS, ELEMENTS)))
     along = (end - start) / np.maximum(np.linalg.norm(end - start, axis=-1, keepdims=True), 1e-9)
     passing_m = np.abs(along[..., 0] * start[..., 1] - along[..., 1] * start[..., 0])
@@ -178,9 +166,11 @@ def test_a_scatterer_is_small_against_the_dark_chords_around_it(half_waves, seen
 @pytest.mark.parametrize("change_c", [0.5, pytest.param(-0.5, marks=pytest.mark.nightly)])
 def test_water_that_warms_or_cools_during_the_scan(water, change_c):
     speed = WATER_MPS + 2.9 * change_c * (np.arange(ELEMENTS) / (ELEMENTS - 1.0) - 0.5)
-    distance = recorded().distance_m()
+    distance = half_disc().distance_m()
     late = distance / speed[:, None] - distance / WATER_MPS
-    (finding,) = found(with_traces(lambda traces: later(traces, late), water=water))
+    (finding,) = found(
+        with_traces(lambda traces: later(traces, late, half_disc().sampling_rate_hz), water=water)
+    )
     assert finding.check == "water temperature drift"
     assert finding.value == pytest.approx(2.9 * change_c, rel=0.15)
     assert f"{'warms' if change_c > 0.0 else 'cools'} by 0.5 °C" in finding.found
@@ -188,12 +178,12 @@ def test_water_that_warms_or_cools_during_the_scan(water, change_c):
 
 def test_an_element_is_dead_where_the_water_shot_has_no_pulse_of_it():
     """The object may hide an element; the water does not."""
-    traces = recorded().waveform
+    traces = half_disc().waveform
     water, hidden = traces.water.copy(), traces.object.copy()
     water[7], hidden[9] = 0.0, 0.0
     scans = (Waveform(traces.object, water), Waveform(hidden, traces.water))
     dead, none = (
-        [finding for finding in found(replace(recorded(), waveform=waveform)) if "dead" in finding.check]
+        [finding for finding in found(replace(half_disc(), waveform=waveform)) if "dead" in finding.check]
         for waveform in scans
     )
     assert [(finding.elements, finding.role) for finding in dead] == [((7,), "emission")]

@@ -1,6 +1,7 @@
 """Faults planted in simulated waves: each is found, named, and survived or refused with a reason."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,13 +16,53 @@ from bentray_kernels.acquisition.quality.chords import _log_ratio
 from bentray_kernels.acquisition.quality.element_errors import _robust_fit
 from bentray_kernels.acquisition.quality.polarity import MIN_PAIRS, _majority
 from bentray_kernels.acquisition.quality.swapped import _exchanged
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_kernels.wave.medium import Medium
+from bentray_kernels.wave.simulation import simulate
 
-from ..waves import ELEMENTS, FREQUENCY_HZ, NOISE, SKIP, STEP_S, wave_scan
+from ..traces import later
 
+ELEMENTS, RADIUS_M, WATER_MPS, FREQUENCY_HZ = 32, 0.024, 1500.0, 4e5
+# Seven nodes in a wave and 32 steps in a period: the water is as good as free of dispersion.
+SPACING_M, HALF, STEP_S, SKIP, STEPS = 5e-4, 52, 7.8125e-8, 4, 640
+START_S, NOISE = -2.5 / FREQUENCY_HZ, 0.01
+RATE_HZ = 1.0 / (STEP_S * SKIP)
 LATE_S = 4.0e-7
 
 # Element pairs whose traces of the object stand still or hold no number, and of the water.
 CONSTANT, INFINITE, NAN = ([2, 15], [9, 30]), ([5], [21]), ([28], [12])
+
+
+@cache
+def wave_scan() -> Dataset:
+    """float32 traces of two blobs, one slow and one fast, with noise of a hundredth of the usual pulse."""
+    axis = SPACING_M * np.arange(-HALF, HALF + 1)
+    x, y = np.meshgrid(axis, axis, indexing="ij")
+    water = np.full_like(x, WATER_MPS)
+    blobs = water - 50.0 * np.exp(-(((x**2 + (y + 0.003) ** 2) / 0.008**2) ** 2))
+    blobs += 60.0 * np.exp(-(((x - 0.003) ** 2 + (y - 0.006) ** 2) / 0.003**2))
+    position = Ring(ELEMENTS, RADIUS_M).positions()
+    late = (START_S + STEP_S * np.arange(STEPS)) * FREQUENCY_HZ
+    pulse = np.exp(-((0.9 * late) ** 2)) * np.sin(2.0 * np.pi * late)
+    random = np.random.default_rng(5)
+
+    def traces(speed: np.ndarray) -> np.ndarray:
+        medium, at = Medium.from_speed(speed, SPACING_M, STEP_S, edge_nodes=20), position + SPACING_M * HALF
+        clean = np.stack([simulate(medium, source, at, pulse)[:, ::SKIP] for source in at])
+        usual = float(np.median(np.abs(clean).max(axis=-1)))
+        return (clean / usual + NOISE * random.standard_normal(clean.shape)).astype(np.float32)
+
+    every = np.arange(ELEMENTS)
+    return Dataset(
+        position,
+        every,
+        every,
+        WATER_MPS,
+        waveform=Waveform(traces(blobs), traces(water)),
+        center_frequency_hz=FREQUENCY_HZ,
+        sampling_rate_hz=RATE_HZ,
+        t0_s=START_S,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -39,12 +80,6 @@ def found(examined: Examined, check: str) -> list[Finding]:
     return [finding for finding in examined.report.findings if finding.check == check]
 
 
-def later(traces: np.ndarray, seconds: float) -> np.ndarray:
-    """Traces moved by a part of a sample; the first and last samples are as good as silent."""
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(traces.shape[-1], SKIP * STEP_S) * seconds)
-    return np.fft.irfft(np.fft.rfft(traces, axis=-1) * turn, traces.shape[-1], axis=-1).astype(np.float32)
-
-
 class Planted:
     """A scan with all faults that one scan may have: in some elements, and in one pair of twenty, of which
     the object's pulse is moved by a period or more."""
@@ -54,13 +89,13 @@ class Planted:
         self.roles = roles
         random = np.random.default_rng(seed)
         received, water = (t.copy() for t in (wave_scan().waveform.object, wave_scan().waveform.water))
-        received = later(received, LATE_S)
+        received = later(received, LATE_S, RATE_HZ)
         pairs = np.argwhere(~np.eye(ELEMENTS, dtype=bool))
         self.moved = np.zeros((ELEMENTS, ELEMENTS), dtype=bool)
         for e, r in pairs[random.permutation(len(pairs))[: len(pairs) // 20]]:
             self.moved[e, r] = True
             periods = random.choice([-1.0, 1.0]) * random.choice([1.0, 1.7, 2.4])
-            received[e, r] = later(received[e, r], periods / FREQUENCY_HZ)
+            received[e, r] = later(received[e, r], periods / FREQUENCY_HZ, RATE_HZ)
         order = np.arange(ELEMENTS)
         order[self.swapped] = order[self.swapped[::-1]]
         for traces in (received, water):
@@ -134,8 +169,8 @@ def test_truncated_pulses_do_not_bias_the_water_speed():
 @pytest.mark.parametrize(
     ("changes", "check", "reason"),
     [
-        ({"sampling_rate_hz": 0.9 / (SKIP * STEP_S)}, "sampling rate", "sampling rate, element positions or"),
-        ({"sampling_rate_hz": 1.25 / (SKIP * STEP_S)}, "sampling rate", "arrivals in water at"),
+        ({"sampling_rate_hz": 0.9 * RATE_HZ}, "sampling rate", "sampling rate, element positions or"),
+        ({"sampling_rate_hz": 1.25 * RATE_HZ}, "sampling rate", "arrivals in water at"),
         ({"center_frequency_hz": None}, "centre frequency", "none"),
     ],
 )

@@ -1,7 +1,6 @@
 """The stated water speed against the travel times of chords through water."""
 
 from dataclasses import replace
-from functools import cache
 
 import pytest
 
@@ -9,23 +8,17 @@ from bentray_kernels.acquisition import Dataset, temperature_from_speed
 from bentray_kernels.acquisition.quality import examine
 from bentray_kernels.acquisition.quality.water_speed import WATER_SPEED, find_water_speed, water_summary
 
-from ..reference.object_scans import ELEMENTS, disc_delay_s, without_water
-from ..traces import RADIUS_M, WATER_MPS, scan
+from ..reference.object_scans import half_disc, without_water
+from ..traces import WATER_MPS
 
 SIGMA_MPS = 0.4
-
-
-@cache
-def recorded() -> Dataset:
-    """A disc in water of ``WATER_MPS``, with its water shot."""
-    return scan(disc_delay_s(0.5 * RADIUS_M), elements=ELEMENTS, noise=0.02)
 
 
 def stated(mps: float, *, assumed: bool = False) -> Dataset:
     """The scan with another water speed in its file."""
     celsius = temperature_from_speed(mps)
     return replace(
-        recorded(), water_speed_mps=mps, water_temperature_c=celsius, water_temperature_assumed=assumed
+        half_disc(), water_speed_mps=mps, water_temperature_c=celsius, water_temperature_assumed=assumed
     )
 
 

@@ -1,31 +1,24 @@
 """Scans of a disc: pulses at the straight time through it, with delays and gains of elements."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from bentray_kernels.acquisition import Dataset, Waveform
 
-from ..traces import WATER_MPS, scan
+from ...straight_scans import chords_m, ring_scan
+from ..traces import RADIUS_M, WATER_MPS, scan
 
 ELEMENTS = 64
-
-
-def in_disc_m(dataset: Dataset, radius_m: float, centre_m: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
-    """Length of each chord within a disc, (ntx, nrx), m."""
-    start = dataset.element_position_m[dataset.tx][:, None] - np.array(centre_m)
-    along = dataset.element_position_m[dataset.rx][None] - np.array(centre_m) - start
-    length = np.maximum(np.linalg.norm(along, axis=-1), 1e-12)
-    offset = np.abs(start[..., 0] * along[..., 1] - start[..., 1] * along[..., 0]) / length
-    return np.asarray(2.0 * np.sqrt(np.maximum(radius_m**2 - offset**2, 0.0)))
 
 
 def disc_delay_s(
     radius_m: float, centre_m: tuple[float, float] = (0.0, 0.0), speed_mps: float = 1420.0
 ) -> np.ndarray:
     """Object minus water of each pair of a ring around a disc, s."""
-    bare = scan(elements=ELEMENTS)
-    return np.asarray(in_disc_m(bare, radius_m, centre_m) * (1.0 / speed_mps - 1.0 / WATER_MPS))
+    chord = chords_m(ring_scan(ELEMENTS, RADIUS_M), radius_m, centre_m)
+    return np.asarray(chord * (1.0 / speed_mps - 1.0 / WATER_MPS))
 
 
 def with_elements(
@@ -53,3 +46,9 @@ def without_water(dataset: Dataset) -> Dataset:
     """The scan without its water shot."""
     assert dataset.waveform is not None
     return replace(dataset, waveform=replace(dataset.waveform, water=None, water_scale=None))
+
+
+@cache
+def half_disc() -> Dataset:
+    """A slow disc of half the radius of the ring, in noise."""
+    return scan(disc_delay_s(0.5 * RADIUS_M), elements=ELEMENTS, noise=0.02)

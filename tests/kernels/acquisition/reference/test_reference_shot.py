@@ -15,8 +15,9 @@ from bentray_kernels.acquisition.reference import find_water_chords
 from bentray_kernels.acquisition.reference.water_chords import NEAREST, NEAREST_PART, chord_offset
 from bentray_kernels.errors import InvalidInput
 
+from ...straight_scans import chords_m
 from ..traces import FREQUENCY_HZ, RADIUS_M, WATER_MPS, scan
-from .object_scans import ELEMENTS, disc_delay_s, in_disc_m, with_elements, without_water
+from .object_scans import ELEMENTS, disc_delay_s, with_elements, without_water
 
 DELAY_S = disc_delay_s(0.6 * RADIUS_M)
 
@@ -123,7 +124,7 @@ def test_speed_and_delay_are_those_of_the_water(radius_m, position, off, speed_m
     """The disc may lie anywhere within four fifths of the ring."""
     reach = off * (0.8 * RADIUS_M - radius_m) if radius_m < 0.8 * RADIUS_M else 0.0
     centre = (reach * np.cos(position), reach * np.sin(position))
-    inside = in_disc_m(BARE, radius_m, centre)
+    inside = chords_m(BARE, radius_m, centre)
     arrival = delay_s + BARE.distance_m() / water_mps + inside * (1.0 / speed_mps - 1.0 / water_mps)
     arrival += 0.01 * PERIOD_S * np.random.default_rng(seed).standard_normal(arrival.shape)
     chords = find_water_chords(BARE, arrival, PERIOD_S)
@@ -177,7 +178,7 @@ def test_chords_nearer_than_a_few_wavelengths_are_not_used_and_all_others_may_be
 @pytest.mark.parametrize(("part", "speed_mps"), [(0.7, 1440.0), (0.7, 1500.0), (0.8, 1530.0)])
 def test_the_outermost_chords_show_the_line_where_most_chords_cross_the_object(part, speed_mps):
     """The line through most arrivals is that of the object; no outermost chord lies on it."""
-    inside = in_disc_m(BARE, part * RADIUS_M, (0.0, 0.0))
+    inside = chords_m(BARE, part * RADIUS_M, (0.0, 0.0))
     arrival = BARE.distance_m() / WATER_MPS + inside * (1.0 / speed_mps - 1.0 / WATER_MPS)
     chords = find_water_chords(BARE, arrival, PERIOD_S)
     assert chords.speed_mps == pytest.approx(WATER_MPS, abs=0.1)

@@ -16,7 +16,7 @@ from bentray_kernels.tomography.sart.sart_step import advance, begin, emitter_or
 from bentray_kernels.tomography.sart.sart_update import propagation_speed, update_for
 
 from ....table6 import table6_scan
-from ..ring_scans import ring_scan
+from ...straight_scans import ring_scan
 
 NODES, WATER = 64, 1375.0
 PHANTOM = table6(WATER)
