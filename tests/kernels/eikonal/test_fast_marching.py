@@ -51,23 +51,6 @@ def test_sources_in_the_middle_of_a_cell_give_mirrored_times_in_a_mirror(
     )
 
 
-@pytest.mark.parametrize("method", ["accurate", "hafmm", "fmm", "fmm-untidy"])
-@pytest.mark.parametrize("ndim", [2, 3])
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    speed_unit=st.sampled_from([1e-3, 7.0, 1500.0]),
-    length_unit=st.sampled_from([1e-4, 1.0, 30.0]),
-)
-@settings(max_examples=10, deadline=None)
-def test_units_of_length_and_speed_change_no_time_but_its_unit(method, ndim, seed, speed_unit, length_unit):
-    rng = np.random.default_rng(seed)
-    shape = (11, 9) if ndim == 2 else (6, 5, 7)
-    speed, source = rng.uniform(1.0, 3.0, shape), rng.uniform(0.0, 1.0, ndim) * (np.array(shape) - 1)
-    plain = eikonal.solve(speed, 1.0, source, method)
-    scaled = eikonal.solve(speed_unit * speed, length_unit, length_unit * source, method)
-    assert np.allclose(scaled * speed_unit / length_unit, plain, rtol=1e-9, atol=1e-12)
-
-
 def untidy_error_bound(problem, width=0.01):
     """By which part a first-order untidy time may be later than that of ``fast_marching``."""
     least = problem.spacing * float(problem.slowness.min())

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
+from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere, torus
 from bentray_kernels.meshes.mesh import TriangleMesh
 
 BUNNY = Path(__file__).parents[4] / "shared" / "data" / "bunny.off"
@@ -76,3 +76,14 @@ def bunny():
 def volume_of(surface):
     first, second, third = np.moveaxis(surface.corners, 1, 0)
     return (first * np.cross(second, third)).sum() / 6.0
+
+
+SURFACES = {
+    "sphere": sphere(),
+    "torus": torus(40, 40),
+    "two handles": two_handles(),
+    "ball": bumpy_ball(5000),
+    "holes": ball_with_holes(),
+    "torus with holes": without(torus(30, 30), [5, 300, 900]),
+    "patch": flat_patch(9, 9, lambda x, y: np.sin(0.4 * x) * np.cos(0.3 * y)),
+}

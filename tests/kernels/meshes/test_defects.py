@@ -1,5 +1,8 @@
 """Meshes from files: what can be mended is, what cannot is named."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -245,3 +248,8 @@ PLACES = [(0.0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (2
 def test_rejects_meshes_that_cannot_be_repaired(vertices, faces, words):
     with pytest.raises(InvalidInput, match=words):
         sound(np.array(vertices), np.array(faces))
+
+
+def test_reading_a_mesh_does_not_import_libigl():
+    program = "import sys; from bentray_kernels.meshes.defects import sound; sys.exit('igl' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

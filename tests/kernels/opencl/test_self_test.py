@@ -136,32 +136,34 @@ def test_a_failing_child_reports_the_reason(gpu):
     assert ending.startswith("ended with exit code 1 (Fast Platform:GPU 9000 is no longer")
 
 
-def test_compiler_error_is_reported_as_the_reason(gpu, monkeypatch, tmp_path):
-    package = tmp_path / "refusing"
+@pytest.mark.parametrize(
+    ("program", "answers", "ending"),
+    [
+        (
+            "raise SystemExit(\"error: unknown target CPU 'generic'\\nDevice failed\\n(options: -DREAL)\")",
+            {},
+            "ended with exit code 1 (error: unknown target CPU 'generic')",
+        ),
+        (
+            'import os\nprint("""{"stage": "double1", "fault": ""}""", flush=True)\nprint("-")\nos.abort()',
+            {"double1": ""},
+            "ended by signal 6",
+        ),
+    ],
+    ids=["the compiler's error", "aborts"],
+)
+def test_a_child_that_ends_early_is_survived_and_says_why(
+    gpu, monkeypatch, tmp_path, program, answers, ending
+):
+    package = tmp_path / "child"
     package.mkdir()
     (package / "__init__.py").touch()
-    (package / "self_test.py").write_text(
-        "raise SystemExit(\"error: unknown target CPU 'generic'\\nDevice failed\\n(options: -DREAL)\")"
-    )
+    (package / "self_test.py").write_text(program)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(self_test_results, "__package__", "refusing")
-    answers, ending = in_a_child(gpu, STAGES, 60.0)
-    assert answers == {}
-    assert ending == "ended with exit code 1 (error: unknown target CPU 'generic')"
-
-
-def test_an_aborting_child_is_survived(gpu, monkeypatch, tmp_path):
-    package = tmp_path / "aborting"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    (package / "self_test.py").write_text(
-        'import os\nprint(\'{"stage": "double1", "fault": ""}\', flush=True)\nprint(\'remark\')\nos.abort()\n'
-    )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(self_test_results, "__package__", "aborting")
-    answers, ending = in_a_child(gpu, STAGES, 60.0)
-    assert answers == {"double1": ""}
-    assert ending.startswith("ended by signal 6")
+    monkeypatch.setattr(self_test_results, "__package__", "child")
+    answered, ended = in_a_child(gpu, STAGES, 60.0)
+    assert answered == answers
+    assert ended.startswith(ending)
 
 
 def test_device_without_double_precision_is_not_tested(gpu, monkeypatch, fresh):

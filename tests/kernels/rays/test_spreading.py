@@ -10,6 +10,7 @@ from bentray_kernels import eikonal, rays
 from bentray_kernels.errors import InvalidInput
 
 from ...effort import effort
+from .problems import rough_problem
 
 CENTRE = np.array([0.45, 0.52, 0.5])
 SOURCE = np.array([0.2, 0.23, 0.4])
@@ -174,11 +175,8 @@ def test_a_path_through_a_caustic_has_none(ndim):
 @given(seed=st.integers(0, 2**32 - 1), flat=st.booleans())
 @settings(max_examples=20, deadline=None)
 def test_rough_models_give_positive_numbers_or_none(seed, flat):
-    rng = np.random.default_rng(seed)
-    shape = (14, 17) if flat else (7, 8, 6)
-    last = np.array(shape) - 1.0
-    source, receivers = rng.random(len(shape)) * last, rng.random((6, len(shape))) * last
-    got = spread(rng.uniform(0.5, 2.0, shape), 1.0, receivers, source)
+    speed, source, receivers = rough_problem(seed, flat, 0.5, 2.0)
+    got = spread(speed, 1.0, receivers, source)
     assert ((got > 0.0) | np.isnan(got)).all()
     assert not np.isinf(got).any()
 

@@ -9,17 +9,13 @@ from bentray_kernels import eikonal, rays
 from bentray_kernels.errors import InvalidInput
 
 from ...effort import effort
+from .problems import gradient_speed, gradient_times, rough_problem
 
 
 def gradient_problem(n, ndim, receivers):
     """Speed 1 + 4x on the unit cube, and the exact times from one point of it to some others."""
     source = np.array([0.2, 0.13, 0.4])[:ndim]
-    speed = 1.0 + 4.0 * np.broadcast_to(
-        np.linspace(0.0, 1.0, n).reshape((n,) + (1,) * (ndim - 1)), (n,) * ndim
-    )
-    squared = ((receivers - source) ** 2).sum(axis=1)
-    exact = np.arccosh(1.0 + 8.0 * squared / ((1.0 + 4.0 * source[0]) * (1.0 + 4.0 * receivers[:, 0]))) / 4.0
-    return speed, 1.0 / (n - 1), source, exact
+    return gradient_speed(n, ndim), 1.0 / (n - 1), source, gradient_times(receivers, source)
 
 
 @pytest.mark.parametrize(("ndim", "sizes"), [(2, (33, 65, 129)), (3, (17, 33))])
@@ -58,12 +54,7 @@ def test_exact_in_a_homogeneous_medium(ndim):
 @settings(max_examples=effort(20, 40), deadline=None)
 def test_rough_models_give_times_that_no_straight_ray_undercuts(seed, flat):
     """Fermat: bending begins at a ray and only takes time off it, even where no valley is smooth."""
-    rng = np.random.default_rng(seed)
-    shape = (14, 17) if flat else (7, 8, 6)
-    last = np.array(shape) - 1.0
-    speed = rng.uniform(0.5, 2.0, shape)
-    source = rng.uniform(0.0, 1.0, len(shape)) * last
-    receivers = rng.uniform(0.0, 1.0, (6, len(shape))) * last
+    speed, source, receivers = rough_problem(seed, flat, 0.5, 2.0)
     tof = eikonal.solve(speed, 1.0, source)
     times = rays.travel_times(tof, speed, 1.0, receivers, source)
     distance = np.linalg.norm(receivers - source, axis=1)

@@ -8,12 +8,12 @@ from bentray_kernels.geometry_field.image.geometry_image import geometry_image
 from bentray_kernels.geometry_field.image.raster import INSIDE, OUTSIDE
 from bentray_kernels.geometry_field.image.subsampling import fitted_image
 from bentray_kernels.geometry_field.layout.parameterisation import parameterise
-from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere, torus
+from bentray_kernels.meshes.example_surfaces import bumpy_ball, sphere
 from bentray_kernels.meshes.geometric_error import geometric_error
 from bentray_kernels.meshes.surface_distance import SurfaceGrid
 from bentray_kernels.meshes.topology import topology_of
 
-from ...meshes.examples import ball_with_holes, bunny, flat_patch, two_handles, without
+from ...meshes.examples import SURFACES, bunny, flat_patch, volume_of
 
 
 @pytest.fixture(scope="module")
@@ -97,22 +97,6 @@ def test_every_second_pixel_is_kept(chart):
     np.testing.assert_allclose(coarse.positions[inside], fine.positions[::2, ::2][inside], atol=1e-12)
 
 
-SURFACES = {
-    "sphere": sphere(),
-    "torus": torus(40, 40),
-    "two handles": two_handles(),
-    "ball": bumpy_ball(5000),
-    "holes": ball_with_holes(),
-    "torus with a hole": without(torus(30, 30), [5]),
-    "patch": flat_patch(9, 9, lambda x, y: np.sin(0.4 * x) * np.cos(0.3 * y)),
-}
-
-
-def volume_of(surface):
-    first, second, third = np.moveaxis(surface.corners - 0.5, 1, 0)
-    return (first * np.cross(second, third)).sum() / 6.0
-
-
 @pytest.mark.parametrize("size", [65, 128])
 @pytest.mark.parametrize("name", SURFACES)
 def test_topology_comes_back(name, size):
@@ -132,8 +116,7 @@ def test_topology_comes_back(name, size):
 
 
 def test_the_boundary_of_a_patch_is_kept_whole():
-    patch = flat_patch(9, 9, lambda x, y: np.sin(0.4 * x) * np.cos(0.3 * y))
-    chart = parameterise(patch).chart
+    chart = parameterise(SURFACES["patch"]).chart
     mesh = geometry_image(chart, 64).mesh()
 
     def rim(surface):
