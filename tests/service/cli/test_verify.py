@@ -14,10 +14,8 @@ from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, new_id
 from bentray_service.rows.stored_tables import Datasets
 
+from ..rows.conftest import SUMMARY
 from .conftest import Run
-
-SUMMARY = {"title": "", "source": "", "license": "", "dimension": 2, "elements": 3, "ntx": 3, "nrx": 3}
-SUMMARY |= {"slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": False}
 
 
 @pytest.fixture
@@ -30,8 +28,7 @@ def stored(tmp_path: Path) -> tuple[Path, Path, Path]:
         for path in paths:
             path.write_bytes(b"what a scan holds")
         for path in paths[:2]:
-            summary = {**SUMMARY, "water_speed_mps": 1500.0}
-            Datasets(database).add(LOCAL, path.stem, size=1, sha256="", summary=summary)
+            Datasets(database).add(LOCAL, path.stem, size=1, sha256="", summary=SUMMARY)
         files.store.publish(paths[0])
     return paths[0], paths[1], paths[2]
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 import tenacity
 import uvicorn
@@ -247,10 +246,3 @@ def test_no_patience_gives_up_at_once(serve: Callable[..., str], soon: None) -> 
             with pytest.raises(ClientError):
                 client.job("job-" + 20 * "0")
         assert proxy.made < 40
-
-
-def test_h5_is_hdf5(serve: Callable[..., str], scan: Callable[..., Path], work: Any, tmp_path: Path) -> None:
-    with Client(serve()) as client:
-        job = client.wait(client.submit(client.upload(scan()).id, {"nodes": 16, "iterations": 1}).id)
-        one, other = (client.download(job.volume, name, tmp_path / name) for name in ("hdf5", "h5"))
-    assert np.array_equal(np.fromfile(one, np.uint8), np.fromfile(other, np.uint8))

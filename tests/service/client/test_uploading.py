@@ -122,6 +122,7 @@ def test_volumes_too(serve, tmp_path):
             result = client.result(volume.id)
             np.testing.assert_array_equal(result.values["value"], np.load(tmp_path / name))
             np.testing.assert_allclose(result.coordinates["y"][:3], [0.0, 0.002, 0.004])
+            assert (result.units, result.attributes["title"]) == ({"value": ""}, "A head")
         with pytest.raises(InvalidInput, match="kind"):
             client.upload(tmp_path / "small.npy", kind="picture")
 

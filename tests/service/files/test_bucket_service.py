@@ -29,13 +29,16 @@ AWAY = (503, "/problems/storage-away", "10")
 
 
 @pytest.fixture
-def begun(work, submitted):
-    """Begin a job that is held in the middle; returns its id."""
+def publishing(work, running, s3_server):
+    """Let a job end whose result waits for the bucket, which is away; returns its id."""
 
-    def go(http, dataset):
-        work.hold.clear()
-        job = submitted(http, dataset)["id"]
+    def go(http):
+        job = running(http)["id"]
         wait_until(lambda: work.calls)
+        s3_server.away.set()
+        s3_server.asked.clear()
+        work.hold.set()
+        wait_until(lambda: any("/volumes/" in path for _, path in list(s3_server.asked)))
         return job
 
     return go
@@ -88,14 +91,9 @@ def test_a_result_is_served_from_the_bucket_wherever_it_was_made(
     assert not list(Bucket(bucket_url).listed("tenants/"))
 
 
-def test_a_result_waits_for_the_bucket_and_is_not_lost(service, work, uploaded, begun, until, s3_server):
+def test_a_result_waits_for_the_bucket_and_is_not_lost(service, work, publishing, until, s3_server):
     http = service("one")
-    dataset = uploaded(http)
-    job = begun(http, dataset)
-    s3_server.away.set()
-    s3_server.asked.clear()
-    work.hold.set()
-    wait_until(lambda: any("/volumes/" in path for _, path in list(s3_server.asked)))
+    job = publishing(http)
     assert http.get(f"/v1/jobs/{job}").json()["state"] == "running"
     s3_server.away.clear()
     done = until(http, job)
@@ -104,24 +102,17 @@ def test_a_result_waits_for_the_bucket_and_is_not_lost(service, work, uploaded, 
     assert http.get(f"{done['links']['volume']}/data").status_code == 200
 
 
-def test_a_job_can_be_cancelled_while_its_result_waits(service, work, uploaded, begun, until, s3_server):
+def test_a_job_can_be_cancelled_while_its_result_waits(service, publishing, until):
     http = service("one")
-    job = begun(http, uploaded(http))
-    s3_server.away.set()
-    s3_server.asked.clear()
-    work.hold.set()
-    wait_until(lambda: any("/volumes/" in path for _, path in list(s3_server.asked)))
+    job = publishing(http)
     assert http.post(f"/v1/jobs/{job}/cancel").status_code == 202
     assert until(http, job)["state"] == "cancelled"
     assert http.get("/v1/volumes").json()["volumes"] == []
 
 
-def test_publication_resumes_at_the_next_start(service, work, uploaded, begun, until, s3_server):
+def test_publication_resumes_at_the_next_start(service, publishing, until, s3_server):
     http = service("one")
-    dataset = uploaded(http)
-    job = begun(http, dataset)
-    s3_server.away.set()
-    work.hold.set()
+    job = publishing(http)
     http.__exit__(None, None, None)
     s3_server.away.clear()
     assert until(service("one"), job)["state"] == "succeeded"

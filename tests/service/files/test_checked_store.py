@@ -1,4 +1,4 @@
-"""Checked store: damaged files are rejected by name or replaced from another copy."""
+"""The data folder as a store, plain and checked: damaged files are rejected by name or replaced."""
 
 import os
 
@@ -196,3 +196,15 @@ def test_a_bucket_has_another_copy(tmp_path, rows, bucket_url):
     assert store.fetch(path).read_bytes() == CONTENT
     assert rows.get(LOCAL, path.stem).damaged is None
     database.close()
+
+
+class TestStore(StoreSuite):
+    @pytest.fixture
+    def files(self, tmp_path):
+        files = Files(tmp_path)
+        files.prepare()
+        return files
+
+    @pytest.fixture
+    def elsewhere(self, files):
+        return files

@@ -30,10 +30,10 @@ from bentray_service.rows.tables import (
 )
 from bentray_service.rows.uploads import Uploads
 
+from ..rows.conftest import SUMMARY, volume_row
+
 OTHER = Tenant("other")
-SCAN = {"title": "", "source": "", "license": "", "dimension": 2, "elements": 8, "ntx": 8, "nrx": 8}
-SCAN |= {"slices": 1, "has_traces": False, "has_travel_times": True, "has_truth": False}
-SCAN |= {"water_speed_mps": 1500.0}
+
 GRID = {"shape": [2, 2, 2], "spacing_m": [1.0] * 3, "origin_m": [0.0] * 3}
 SURFACE = {"title": "", "format": "ply", "vertices": 4, "faces": 4, "genus": 0, "holes": 0, "coloured": False}
 SENT = {"size": 1, "sha256": "0" * 64}
@@ -54,7 +54,7 @@ class Shelf:
 
     def dataset(self, tenant=LOCAL):
         name = new_id("dataset")
-        Datasets(self.database).add(tenant, name, summary=SCAN, **SENT)
+        Datasets(self.database).add(tenant, name, summary=SUMMARY, **SENT)
         self.files.of(tenant).dataset(name).write_bytes(b"x")
         return name
 
@@ -68,16 +68,9 @@ class Shelf:
         """A job that has succeeded, its volume, and the exports of that."""
         job = self.ended(self.jobs.add(tenant, NewJob("reconstruction", {}, dataset)))
         name, files = volume_of(job), self.files.of(tenant)
-        row = {
-            **GRID,
-            "axes": "x,y,z",
-            "speed_range_mps": [1.0, 2.0],
-            "water_speed_mps": 1.0,
-            "provenance": {},
-        }
         with self.database.write() as connection:
-            values = {"id": name, "job_id": job, "created": time.time(), "bytes": 1, "tenant": tenant}
-            connection.execute(insert(ResultVolumeRow).values(**values, **row))
+            values = {"job_id": job, "created": time.time(), "tenant": tenant}
+            connection.execute(insert(ResultVolumeRow).values(**values, **volume_row(job)))
         for path in (files.volume(name), files.export(name, "npy"), files.export(name, "nii")):
             path.write_bytes(b"x")
         return job, name

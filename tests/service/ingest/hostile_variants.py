@@ -1,7 +1,6 @@
 """Further damaged files of every format, one fault each, with the field that each is to be refused for."""
 
 import io
-import json
 import struct
 import zipfile
 from pathlib import Path
@@ -31,7 +30,7 @@ NRRDS: dict[str, tuple[bytes, str]] = {
     **{f"dimension {told!r}": (nrrd(dimension=told), "file") for told in ("three", "3.5", "", "9" * 5000)},
     **{
         f"sizes {told}": (nrrd(sizes=told), "sizes")
-        for told in ("-3 -4 5", "0 4 5", "3 4 1000000000", "3 4 99999999999999999999", "1 12 5")
+        for told in ("0 4 5", "3 4 1000000000", "3 4 99999999999999999999", "1 12 5")
     },
     "two sizes": (nrrd(sizes="12 5"), "sizes"),
     "four sizes": (nrrd(sizes="3 4 5 1"), "sizes"),
@@ -52,33 +51,23 @@ NRRDS: dict[str, tuple[bytes, str]] = {
     "an endless origin": (nrrd(SPACE, IDENTITY, "space origin: (inf,0,0)"), "origin_m"),
     "a far origin": (nrrd(SPACE, IDENTITY, "space origin: (1e300,0,0)"), "origin_m"),
     **{f"type {told}": (nrrd(type=told), "type") for told in ("block", "string", "double[3]", "complex")},
-    **{f"encoding {told}": (nrrd(encoding=told), "encoding") for told in ("hex", "bzip2", "ascii", "zlib")},
-    "a data file": (nrrd("data file: /etc/passwd"), "data file"),
+    **{f"encoding {told}": (nrrd(encoding=told), "encoding") for told in ("ascii", "zlib")},
     "a list of data files": (nrrd("data file: LIST"), "data file"),
-    "a byte skip": (nrrd("byte skip: -1"), "byte skip"),
     "a line skip": (nrrd("line skip: 7"), "line skip"),
     "units of parsecs": (nrrd("spacings: 1 1 1", 'units: "parsec" "mm" "mm"'), "units"),
     "vectors": (nrrd("kinds: vector domain domain"), "kinds"),
     "gzip of nothing": (nrrd(encoding="gzip", values=b""), "file"),
-    "gzip that is none": (nrrd(encoding="gzip"), "file"),
 }
 NIFTIS: dict[str, tuple[bytes, str]] = {
     "minus three axes": (nifti({"dim": (-3, 3, 4, 5, 1, 1, 1, 1)}), "file"),
     "nine axes": (nifti({"dim": (9, 3, 4, 5, 1, 1, 1, 1)}), "file"),
     "no axes": (nifti({"dim": (0, 3, 4, 5, 1, 1, 1, 1)}), "dim"),
-    "a negative axis": (nifti({"dim": (3, -3, -4, 5, 1, 1, 1, 1)}), "dim"),
     "an axis of nothing": (nifti({"dim": (3, 0, 4, 5, 1, 1, 1, 1)}), "dim"),
-    "long axes": (nifti({"dim": (3, 32767, 32767, 32767, 1, 1, 1, 1)}), "dim"),
     "moments": (nifti({"dim": (4, 3, 4, 5, 7, 1, 1, 1)}), "dim"),
     "a negative offset": (nifti({"vox_offset": -1.0}), "file"),
-    "a far offset": (nifti({"vox_offset": 1e30}), "vox_offset"),
     "an offset in the header": (nifti({"vox_offset": 16.0}), "file"),
     "an endless slope": (nifti({"scl_slope": np.inf, "scl_inter": 0.0}), "scl_slope"),
-    "a huge slope": (nifti({"scl_slope": 3e38, "scl_inter": 3e38}), "values"),
     "no type": (nifti({"datatype": 0}), "file"),
-    "an unknown type": (nifti({"datatype": 9999}), "file"),
-    "complex numbers": (nifti({"datatype": 32, "bitpix": 64}), "dim"),
-    "colours": (nifti({"datatype": 128, "bitpix": 24}), "dim"),
     "steps of nothing": (nifti({"pixdim": (1, 0, 1, 1, 1, 1, 1, 1), **UNPLACED}), "pixdim"),
     "endless steps": (nifti({"pixdim": (1, np.inf, 1, 1, 1, 1, 1, 1), **UNPLACED}), "spacing_m"),
     "steps that are none": (nifti({"pixdim": (1, np.nan, 1, 1, 1, 1, 1, 1), **UNPLACED}), "spacing_m"),
@@ -322,8 +311,3 @@ def files(folder: Path) -> dict[str, tuple[str, Path, Given]]:
         path.write_bytes(content)
         written[name] = what, path, given
     return written
-
-
-def spoken(answer: Any) -> str:
-    """All that a refusal says."""
-    return json.dumps(answer)

@@ -1,16 +1,21 @@
-"""The fair queue of uploads: a second tenant starts at once, and cancelled uploads leave the queue."""
+"""Uploads on their way: turns of tenants in the queue, and how many of one, in all and begun in a minute."""
 
 import threading
+from contextlib import ExitStack
 
 import pytest
 
+from bentray_service.errors import Busy, RateLimited
 from bentray_service.ingest import fair_queue
 from bentray_service.ingest.fair_queue import FairQueue, readers_at_once
+from bentray_service.ingest.upload_limits import UploadLimits
 from bentray_service.rows.ids import Tenant
 
 from ..conftest import NoProjects
 
 PATIENCE_S = 60.0
+
+
 BUSY, SMALL, THIRD = Tenant("busy"), Tenant("small"), Tenant("third")
 
 
@@ -112,3 +117,36 @@ def test_there_are_as_many_readers_as_cores_and_half_of_the_memory_allow(
     monkeypatch.setattr(fair_queue, "CPU_COUNT", cores)
     monkeypatch.setattr(fair_queue, "MEMORY_LIMIT", memory_gib * 2**30)
     assert readers_at_once(4 * 2**30) == at_once
+
+
+ONE, OTHER = Tenant("one"), Tenant("other")
+
+
+def test_uploads_are_limited_per_tenant_and_in_total():
+    limits = UploadLimits(NoProjects(), of_account=2, in_all=3)
+    with ExitStack() as stack:
+        for tenant in (ONE, ONE, OTHER):
+            stack.enter_context(limits(tenant))
+        with pytest.raises(RateLimited, match="2 in progress; accepted: at most 2 per tenant"), limits(ONE):
+            raise AssertionError
+        with pytest.raises(Busy, match="3 in progress"), limits(Tenant("third")):
+            raise AssertionError
+    with limits(ONE), limits(Tenant("third")):
+        pass
+
+
+def test_failed_upload_is_removed():
+    limits = UploadLimits(NoProjects(), of_account=1)
+    for _ in range(3):
+        with pytest.raises(ConnectionError), limits(ONE):
+            raise ConnectionError
+
+
+def test_new_uploads_per_minute_are_limited():
+    limits = UploadLimits(NoProjects(), begun_per_minute=3)
+    for _ in range(3):
+        limits.check_begin(ONE)
+    with pytest.raises(RateLimited, match="more than 3 new uploads per minute") as refused:
+        limits.check_begin(ONE)
+    assert 0.0 < refused.value.wait_s <= 20.0
+    limits.check_begin(OTHER)

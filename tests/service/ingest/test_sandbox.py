@@ -144,12 +144,6 @@ def test_a_reader_that_crashes(program, scan, tmp_path):
         run(scan(), tmp_path)
 
 
-def test_a_reader_that_stops(program, scan, tmp_path):
-    program("raise SystemExit(7)")
-    with pytest.raises(InvalidInput, match="exit code 7"):
-        run(scan(), tmp_path)
-
-
 def test_full_disk_is_reported(program, scan, tmp_path):
     program("print('{\"full\": true}')")
     with pytest.raises(StorageFull, match="no space"):

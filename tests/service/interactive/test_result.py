@@ -12,7 +12,6 @@ from matplotlib import pyplot as plt
 import bentray
 from bentray_kernels.tomography.result import Caution, Reflection
 from bentray_service.interactive.result import Result, result_of
-from bentray_workers.files.export.registry import SUFFIXES
 from bentray_workers.files.volume import Volume
 
 from ...workers.files.reconstructions import made, truth
@@ -218,15 +217,6 @@ def test_notebooks_show_pictures_and_escaped_words(result: Result) -> None:
         assert "<b>" not in shown
     assert "A &lt;b&gt;disc&lt;/b&gt;" in result._repr_html_()
     assert not plt.get_fignums(), "no figure of pyplot stays open"
-
-
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_every_suffix_is_a_file(tmp_path: Path, suffix: str) -> None:
-    image = made(nodes=6)
-    image = replace(image, provenance={**image.provenance, "frequency_hz": "1e6"})
-    path = result_of(image, {}).save(tmp_path / f"image{suffix}")
-    assert path.exists()
-    assert [path.name for path in tmp_path.iterdir()] == [f"image{suffix}"]
 
 
 def test_compressed_nifti_holds_the_image_and_hdf5_everything(result: Result, tmp_path: Path) -> None:
