@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import permutations, product
 from typing import NamedTuple
 
@@ -236,16 +237,6 @@ def _pitch(position: Floats) -> float:
     return float(np.median(np.linalg.norm(np.diff(position, axis=0), axis=1))) if len(position) > 1 else 0.0
 
 
-def _from_degrees(position: Floats) -> Floats | None:
-    """Positions on a circle whose angles in degrees were taken as radians, in their right places."""
-    return _with_angles(position, math.radians(1.0))
-
-
-def _from_radians(position: Floats) -> Floats | None:
-    """Positions on a circle whose angles in radians were taken as degrees, in their right places."""
-    return _with_angles(position, math.degrees(1.0))
-
-
 def _with_angles(position: Floats, factor: float) -> Floats | None:
     """Positions on a circle with the angles multiplied; None where they are on no circle.
 
@@ -279,9 +270,10 @@ def _transposed(position: Floats) -> Floats:
     return np.ascontiguousarray(position.reshape(position.shape[::-1]).T)
 
 
+# By the fault of positions, the right ones: angles in degrees were taken as radians, or the other way round.
 POSITION_FAULTS: Mapping[str, Callable[[Floats], Floats | None]] = {
-    "in-degrees": _from_degrees,
-    "in-radians": _from_radians,
+    "in-degrees": partial(_with_angles, factor=math.radians(1.0)),
+    "in-radians": partial(_with_angles, factor=math.degrees(1.0)),
     "transposed": _transposed,
 }
 

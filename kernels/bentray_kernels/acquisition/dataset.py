@@ -168,14 +168,13 @@ class Dataset:
         if np.abs(self.element_position_m).max() > FARTHEST_M:
             return
         pairs = self._pairs
-        geometry = Geometry(self.element_position_m, self.tx, self.rx, self.water_speed_mps)
         counts = dict(self.impossible_times)
         for name in ("tof_s", "delta_tof_s"):
             times = getattr(self, name)
             # Another shape is refused below.
             if times is None or times.shape != pairs:
                 continue
-            kept, impossible = without_impossible(times, geometry, absolute=name == "tof_s")
+            kept, impossible = without_impossible(times, self.geometry, absolute=name == "tof_s")
             if kept is not times:
                 object.__setattr__(self, name, kept)
             for kind, count in impossible.items():
@@ -273,6 +272,11 @@ class Dataset:
     def slices(self) -> int:
         """Number of axial slices, 1 for a plain 2-D scan."""
         return 1 if self.slice_z_m is None else len(self.slice_z_m)
+
+    @property
+    def geometry(self) -> Geometry:
+        """Which elements the pairs are between."""
+        return Geometry(self.element_position_m, self.tx, self.rx, self.water_speed_mps)
 
     @property
     def picked(self) -> bool:

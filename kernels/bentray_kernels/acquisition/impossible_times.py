@@ -73,6 +73,15 @@ class Geometry:
         away[(self.rx == self.tx[e]) | (away <= SAME_PLACE * self.width_m)] = np.nan
         return np.asarray(away)
 
+    def reverses(self, values: Floats) -> Floats:
+        """Values of the other direction of each pair, (ntx, nrx); NaN where it was not measured."""
+        at_tx, at_rx = (np.full(len(self.position_m), -1) for _ in range(2))
+        at_tx[self.tx], at_rx[self.rx] = np.arange(len(self.tx)), np.arange(len(self.rx))
+        back_e, back_r = at_tx[self.rx], at_rx[self.tx]
+        both = (back_e >= 0)[None, :] & (back_r >= 0)[:, None]
+        both &= self.tx[:, None] != self.rx[None, :]
+        return np.where(both, values[back_e[None, :], back_r[:, None]], np.nan)
+
     @property
     def width_m(self) -> float:
         """Diagonal of the array, m; no two elements are farther apart."""
@@ -208,23 +217,13 @@ def _placeholders(times: Floats) -> Flags:
     return flags
 
 
-def _reverse(times: Floats, geometry: Geometry) -> Floats:
-    """Times of the other direction of each pair, (ntx, nrx), s; NaN where it was not measured."""
-    at_tx, at_rx = (np.full(len(geometry.position_m), -1) for _ in range(2))
-    at_tx[geometry.tx], at_rx[geometry.rx] = np.arange(len(geometry.tx)), np.arange(len(geometry.rx))
-    back_e, back_r = at_tx[geometry.rx], at_rx[geometry.tx]
-    both = (back_e >= 0)[None, :] & (back_r >= 0)[:, None]
-    both &= geometry.tx[:, None] != geometry.rx[None, :]
-    return np.where(both, times[back_e[None, :], back_r[:, None]], np.nan)
-
-
 def _is_half(flags: Flags, times: Floats, geometry: Geometry) -> bool:
     """Whether flags mark one half of a matrix, whose pairs have times in the other half."""
     e, r = np.nonzero(flags)
     if not e.size:
         return False
     above = float((geometry.tx[e] < geometry.rx[r]).mean())
-    other = np.isfinite(_reverse(np.where(flags, np.nan, times), geometry)[flags]).mean()
+    other = np.isfinite(geometry.reverses(np.where(flags, np.nan, times))[flags]).mean()
     return bool(max(above, 1.0 - above) >= ONE_TRIANGLE and other >= ONE_TRIANGLE)
 
 
@@ -234,7 +233,7 @@ def _one_way(times: Floats, geometry: Geometry) -> Flags:
     zero = (times == 0.0) & (geometry.tx[:, None] != geometry.rx[None, :])
     if not zero.any() or not (times != 0.0).any():
         return none
-    reverse = _reverse(times, geometry)
+    reverse = geometry.reverses(times)
     off = np.where(np.isfinite(times) & np.isfinite(reverse), times - reverse, np.nan)
     contrary = zero & (np.abs(off) > 0.0)
     measured = np.isfinite(off) & ~zero & (reverse != 0.0)

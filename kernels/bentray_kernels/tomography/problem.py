@@ -12,6 +12,7 @@ from ..acquisition.array_hull import POSITION, check_extent, inside_array
 from ..arrays import Flags, Floats, Ints
 from ..errors import InvalidInput
 from . import pairs
+from .requirements import check_bounds
 from .roi import inside
 from .settings import Settings
 
@@ -51,13 +52,7 @@ class Problem(pairs.Pairs):
                 without a node inside the array, bounds that exclude the water, a region of interest without
                 a grid or a node.
         """
-        low, high = settings.speed_bounds_mps
-        if not low <= dataset.water_speed_mps <= high:
-            raise InvalidInput(
-                "speed_bounds_mps",
-                settings.speed_bounds_mps,
-                f"bounds around the speed of the water, {dataset.water_speed_mps:g} m/s",
-            )
+        check_bounds(settings, dataset.water_speed_mps)
         data = pairs.from_dataset(dataset, settings, index)
         elements = data.elements
         check_extent(elements)

@@ -23,11 +23,7 @@ def check_scan(dataset: Dataset, settings: Settings, samples: int) -> None:
         InvalidInput: naming the setting or the field of the file.
     """
     water = dataset.in_water_of(settings.water_temperature_c).water_speed_mps
-    low, high = settings.speed_bounds_mps
-    if not low <= water <= high:
-        raise InvalidInput(
-            "speed_bounds_mps", (low, high), f"bounds around the speed of the water, {water:g} m/s"
-        )
+    check_bounds(settings, water)
     if settings.roi and dataset.roi is None:
         raise InvalidInput("mask/roi", "nothing", "a region of interest, since the setting roi is true")
     if settings.reads_amplitudes and not samples:
@@ -38,6 +34,18 @@ def check_scan(dataset: Dataset, settings: Settings, samples: int) -> None:
     pairs.count(dataset, settings)
     flat = decomposition_of(dataset.element_position_m, settings) == "slices"
     check_extent(dataset.element_position_m[:, :2] if flat else dataset.element_position_m)
+
+
+def check_bounds(settings: Settings, water_mps: float) -> None:
+    """Check that the speed of the water lies within the bounds of the speed.
+
+    Raises:
+        InvalidInput: for bounds that exclude it.
+    """
+    low, high = settings.speed_bounds_mps
+    if not low <= water_mps <= high:
+        accepted = f"bounds around the speed of the water, {water_mps:g} m/s"
+        raise InvalidInput("speed_bounds_mps", (low, high), accepted)
 
 
 def check_waveform(settings: Settings, samples: int, slices: int, *, in_space: bool) -> None:

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from bentray_kernels import eikonal, rays
-from bentray_kernels.acquisition.simulation.attenuation_line_integrals import log_ratios
+from bentray_kernels.acquisition.simulation.fine_medium import log_ratios
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography.focusing import FRESNEL_PART, focusing

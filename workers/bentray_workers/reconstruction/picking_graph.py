@@ -289,17 +289,13 @@ def find_chords(
     if source.examine:
         more, chords = examine_chords(dataset, measures)
         return ExaminedChords((*findings, *_usable(source, index, more)), chords)
-    assert dataset.center_frequency_hz is not None
-    return ExaminedChords(
-        findings, find_water_chords(dataset, measures.strongest_s, 1.0 / dataset.center_frequency_hz)
-    )
+    return ExaminedChords(findings, find_water_chords(dataset, measures.strongest_s))
 
 
 def read_chords(source: PickingSource, index: int, examined: ExaminedChords, emissions: range) -> ChordPulses:
     """Task: pulses of the chords through water in a batch of emissions."""
     with source.slice(index, examined.findings) as dataset:
-        assert dataset.center_frequency_hz is not None
-        return read_pulses(dataset, emissions, examined.chords, 1.0 / dataset.center_frequency_hz)
+        return read_pulses(dataset, emissions, examined.chords)
 
 
 def estimate_slice_water(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -29,30 +29,21 @@ OUTLYING = 4.0
 MIN_PER_ELEMENT = 6
 
 
-@dataclass(frozen=True)
-class _Unknowns:
-    """Offsets of the unknowns in the vector: positions, emission, reception, common, speed."""
+class _Unknowns(NamedTuple):
+    """Where the unknowns are in the vector; the slowness of the water is the last one."""
 
-    elements: int
-    ntx: int
-    nrx: int
+    position: slice
+    emission: slice
+    reception: slice
+    common: int
+    size: int
 
-    @property
-    def emission(self) -> int:
-        return 2 * self.elements
-
-    @property
-    def reception(self) -> int:
-        return self.emission + self.ntx
-
-    @property
-    def common(self) -> int:
-        return self.reception + self.nrx
-
-    @property
-    def count(self) -> int:
-        """With the slowness of the water as the last one."""
-        return self.common + 2
+    @classmethod
+    def from_dataset(cls, dataset: Dataset) -> _Unknowns:
+        emission = 2 * len(dataset.element_position_m)
+        reception = emission + len(dataset.tx)
+        common = reception + len(dataset.rx)
+        return cls(slice(emission), slice(emission, reception), slice(reception, common), common, common + 2)
 
 
 def calibrate(
@@ -81,12 +72,12 @@ def calibrate(
     if times_s.shape != (len(dataset.tx), len(dataset.rx)):
         accepted = f"({len(dataset.tx)}, {len(dataset.rx)})"
         raise InvalidInput("times_s", f"shape {times_s.shape}", accepted)
-    at = _Unknowns(len(dataset.element_position_m), len(dataset.tx), len(dataset.rx))
+    at = _Unknowns.from_dataset(dataset)
     emitter, receiver = np.nonzero(np.isfinite(times_s) & (dataset.tx[:, None] != dataset.rx[None, :]))
     time = times_s[emitter, receiver]
     used = _used(dataset, emitter, receiver)
-    value = np.zeros(at.count)
-    value[: at.emission] = dataset.element_position_m.ravel()
+    value = np.zeros(at.size)
+    value[at.position] = dataset.element_position_m.ravel()
     value[-1] = 1.0 / dataset.water_speed_mps
     for _ in range(MAX_ITERATIONS):
         rows, residual = _linear(dataset, at, value, emitter, receiver, time)
@@ -95,7 +86,7 @@ def calibrate(
         inliers = used & (off <= OUTLYING * robust_deviation(residual[used]) + 1e-12)
         free = _free(dataset, at, emitter[inliers], receiver[inliers], fit_speed)
         step, covariance = _step(dataset, at, rows[inliers], residual[inliers], free, fit_speed)
-        moved = np.abs(step[: at.emission]).max()
+        moved = np.abs(step[at.position]).max()
         value[free] += step[free] * min(1.0, LONGEST_STEP_M / max(moved, 1e-30))
         if moved < SETTLED_M:
             break
@@ -103,7 +94,7 @@ def calibrate(
     residual = residual[inliers]
     spare = residual.size - int(free.sum()) + _gauges(fit_speed)
     noise = sigma_s if sigma_s is not None else math.sqrt(float((residual**2).sum()) / max(spare, 1))
-    deviation = np.full(at.count, np.nan)
+    deviation = np.full(at.size, np.nan)
     deviation[free] = noise * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return _calibration(at, value, deviation, residual, int(used.sum()) - residual.size, fit_speed)
 
@@ -138,7 +129,7 @@ def _linear(
     dataset: Dataset, at: _Unknowns, value: Floats, emitter: Ints, receiver: Ints, time: Floats
 ) -> tuple[sparse.csr_array, Floats]:
     """Derivatives of the times, and residuals."""
-    position, slowness = value[: at.emission].reshape(-1, 2), value[-1]
+    position, slowness = value[at.position].reshape(-1, 2), value[-1]
     a, b = dataset.tx[emitter], dataset.rx[receiver]
     along = position[a] - position[b]
     distance = np.linalg.norm(along, axis=1)
@@ -149,25 +140,25 @@ def _linear(
         (2 * a + 1, toward[:, 1]),
         (2 * b, -toward[:, 0]),
         (2 * b + 1, -toward[:, 1]),
-        (at.emission + emitter, ones_column),
-        (at.reception + receiver, ones_column),
+        (at.emission.start + emitter, ones_column),
+        (at.reception.start + receiver, ones_column),
         (np.full(len(time), at.common), ones_column),
-        (np.full(len(time), at.count - 1), distance),
+        (np.full(len(time), at.size - 1), distance),
     )
     row = np.tile(np.arange(len(time)), len(entries))
     columns, values = (np.concatenate(arrays) for arrays in zip(*entries, strict=True))
-    rows = sparse.csr_array((values, (row, columns)), shape=(len(time), at.count))
-    delay = value[at.emission + emitter] + value[at.reception + receiver] + value[at.common]
+    rows = sparse.csr_array((values, (row, columns)), shape=(len(time), at.size))
+    delay = value[at.emission][emitter] + value[at.reception][receiver] + value[at.common]
     return rows, np.asarray(time - delay - slowness * distance)
 
 
 def _free(dataset: Dataset, at: _Unknowns, emitter: Ints, receiver: Ints, fit_speed: bool) -> Flags:
     """Unknowns with at least one pair."""
-    free = np.zeros(at.count, dtype=bool)
+    free = np.zeros(at.size, dtype=bool)
     elements = np.union1d(dataset.tx[emitter], dataset.rx[receiver])
     free[2 * elements] = free[2 * elements + 1] = True
-    free[at.emission + np.unique(emitter)] = True
-    free[at.reception + np.unique(receiver)] = True
+    free[at.emission.start + np.unique(emitter)] = True
+    free[at.reception.start + np.unique(receiver)] = True
     free[at.common] = True
     free[-1] = fit_speed
     return free
@@ -203,7 +194,7 @@ def _step(
         raise InvalidInput(
             "times_s", "times that leave positions or delays open", "more pairs, around the whole array"
         ) from None
-    change = np.zeros(at.count)
+    change = np.zeros(at.size)
     change[free] = scale * cho_solve(factor, scale * (free_columns.T @ residual))
     inverse = cho_solve(factor, np.eye(len(scale)))
     # The contribution of the conventions is not an uncertainty of the data.
@@ -215,14 +206,14 @@ def _step(
 def _conventions(dataset: Dataset, at: _Unknowns, fit_speed: bool) -> Floats:
     """Rows whose product with a change must be 0: translation, rotation, mean delays, and scale."""
     centred = dataset.element_position_m - dataset.element_position_m.mean(axis=0)
-    rows = np.zeros((_gauges(fit_speed), at.count))
-    rows[0, 0 : at.emission : 2] = 1.0
-    rows[1, 1 : at.emission : 2] = 1.0
-    rows[2, 0 : at.emission : 2], rows[2, 1 : at.emission : 2] = -centred[:, 1], centred[:, 0]
-    rows[3, at.emission : at.reception] = 1.0
-    rows[4, at.reception : at.common] = 1.0
+    rows = np.zeros((_gauges(fit_speed), at.size))
+    rows[0, 0 : at.emission.start : 2] = 1.0
+    rows[1, 1 : at.emission.start : 2] = 1.0
+    rows[2, 0 : at.emission.start : 2], rows[2, 1 : at.emission.start : 2] = -centred[:, 1], centred[:, 0]
+    rows[3, at.emission] = 1.0
+    rows[4, at.reception] = 1.0
     if fit_speed:
-        rows[5, : at.emission] = centred.ravel()
+        rows[5, at.position] = centred.ravel()
     return rows
 
 
@@ -231,12 +222,12 @@ def _calibration(
 ) -> Calibration:
     slowness = float(value[-1])
     return Calibration(
-        element_position_m=value[: at.emission].reshape(-1, 2).copy(),
-        position_sigma_m=deviation[: at.emission].reshape(-1, 2).copy(),
-        emission_delay_s=value[at.emission : at.reception].copy(),
-        emission_sigma_s=deviation[at.emission : at.reception].copy(),
-        reception_delay_s=value[at.reception : at.common].copy(),
-        reception_sigma_s=deviation[at.reception : at.common].copy(),
+        element_position_m=value[at.position].reshape(-1, 2).copy(),
+        position_sigma_m=deviation[at.position].reshape(-1, 2).copy(),
+        emission_delay_s=value[at.emission].copy(),
+        emission_sigma_s=deviation[at.emission].copy(),
+        reception_delay_s=value[at.reception].copy(),
+        reception_sigma_s=deviation[at.reception].copy(),
         common_delay_s=float(value[at.common]),
         water_speed_mps=1.0 / slowness,
         water_speed_sigma_mps=float(deviation[-1]) / slowness**2 if fit_speed else 0.0,

@@ -133,7 +133,7 @@ def departures(dataset: Dataset, delta: Floats) -> tuple[Floats, Floats]:
     Returns:
         (ntx, nrx) each, s; NaN departures where a pick or its neighbours are missing.
     """
-    position, reverse = dataset.element_position_m, _reverses(dataset, delta)
+    position, reverse = dataset.element_position_m, dataset.geometry.reverses(delta)
     emitters = _nearest(position[dataset.tx], NEAR_EMITTERS)
     receivers = _nearest(position[dataset.rx], NEAR_RECEIVERS)
     departure, accepted = np.empty((2, *delta.shape))
@@ -187,19 +187,11 @@ def unreciprocal(dataset: Dataset, delta: Floats, skip_s: float) -> Flags:
 
     Differences within ``CERTAIN`` robust standard deviations of all of them are noise.
     """
-    difference = np.abs(delta - _reverses(dataset, delta))
+    difference = np.abs(delta - dataset.geometry.reverses(delta))
     finite = difference[np.isfinite(difference) & (dataset.tx[:, None] != dataset.rx)]
     noise = 1.4826 * float(np.median(finite)) if finite.size else 0.0
     with np.errstate(invalid="ignore"):
         return np.asarray(difference > max(skip_s, CERTAIN * noise))
-
-
-def _reverses(dataset: Dataset, delta: Floats) -> Floats:
-    """(ntx, nrx): the pick of each reciprocal pair, s; NaN where there is none."""
-    elements = len(dataset.element_position_m)
-    full = np.full((elements, elements), np.nan)
-    full[np.ix_(dataset.tx, dataset.rx)] = delta
-    return np.asarray(full.T[np.ix_(dataset.tx, dataset.rx)])
 
 
 def _neighbours(delta: Floats, emitters: Ints, receivers: Ints) -> Floats:

@@ -34,17 +34,17 @@ def examine_chords(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
     Raises:
         InvalidInput: where too few chords pass through water.
     """
-    period, strongest = 1.0 / dataset.frequency_hz, measures.unclipped_s
+    strongest = measures.unclipped_s
     if mismatch := find_wrong_order(dataset, strongest):
         raise InvalidInput(ORDER, mismatch[0].found, mismatch[0].accepted)
-    chords = find_water_chords(dataset, strongest, period)
+    chords = find_water_chords(dataset, strongest)
     findings = find_swapped(dataset, strongest, _expected(dataset, chords))
     if findings:
         for finding in findings:
             order, axis = exchange_order(dataset, finding)
             strongest = np.take(strongest, order, axis=axis)
         dataset = apply(dataset, findings)
-        chords = find_water_chords(dataset, strongest, period)
+        chords = find_water_chords(dataset, strongest)
     late = strongest - _expected(dataset, chords)
     errors = find_element_errors(dataset, late)
     findings += errors
@@ -56,7 +56,7 @@ def examine_chords(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
             (emission if sent else reception)[of_role] += finding.value
     if emission.any() or reception.any():
         right = strongest - emission[:, None] - reception
-        chords = find_water_chords(dataset, right, period).with_delays(emission, reception)
+        chords = find_water_chords(dataset, right).with_delays(emission, reception)
         late = right - _expected(dataset, chords)
     findings += find_drift(dataset, late)
     findings += find_scatterer(dataset, _log_ratio(dataset, measures))

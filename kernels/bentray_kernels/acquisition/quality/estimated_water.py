@@ -33,9 +33,9 @@ def estimate_water(dataset: Dataset, measures: Measures) -> tuple[list[Finding],
         InvalidInput: where too few chords pass through water.
     """
     findings, chords = examine_chords(dataset, measures)
-    period_s = 1.0 / dataset.frequency_hz
-    pulses = read_pulses(apply(dataset, findings), range(len(dataset.tx)), chords, period_s)
-    estimated, reference = estimate_from_pulses(apply(dataset, findings), chords, pulses)
+    dataset = apply(dataset, findings)
+    pulses = read_pulses(dataset, range(len(dataset.tx)), chords)
+    estimated, reference = estimate_from_pulses(dataset, chords, pulses)
     return [*findings, *estimated], reference
 
 
@@ -53,13 +53,12 @@ def estimate_from_pulses(
     Raises:
         InvalidInput: where too few chords pass through water.
     """
-    period_s = 1.0 / dataset.frequency_hz
     findings: list[Finding] = []
     if examine:
-        findings = find_inverted(dataset, chord_signs(dataset, chords, pulses, period_s))
+        findings = find_inverted(dataset, chord_signs(dataset, chords, pulses))
     for finding in findings:
         pulses = pulses.inverted(pairs_of(dataset, finding))
-    reference = estimate_reference(dataset, chords, pulses, period_s)
+    reference = estimate_reference(dataset, chords, pulses)
     findings.append(find_estimated_water(dataset, reference))
     if examine:
         fitted = reference.speed_mps, reference.speed_sigma_mps

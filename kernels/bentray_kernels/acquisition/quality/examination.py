@@ -8,7 +8,6 @@ from itertools import count
 
 import numpy as np
 
-from ...arrays import Flags, Floats
 from ...errors import InvalidInput
 from ...requests.limits import LEFT_OUT as SHARE
 from ...requests.limits import MAX_LEFT_OUT
@@ -178,7 +177,10 @@ def check_times(dataset: Dataset) -> list[Finding]:
     if findings:
         return findings
     if dataset.valid is None:
-        findings += find_dead(dataset, _detected(dataset, dataset.differential_tof()))
+        delta = dataset.differential_tof()
+        # Pairs with a time in at least one direction.
+        detected = np.isfinite(delta) | np.isfinite(dataset.geometry.reverses(delta))
+        findings += find_dead(dataset, np.asarray(detected))
     findings += find_time_shift(dataset, dataset.differential_tof())
     if any(finding.action == "refused" for finding in findings):
         return findings
@@ -187,12 +189,3 @@ def check_times(dataset: Dataset) -> list[Finding]:
     if not np.isfinite(apply(corrected, later).differential_tof()).any():
         later.append(Finding("travel times", "no usable ones", "travel times of some pairs", "refused"))
     return findings + later
-
-
-def _detected(dataset: Dataset, delta: Floats) -> Flags:
-    """(ntx, nrx): pairs with a time in at least one direction."""
-    finite = np.isfinite(delta)
-    elements = len(dataset.element_position_m)
-    full = np.zeros((elements, elements), dtype=bool)
-    full[np.ix_(dataset.tx, dataset.rx)] = finite
-    return np.asarray((full | full.T)[np.ix_(dataset.tx, dataset.rx)])

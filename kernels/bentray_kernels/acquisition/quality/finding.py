@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -53,17 +53,10 @@ class Finding:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, with the number of pairs and the first of them as (emission, reception)."""
-        record: dict[str, Any] = {
-            "check": self.check,
-            "found": self.found,
-            "accepted": self.accepted,
-            "action": self.action,
-            "slice": self.slice,
-            "elements": list(self.elements),
-            "role": self.role,
-            "value": self.value if math.isfinite(self.value) else None,
-            "unit": self.unit,
-        }
+        names = ("check", "found", "accepted", "action", "slice", "elements", "role", "value", "unit")
+        record: dict[str, Any] = {name: getattr(self, name) for name in names}
+        record["elements"] = list(self.elements)
+        record["value"] = self.value if math.isfinite(self.value) else None
         if self.pairs is not None:
             where = np.argwhere(self.pairs)
             record["pair_count"] = len(where)
@@ -114,6 +107,15 @@ class Report:
         if self.refusal is not None:
             return "refused"
         return "usable" if self.findings else "clean"
+
+
+def left_out(findings: Iterable[Finding], shape: tuple[int, ...]) -> Flags:
+    """Pairs that findings leave out, of this shape."""
+    pairs = np.zeros(shape, dtype=bool)
+    for finding in findings:
+        if finding.action == "left out" and finding.pairs is not None:
+            pairs |= finding.pairs
+    return pairs
 
 
 def words(findings: Sequence[Finding], *, stacked: bool = False) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..dataset import Dataset
 from ..impossible_times import impossible_words, lost_pairs
-from .finding import Finding
+from .finding import Finding, left_out
 
 IMPOSSIBLE, LEFT_OUT = "impossible times", "pairs left out"
 
@@ -33,11 +33,7 @@ def count_left_out(dataset: Dataset, findings: Iterable[Finding]) -> Pairs:
     else:
         usable = np.asarray(dataset.tx[:, None] != dataset.rx)
         usable = usable if dataset.valid is None else usable & dataset.valid
-    out = np.zeros_like(usable)
-    for finding in findings:
-        if finding.action == "left out" and finding.pairs is not None:
-            out |= finding.pairs
-    return Pairs(int(usable.sum()), int((usable & out).sum()))
+    return Pairs(int(usable.sum()), int((usable & left_out(findings, usable.shape)).sum()))
 
 
 def count_usable(dataset: Dataset) -> tuple[int, int]:

@@ -32,11 +32,8 @@ def find_displaced(dataset: Dataset, strongest_s: Floats, line: WaterLine) -> li
     """
     distance = dataset.distance_m()
     off = np.where(distance > 0.25 * distance.max(), strongest_s - distance / line.speed_mps, np.nan)
-    elements = len(dataset.element_position_m)
-    full = np.full((elements, elements), np.nan)
-    full[np.ix_(dataset.tx, dataset.rx)] = off
-    half = np.triu_indices(elements, 1)
-    there, back = full[half], full.T[half]
+    once = dataset.tx[:, None] < dataset.rx
+    there, back = off[once], dataset.geometry.reverses(off)[once]
     both = np.isfinite(there + back)
     if both.sum() < MIN_PAIRS:
         return []

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Flags, Floats
+from ...arrays import Floats
 from ..dataset import Dataset
 from .broken import find_broken, find_clipped
 from .correction import apply, exchange_order
 from .dead import find_dead
 from .drift import DRIFT, find_drift
 from .elements import CLOCK, DISPLACED, find_element_errors
-from .finding import Finding
+from .finding import Finding, left_out
 from .measures import Measures
 from .order import ORDER, find_wrong_order
 from .polarity import find_inverted, water_signs
@@ -93,16 +93,10 @@ def check_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], t
         if dataset.center_frequency_hz is not None:
             findings += find_scatterer(dataset, _log_ratio(measured.object, measured.water))
         checked += OF_WATER
-    if not dataset.picked and (missing := _unpickable(dataset)):
-        findings.append(missing)
+    if not dataset.picked and dataset.center_frequency_hz is None:
+        # The traces cannot be picked.
+        findings.append(Finding("centre frequency", "none", "the centre frequency of the pulse", "refused"))
     return findings, checked
-
-
-def _unpickable(dataset: Dataset) -> Finding | None:
-    """A finding if the traces cannot be picked."""
-    if dataset.center_frequency_hz is None:
-        return Finding("centre frequency", "none", "the centre frequency of the pulse", "refused")
-    return None
 
 
 def _of_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], Floats | None]:
@@ -113,8 +107,8 @@ def _of_traces(dataset: Dataset, measured: Measured) -> tuple[list[Finding], Flo
             continue
         if which == "water" or measured.water is None:
             findings += find_dead(dataset, measures.detected)
-        left_out = _left_out(findings, measures.detected)
-        findings += find_broken(dataset, measures, which, left_out)
+        out = left_out(findings, measures.detected.shape)
+        findings += find_broken(dataset, measures, which, out)
         findings += find_clipped(dataset, measures, which)
     if measured.water is None:
         return findings, None
@@ -161,11 +155,3 @@ def _log_ratio(received: Measures, water: Measures) -> Floats:
     usable = water.detected & np.isfinite(received.peak) & (received.peak > 0.0)
     ratio = np.where(usable, received.peak, 1.0) / np.where(usable, water.peak, 1.0)
     return np.where(usable, np.log(ratio), np.nan)
-
-
-def _left_out(findings: list[Finding], like: Flags) -> Flags:
-    pairs = np.zeros_like(like)
-    for finding in findings:
-        if finding.action == "left out" and finding.pairs is not None:
-            pairs |= finding.pairs
-    return pairs

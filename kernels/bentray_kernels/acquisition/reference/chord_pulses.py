@@ -54,19 +54,16 @@ def chords_of_emission(emissions: int) -> int:
     return min(MAX_PER_EMISSION, max(MIN_PER_EMISSION, MAX_CHORDS // emissions))
 
 
-def read_pulses(
-    dataset: Dataset, emissions: Iterable[int], chords: WaterChords, period_s: float
-) -> ChordPulses:
+def read_pulses(dataset: Dataset, emissions: Iterable[int], chords: WaterChords) -> ChordPulses:
     """Cut the pulses of chords through water out of the traces of some emissions.
 
     Args:
-        dataset: of one slice with traces of the object, which may be ``Emissions``.
+        dataset: of one slice with traces of the object, which may be ``Emissions``, and a centre frequency.
         emissions: indices, from 0.
         chords: see ``find_water_chords``.
-        period_s: of the pulse, s.
     """
     traces = dataset.traces
-    before, length = window(dataset.rate_hz * period_s)
+    before, length = window(dataset.rate_hz * (1.0 / dataset.frequency_hz))
     late = chords.arrival_s(dataset.distance_m())
     if chords.emission_delay_s is not None and chords.reception_delay_s is not None:
         late = late + chords.emission_delay_s[:, None] + chords.reception_delay_s

@@ -123,24 +123,21 @@ class ReferenceShot:
         return shots
 
 
-def estimate_reference(
-    dataset: Dataset, chords: WaterChords, pulses: ChordPulses, period_s: float
-) -> ReferenceShot:
+def estimate_reference(dataset: Dataset, chords: WaterChords, pulses: ChordPulses) -> ReferenceShot:
     """Estimate pulse, wave number, delays and gains from chords through water.
 
     The common pulse and, at each frequency, the phase over distance are fitted in turn with the delays of
     elements; then chords are selected again by their delays to a fraction of a sample.
 
     Args:
-        dataset: of one slice; its traces are not read.
+        dataset: of one slice, with a centre frequency; its traces are not read.
         chords: by the maxima of envelopes.
         pulses: of these chords.
-        period_s: of the pulse, s.
 
     Raises:
         InvalidInput: where too few chords pass through water.
     """
-    fit = _Fit(dataset, chords, pulses, period_s)
+    fit = _Fit(dataset, chords, pulses)
     known_s = fit.known_s
     for _ in range(ROUNDS):
         fit.improve()
@@ -148,7 +145,7 @@ def estimate_reference(
     arrival = np.full(chords.pairs.shape, np.nan)
     at = pulses.emission[fit.used], pulses.reception[fit.used]
     arrival[at] = (fit.model_s() + fit.lag_s - known_s)[fit.used]
-    again = find_water_chords(dataset, arrival, period_s, tolerance=0.01)
+    again = find_water_chords(dataset, arrival, tolerance=0.01)
     fit.keep(again.pairs)
     for _ in range(ROUNDS):
         fit.improve()
@@ -159,15 +156,15 @@ def estimate_reference(
     return fit.reference(fitted)
 
 
-def chord_signs(dataset: Dataset, chords: WaterChords, pulses: ChordPulses, period_s: float) -> Floats:
+def chord_signs(dataset: Dataset, chords: WaterChords, pulses: ChordPulses) -> Floats:
     """(ntx, nrx): correlation of each chord's pulse with the usual one, from -1 to 1; NaN for other pairs.
 
     Args:
-        dataset, chords, pulses, period_s: as ``estimate_reference`` takes them.
+        dataset, chords, pulses: as ``estimate_reference`` takes them.
     """
     sign = np.full(chords.pairs.shape, np.nan)
     if pulses.emission.size:
-        alike = _Fit(dataset, chords, pulses, period_s).likeness()
+        alike = _Fit(dataset, chords, pulses).likeness()
         sign[pulses.emission, pulses.reception] = alike
     return sign
 
@@ -175,8 +172,9 @@ def chord_signs(dataset: Dataset, chords: WaterChords, pulses: ChordPulses, peri
 class _Fit:
     """State of the estimation; phases are relative to the arrival by the model."""
 
-    def __init__(self, dataset: Dataset, chords: WaterChords, pulses: ChordPulses, period_s: float) -> None:
-        rate, self._period_s, self._pulses = dataset.rate_hz, period_s, pulses
+    def __init__(self, dataset: Dataset, chords: WaterChords, pulses: ChordPulses) -> None:
+        rate, period_s, self._pulses = dataset.rate_hz, 1.0 / dataset.frequency_hz, pulses
+        self._period_s = period_s
         self._distance = dataset.distance_m()[pulses.emission, pulses.reception]
         _, length = window(rate * period_s)
         padded = 2 ** math.ceil(math.log2(4 * length))

@@ -74,24 +74,21 @@ class WaterChords:
         return replace(self, emission_delay_s=emission_s, reception_delay_s=reception_s)
 
 
-def find_water_chords(
-    dataset: Dataset, arrival_s: Floats, period_s: float, tolerance: float = MIN_TOLERANCE
-) -> WaterChords:
+def find_water_chords(dataset: Dataset, arrival_s: Floats, tolerance: float = MIN_TOLERANCE) -> WaterChords:
     """Find the chords that miss the object, without an assumption on its size.
 
     The line through most arrivals is searched among all plausible speeds. From the outermost chords inwards,
     groups of chords are added while they agree with the line through the previous ones.
 
     Args:
-        dataset: of one slice.
+        dataset: of one slice, with a centre frequency.
         arrival_s: (ntx, nrx), s, NaN where unknown: of a scan with the object.
-        period_s: of the pulse, s.
         tolerance: least distance from the line that agrees, periods.
 
     Raises:
         InvalidInput: where no such line exists: too few chords miss the object.
     """
-    distance = dataset.distance_m()
+    distance, period_s = dataset.distance_m(), 1.0 / dataset.frequency_hz
     nearest = min(NEAREST * dataset.water_speed_mps * period_s, NEAREST_PART * float(distance.max()))
     usable = np.isfinite(arrival_s) & (distance > nearest)
     usable &= dataset.tx[:, None] != dataset.rx[None, :]

@@ -195,7 +195,7 @@ def _curvature(image: Floats, half: Sequence[Rows], weights: Sequence[Floats]) -
     """Aᵀ·W·A·image of the rows of some parts, (nodes,), with weights by part."""
     into = np.zeros(image.size)
     for block, weight in zip(half, weights, strict=True):
-        normal_product(block.pointers, block.columns, block.lengths, weight, image, into)
+        normal_product(block.matrix, weight, image, into)
     return into
 
 

@@ -24,7 +24,7 @@ from ...splines import coefficients
 from ..finite_frequency import front_smoothing, ray_slowness
 from ..problem import Problem
 from ..settings import Settings
-from .ray_matrix import back_project, project
+from .ray_matrix import RayMatrix, back_project, project
 
 # Entries of the matrix that are worth a second thread.
 MIN_ENTRIES = 200_000
@@ -53,6 +53,11 @@ class Rows:
     residual: Floats
     counts: Ints
 
+    @property
+    def matrix(self) -> RayMatrix:
+        """A, for compiled code."""
+        return RayMatrix(self.pointers, self.columns, self.lengths)
+
     def between(self, first: int, last: int) -> Rows:
         """The rows ``first`` up to, without, ``last``, as of one emitter; views of these arrays."""
         entries = slice(self.pointers[first], self.pointers[last])
@@ -73,12 +78,12 @@ class Rows:
     def project(self, image: Floats) -> Floats:
         """A·image, (rays,): sums along the rays."""
         sums = np.empty(self.residual.size)
-        project(self.pointers, self.columns, self.lengths, image.ravel(), sums)
+        project(self.matrix, image.ravel(), sums)
         return sums
 
     def back_project(self, values: Floats, into: Floats) -> None:
         """Add Aᵀ·values to ``into``, (nodes,)."""
-        back_project(self.pointers, self.columns, self.lengths, values, into)
+        back_project(self.matrix, values, into)
 
 
 def halves(blocks: Sequence[Rows]) -> list[list[Rows]]:

@@ -5,54 +5,51 @@ Indices are unsigned: for signed ones numba tests whether they count from the en
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
-from ...arrays import Floats, Ints
+import numpy as np
+
+from ...arrays import Float32s, Floats, Int32s, Ints
 from ...compilation.compiled import kernel
 
 LANES = np.uint64(4)
 
 
+class RayMatrix(NamedTuple):
+    """Rays as rows of a compressed sparse matrix A over the nodes; see ``linearisation.Rows``."""
+
+    pointers: Ints
+    columns: Int32s
+    lengths: Float32s
+
+
 @kernel
-def project(
-    pointers: Ints, columns: NDArray[np.int32], lengths: NDArray[np.float32], image: Floats, into: Floats
-) -> None:
+def project(matrix: RayMatrix, image: Floats, into: Floats) -> None:
     """Write A·image to ``into``."""
-    for row in range(len(pointers) - 1):
-        into[row] = _along(pointers, columns, lengths, image, row)
+    for row in range(len(matrix.pointers) - 1):
+        into[row] = _along(matrix, image, row)
 
 
 @kernel
-def back_project(
-    pointers: Ints, columns: NDArray[np.int32], lengths: NDArray[np.float32], values: Floats, into: Floats
-) -> None:
+def back_project(matrix: RayMatrix, values: Floats, into: Floats) -> None:
     """Add Aᵀ·values to ``into``."""
-    for row in range(len(pointers) - 1):
-        _spread(pointers, columns, lengths, values[row], row, into)
+    for row in range(len(matrix.pointers) - 1):
+        _spread(matrix, values[row], row, into)
 
 
 @kernel
-def normal_product(
-    pointers: Ints,
-    columns: NDArray[np.int32],
-    lengths: NDArray[np.float32],
-    weights: Floats,
-    image: Floats,
-    into: Floats,
-) -> None:
+def normal_product(matrix: RayMatrix, weights: Floats, image: Floats, into: Floats) -> None:
     """Add Aᵀ·W·A·image to ``into``, with one weight a row, reading each row once."""
-    for row in range(len(pointers) - 1):
-        value = weights[row] * _along(pointers, columns, lengths, image, row)
-        _spread(pointers, columns, lengths, value, row, into)
+    for row in range(len(matrix.pointers) - 1):
+        value = weights[row] * _along(matrix, image, row)
+        _spread(matrix, value, row, into)
 
 
 @kernel(inline="always")
-def _along(
-    pointers: Ints, columns: NDArray[np.int32], lengths: NDArray[np.float32], image: Floats, row: int
-) -> float:
+def _along(matrix: RayMatrix, image: Floats, row: int) -> float:
     """One row times an image."""
-    first, last = np.uint64(pointers[row]), np.uint64(pointers[row + 1])
+    columns, lengths = matrix.columns, matrix.lengths
+    first, last = np.uint64(matrix.pointers[row]), np.uint64(matrix.pointers[row + 1])
     # Four independent sums: with one, every addition waits for the previous one.
     a = b = c = d = 0.0
     k = first
@@ -68,14 +65,7 @@ def _along(
 
 
 @kernel(inline="always")
-def _spread(
-    pointers: Ints,
-    columns: NDArray[np.int32],
-    lengths: NDArray[np.float32],
-    value: float,
-    row: int,
-    into: Floats,
-) -> None:
+def _spread(matrix: RayMatrix, value: float, row: int, into: Floats) -> None:
     """Add a value times one row to ``into``."""
-    for k in range(np.uint64(pointers[row]), np.uint64(pointers[row + 1])):
-        into[np.uint32(columns[k])] += lengths[k] * value
+    for k in range(np.uint64(matrix.pointers[row]), np.uint64(matrix.pointers[row + 1])):
+        into[np.uint32(matrix.columns[k])] += matrix.lengths[k] * value

@@ -55,19 +55,15 @@ def joined(times: list[ElementTimes]) -> ElementTimes:
     return ElementTimes(*(np.concatenate(arrays) for arrays in zip(*times, strict=True)))
 
 
-def times_between(times: ElementTimes, spacing: float, elements: Floats) -> Floats:
+@kernel
+def times_between(times: ElementTimes, spacing: float, others: Floats) -> Floats:
     """Time from each element to each of others, (k, n), s.
 
     Args:
         times: of the first.
         spacing: of its nodes, m.
-        elements: (n, 2), m, node 0 at 0.
+        others: (n, 2), nodes.
     """
-    return _between(times, spacing, elements / spacing)
-
-
-@kernel
-def _between(times: ElementTimes, spacing: float, others: Floats) -> Floats:
     found = np.empty((len(times.place), len(others)))
     for k in range(len(times.place)):
         for n in range(len(others)):

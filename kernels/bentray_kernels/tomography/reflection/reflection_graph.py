@@ -300,4 +300,4 @@ def _transmitted(plan: ReflectionPlan, times: list[ElementTimes], emissions: Int
     whole = joined(times)
     which = plan.emitters[emissions]
     of_emitters = ElementTimes(whole.place[which], whole.slowness[which])
-    return times_between(of_emitters, plan.spacing, plan.elements[plan.receivers])
+    return times_between(of_emitters, plan.spacing, plan.elements[plan.receivers] / plan.spacing)

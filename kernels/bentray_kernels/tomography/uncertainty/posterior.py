@@ -60,7 +60,7 @@ class Posterior:
         """
         into = np.zeros((self.deviation.size, LANES))
         for block, weight, values in zip(self.parts, self.weights, noise, strict=True):
-            back_projections(block.pointers, block.columns, block.lengths, weight[:, None] * values, into)
+            back_projections(block.matrix, weight[:, None] * values, into)
         with map_halves(self.parts) as spread:
             return self._image(self._solved(prior + self._coefficients(into), spread))
 
@@ -145,5 +145,5 @@ class Posterior:
 def _products(probes: Floats, half: Sequence[Rows], weights: Sequence[Floats]) -> Floats:
     into = np.zeros_like(probes)
     for block, weight in zip(half, weights, strict=True):
-        normal_products(block.pointers, block.columns, block.lengths, weight, probes, into)
+        normal_products(block.matrix, weight, probes, into)
     return into

@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats
 from ...compilation.compiled import kernel
+from ..gauss_newton.ray_matrix import RayMatrix
 
 # Probes of one product; a constant, so that the innermost loops are vectorised.
 LANES = 8
 
 
 @kernel
-def normal_products(
-    pointers: Ints,
-    columns: NDArray[np.int32],
-    lengths: NDArray[np.float32],
-    weights: Floats,
-    probes: Floats,
-    into: Floats,
-) -> None:
+def normal_products(matrix: RayMatrix, weights: Floats, probes: Floats, into: Floats) -> None:
     """Add Aᵀ·W·A·probe to ``into`` for each probe.
 
     Args:
-        pointers, columns, lengths: the matrix A; see ``gauss_newton.linearisation.Rows``.
+        matrix: A.
         weights: (rays,), the diagonal of W.
         probes: (nodes, LANES); into: the same shape.
     """
+    pointers, columns, lengths = matrix
     sums = np.empty(LANES)
     for row in range(len(pointers) - 1):
         first, last = np.uint64(pointers[row]), np.uint64(pointers[row + 1])
@@ -46,19 +40,14 @@ def normal_products(
 
 
 @kernel
-def back_projections(
-    pointers: Ints,
-    columns: NDArray[np.int32],
-    lengths: NDArray[np.float32],
-    values: Floats,
-    into: Floats,
-) -> None:
+def back_projections(matrix: RayMatrix, values: Floats, into: Floats) -> None:
     """Add Aᵀ·values to ``into`` for each probe.
 
     Args:
-        pointers, columns, lengths: as ``normal_products`` takes them.
+        matrix: A.
         values: (rays, LANES); into: (nodes, LANES).
     """
+    pointers, columns, lengths = matrix
     for row in range(len(pointers) - 1):
         for k in range(np.uint64(pointers[row]), np.uint64(pointers[row + 1])):
             node, length = np.uint32(columns[k]), lengths[k]

@@ -73,12 +73,6 @@ def half_plans_after(
     return half_plans(plan, [plan.bands[k] for k in ran]), before
 
 
-def last_band(plan: WaveSettings, ends: Sequence[BandEnd]) -> Band:
-    """The last band of the speed that was inverted."""
-    ran = [band for band, end in zip(plan.bands, ends, strict=True) if end.history and band.of == "speed"]
-    return ran[-1]
-
-
 def deviation(image: Image, halves: Sequence[Image], width_m: float) -> Floats:
     """Standard deviation of each node, (nx, ny), m/s.
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ..attenuation import EXPERIMENTAL
 from ..cautions import bound_cautions
 from ..numerics import recorded
@@ -29,6 +29,9 @@ from .waveform_settings import WaveSettings
 # ``auto`` gives the refined image if its misfit of held-out emitters is below this part of that before.
 # Set on the scans of README, which therefore do not judge it.
 CLEARLY = 0.92
+
+# Spacing, origin and shape of an image.
+Grid = tuple[float, tuple[float, float], tuple[int, ...]]
 
 
 class Refinement:
@@ -72,7 +75,7 @@ class Refinement:
             run_graphs(graphs[-1:], made, self._of_image * (len(images) - 1 - index) + after)
             made += graphs[-1].total
             history = graphs[-1].history
-        if self._settings.method == "auto" and not predicts_better(graphs):
+        if self._settings.method == "auto" and not misfit_ratio(graphs) < CLEARLY:
             summary = _summary(rays, self._plan, graphs)
             summary += "; not clearly better, so the image of the rays is given"
             return replace(rays, history=history, provenance={**rays.provenance, "waveform": summary})
@@ -100,16 +103,14 @@ class Refinement:
             for number, run in enumerate(runs):
                 run_graphs([run], made, self._of_halves // 2 * (2 * (len(images) - index) - 1 - number))
                 made += run.total
-            band = half_runs.last_band(self._plan, graph.ends)
-            widths.append(half_runs.WIDTH_WAVES * self._water_mps / band.high_hz)
+            widths.append(half_runs.WIDTH_WAVES * self._water_mps / plans[0].bands[-1].high_hz)
             deviation = half_runs.deviation(graph.image, [run.image for run in runs], widths[-1])
             spread.append(
                 replace(graph.image, speed=np.where(graph.image.speed != self._water_mps, deviation, 0.0))
             )
         grid = result.spacing_m[0], (result.origin_m[0], result.origin_m[1]), result.speed.shape[:2]
-        speeds = [image.speed if _grid(image) == grid else resampled(image, *grid) for image in spread]
-        stacked = np.ascontiguousarray(np.stack(speeds, axis=-1)) if result.speed.ndim == 3 else speeds[0]
-        return replace(result, uncertainty=stacked, resolution_width_m=tuple(widths))
+        deviations = _stacked(spread, grid, result.speed.ndim)
+        return replace(result, uncertainty=deviations, resolution_width_m=tuple(widths))
 
     @property
     def passes(self) -> int:
@@ -139,11 +140,10 @@ class Refinement:
         finest = min(images, key=lambda image: image.spacing)
         grid = _grid(finest)
 
-        def stacked(images: Sequence[Image]) -> NDArray[np.float64]:
-            speeds = [image.speed if _grid(image) == grid else resampled(image, *grid) for image in images]
-            return np.ascontiguousarray(np.stack(speeds, axis=-1)) if rays.speed.ndim == 3 else speeds[0]
+        def stacked(images: Sequence[Image]) -> Floats:
+            return _stacked(images, grid, rays.speed.ndim)
 
-        def of_rays(values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+        def of_rays(values: Floats | None) -> Floats | None:
             return None if values is None else stacked(_slices(rays, values))
 
         attenuation = of_rays(rays.attenuation)
@@ -181,11 +181,6 @@ class Refinement:
         )
 
 
-def predicts_better(graphs: Sequence[RefinementGraph]) -> bool:
-    """Whether refinement has clearly reduced the misfit of held-out emitters."""
-    return misfit_ratio(graphs) < CLEARLY
-
-
 def misfit_ratio(graphs: Sequence[RefinementGraph]) -> float:
     """Misfit of held-out emitters after refinement over that before, averaged over slices.
 
@@ -202,12 +197,18 @@ def misfit_ratio(graphs: Sequence[RefinementGraph]) -> float:
     return sum(gains) / len(gains)
 
 
-def _grid(image: Image) -> tuple[float, tuple[float, float], tuple[int, ...]]:
+def _grid(image: Image) -> Grid:
     """The grid of an image."""
     return image.spacing, image.origin, image.speed.shape
 
 
-def _slices(rays: Reconstruction, values: NDArray[np.float64]) -> list[Image]:
+def _stacked(images: Sequence[Image], grid: Grid, ndim: int) -> Floats:
+    """Images on one grid: (nx, ny, nz), or (nx, ny) of a single slice."""
+    speeds = [image.speed if _grid(image) == grid else resampled(image, *grid) for image in images]
+    return np.ascontiguousarray(np.stack(speeds, axis=-1)) if ndim == 3 else speeds[0]
+
+
+def _slices(rays: Reconstruction, values: Floats) -> list[Image]:
     """An array of a reconstruction as one image per slice."""
     origin = (rays.origin_m[0], rays.origin_m[1])
     slices = np.moveaxis(np.atleast_3d(values), -1, 0)

@@ -55,7 +55,7 @@ class RefinementGraph:
     ) -> None:
         self._scan, self._start = scan, start
         self._index, self._earlier, self._stage = index, earlier, stage
-        self._sizes = [band.evaluations(scan.settings().held_out) for band in scan.settings().bands]
+        self._sizes = [band.evaluations(scan.plan.held_out) for band in scan.plan.bands]
         self.ends: tuple[BandEnd, ...] = ()
         self._band: ActiveBand | None = None
         self._misfits: dict[int, Any] = {}
@@ -90,7 +90,7 @@ class RefinementGraph:
 
     def _passes(self, number: int, iterations: int, further: int = 0) -> int:
         """Emitter passes of a band that has finished some iterations, at most the planned ones."""
-        settings = self._scan.settings()
+        settings = self._scan.plan
         each = settings.bands[number].emitters + settings.held_out
         return min(each * iterations + min(further, each), self._sizes[number])
 
@@ -103,7 +103,7 @@ class RefinementGraph:
         records = list(self._earlier)
         for number, (history, over, skipped) in enumerate(bands):
             records += iteration_records(
-                self._scan.settings(),
+                self._scan.plan,
                 number,
                 history,
                 self._index,
@@ -164,7 +164,7 @@ class RefinementGraph:
             grid = self._band.spacing, self._band.origin
             image, curvature = self._after_band(Image(result.image, *grid)), None
             if self._of == "speed" and len(result.steps):
-                high_hz = self._scan.settings().bands[self.number].high_hz
+                high_hz = self._scan.plan.bands[self.number].high_hz
                 curvature = Curvature(result.steps, result.changes, *grid, high_hz)
             self.ends = (*self.ends, BandEnd(image, result.skipped, result.history, curvature))
             self._band = None
@@ -175,12 +175,12 @@ class RefinementGraph:
 
     @property
     def _emitters_of_a_task(self) -> int:
-        return EMITTERS_OF_A_TASK[self._scan.settings().engine]
+        return EMITTERS_OF_A_TASK[self._scan.plan.engine]
 
     @property
     def _of(self) -> Unknown:
         """The unknown of the active band."""
-        return self._scan.settings().bands[self.number].of
+        return self._scan.plan.bands[self.number].of
 
     def _after_band(self, result: Image) -> Image:
         """The image after a band: its speed, or the previous image with its attenuation."""
@@ -205,11 +205,11 @@ def start_band(
     problem = scan.problem(number)
     if problem.water_correlation < MIN_WATER_CORRELATION:
         return None
-    count, models = len(band_inversion.emitters(problem)), starting_models(image, problem, scan.settings())
+    count, models = len(band_inversion.emitters(problem)), starting_models(image, problem, scan.plan)
     start = models[0]
     if len(models) > 1 and problem.held.size:
         # A task that starts a band has no device.
-        here = replace(scan.settings(), engine="compiled")
+        here = replace(scan.plan, engine="compiled")
         start = min(models, key=lambda model: held_out_misfit(problem, here, model))
     grid = problem.band.spacing_m, problem.origin
     if problem.band.of == "speed":
@@ -226,14 +226,14 @@ def evaluate_emitter(scan: WaveScan, number: int, model: Model, first: int, coun
     """Task: misfit and gradient of some emitters, by their places among the band's emitters."""
     problem = scan.problem(number)
     emitters = band_inversion.emitters(problem)[first : first + count]
-    return band_inversion.evaluate(problem, scan.settings(), model, emitters)
+    return band_inversion.evaluate(problem, scan.plan, model, emitters)
 
 
 def update_image(
     scan: WaveScan, number: int, state: InversionState, misfits: list[EmitterMisfit]
 ) -> InversionState:
     """Task: the next image."""
-    return band_inversion.step(scan.problem(number), scan.settings(), state, misfits)
+    return band_inversion.step(scan.problem(number), scan.plan, state, misfits)
 
 
 def starting_models(image: Image, problem: WaveProblem, settings: WaveSettings) -> list[Model]:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ...acquisition.emissions import Emissions
 from ...arrays import Floats, Ints
-from ...wave.simulation import simulate
 from .misfits import correlation
 from .trace_resampling import Water, resampler
 from .water_phase import MIN_PAIRS, fit_water
@@ -53,10 +52,7 @@ def with_calibrated_source(problem: WaveProblem, shots: WaterShots) -> WaveProbl
     valid = valid[np.argsort(distance[valid], kind="stable")]
     if valid.size < MIN_PAIRS:
         return best
-    medium = problem.medium(np.full(problem.region.shape, problem.water.speed))
-    model = simulate(
-        medium, problem.emitters[shot], problem.receivers[valid], best.wavelet, poll=problem.poll
-    )
+    model = problem.simulated(problem.in_water(problem.water.speed), shot, valid, best.wavelet)
     recorded = np.asarray(shots.traces[shot][valid] @ best.sampler, dtype=np.float64)
     water = fit_water(problem.water, distance[valid], model, recorded, problem.clock.step_s)
     if max(abs(water.lead + water.bend * f**2) for f in (band.low_hz, band.high_hz)) > FARTHEST:
@@ -71,14 +67,12 @@ def with_normalised_amplitudes(problem: WaveProblem, shots: WaterShots) -> WaveP
     In water the amplitude is a smooth function of the distance, fitted to a few simulated shots. The
     sensitivities of the elements, which differ from pair to pair, are so divided out of the object traces.
     """
-    medium = problem.medium(np.full(problem.region.shape, problem.water.speed))
+    medium = problem.in_water(problem.water.speed)
     distance = np.linalg.norm(problem.emitters[:, None] - problem.receivers[None], axis=-1)
     apart, size = [], []
     for emitter in calibration_emitters(problem):
         valid = problem.valid_receivers(emitter)
-        model = simulate(
-            medium, problem.emitters[emitter], problem.receivers[valid], problem.wavelet, poll=problem.poll
-        )
+        model = problem.simulated(medium, emitter, valid, problem.wavelet)
         apart.append(distance[emitter][valid])
         size.append(_energy(problem, shots, emitter, valid, model))
     curve = np.polynomial.Polynomial.fit(
@@ -117,15 +111,10 @@ def _with_wavelet(problem: WaveProblem, shots: WaterShots, water: Water) -> Wave
     ahead = int(-problem.clock.begin_s / (samples[1] - samples[0])) + 1
     impulse[min(samples.size // 2, max(ahead, 0))] = 1.0
     pulse = impulse @ sampler.astype(np.float64)
-    medium = problem.medium(np.full(problem.region.shape, water.speed))
-    emitters = calibration_emitters(problem)
-
-    readings = []
-    for emitter in emitters:
+    medium, readings = problem.in_water(water.speed), []
+    for emitter in calibration_emitters(problem):
         valid = problem.valid_receivers(emitter)
-        model = simulate(
-            medium, problem.emitters[emitter], problem.receivers[valid], pulse, poll=problem.poll
-        )
+        model = problem.simulated(medium, emitter, valid, pulse)
         recorded = shots.gain[emitter][valid][:, None] * (shots.traces[emitter][valid] @ sampler)
         window = problem.window(emitter, valid, shots.reach_s)
         readings.append((model, np.asarray(recorded, dtype=np.float64), window))

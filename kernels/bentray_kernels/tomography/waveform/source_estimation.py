@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats
-from ...wave.simulation import simulate
 from .source_calibration import calibration_emitters
 from .waveform_problem import WaveProblem
 from .wavelet import fit_wavelet
@@ -26,9 +25,7 @@ def estimate_source(problem: WaveProblem, speed: Floats, window_s: tuple[float, 
     pairs = []
     for emitter in calibration_emitters(problem):
         valid = problem.valid_receivers(emitter)
-        model = simulate(
-            medium, problem.emitters[emitter], problem.receivers[valid], problem.wavelet, poll=problem.poll
-        )
+        model = problem.simulated(medium, emitter, valid, problem.wavelet)
         window = problem.window(emitter, valid, window_s)
         simulated, recorded = window * model, window * problem.recorded(emitter, valid)
         energies = [(traces**2).sum(axis=1, keepdims=True) for traces in (simulated, recorded)]

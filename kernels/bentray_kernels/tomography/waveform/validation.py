@@ -62,7 +62,7 @@ class ValidationGraph:
         self._scan, self._image = scan, image
         self.history = history
         self.checkpoint = ValidationCheckpoint(None)
-        self.total = evaluations(scan.settings())
+        self.total = evaluations(scan.plan)
 
     @property
     def done(self) -> int:
@@ -101,7 +101,7 @@ def evaluations(settings: WaveSettings) -> int:
 
 def validate_image(scan: WaveScan, image: Image) -> Validation:
     """Task: the misfits of an image."""
-    settings, problem = scan.settings(), scan.problem(0)
+    settings, problem = scan.plan, scan.problem(0)
     if problem.water_correlation < MIN_VALID_CORRELATION or not problem.held.size:
         return Validation()
     models = starting_models(image, problem, settings)

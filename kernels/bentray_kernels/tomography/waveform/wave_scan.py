@@ -11,15 +11,11 @@ from .waveform_settings import WaveSettings
 
 
 class WaveScan(NamedTuple):
-    """The problems of one slice; it is sent with tasks."""
+    """The problems of one slice with the settings of its refinement; it is sent with tasks."""
 
     source: Source
     plan: WaveSettings
     slice: int = 0
-
-    def settings(self) -> WaveSettings:
-        """Settings of the refinement."""
-        return self.plan
 
     def problem(self, number: int) -> WaveProblem:
         """The problem of a band, from 0; made once in a process."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Flags, Floats, Ints
 from ...wave.medium import Medium
+from ...wave.simulation import simulate
 from ...wave.stencil import OPTIMISED
 from ...wave.time_blocks import Poll, no_poll
 from .misfits import arrival_window
@@ -70,6 +71,15 @@ class WaveProblem:
         return Medium.from_speed(
             speed, self.band.spacing_m, self.clock.step_s, attenuation=attenuation, order=OPTIMISED
         )
+
+    def in_water(self, speed_mps: float) -> Medium:
+        """Water of this speed on this grid."""
+        return self.medium(np.full(self.region.shape, speed_mps))
+
+    def simulated(self, medium: Medium, emitter: int, receivers: Ints, wavelet: Floats) -> Floats:
+        """Traces of some receivers in a medium, (receivers, steps)."""
+        where = self.emitters[emitter], self.receivers[receivers]
+        return simulate(medium, *where, wavelet, poll=self.poll)
 
     def recorded(self, emitter: int, receivers: Ints) -> Floats:
         """Traces of some receivers, resampled to the simulator's time steps, (receivers, steps)."""

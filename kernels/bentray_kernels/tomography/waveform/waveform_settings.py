@@ -6,7 +6,7 @@ from dataclasses import MISSING, dataclass
 from typing import Literal, NamedTuple
 
 from ...errors import InvalidInput
-from ...requests.limits import SPACING_M, SPEED_MPS
+from ...requests.limits import SPACING_M, SPEED_MPS, check_speeds
 from ...requests.ranges import SEED, Range, check_ranges, ranged
 from ...wave.emissions import Engine
 from ...wave.simulation import Unknown
@@ -141,12 +141,7 @@ class WaveSettings:
         if not self.bands:
             raise InvalidInput("bands", "none", "at least one band")
         check_ranges(self)
-        low, high = self.speed_bounds_mps
-        least, most = SPEED_MPS.least, SPEED_MPS.most
-        if not least <= low < high <= most:
-            raise InvalidInput(
-                "speed_bounds_mps", self.speed_bounds_mps, f"{least:g} <= lowest < highest <= {most:g} m/s"
-            )
+        check_speeds("speed_bounds_mps", self.speed_bounds_mps)
         for end in self.window_s:
             WINDOW_S.check("window_s", end)
 

@@ -127,7 +127,7 @@ def test_speed_and_delay_are_those_of_the_water(radius_m, position, off, speed_m
     inside = chords_m(BARE, radius_m, centre)
     arrival = delay_s + BARE.distance_m() / water_mps + inside * (1.0 / speed_mps - 1.0 / water_mps)
     arrival += 0.01 * PERIOD_S * np.random.default_rng(seed).standard_normal(arrival.shape)
-    chords = find_water_chords(BARE, arrival, PERIOD_S)
+    chords = find_water_chords(BARE, arrival)
     assert chords.speed_mps == pytest.approx(water_mps, abs=2.0)
     assert chords.delay_s == pytest.approx(delay_s, abs=0.03 * PERIOD_S)
     # A chord that only grazes the disc is as good as water.
@@ -141,7 +141,7 @@ def test_an_object_that_fills_the_ring_leaves_no_chord():
     with pytest.raises(
         InvalidInput, match=r"waveform/water: found no traces, and \d+ chords.*accepted: a scan"
     ):
-        find_water_chords(BARE, arrival, PERIOD_S)
+        find_water_chords(BARE, arrival)
 
 
 @pytest.mark.parametrize("count", [0, 20])
@@ -149,13 +149,13 @@ def test_too_few_arrivals_are_rejected(count):
     arrival = BARE.distance_m() / WATER_MPS
     arrival.ravel()[count:] = np.nan
     with pytest.raises(InvalidInput, match="waveform/water"):
-        find_water_chords(BARE, arrival, PERIOD_S)
+        find_water_chords(BARE, arrival)
 
 
 def test_invalid_pairs_are_not_used():
     arrival = BARE.distance_m() / WATER_MPS
     valid = np.random.default_rng(1).random(arrival.shape) < 0.7
-    chords = find_water_chords(replace(BARE, valid=valid), arrival, PERIOD_S)
+    chords = find_water_chords(replace(BARE, valid=valid), arrival)
     assert not (chords.pairs & ~valid).any()
     assert chords.pairs.sum() > 0.5 * valid.sum()
 
@@ -171,7 +171,7 @@ def test_chords_nearer_than_a_few_wavelengths_are_not_used_and_all_others_may_be
     distance = BARE.distance_m()
     for period_s in (PERIOD_S, 10.0 * PERIOD_S):
         limits = NEAREST * WATER_MPS * period_s, NEAREST_PART * distance.max()
-        chords = find_water_chords(BARE, distance / WATER_MPS, period_s)
+        chords = find_water_chords(replace(BARE, center_frequency_hz=1.0 / period_s), distance / WATER_MPS)
         assert (chords.pairs == (distance > min(limits))).all()
 
 
@@ -180,6 +180,6 @@ def test_the_outermost_chords_show_the_line_where_most_chords_cross_the_object(p
     """The line through most arrivals is that of the object; no outermost chord lies on it."""
     inside = chords_m(BARE, part * RADIUS_M, (0.0, 0.0))
     arrival = BARE.distance_m() / WATER_MPS + inside * (1.0 / speed_mps - 1.0 / WATER_MPS)
-    chords = find_water_chords(BARE, arrival, PERIOD_S)
+    chords = find_water_chords(BARE, arrival)
     assert chords.speed_mps == pytest.approx(WATER_MPS, abs=0.1)
     assert not inside[chords.pairs].any()

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition.simulation import array_shapes
-from bentray_kernels.acquisition.simulation.attenuation_line_integrals import log_ratios
-from bentray_kernels.acquisition.simulation.fine_medium import FineMedium, read
+from bentray_kernels.acquisition.simulation.fine_medium import FineMedium, log_ratios, read
 from bentray_kernels.acquisition.simulation.ring_scan import Ring, TravelTimeScan
 from bentray_kernels.eikonal import solve
 from bentray_kernels.errors import InvalidInput

@@ -143,7 +143,8 @@ def test_ringing_after_the_pulse_is_taken_from_the_water_shot(inner):
     speed = np.where(np.hypot(line[:, None], line[None]) < 0.015, inner, WATER)
     spacing = line[1] - line[0]
     direct = np.linalg.norm(elements[:, None] - elements[None], axis=-1) / WATER
-    arrival = times_between(solve_times(speed, spacing, elements - corner), spacing, elements - corner)
+    inside = elements - corner
+    arrival = times_between(solve_times(speed, spacing, inside), spacing, inside / spacing)
     energy = []
     for water in (None, 0.5 * with_ringing(direct)):
         dataset = scan(waveform=Waveform(with_ringing(arrival).astype(np.float32), water))

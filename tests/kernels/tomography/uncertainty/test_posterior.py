@@ -9,6 +9,7 @@ from scipy.sparse import random_array
 from bentray_kernels.tomography.finite_frequency import blurred
 from bentray_kernels.tomography.gauss_newton import linearisation
 from bentray_kernels.tomography.gauss_newton.linearisation import Rows
+from bentray_kernels.tomography.gauss_newton.ray_matrix import RayMatrix
 from bentray_kernels.tomography.uncertainty import posterior as module
 from bentray_kernels.tomography.uncertainty.posterior import Posterior
 from bentray_kernels.tomography.uncertainty.probe_product import LANES, back_projections, normal_products
@@ -101,12 +102,12 @@ def test_products_equal_those_of_the_dense_matrix():
     matrix = random_array((30, 50), density=0.2, rng=random, format="csr")
     lengths = matrix.data.astype(np.float32)
     dense = matrix.toarray().astype(np.float32).astype(float)
-    rows = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int32), lengths
+    rows = RayMatrix(matrix.indptr.astype(np.int64), matrix.indices.astype(np.int32), lengths)
     weights = random.uniform(0.5, 2.0, 30)
     probes, begun = random.standard_normal((50, LANES)), random.standard_normal((50, LANES))
     into = begun.copy()
-    normal_products(*rows, weights, probes, into)
+    normal_products(rows, weights, probes, into)
     assert np.allclose(into, begun + dense.T @ (weights[:, None] * (dense @ probes)), rtol=1e-12)
     values, into = random.standard_normal((30, LANES)), begun.copy()
-    back_projections(*rows, values, into)
+    back_projections(rows, values, into)
     assert np.allclose(into, begun + dense.T @ values, rtol=1e-12)

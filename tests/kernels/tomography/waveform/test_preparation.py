@@ -188,8 +188,7 @@ def test_a_band_begins_with_it_where_the_settings_say_so(truth, spoiled):
     settings = replace(ONE_BAND, estimates_source=True)
 
     class Scan:
-        def settings(self):
-            return settings
+        plan = settings
 
         def problem(self, number):
             return spoiled[1]

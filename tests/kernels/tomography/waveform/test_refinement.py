@@ -11,7 +11,7 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Candidate, Settings, reconstruct
 from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.inversion_state import BandEnd, Image
-from bentray_kernels.tomography.waveform.refinement import _band_note, predicts_better
+from bentray_kernels.tomography.waveform.refinement import CLEARLY, _band_note, misfit_ratio
 from bentray_kernels.tomography.waveform.validation import Validation
 from bentray_kernels.tomography.waveform.waveform_cost import advice
 
@@ -120,8 +120,8 @@ def test_improvements_of_bands_multiply(held, expected):
     for before, after in held:
         passes = (Evaluation(1.0, before, accepted=True), Evaluation(0.5, after, accepted=True))
         ends.append(BandEnd(image, skipped=False, history=passes))
-    assert predicts_better([SimpleNamespace(ends=ends)]) is expected
-    assert not predicts_better([SimpleNamespace(ends=ends[:1])])
+    assert (misfit_ratio([SimpleNamespace(ends=ends)]) < CLEARLY) is expected
+    assert misfit_ratio([SimpleNamespace(ends=ends[:1])]) >= CLEARLY
 
 
 def test_the_note_of_a_band_counts_slices_where_there_are_several():

@@ -70,7 +70,7 @@ def test_no_report_where_water_shots_cannot_be_simulated():
 
 
 def test_few_emitters_are_read(heard):
-    plan = heard.settings()
+    plan = heard.plan
     assert evaluations(plan) == SHOTS + plan.held_out
     assert len(heard.problem(0).traces) == evaluations(plan)
     assert [band.of for band in plan.bands] == ["speed"]
