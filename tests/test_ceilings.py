@@ -41,7 +41,7 @@ LONG_FUNCTIONS = {
     "bench.py bench": "options of a command are its parameters",
     "submit.py submit": "options of a command are its parameters",
     "worker.py worker": "options of a command are its parameters",
-    "volume_data.py volume_data": "parameters of a route with their descriptions",
+    "volumes.py volume_data": "parameters of a route with their descriptions",
     "result_summary.py result_summary": "fields of one record, in its order",
     "planning.py plan": "checks and lanes in the order in which a plan is refused",
 }

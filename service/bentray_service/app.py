@@ -49,7 +49,6 @@ from .routes import (
     health,
     jobs,
     meshes,
-    names,
     pages,
     projects,
     sign_in,
@@ -139,22 +138,23 @@ def _routes() -> tuple[BaseRoute, ...]:
     FastAPI reads the signatures of their functions again for every application that includes a router itself.
     """
     router = APIRouter(responses=errors.problems("default"))
-    for part in (
-        tus,
-        direct_uploads,
-        datasets,
-        jobs,
-        batches,
-        names,
-        events,
-        volumes,
-        meshes,
-        geometry_fields,
-        access,
-        projects,
+    for protected in (
+        tus.router,
+        direct_uploads.router,
+        datasets.router,
+        jobs.router,
+        batches.router,
+        datasets.changes_router,
+        events.router,
+        volumes.router,
+        meshes.router,
+        geometry_fields.router,
+        access.router,
+        projects.router,
+        jobs.plans_router,
+        health.metrics_router,
+        health.cluster_router,
     ):
-        router.include_router(part.router, **CLOSED)
-    for protected in (jobs.plans_router, health.metrics_router, health.cluster_router):
         router.include_router(protected, **CLOSED)
     for public in (health, pages, sign_in):
         router.include_router(public.router)

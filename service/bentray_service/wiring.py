@@ -1,11 +1,9 @@
-"""Three records of what a running service consists of, and the dependencies that give them to routes."""
+"""Three records of what a running service consists of, and the context that gives them to routes."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Annotated, TypeVar, cast
+from typing import Annotated, cast
 
 from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
@@ -26,7 +24,7 @@ from .readiness import Readiness
 from .rows.batches import Batches
 from .rows.database import Database
 from .rows.ids import Tenant
-from .rows.jobs import Jobs
+from .rows.jobs import Jobs, Submission
 from .rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
 from .rows.tables import DatasetRow, FieldRow, VolumeRow
 from .settings import ServiceSettings
@@ -71,67 +69,53 @@ class AccessParts:
     audit: Audit
 
 
-def background_of(request: Request) -> BackgroundParts:
-    """Make the parts that work beside the requests."""
-    return cast(BackgroundParts, request.app.state.background)
-
-
 def access_of(scope: Scope) -> AccessParts:
-    """Make the parts that decide on a request."""
+    """The parts that decide on a request."""
     return cast(AccessParts, scope["app"].state.access)
 
 
-def caller_of(request: Request) -> Caller:
-    """The authenticated caller of a request."""
-    return cast(Caller, request.state.caller)
+@dataclass(frozen=True)
+class RequestContext:
+    """What a route works with: its request, the caller, and the parts of the service."""
+
+    request: Request
+    caller: Caller
+    stores: StoreParts
+    background: BackgroundParts
+    access: AccessParts
+
+    @property
+    def tenant(self) -> Tenant:
+        """The tenant of the caller, for queries."""
+        return self.caller.tenant
+
+    # Routes find items themselves, so that wrong parameters are named before an unknown id.
+    async def dataset(self, dataset_id: str) -> DatasetRow:
+        """Find the scan that a path names."""
+        return await run_in_threadpool(self.stores.datasets.get, self.tenant, dataset_id)
+
+    async def volume(self, volume_id: str) -> VolumeRow:
+        """Find the volume that a path names."""
+        return await run_in_threadpool(self.stores.volumes.get, self.tenant, volume_id)
+
+    async def field(self, field_id: str) -> FieldRow:
+        """Find the geometry field that a path names."""
+        return await run_in_threadpool(self.stores.geometry_fields.get, self.tenant, field_id)
+
+    def check_render(self, share: float = 1.0) -> None:
+        """Check the rate limit of the caller, see ``SignIn.check_render``."""
+        self.access.sign_in.check_render(self.caller, share)
+
+    def submission(self, idempotency_key: str | None, webhook: str | None) -> Submission:
+        """Properties of the jobs that the request starts."""
+        limits = self.stores.quota.most_bytes, self.access.settings.max_queued_jobs
+        return Submission(*limits, idempotency_key, self.caller.who, webhook)
 
 
-# Coroutines, since FastAPI runs plain functions in the thread pool.
-async def _stores(request: Request) -> StoreParts:
-    return cast(StoreParts, request.app.state.stores)
+# A coroutine, since FastAPI runs plain functions in the thread pool.
+async def _context(request: Request) -> RequestContext:
+    state = request.app.state
+    return RequestContext(request, request.state.caller, state.stores, state.background, state.access)
 
 
-async def _background(request: Request) -> BackgroundParts:
-    return background_of(request)
-
-
-async def _access(request: Request) -> AccessParts:
-    return access_of(request.scope)
-
-
-async def _caller(request: Request) -> Caller:
-    return caller_of(request)
-
-
-async def _tenant(request: Request) -> Tenant:
-    return caller_of(request).tenant
-
-
-Stores = Annotated[StoreParts, Depends(_stores)]
-Background = Annotated[BackgroundParts, Depends(_background)]
-Access = Annotated[AccessParts, Depends(_access)]
-CurrentCaller = Annotated[Caller, Depends(_caller)]
-# The tenant of the caller, for queries.
-CallerTenant = Annotated[Tenant, Depends(_tenant)]
-
-
-Row = TypeVar("Row", DatasetRow, FieldRow, VolumeRow)
-# Finds the item that a path names; routes await it, so that wrong parameters are named before an unknown id.
-Find = Callable[[], Awaitable[Row]]
-
-
-async def _dataset(dataset_id: str, stores: Stores, tenant: CallerTenant) -> Find[DatasetRow]:
-    return partial(run_in_threadpool, stores.datasets.get, tenant, dataset_id)
-
-
-async def _volume(volume_id: str, stores: Stores, tenant: CallerTenant) -> Find[VolumeRow]:
-    return partial(run_in_threadpool, stores.volumes.get, tenant, volume_id)
-
-
-async def _field(field_id: str, stores: Stores, tenant: CallerTenant) -> Find[FieldRow]:
-    return partial(run_in_threadpool, stores.geometry_fields.get, tenant, field_id)
-
-
-FindDataset = Annotated[Find[DatasetRow], Depends(_dataset)]
-FindVolume = Annotated[Find[VolumeRow], Depends(_volume)]
-FindField = Annotated[Find[FieldRow], Depends(_field)]
+Context = Annotated[RequestContext, Depends(_context)]

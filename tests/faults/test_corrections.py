@@ -19,7 +19,7 @@ CORRECTION = {"frequency_hz": 500000}
 KILL = "import os, signal\ndef killed(*_, **__):\n    os.kill(os.getpid(), signal.SIGKILL)\n"
 FILE_IS_MOVED = f"{KILL}from bentray_service.files.store import Store\nStore.publish = killed\n"
 ROW_IS_DUE = f"{KILL}from bentray_service.rows.stored_tables import Datasets\nDatasets.add = killed\n"
-ANSWER_IS_DUE = f"{KILL}from bentray_service.routes import names\nnames.dataset_record = killed\n"
+ANSWER_IS_DUE = f"{KILL}from bentray_service.routes import datasets\ndatasets.dataset_record = killed\n"
 
 
 def corrected(service, here):

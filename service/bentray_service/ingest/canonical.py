@@ -10,7 +10,6 @@ from typing import Any
 from ..errors import KeyReused
 from ..files.disk import digest_of
 from ..files.tenant_files import TenantFiles
-from ..rows.ids import Tenant
 from ..rows.stored_tables import Datasets, RequestKey
 from ..rows.tables import DatasetRow
 from .ingest_process import CORRECTION, FILE_NAME
@@ -90,7 +89,6 @@ LONGEST_NAME, LONGEST_NOTES = 200, 4000
 
 
 def add_corrected(
-    tenant: Tenant,
     scan: DatasetRow,
     correction: Mapping[str, Any],
     request: RequestKey,
@@ -103,7 +101,6 @@ def add_corrected(
     """Write the corrected copy of a scan in a separate process, as for an upload, and insert its row.
 
     Args:
-        tenant: owner of both.
         scan: stored; neither its row nor its file is changed, since its results were made of them.
         correction: arguments of ``Correction``.
         request: an equal one that was faster keeps its copy, and there is no other.
@@ -126,9 +123,11 @@ def add_corrected(
         "notes": "\n".join(part for part in (statement, scan.notes) if part)[:LONGEST_NOTES],
         "water_temperature_c": scan.water_temperature_c,
     }
-    size, digest = path.stat().st_size, digest_of(path).sha256
+    size, sha256 = digest_of(path)
     try:
-        made = datasets.add_once(tenant, new_id, request, size=size, sha256=digest, summary=summary | own)
+        made = datasets.add_once(
+            scan.tenant, new_id, request, size=size, sha256=sha256, summary=summary | own
+        )
     except KeyReused:
         files.remove([new_id])
         raise

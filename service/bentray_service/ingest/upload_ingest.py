@@ -49,6 +49,9 @@ class UploadIngest:
     """Submits complete uploads to the ingest queue, oldest first, with a limit for each account.
 
     Uploads that a dead service was reading are read again.
+
+    Attributes:
+        limits: of an ingest process.
     """
 
     def __init__(
@@ -67,7 +70,6 @@ class UploadIngest:
         uploads: the table of uploads.
         files: the data folder.
         stores: tables of the results by type.
-        limits: of an ingest process.
         keep_s: how long the row of a completed upload is kept, s.
         queue: the ingest queue.
         accounts: whose queued uploads are counted.
@@ -79,7 +81,7 @@ class UploadIngest:
         self._direct = direct
         self._files = files
         self._stores = stores
-        self._limits = limits
+        self.limits = limits
         self._keep_s = keep_s
         self._accounts = accounts
         self._quota = quota
@@ -214,7 +216,7 @@ class UploadIngest:
                 path,
                 row.result_id,
                 files,
-                self._limits,
+                self.limits,
                 row.given,
                 partial(self._quota.resize, tenant, row.result_id),
                 partial(self._started, row.id),

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from ..rows.keys import Keys
 from ..rows.usage import StoredKind, usage_by_kind
 from ..web.errors import problems
-from ..wiring import Access, CurrentCaller, Stores
+from ..wiring import Context
 
 router = APIRouter(prefix="/v1/access", tags=["access"])
 
@@ -79,10 +79,10 @@ class OwnKeyList(BaseModel):
 
 
 @router.get("", responses=problems(503))
-def show_access(stores: Stores, access: Access, caller: CurrentCaller) -> AccessRecord:
+def show_access(context: Context) -> AccessRecord:
     """Show the identity, permissions and storage usage of the caller."""
-    settings, limited = access.settings, caller.how != "open"
-    used = stores.quota.of(caller.tenant)
+    caller, settings = context.caller, context.access.settings
+    limited, used = caller.how != "open", context.stores.quota.of(caller.tenant)
     return AccessRecord(
         tenant=caller.home,
         project=caller.project or None,
@@ -99,17 +99,17 @@ def show_access(stores: Stores, access: Access, caller: CurrentCaller) -> Access
 
 
 @router.get("/storage", responses=problems(503))
-def show_storage(stores: Stores, access: Access, caller: CurrentCaller) -> StorageList:
+def show_storage(context: Context) -> StorageList:
     """Show the storage of the tenant by kind."""
-    found = usage_by_kind(stores.database, caller.tenant)
+    found = usage_by_kind(context.stores.database, context.tenant)
     return StorageList(
         storage=[StorageRecord.model_validate(one) for one in found],
-        bytes_most=access.settings.max_tenant_bytes,
+        bytes_most=context.access.settings.max_tenant_bytes,
     )
 
 
 @router.get("/keys", responses=problems(503))
-def list_keys(stores: Stores, caller: CurrentCaller) -> OwnKeyList:
+def list_keys(context: Context) -> OwnKeyList:
     """List the API keys of the tenant; `bentray keys` creates and revokes them."""
-    rows = Keys(stores.database).all(caller.home)
+    rows = Keys(context.stores.database).all(context.caller.home)
     return OwnKeyList(keys=[OwnKey.model_validate(row) for row in rows])

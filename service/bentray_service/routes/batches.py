@@ -13,10 +13,9 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import InUse
 from ..files.deletion import StoredItem
 from ..jobs.kinds import KINDS, ReconstructionRequest
-from ..rows.jobs import Submission
 from ..rows.tables import ENDED
 from ..web.errors import problems
-from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
+from ..wiring import Context
 from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types, answer_made
 from .models.batch_records import BatchList, BatchRecord, BatchRequest
 from .record_conversion import batch_record
@@ -47,26 +46,22 @@ router = APIRouter(prefix="/v1/batches", tags=["batches"], route_class=SmallBody
 def start_batch(
     batch_request: Annotated[BatchRequest, Body(openapi_examples=EXAMPLES)],
     response: Response,
-    stores: Stores,
-    background: Background,
-    access: Access,
-    caller: CurrentCaller,
+    context: Context,
     idempotency_key: IdempotencyKey = None,
 ) -> BatchRecord:
     """Queue one reconstruction for each dataset. All are stored before the response, or none."""
-    datasets, settings = batch_request.datasets, batch_request.settings
+    datasets, settings, background = batch_request.datasets, batch_request.settings, context.background
     if len(set(datasets)) < len(datasets):
         twice = next(one for one in datasets if datasets.count(one) > 1)
         raise InvalidInput("datasets", f"{twice[:80]} twice", "each dataset once")
     new = []
     for dataset in datasets:
         one = ReconstructionRequest(kind=KIND, dataset=dataset, settings=settings)
-        new.append(KINDS[KIND].plan(one, caller.tenant, stores, background.runner.compute))
-    webhook = batch_request.webhook
-    background.webhooks.check(caller.tenant, webhook)
-    limits = stores.quota.most_bytes, access.settings.max_queued_jobs
-    how = Submission(*limits, idempotency_key, caller.who, webhook)
-    row = stores.batches.add(caller.tenant, batch_request.name, settings.to_dict(), new, how)
+        new.append(KINDS[KIND].plan(one, context.tenant, context.stores, background.runner.compute))
+    background.webhooks.check(context.tenant, batch_request.webhook)
+    how = context.submission(idempotency_key, batch_request.webhook)
+    batches = context.stores.batches
+    row = batches.add(context.tenant, batch_request.name, settings.to_dict(), new, how)
     log.info("%s queued, %d jobs", row.id, row.size, extra={"figures": {"batch": row.id}})
     background.runner.notify(row.id)
     batch = batch_record(row)
@@ -75,32 +70,33 @@ def start_batch(
 
 
 @router.get("", responses=problems(422))
-def list_batches(stores: Stores, tenant: CallerTenant, limit: Limit = 100) -> BatchList:
+def list_batches(context: Context, limit: Limit = 100) -> BatchList:
     """List batches, newest first."""
-    return BatchList(batches=[batch_record(row) for row in stores.batches.newest(tenant, limit)])
+    rows = context.stores.batches.newest(context.tenant, limit)
+    return BatchList(batches=[batch_record(row) for row in rows])
 
 
 @router.get("/{batch_id}", responses=problems(404))
-def show_batch(batch_id: str, stores: Stores, tenant: CallerTenant) -> BatchRecord:
+def show_batch(batch_id: str, context: Context) -> BatchRecord:
     """Show one batch: state, progress and jobs."""
-    return batch_record(stores.batches.get(tenant, batch_id))
+    return batch_record(context.stores.batches.get(context.tenant, batch_id))
 
 
 @router.post("/{batch_id}/cancel", status_code=status.HTTP_202_ACCEPTED, responses=problems(404, 409))
-def cancel_batch(batch_id: str, stores: Stores, tenant: CallerTenant) -> BatchRecord:
+def cancel_batch(batch_id: str, context: Context) -> BatchRecord:
     """Cancel the jobs that have not ended; results of the others stay."""
-    return batch_record(stores.batches.request_cancel(tenant, batch_id))
+    return batch_record(context.stores.batches.request_cancel(context.tenant, batch_id))
 
 
 @router.delete("/{batch_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
-def delete_batch(batch_id: str, stores: Stores, tenant: CallerTenant) -> None:
+def delete_batch(batch_id: str, context: Context) -> None:
     """Delete a batch that has ended, with its jobs and their volumes; the scans stay.
 
     If the service dies in between, the remaining jobs keep the batch, and it can be deleted again.
     """
-    batch = stores.batches.get(tenant, batch_id)
+    batch = context.stores.batches.get(context.tenant, batch_id)
     busy = next((job for job in batch.jobs if job.state not in ENDED), None)
     if busy is not None:
         raise InUse("batch", f"{batch.id} with {busy.id} ({busy.state})", "a batch that has ended")
     for job in batch.jobs:
-        stores.deletion.delete(StoredItem(tenant, "job", job.id))
+        context.stores.deletion.delete(StoredItem(context.tenant, "job", job.id))

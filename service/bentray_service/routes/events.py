@@ -17,7 +17,7 @@ from ..jobs.feed import EventFeed, Watched, WatchedJob, WatchedTenant
 from ..rows.jobs import JobProgress
 from ..rows.tables import ENDED
 from ..web.errors import problems
-from ..wiring import Background, CallerTenant, Stores
+from ..wiring import Context
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -34,8 +34,7 @@ Seen = TypeVar("Seen", bound=Watched)
 
 @router.get("/events", response_class=StreamingResponse, responses={200: STREAM, **problems(404, 422, 429)})
 def all_events(
-    background: Background,
-    tenant: CallerTenant,
+    context: Context,
     seconds: Annotated[int, Query(ge=1, le=3600, description="The stream ends after this time, s.")] = 600,
 ) -> Response:
     """Stream the changes of all jobs: first one event for each unfinished job, then one for each change.
@@ -43,10 +42,8 @@ def all_events(
     A `job` event has the id, the state and the progress of a job. The limits are those of the events of one
     job.
     """
-    feed = background.feed
-    return _Stream(
-        lambda: feed.watch_tenant(tenant), lambda jobs: _of_tenant(feed, jobs, time.monotonic() + seconds)
-    )
+    feed, end = context.background.feed, time.monotonic() + seconds
+    return _Stream(lambda: feed.watch_tenant(context.tenant), lambda jobs: _of_tenant(feed, jobs, end))
 
 
 @router.get(
@@ -56,9 +53,7 @@ def all_events(
 )
 def job_events(
     job_id: str,
-    stores: Stores,
-    background: Background,
-    tenant: CallerTenant,
+    context: Context,
     last_event_id: Annotated[
         int, Header(ge=0, le=2**63 - 1, description="Only later events; set by browsers automatically.")
     ] = 0,
@@ -68,9 +63,9 @@ def job_events(
     `state` events are changes of state with increasing ids; `progress` events have no id. A tenant may have
     64 open streams; further ones are rejected with 429.
     """
-    stores.jobs.get(tenant, job_id)
-    feed = background.feed
-    return _Stream(lambda: feed.watch(tenant, job_id), lambda job: _of_job(feed, job, last_event_id))
+    context.stores.jobs.get(context.tenant, job_id)
+    feed = context.background.feed
+    return _Stream(lambda: feed.watch(context.tenant, job_id), lambda job: _of_job(feed, job, last_event_id))
 
 
 class _Stream(Response, Generic[Seen]):

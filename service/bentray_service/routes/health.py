@@ -8,8 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
 from ..errors import NotReady
+from ..readiness import Readiness
 from ..web.errors import problems
-from ..wiring import Background, CallerTenant, background_of
+from ..wiring import Context
 
 router = APIRouter(prefix="/health", tags=["health"])
 metrics_router = APIRouter(tags=["health"])
@@ -40,7 +41,8 @@ async def live() -> Alive:
 @router.get("/ready", responses=problems(503))
 async def ready(request: Request) -> Ready:
     """Readiness: whether uploads and jobs can be processed now; otherwise each fault is named."""
-    seen = await background_of(request).readiness.report()
+    readiness: Readiness = request.app.state.background.readiness
+    seen = await readiness.report()
     if seen.faults:
         raise NotReady(seen.faults)
     return Ready(workers=seen.workers, free_bytes=seen.free_bytes)
@@ -95,10 +97,11 @@ class ClusterRecord(BaseModel):
 
 
 @cluster_router.get("", responses=problems(503))
-async def show_cluster(background: Background, tenant: CallerTenant) -> ClusterRecord:
+async def show_cluster(context: Context) -> ClusterRecord:
     """Show the health of the workers and the lengths of the queues."""
-    workers = await run_in_threadpool(background.runner.compute.health)
-    lengths = await run_in_threadpool(background.runner.queue.lengths, tenant)
+    runner = context.background.runner
+    workers = await run_in_threadpool(runner.compute.health)
+    lengths = await run_in_threadpool(runner.queue.lengths, context.tenant)
     (queued, all_queued), (running, all_running) = lengths["queued"], lengths["running"]
     return ClusterRecord(
         workers=[WorkerRecord.model_validate(one) for one in workers],
@@ -107,6 +110,6 @@ async def show_cluster(background: Background, tenant: CallerTenant) -> ClusterR
             running=running,
             all_queued=all_queued,
             all_running=all_running,
-            waiting_images=background.pictures.waiting(tenant),
+            waiting_images=context.background.pictures.waiting(context.tenant),
         ),
     )

@@ -1,4 +1,4 @@
-"""/v1/jobs: start, list, show, preview, cancel and delete jobs; /v1/plans: what a job would be."""
+"""/v1/jobs: start, list, show, name, preview, cancel and delete jobs; /v1/plans: what a job would be."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import logging
 from typing import TYPE_CHECKING, Annotated, Literal, Union
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Body, Depends, Query, Request, Response, status
+from fastapi import APIRouter, Body, Depends, Query, Response, status
+from fastapi.openapi.models import Example
 
 from bentray_workers.reconstruction.preview import checkpoint_image
 
@@ -15,19 +16,21 @@ from ..files.deletion import StoredItem
 from ..jobs.estimate import READ, estimate
 from ..jobs.kinds import KINDS
 from ..rows.ids import checked
-from ..rows.jobs import Submission
+from ..rows.jobs import NewJob
 from ..rows.tables import ENDED, JobRow
 from ..web.errors import problems
-from ..wiring import Access, Background, CallerTenant, CurrentCaller, Stores
+from ..wiring import Context, RequestContext
 from .bodies import IdempotencyKey, Limit, SmallBody, accept_media_types, answer_made
 from .downloads import download, download_of
 from .models.job_records import EstimateRecord, JobList, JobRecord, PlanRecord, PreviewRecord, State
-from .models.name_changes import TEXT
+from .models.name_changes import TEXT, JobChanges
 from .pictures import check_render_rate
 from .record_conversion import job_record
 
 log = logging.getLogger("bentray.jobs")
 
+JSON = [Depends(accept_media_types("application/json"))]
+NAMES: dict[str, Example] = {"named": {"value": {"name": "With the new water speed"}}}
 # Media types of turntable animations.
 ANIMATIONS = {"zip": "application/zip", "apng": "image/apng"}
 
@@ -50,37 +53,29 @@ else:
 @router.post(
     "",
     status_code=status.HTTP_202_ACCEPTED,
-    dependencies=[Depends(accept_media_types("application/json"))],
+    dependencies=JSON,
     responses=problems(400, 404, 409, 413, 415, 422, 429, 503, 507),
 )
 def start_job(
     job_request: JobRequest,
     response: Response,
-    stores: Stores,
-    background: Background,
-    access: Access,
-    caller: CurrentCaller,
+    context: Context,
     idempotency_key: IdempotencyKey = None,
 ) -> JobRecord:
     """Queue a job. It is stored before the response and survives a restart of the service."""
-    kind: str = job_request.kind
-    tenant = caller.tenant
-    background.webhooks.check(tenant, job_request.webhook)
-    new = KINDS[kind].plan(job_request, tenant, stores, background.runner.compute)
-    limits = stores.quota.most_bytes, access.settings.max_queued_jobs
-    how = Submission(*limits, idempotency_key, caller.who, job_request.webhook)
-    row = stores.jobs.add(tenant, new, how)
-    job = _shown(stores, background, row)
+    new = _planned(job_request, context)
+    how = context.submission(idempotency_key, job_request.webhook)
+    row = context.stores.jobs.add(context.tenant, new, how)
+    job = _shown(context, row)
     log.info("%s queued, kind %s", job.id, job.kind, extra={"figures": {"job": job.id}})
-    background.runner.notify(job.id)
+    context.background.runner.notify(job.id)
     answer_made(response, job.links["self"], replayed=row.replayed)
     return job
 
 
 @router.get("", responses=problems(404, 422))
 def list_jobs(
-    stores: Stores,
-    tenant: CallerTenant,
+    context: Context,
     limit: Limit = 100,
     state: Annotated[State | None, Query(description="Only these.")] = None,
     kind: Annotated[JobKind | None, Query(description="Only these.")] = None,
@@ -99,7 +94,7 @@ def list_jobs(
     """List jobs, newest first; `next` is the address of the next page."""
     batch_id = None if batch is None else checked("batch", batch)
     equal = {"state": state, "kind": kind, "batch_id": batch_id}
-    rows = stores.jobs.search(tenant, limit + 1, before, text, **equal)
+    rows = context.stores.jobs.search(context.tenant, limit + 1, before, text, **equal)
     shown = [job_record(row) for row in rows[:limit]]
     if len(rows) == len(shown):
         return JobList(jobs=shown, next=None)
@@ -116,20 +111,26 @@ def list_jobs(
 
 
 @router.get("/{job_id}", responses=problems(404))
-def show_job(job_id: str, stores: Stores, background: Background, tenant: CallerTenant) -> JobRecord:
+def show_job(job_id: str, context: Context) -> JobRecord:
     """Show one job: state, progress, and the residual after every iteration."""
-    return _shown(stores, background, stores.jobs.get(tenant, job_id))
+    return _shown(context, context.stores.jobs.get(context.tenant, job_id))
 
 
-def _shown(stores: Stores, background: Background, row: JobRow) -> JobRecord:
+def _shown(context: RequestContext, row: JobRow) -> JobRecord:
     """The record of one job, with its place in the queue, its estimate and its webhook."""
-    minutes = None
+    jobs, minutes, delivery = context.stores.jobs, None, None
     if row.state == "queued":
-        minutes = estimate(row.plan, stores.jobs.durations(row.tenant, row.kind, READ)).minutes
-    delivery = None
+        minutes = estimate(row.plan, jobs.durations(row.tenant, row.kind, READ)).minutes
     if row.webhook is not None and row.state in ENDED:
-        delivery = background.webhooks.deliveries.of_job(row.tenant, row.id)
-    return job_record(row, stores.jobs.place(row), minutes, delivery)
+        delivery = context.background.webhooks.deliveries.of_job(row.tenant, row.id)
+    return job_record(row, jobs.place(row), minutes, delivery)
+
+
+def _planned(job_request: JobRequest, context: RequestContext) -> NewJob:
+    """The job of a request, whose webhook is checked first."""
+    context.background.webhooks.check(context.tenant, job_request.webhook)
+    kind, compute = KINDS[str(job_request.kind)], context.background.runner.compute
+    return kind.plan(job_request, context.tenant, context.stores, compute)
 
 
 @router.post(
@@ -137,18 +138,28 @@ def _shown(stores: Stores, background: Background, row: JobRow) -> JobRecord:
     status_code=status.HTTP_202_ACCEPTED,
     responses=problems(404, 409),
 )
-def cancel_job(job_id: str, stores: Stores, tenant: CallerTenant) -> JobRecord:
+def cancel_job(job_id: str, context: Context) -> JobRecord:
     """Cancel a job. A queued job ends at once, a running one within a second or so."""
-    return job_record(stores.jobs.request_cancel(tenant, job_id))
+    return job_record(context.stores.jobs.request_cancel(context.tenant, job_id))
 
 
 @router.delete("/{job_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
-def delete_job(job_id: str, stores: Stores, tenant: CallerTenant) -> None:
+def delete_job(job_id: str, context: Context) -> None:
     """Delete a job that has ended, with the volume, animation or geometry field that it made.
 
     A simulated scan stays, and so does a geometry field that another job made too.
     """
-    stores.deletion.delete(StoredItem(tenant, "job", job_id))
+    context.stores.deletion.delete(StoredItem(context.tenant, "job", job_id))
+
+
+@router.patch("/{job_id}", dependencies=JSON, responses=problems(400, 404, 413, 415, 422))
+def change_job(
+    job_id: str, changes: Annotated[JobChanges, Body(openapi_examples=NAMES)], context: Context
+) -> JobRecord:
+    """Change the name or the notes of a job in any state."""
+    jobs = context.stores.jobs
+    row = jobs.describe(context.tenant, job_id, **changes.model_dump(exclude_none=True))
+    return job_record(row, jobs.place(row))
 
 
 @router.head("/{job_id}/animation", include_in_schema=False)
@@ -157,29 +168,29 @@ def delete_job(job_id: str, stores: Stores, tenant: CallerTenant) -> None:
     response_class=Response,
     responses={**download_of(*ANIMATIONS.values()), **problems(404, 409, 503)},
 )
-def animation(job_id: str, request: Request, stores: Stores, tenant: CallerTenant) -> Response:
+def animation(job_id: str, context: Context) -> Response:
     """Download the animation of a successful refraction job.
 
     Interrupted downloads can be resumed with Range and If-Range.
     """
-    job = stores.jobs.get(tenant, job_id)
+    job, files = context.stores.jobs.get(context.tenant, job_id), context.stores.files
     if job.kind != "refraction" or job.state != "succeeded":
         raise NoAnimation(job.id, job.kind, job.state)
     extension = job.settings["format"]
-    path = stores.files.store.fetch(stores.files.of(tenant).animation(job.id, extension))
-    return download(request, path, repr((job.id, job.finished)), ANIMATIONS[extension])
+    path = files.store.fetch(files.of(context.tenant).animation(job.id, extension))
+    return download(context.request, path, repr((job.id, job.finished)), ANIMATIONS[extension])
 
 
 @router.get("/{job_id}/preview", responses=problems(404, 409, 429), dependencies=[Depends(check_render_rate)])
-def show_preview(job_id: str, response: Response, stores: Stores, tenant: CallerTenant) -> PreviewRecord:
+def show_preview(job_id: str, response: Response, context: Context) -> PreviewRecord:
     """Show the image that a running reconstruction has reached, reduced to at most 256 nodes along a side.
 
     There is one after the first iteration, or after some seconds of a longer one.
     """
-    job = stores.jobs.get(tenant, job_id)
+    job = context.stores.jobs.get(context.tenant, job_id)
     if job.kind != "reconstruction" or job.state not in ("running", "cancelling"):
         raise NoPreview(job.id, job.kind, job.state)
-    image = checkpoint_image(stores.files.of(tenant).checkpoints(job.id))
+    image = checkpoint_image(context.stores.files.of(context.tenant).checkpoints(job.id))
     if image is None:
         raise NoPreview(job.id, "reconstruction", "before its first image")
     response.headers["Cache-Control"] = "no-store"
@@ -189,27 +200,19 @@ def show_preview(job_id: str, response: Response, stores: Stores, tenant: Caller
 plans_router = APIRouter(prefix="/v1/plans", tags=["jobs"], route_class=SmallBody)
 
 
-@plans_router.post(
-    "",
-    dependencies=[Depends(accept_media_types("application/json"))],
-    responses=problems(400, 404, 413, 415, 422, 503),
-)
-def plan_job(
-    job_request: JobRequest, stores: Stores, background: Background, tenant: CallerTenant
-) -> EstimateRecord:
+@plans_router.post("", dependencies=JSON, responses=problems(400, 404, 413, 415, 422, 503))
+def plan_job(job_request: JobRequest, context: Context) -> EstimateRecord:
     """Plan a job without starting it: method, nodes, tasks, memory, estimated time and place in the queue.
 
     A job that would be rejected is rejected here with the same error.
     """
-    kind: str = job_request.kind
-    background.webhooks.check(tenant, job_request.webhook)
-    plan = KINDS[kind].plan(job_request, tenant, stores, background.runner.compute).plan
-    found = estimate(plan, stores.jobs.durations(tenant, kind, READ))
+    new, jobs = _planned(job_request, context), context.stores.jobs
+    found = estimate(new.plan, jobs.durations(context.tenant, new.kind, READ))
     return EstimateRecord(
-        plan=None if plan is None else PlanRecord.model_validate(plan),
+        plan=None if new.plan is None else PlanRecord.model_validate(new.plan),
         minutes=found.minutes,
         rough=found.rough,
         compared=found.compared,
         basis=found.basis,
-        ahead=stores.jobs.next_place(tenant),
+        ahead=jobs.next_place(context.tenant),
     )

@@ -14,7 +14,7 @@ from starlette.requests import ClientDisconnect
 from .. import __version__
 from ..rows.tables import StoredRow
 from ..web.errors import problems
-from ..wiring import access_of, caller_of
+from ..wiring import Context, RequestContext
 from .downloads import headers_of, unchanged, without_length
 
 Made = TypeVar("Made")
@@ -32,24 +32,30 @@ PICTURE: dict[int | str, dict[str, Any]] = {
 
 
 async def picture(
-    request: Request, item: StoredRow, how: Mapping[str, Any], draw: Callable[[], Awaitable[bytes]]
+    context: RequestContext,
+    item: StoredRow,
+    how: Mapping[str, Any],
+    draw: Callable[[], Awaitable[bytes]],
+    media_type: str = "image/png",
 ) -> Response:
-    """The response with a PNG, or 304.
+    """The response with a PNG or another result of a worker, or 304.
 
     Args:
-        request: HEAD is answered without rendering, hence without Content-Length.
+        context: HEAD is answered without rendering, hence without Content-Length.
         item: what is shown.
         how: all other parameters of the image.
         draw: renders the image; cancelled when the client disconnects.
+        media_type: of the image.
     """
+    request = context.request
     seed = repr((__version__, item.id, item.created, sorted(how.items())))
     tag = f'"{hashlib.sha256(seed.encode()).hexdigest()[:32]}"'
     if (response := unchanged(request, tag)) is not None:
         return response
     if request.method == "HEAD":
-        return without_length("image/png", headers_of(tag))
-    access_of(request.scope).sign_in.check_render(caller_of(request), _share(how))
-    return Response(await while_connected(request, draw()), media_type="image/png", headers=headers_of(tag))
+        return without_length(media_type, headers_of(tag))
+    context.check_render(_share(how))
+    return Response(await while_connected(request, draw()), media_type=media_type, headers=headers_of(tag))
 
 
 def _share(how: Mapping[str, Any]) -> float:
@@ -61,9 +67,9 @@ def _share(how: Mapping[str, Any]) -> float:
     return min(1.0, max(LEAST_SHARE, rays / WHOLE_RAYS))
 
 
-async def check_render_rate(request: Request) -> None:
+async def check_render_rate(context: Context) -> None:
     """Limit the rate of what workers compute like that of rendered images."""
-    access_of(request.scope).sign_in.check_render(caller_of(request))
+    context.check_render()
 
 
 async def while_connected(request: Request, work: Awaitable[Made]) -> Made:

@@ -7,12 +7,11 @@ from typing import Annotated, Any, TypeVar
 from fastapi import APIRouter, Body, Depends, Response, status
 from fastapi.openapi.models import Example
 
-from ..access.caller import Caller
 from ..errors import Forbidden
 from ..rows.projects import OWNER
 from ..rows.tables import ProjectRow
 from ..web.errors import problems
-from ..wiring import Access, CurrentCaller
+from ..wiring import Context, RequestContext
 from .bodies import SmallBody, accept_media_types
 from .models.project_records import (
     MemberList,
@@ -43,68 +42,69 @@ router = APIRouter(prefix="/v1/projects", tags=["projects"], route_class=SmallBo
 def create_project(
     project: Annotated[ProjectRequest, Body(openapi_examples=NAMES)],
     response: Response,
-    access: Access,
-    caller: CurrentCaller,
+    context: Context,
 ) -> ProjectDetails:
     """Create a project; the caller becomes its owner."""
-    made = _details(access, access.sign_in.projects.add(caller.home, project.name, caller.member))
+    caller = context.caller
+    made = _details(context, context.access.sign_in.projects.add(caller.home, project.name, caller.member))
     response.headers["Location"] = made.links["self"]
     return made
 
 
 @router.get("", responses=problems(503))
-def list_projects(access: Access, caller: CurrentCaller) -> ProjectList:
+def list_projects(context: Context) -> ProjectList:
     """List the projects that the caller is a member of."""
-    found = access.sign_in.projects.all(caller.home, caller.member)
+    found = context.access.sign_in.projects.all(context.caller.home, context.caller.member)
     return ProjectList(projects=[_record(ProjectRecord, row) for row in found])
 
 
 @router.get("/{project_id}", responses=problems(404))
-def show_project(project_id: str, access: Access, caller: CurrentCaller) -> ProjectDetails:
+def show_project(project_id: str, context: Context) -> ProjectDetails:
     """Show a project with its members, to its members."""
-    return _details(access, access.sign_in.projects.get(caller.home, project_id, caller.member))
+    return _details(context, _project(context, project_id))
 
 
 @router.patch("/{project_id}", dependencies=JSON, responses=problems(400, 404, 413, 415, 422))
 def rename_project(
     project_id: str,
     project: Annotated[ProjectRequest, Body(openapi_examples=NAMES)],
-    access: Access,
-    caller: CurrentCaller,
+    context: Context,
 ) -> ProjectDetails:
     """Rename a project; owners only."""
-    access.sign_in.projects.rename(_owned(access, caller, project_id), project.name)
-    return show_project(project_id, access, caller)
+    context.access.sign_in.projects.rename(_owned(context, project_id), project.name)
+    return show_project(project_id, context)
 
 
 @router.delete("/{project_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409))
-def delete_project(project_id: str, access: Access, caller: CurrentCaller) -> None:
+def delete_project(project_id: str, context: Context) -> None:
     """Delete an empty project; owners only."""
-    access.sign_in.projects.delete(_owned(access, caller, project_id))
+    context.access.sign_in.projects.delete(_owned(context, project_id))
 
 
 @router.put("/{project_id}/members", dependencies=JSON, responses=problems(400, 404, 413, 415, 422))
 def put_member(
     project_id: str,
     member: Annotated[MemberRequest, Body(openapi_examples=MEMBERS)],
-    access: Access,
-    caller: CurrentCaller,
+    context: Context,
 ) -> MemberList:
     """Add a member, change their role or remove them; owners only, but all members may remove themselves."""
-    project = access.sign_in.projects.get(caller.home, project_id, caller.member)
-    if member.role is None:
-        if member.member != caller.member:
-            _check_owner(project)
-        access.sign_in.projects.remove_member(project, member.member)
-    else:
+    project, projects = _project(context, project_id), context.access.sign_in.projects
+    if member.role is not None or member.member != context.caller.member:
         _check_owner(project)
-        access.sign_in.projects.put_member(project, member.member, member.role)
-    found = access.sign_in.projects.members(project)
-    return MemberList(members=[record_of(MemberRecord, row) for row in found])
+    if member.role is None:
+        projects.remove_member(project, member.member)
+    else:
+        projects.put_member(project, member.member, member.role)
+    return MemberList(members=_members(context, project))
 
 
-def _owned(access: Access, caller: Caller, project_id: str) -> ProjectRow:
-    project = access.sign_in.projects.get(caller.home, project_id, caller.member)
+def _project(context: RequestContext, project_id: str) -> ProjectRow:
+    caller = context.caller
+    return context.access.sign_in.projects.get(caller.home, project_id, caller.member)
+
+
+def _owned(context: RequestContext, project_id: str) -> ProjectRow:
+    project = _project(context, project_id)
     _check_owner(project)
     return project
 
@@ -114,9 +114,12 @@ def _check_owner(project: ProjectRow) -> None:
         raise Forbidden("role", project.role, f"{OWNER} of the project")
 
 
-def _details(access: Access, project: ProjectRow) -> ProjectDetails:
-    members = [record_of(MemberRecord, row) for row in access.sign_in.projects.members(project)]
-    return _record(ProjectDetails, project, members=members)
+def _members(context: RequestContext, project: ProjectRow) -> list[MemberRecord]:
+    return [record_of(MemberRecord, row) for row in context.access.sign_in.projects.members(project)]
+
+
+def _details(context: RequestContext, project: ProjectRow) -> ProjectDetails:
+    return _record(ProjectDetails, project, members=_members(context, project))
 
 
 def _record(model: type[Shown], project: ProjectRow, **given: Any) -> Shown:

@@ -19,7 +19,7 @@ from ..access.browser_sessions import CALLBACK, START, BrowserSessions, Cookie
 from ..errors import NoSignIn
 from ..web.documents import document
 from ..web.errors import problem_of
-from ..wiring import Access
+from ..wiring import access_of
 
 log = logging.getLogger("bentray.access")
 
@@ -32,26 +32,26 @@ NO_STORE = {"Cache-Control": "no-store"}
 
 
 @router.get("/sign-in/provider")
-def provider(access: Access) -> JSONResponse:
+def provider(request: Request) -> JSONResponse:
     """The name of the OpenID provider for the page; null without one."""
-    browsers = access.sign_in.browsers
+    browsers = access_of(request.scope).sign_in.browsers
     return JSONResponse({"name": None if browsers is None else browsers.name})
 
 
 @router.get("/sign-in")
-async def begin(request: Request, access: Access, address: str = START) -> Response:
+async def begin(request: Request, address: str = START) -> Response:
     """Redirect to the provider."""
     peer = request.client
-    access.sign_in.check_sign_in(peer.host if peer else "")
-    browsers = _browsers(access)
+    access_of(request.scope).sign_in.check_sign_in(peer.host if peer else "")
+    browsers = _browsers(request)
     url, cookie = await _in_thread(request, lambda: browsers.begin(address))
     return _redirect(url, [cookie])
 
 
 @router.get(CALLBACK)
-async def finish(request: Request, access: Access) -> Response:
+async def finish(request: Request) -> Response:
     """Start a session with the response of the provider, and return to the page; else say why not."""
-    browsers = _browsers(access)
+    browsers = _browsers(request)
     try:
         address, caller, cookies = await _in_thread(
             request, lambda: browsers.finish(request.query_params, request.headers)
@@ -70,9 +70,9 @@ async def finish(request: Request, access: Access) -> Response:
 
 
 @router.post("/sign-out")
-async def sign_out(request: Request, access: Access) -> Response:
+async def sign_out(request: Request) -> Response:
     """End the session; returns the address at which the user signs out at the provider, or null."""
-    browsers = _browsers(access)
+    browsers = _browsers(request)
     caller, url, cookie = await _in_thread(request, lambda: browsers.sign_out(request.headers))
     request.state.caller = caller
     return JSONResponse({"address": url}, headers={**NO_STORE, "Set-Cookie": cookie.header()})
@@ -86,8 +86,8 @@ async def _in_thread(request: Request, work: Callable[[], Result]) -> Result:
     return await anyio.to_thread.run_sync(work, limiter=state.sign_in_threads)
 
 
-def _browsers(access: Access) -> BrowserSessions:
-    browsers = access.sign_in.browsers
+def _browsers(request: Request) -> BrowserSessions:
+    browsers = access_of(request.scope).sign_in.browsers
     if browsers is None:
         raise NoSignIn()
     return browsers

@@ -12,14 +12,14 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from ...errors import Busy
-from ...ingest.canonical import IngestLimits, make_canonical
+from ...ingest.canonical import make_canonical
 from ...ingest.fair_queue import FairQueue
 from ...ingest.ingest_process import ACCEPTED, FILE_NAME
 from ...ingest.receive import Received, check_announced, receive
 from ...rows.ids import Tenant, new_id
 from ...rows.stored_tables import UploadedTable
 from ...rows.tables import DatasetRow, MeshRow, UploadedVolumeRow
-from ...wiring import Access, Background, Stores
+from ...wiring import RequestContext
 from .upload_metadata import name_of_body
 
 # Longest wait of a request in the ingest queue, s; proxies rarely wait longer.
@@ -44,45 +44,35 @@ def body_of(what: str, media_types: tuple[str, ...]) -> dict[str, Any]:
 
 
 async def receive_upload(
-    request: Request,
-    stores: Stores,
-    background: Background,
-    access: Access,
-    tenant: Tenant,
-    table: UploadedTable[Record],
-    given: Mapping[str, Any],
+    context: RequestContext, table: UploadedTable[Record], given: Mapping[str, Any]
 ) -> Record:
     """Receive an upload and insert its row; a rejected upload leaves nothing behind.
 
     Args:
-        request: with the file as its body.
-        stores, background, access: of the service.
-        tenant: owner.
+        context: of a request with the file as its body.
         table: of the result.
         given: metadata.
     """
-    what, upload_id = table.what, new_id(table.what)
+    what, upload_id, tenant = table.what, new_id(table.what), context.tenant
+    request, ingest, quota = context.request, context.background.ingest, context.stores.quota
     announced = request.headers.get("content-length")
     length = int(announced) if announced else None
-    check_announced(length, access.settings.max_upload_bytes, ACCEPTED[what])
+    most = context.access.settings.max_upload_bytes
+    check_announced(length, most, ACCEPTED[what])
     given = {**given, FILE_NAME: name_of_body(request.headers.get("content-disposition", ""))}
-    files, settings, quota = stores.files.of(tenant), access.settings, stores.quota
+    files = context.stores.files.of(tenant)
     path = files.incoming(upload_id)
     resize = partial(quota.resize, tenant, upload_id)
 
     def check_and_store(received: Received) -> Record:
-        limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, stores.files.scratch)
-        summary = make_canonical(what, path, upload_id, files, limits, given, resize)
+        summary = make_canonical(what, path, upload_id, files, ingest.limits, given, resize)
         return table.add(tenant, upload_id, size=received.size, sha256=received.sha256, summary=summary)
 
-    with background.ingest.upload_limits(tenant):
+    with ingest.upload_limits(tenant):
         async with quota.reserved(tenant, upload_id, length or 1):
             try:
-                received = await receive(
-                    request.stream(), length, path, settings.max_upload_bytes, ACCEPTED[what], resize
-                )
-                work = partial(check_and_store, received)
-                return await run_in_turn(request, background.ingest.queue, tenant, work)
+                received = await receive(request.stream(), length, path, most, ACCEPTED[what], resize)
+                return await run_in_turn(request, ingest.queue, tenant, partial(check_and_store, received))
             finally:
                 await run_in_threadpool(path.unlink, missing_ok=True)
 

@@ -9,18 +9,17 @@ from __future__ import annotations
 import shutil
 from datetime import UTC, datetime
 from email.utils import format_datetime
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Header, Request, Response, status
+from fastapi import APIRouter, Depends, Header, Response, status
 from starlette.concurrency import run_in_threadpool
 
 from ...errors import StorageFull, TooLarge, WrongOffset, WrongProtocol
 from ...ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, received_bytes
-from ...rows.ids import Tenant
 from ...rows.tables import UploadRow
 from ...web.errors import problems
 from ...web.middleware import TUS_PLACE, TUS_VERSION
-from ...wiring import Access, Background, CallerTenant, Stores
+from ...wiring import Context, RequestContext
 from ..bodies import accept_media_types
 from ..models.upload_records import UploadRecord
 from ..record_conversion import result_link, upload_record
@@ -52,13 +51,13 @@ BODY = {"requestBody": {"required": True, "content": {MEDIA_TYPE: BYTES}}}
 
 
 @router.options("", status_code=status.HTTP_204_NO_CONTENT)
-def show_upload_options(access: Access) -> Response:
+def show_upload_options(context: Context) -> Response:
     """Show the supported options of tus."""
     return Response(
         status_code=status.HTTP_204_NO_CONTENT,
         headers={
             "Tus-Extension": EXTENSIONS,
-            "Tus-Max-Size": str(access.settings.max_upload_bytes),
+            "Tus-Max-Size": str(context.access.settings.max_upload_bytes),
             "Tus-Checksum-Algorithm": ",".join(ALGORITHMS),
         },
     )
@@ -72,10 +71,7 @@ def show_upload_options(access: Access) -> Response:
 )
 def create_upload(
     response: Response,
-    stores: Stores,
-    background: Background,
-    access: Access,
-    tenant: CallerTenant,
+    context: Context,
     upload_length: Annotated[int, Header(ge=1, le=2**63 - 1, description="Total size, bytes.")],
     upload_metadata: Annotated[
         str,
@@ -91,19 +87,11 @@ def create_upload(
 ) -> UploadRecord:
     """Create an upload; send its data with PATCH to the Location of the response."""
     what, given = read_metadata(upload_metadata)
-    most = access.settings.max_upload_bytes
-    if upload_length > most:
-        raise TooLarge(
-            "Upload-Length", f"{upload_length} bytes", f"at most {most} bytes (BENTRAY_MAX_UPLOAD_BYTES)"
-        )
-    free = shutil.disk_usage(stores.files.root).free
+    check_length("Upload-Length", upload_length, context)
+    free = shutil.disk_usage(context.stores.files.root).free
     if upload_length > free:
         raise StorageFull("Upload-Length", f"{upload_length} bytes", f"at most {free} bytes, the free space")
-    background.ingest.upload_limits.check_begin(tenant)
-    keep_s, most_bytes = access.settings.upload_keep_s, stores.quota.most_bytes
-    row = background.ingest.uploads.add(
-        tenant, what, upload_length, given, upload_metadata, keep_s, most_bytes
-    )
+    row = add_upload(context, what, upload_length, given, upload_metadata)
     record = upload_record(row, 0)
     response.headers["Location"] = record.links["self"]
     response.headers["Upload-Expires"] = http_date(row.expires)
@@ -111,13 +99,11 @@ def create_upload(
 
 
 @router.head("/{upload_id}", dependencies=[TusVersion], responses=problems(404, 412), include_in_schema=False)
-def show_upload_offset(
-    upload_id: str, stores: Stores, background: Background, tenant: CallerTenant
-) -> Response:
+def show_upload_offset(upload_id: str, context: Context) -> Response:
     """Show the offset and the state of an upload."""
-    row = background.ingest.uploads.get(tenant, upload_id)
+    row = context.background.ingest.uploads.get(context.tenant, upload_id)
     headers = {
-        "Upload-Offset": str(offset_of(stores, tenant, row)),
+        "Upload-Offset": str(offset_of(context, row)),
         "Upload-Length": str(row.length),
         "Upload-Expires": http_date(row.expires),
         "Cache-Control": "no-store",
@@ -131,10 +117,10 @@ def show_upload_offset(
 
 
 @router.get("/{upload_id}", responses=problems(404))
-def show_upload(upload_id: str, stores: Stores, background: Background, tenant: CallerTenant) -> UploadRecord:
+def show_upload(upload_id: str, context: Context) -> UploadRecord:
     """Show one upload: offset, state, and its result or problem."""
-    row = background.ingest.uploads.get(tenant, upload_id)
-    return upload_record(row, offset_of(stores, tenant, row))
+    row = context.background.ingest.uploads.get(context.tenant, upload_id)
+    return upload_record(row, offset_of(context, row))
 
 
 @router.patch(
@@ -146,11 +132,7 @@ def show_upload(upload_id: str, stores: Stores, background: Background, tenant: 
 )
 async def append_upload(
     upload_id: str,
-    request: Request,
-    stores: Stores,
-    background: Background,
-    access: Access,
-    tenant: CallerTenant,
+    context: Context,
     upload_offset: Offset,
     upload_checksum: Annotated[
         str | None,
@@ -166,28 +148,29 @@ async def append_upload(
     A complete upload is ingested in the background; poll it with `GET`.
     """
     checksum = None if upload_checksum is None else Checksum.from_header(upload_checksum)
+    request, ingest, tenant = context.request, context.background.ingest, context.tenant
     # First check the owner, so that uploads of other tenants are not reported as locked.
-    await run_in_threadpool(background.ingest.uploads.get, tenant, upload_id)
-    with background.ingest.locks(upload_id):
-        row = await run_in_threadpool(background.ingest.uploads.get, tenant, upload_id)
-        offset, expires = await run_in_threadpool(offset_of, stores, tenant, row), row.expires
+    await run_in_threadpool(ingest.uploads.get, tenant, upload_id)
+    with ingest.locks(upload_id):
+        row = await run_in_threadpool(ingest.uploads.get, tenant, upload_id)
+        offset, expires = await run_in_threadpool(offset_of, context, row), row.expires
         if upload_offset != offset:
             raise WrongOffset("Upload-Offset", upload_offset, f"{offset}, of {row.length} bytes")
         if row.multipart_id is not None:
             raise WrongOffset("upload", f"{row.id}, sent to the bucket", "an upload to the service")
         if row.state == "receiving":
-            length, path = row.length, stores.files.of(tenant).upload(upload_id)
+            length, path = row.length, context.stores.files.of(tenant).upload(upload_id)
             announced = int(request.headers.get("content-length", 0))
             if announced > length - offset:
                 raise TooLarge("body", f"{announced} bytes", f"at most {length - offset} bytes")
             try:
                 offset = await append(request.stream(), path, offset, length, checksum)
             finally:
-                keep_s = access.settings.upload_keep_s
-                expires = await run_in_threadpool(background.ingest.uploads.keep, upload_id, keep_s)
+                keep_s = context.access.settings.upload_keep_s
+                expires = await run_in_threadpool(ingest.uploads.keep, upload_id, keep_s)
             if offset == length:
-                await run_in_threadpool(background.ingest.uploads.mark_complete, upload_id)
-                background.ingest.notify()
+                await run_in_threadpool(ingest.uploads.mark_complete, upload_id)
+                ingest.notify()
     headers = {"Upload-Offset": str(offset), "Upload-Expires": http_date(expires)}
     return Response(status_code=status.HTTP_204_NO_CONTENT, headers=headers)
 
@@ -198,21 +181,43 @@ async def append_upload(
     dependencies=[TusVersion],
     responses=problems(404, 409, 412, 422, 423),
 )
-def delete_upload(upload_id: str, background: Background, tenant: CallerTenant) -> None:
+def delete_upload(upload_id: str, context: Context) -> None:
     """Delete an upload and its data; a stored result is kept."""
-    background.ingest.uploads.get(tenant, upload_id)
-    with background.ingest.locks(upload_id):
-        background.housekeeper.forget(background.ingest.uploads.get(tenant, upload_id))
+    ingest = context.background.ingest
+    ingest.uploads.get(context.tenant, upload_id)
+    with ingest.locks(upload_id):
+        context.background.housekeeper.forget(ingest.uploads.get(context.tenant, upload_id))
 
 
-def offset_of(stores: Stores, tenant: Tenant, row: UploadRow) -> int:
+def check_length(field: str, length: int, context: RequestContext) -> None:
+    """Reject an upload that is larger than the service accepts.
+
+    Raises:
+        TooLarge: naming ``field``.
+    """
+    most = context.access.settings.max_upload_bytes
+    if length > most:
+        raise TooLarge(field, f"{length} bytes", f"at most {most} bytes (BENTRAY_MAX_UPLOAD_BYTES)")
+
+
+def add_upload(
+    context: RequestContext, what: str, length: int, given: dict[str, Any], header: str
+) -> UploadRow:
+    """Insert an upload within the rate limit and the quota, see ``Uploads.add``."""
+    ingest, keep_s = context.background.ingest, context.access.settings.upload_keep_s
+    ingest.upload_limits.check_begin(context.tenant)
+    most_bytes = context.stores.quota.most_bytes
+    return ingest.uploads.add(context.tenant, what, length, given, header, keep_s, most_bytes)
+
+
+def offset_of(context: RequestContext, row: UploadRow) -> int:
     """The offset of an upload.
 
     Data with a checksum counts after it has been verified.
     """
     if row.state != "receiving":
         return int(row.length)
-    return received_bytes(stores.files.of(tenant).upload(row.id))
+    return received_bytes(context.stores.files.of(context.tenant).upload(row.id))
 
 
 def http_date(seconds: float) -> str:
