@@ -1,8 +1,10 @@
-"""Errors of the service with the field, the value found and the values accepted."""
+"""Errors of the service with the field, the value found, the values accepted, and their type of problem."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -12,7 +14,65 @@ from bentray_kernels.errors import InvalidInput
 LISTED = {"mesh": "meshes", "field": "geometry-fields", "batch": "batches"}
 
 
-class Rejection(InvalidInput):
+@dataclass(frozen=True)
+class ProblemType:
+    """A type of problem: HTTP status, slug of its address, title."""
+
+    status: int
+    slug: str
+    title: str
+
+
+# All types, in the order of the reference.
+PROBLEMS: list[ProblemType] = []
+
+
+def _problem(status: int, slug: str, title: str) -> ProblemType:
+    PROBLEMS.append(ProblemType(status, slug, title))
+    return PROBLEMS[-1]
+
+
+INVALID = _problem(422, "invalid-input", "Invalid value")
+
+
+class Refusal(InvalidInput):
+    """An error with a type of problem of its own."""
+
+    problem: ClassVar[ProblemType]
+
+
+def _refusal(name: str, status: int, slug: str, title: str) -> type[Refusal]:
+    """A refusal of field, value and accepted, whose title says what it is."""
+    return type(name, (Refusal,), {"problem": _problem(status, slug, title), "__module__": __name__})
+
+
+EmptyBody = _refusal("EmptyBody", 422, "empty-body", "Empty body")
+WrongMediaType = _refusal("WrongMediaType", 415, "wrong-media-type", "Unsupported media type")
+# The response has Accept-Encoding (RFC 9110, 15.5.16).
+PackedBody = _refusal("PackedBody", 415, "packed-body", "Unsupported content coding")
+TooLarge = _refusal("TooLarge", 413, "too-large", "Body too large")
+WrongProtocol = _refusal("WrongProtocol", 412, "wrong-protocol", "Unsupported version of the upload protocol")
+WrongOffset = _refusal("WrongOffset", 409, "wrong-offset", "Wrong offset of the upload")
+Locked = _refusal("Locked", 423, "locked", "Upload in use by another request")
+# Status code of tus, not of HTTP.
+WrongChecksum = _refusal("WrongChecksum", 460, "wrong-checksum", "Checksum mismatch")
+UnknownChecksum = _refusal("UnknownChecksum", 400, "unknown-checksum", "Unknown checksum algorithm")
+InUse = _refusal("InUse", 409, "in-use", "Needed by an unfinished job")
+JobFinished = _refusal("JobFinished", 409, "job-finished", "The job has ended")
+KeyReused = _refusal("KeyReused", 409, "key-reused", "Idempotency key used with another request")
+QueueFull = _refusal("QueueFull", 429, "queue-full", "Too many queued jobs")
+NotAuthenticated = _refusal("NotAuthenticated", 401, "not-let-in", "Authentication required")
+Forbidden = _refusal("Forbidden", 403, "not-allowed", "Permission denied")
+TooManyStreams = _refusal("TooManyStreams", 429, "too-many-streams", "Too many event streams")
+QuotaExceeded = _refusal("QuotaExceeded", 507, "quota-used-up", "Storage quota exceeded")
+NoAnimation = _refusal("NoAnimation", 409, "no-animation", "No animation")
+NoPreview = _refusal("NoPreview", 409, "no-preview", "No preview")
+NoBucket = _refusal("NoBucket", 409, "no-bucket", "No bucket for direct uploads")
+NoSignIn = _refusal("NoSignIn", 404, "no-sign-in", "No sign-in")
+Busy = _refusal("Busy", 503, "busy", "No worker available in time")
+
+
+class Rejection(Refusal):
     """A refusal whose constructor has other arguments; it is pickled as plain InvalidInput."""
 
     def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str, str]]:
@@ -22,6 +82,8 @@ class Rejection(InvalidInput):
 class UnknownId(Rejection):
     """No item has this id."""
 
+    problem = _problem(404, "unknown-id", "Unknown id")
+
     def __init__(self, field: str, value: str) -> None:
         listed = LISTED.get(field, f"{field}s")
         super().__init__(field, repr(value[:80]), f"the id of a {field} that exists; see GET /v1/{listed}")
@@ -30,6 +92,8 @@ class UnknownId(Rejection):
 class Deleted(Rejection, FileNotFoundError):  # noqa: N818 - a refusal, like the others
     """The item was deleted during the request."""
 
+    problem = _problem(404, "deleted", "Deleted")
+
     def __init__(self, name: str) -> None:
         InvalidInput.__init__(self, "id", f"{name}, which has been deleted", "the id of an existing item")
 
@@ -37,77 +101,13 @@ class Deleted(Rejection, FileNotFoundError):  # noqa: N818 - a refusal, like the
 class Damaged(Rejection):
     """The content of a stored file has changed."""
 
+    problem = _problem(500, "stored-data-damaged", "Stored data is damaged")
+
     def __init__(self, name: str, found: str) -> None:
         accepted = (
             "the original content: restore the file from a backup, or delete the item and create it again"
         )
         super().__init__("stored data", f"{name}, {found}", accepted)
-
-
-class WrongMediaType(Rejection):
-    """The Content-Type is not accepted."""
-
-    def __init__(self, found: str | None, accepted: Sequence[str]) -> None:
-        super().__init__("Content-Type", repr(found) if found else "nothing", " or ".join(accepted))
-
-
-class PackedBody(Rejection):
-    """The body is packed; the response has Accept-Encoding (RFC 9110, 15.5.16)."""
-
-    def __init__(self, header: str, found: str, accepted: str) -> None:
-        super().__init__(header, repr(found[:80]), f"{accepted}: send the body as it is, without packing")
-
-
-class EmptyBody(InvalidInput):
-    """The request has no body."""
-
-
-class TooLarge(InvalidInput):
-    """The body is too large."""
-
-
-class WrongProtocol(InvalidInput):
-    """The request has another version of the upload protocol."""
-
-
-class WrongOffset(InvalidInput):
-    """The offset of the data differs from that of the upload."""
-
-
-class Locked(InvalidInput):
-    """Another request uses the upload."""
-
-
-class WrongChecksum(InvalidInput):
-    """The received data does not match its checksum."""
-
-
-class UnknownChecksum(InvalidInput):
-    """The checksum algorithm is unknown."""
-
-
-class InUse(InvalidInput):
-    """An unfinished job needs the item."""
-
-
-class JobFinished(InvalidInput):
-    """The job has ended and cannot be changed."""
-
-
-class KeyReused(InvalidInput):
-    """The idempotency key was used with another request."""
-
-
-class QueueFull(InvalidInput):
-    """Too many jobs are queued."""
-
-
-class NotAuthenticated(InvalidInput):
-    """The caller is not authenticated."""
-
-
-class Forbidden(InvalidInput):
-    """The caller does not have the required permission."""
 
 
 class RateLimited(Rejection):
@@ -117,17 +117,11 @@ class RateLimited(Rejection):
         wait_s: time until the next request is accepted, s.
     """
 
+    problem = _problem(429, "too-often", "Too many requests")
+
     def __init__(self, field: str, value: str, accepted: str, wait_s: float) -> None:
         super().__init__(field, value, accepted)
         self.wait_s = wait_s
-
-
-class TooManyStreams(InvalidInput):
-    """Too many event streams are open."""
-
-
-class QuotaExceeded(InvalidInput):
-    """The storage quota of the tenant is exceeded."""
 
 
 class RangeNotSatisfiable(Rejection):
@@ -137,32 +131,23 @@ class RangeNotSatisfiable(Rejection):
         size: of the file, bytes.
     """
 
+    problem = _problem(416, "no-such-part", "Range not satisfiable")
+
     def __init__(self, found: str, size: int) -> None:
         super().__init__("Range", repr(found), f"a range that starts within the {size} bytes")
         self.size = size
 
 
-class NoAnimation(Rejection):
-    """The job has no animation: it has another kind, or has not succeeded."""
-
-    def __init__(self, job_id: str, kind: str, state: str) -> None:
-        super().__init__("job", f"{job_id}, {kind}, {state}", "a successful job of kind refraction")
-
-
-class NoPreview(Rejection):
-    """The job has no image to preview: it has another kind, does not run, or has not got that far."""
-
-    def __init__(self, job_id: str, kind: str, found: str) -> None:
-        accepted = "a running job of kind reconstruction, after its first iteration"
-        super().__init__("job", f"{job_id}, {kind}, {found}", accepted)
-
-
-class StorageFull(InvalidInput):
+class StorageFull(Refusal):
     """The disk of the service is full."""
+
+    problem = _problem(507, "storage-full", "Disk full")
 
 
 class StorageUnavailable(Rejection):
     """The bucket with the files is unavailable."""
+
+    problem = _problem(503, "storage-away", "Storage unavailable")
 
     def __init__(self, found: str) -> None:
         super().__init__("storage", found, "a later request, when the storage is available")
@@ -170,6 +155,8 @@ class StorageUnavailable(Rejection):
 
 class DatabaseUnavailable(Rejection, SQLAlchemyError):  # noqa: N818 - a refusal, like the others
     """The database is unavailable, locked by another program, or overloaded."""
+
+    problem = _problem(503, "database-away", "Database unavailable")
 
     def __init__(self, found: str) -> None:
         InvalidInput.__init__(self, "database", found, "a later request, when the database is available")
@@ -182,33 +169,19 @@ class DatabaseFull(Rejection, StorageFull, SQLAlchemyError):  # noqa: N818 - a r
         InvalidInput.__init__(self, "database", "no space to write a row", "more free disk space")
 
 
-class NoBucket(Rejection):
-    """The files of the service are not in a bucket."""
-
-    def __init__(self) -> None:
-        super().__init__("storage", "no bucket", "a resumable upload (/v1/uploads)")
-
-
-class NoSignIn(Rejection):
-    """The service has no OpenID provider."""
-
-    def __init__(self) -> None:
-        super().__init__("sign-in", "no OpenID provider", "an API key; BENTRAY_OIDC_ISSUER names a provider")
-
-
 class ProviderUnavailable(Rejection):
     """The provider of sign-ins does not answer, or not as OpenID Connect says."""
+
+    problem = _problem(503, "provider-away", "Sign-in unavailable")
 
     def __init__(self, found: str) -> None:
         super().__init__("OpenID provider", found, "a later request; see the log of the service")
 
 
-class Busy(InvalidInput):
-    """No worker was available in time."""
-
-
 class NotReady(Exception):  # noqa: N818 - names a state, like the other refusals
     """Parts of the service do not work; each fault is (part, found, needed)."""
+
+    problem = _problem(503, "not-ready", "Service not ready")
 
     def __init__(self, faults: Sequence[tuple[str, str, str]]) -> None:
         self.faults = tuple(faults)

@@ -86,7 +86,8 @@ def _check_codings(headers: Headers) -> None:
         given = ", ".join(headers.getlist(header))
         packed = any(one.strip().lower() not in ("", accepted) for one in given.split(","))
         if packed and (chunked or headers.get("content-length", "0") != "0"):
-            raise PackedBody(header, given, accepted)
+            whole = f"{accepted}: send the body as it is, without packing"
+            raise PackedBody(header, repr(given[:80]), whole)
 
 
 def _public(path: str) -> bool:

@@ -38,7 +38,7 @@ def accept_media_types(*accepted: str) -> Callable[[Request], None]:
     def check(request: Request) -> None:
         found = request.headers.get("content-type")
         if found is None or found.partition(";")[0].strip().lower() not in accepted:
-            raise WrongMediaType(found, accepted)
+            raise WrongMediaType("Content-Type", repr(found) if found else "nothing", " or ".join(accepted))
 
     return check
 

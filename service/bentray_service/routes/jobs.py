@@ -175,7 +175,8 @@ def animation(job_id: str, context: Context) -> Response:
     """
     job, files = context.stores.jobs.get(context.tenant, job_id), context.stores.files
     if job.kind != "refraction" or job.state != "succeeded":
-        raise NoAnimation(job.id, job.kind, job.state)
+        found = f"{job.id}, {job.kind}, {job.state}"
+        raise NoAnimation("job", found, "a successful job of kind refraction")
     extension = job.settings["format"]
     path = files.store.fetch(files.of(context.tenant).animation(job.id, extension))
     return download(context.request, path, repr((job.id, job.finished)), ANIMATIONS[extension])
@@ -187,12 +188,13 @@ def show_preview(job_id: str, response: Response, context: Context) -> PreviewRe
 
     There is one after the first iteration, or after some seconds of a longer one.
     """
-    job = context.stores.jobs.get(context.tenant, job_id)
-    if job.kind != "reconstruction" or job.state not in ("running", "cancelling"):
-        raise NoPreview(job.id, job.kind, job.state)
-    image = checkpoint_image(context.stores.files.of(context.tenant).checkpoints(job.id))
+    files, job = context.stores.files.of(context.tenant), context.stores.jobs.get(context.tenant, job_id)
+    image, state = None, job.state
+    if job.kind == "reconstruction" and state in ("running", "cancelling"):
+        image, state = checkpoint_image(files.checkpoints(job.id)), "before its first image"
     if image is None:
-        raise NoPreview(job.id, "reconstruction", "before its first image")
+        accepted = "a running job of kind reconstruction, after its first iteration"
+        raise NoPreview("job", f"{job.id}, {job.kind}, {state}", accepted)
     response.headers["Cache-Control"] = "no-store"
     return PreviewRecord.model_validate(image)
 

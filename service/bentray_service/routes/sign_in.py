@@ -89,7 +89,8 @@ async def _in_thread(request: Request, work: Callable[[], Result]) -> Result:
 def _browsers(request: Request) -> BrowserSessions:
     browsers = access_of(request.scope).sign_in.browsers
     if browsers is None:
-        raise NoSignIn()
+        accepted = "an API key; BENTRAY_OIDC_ISSUER names a provider"
+        raise NoSignIn("sign-in", "no OpenID provider", accepted)
     return browsers
 
 

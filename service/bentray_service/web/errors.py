@@ -1,4 +1,4 @@
-"""Error responses as problem+json (RFC 9457): a table from exception to status, and exception handlers."""
+"""Error responses as problem+json (RFC 9457), and exception handlers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import logging
 import math
 import secrets
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any
 
@@ -22,6 +21,7 @@ from starlette.routing import Match, Mount
 from bentray_kernels.errors import InvalidInput
 
 from .. import errors
+from ..errors import PROBLEMS, ProblemType
 from .middleware import REQUEST_ID, SECURITY_HEADERS
 from .problem import Fault, Problem
 
@@ -34,51 +34,6 @@ RETRY_AFTER = "10"
 METHODS = ("DELETE", "GET", "HEAD", "OPTIONS", "PATCH", "POST", "PUT")
 
 
-@dataclass(frozen=True)
-class ProblemType:
-    """A type of problem: HTTP status, slug of its address, title."""
-
-    status: int
-    slug: str
-    title: str
-
-
-PROBLEMS: Mapping[type[Exception], ProblemType] = {
-    InvalidInput: ProblemType(422, "invalid-input", "Invalid value"),
-    errors.UnknownId: ProblemType(404, "unknown-id", "Unknown id"),
-    errors.Deleted: ProblemType(404, "deleted", "Deleted"),
-    errors.Damaged: ProblemType(500, "stored-data-damaged", "Stored data is damaged"),
-    errors.WrongMediaType: ProblemType(415, "wrong-media-type", "Unsupported media type"),
-    errors.PackedBody: ProblemType(415, "packed-body", "Unsupported content coding"),
-    errors.EmptyBody: ProblemType(422, "empty-body", "Empty body"),
-    errors.TooLarge: ProblemType(413, "too-large", "Body too large"),
-    errors.WrongProtocol: ProblemType(412, "wrong-protocol", "Unsupported version of the upload protocol"),
-    errors.WrongOffset: ProblemType(409, "wrong-offset", "Wrong offset of the upload"),
-    errors.Locked: ProblemType(423, "locked", "Upload in use by another request"),
-    # Status code of tus, not of HTTP.
-    errors.WrongChecksum: ProblemType(460, "wrong-checksum", "Checksum mismatch"),
-    errors.UnknownChecksum: ProblemType(400, "unknown-checksum", "Unknown checksum algorithm"),
-    errors.InUse: ProblemType(409, "in-use", "Needed by an unfinished job"),
-    errors.JobFinished: ProblemType(409, "job-finished", "The job has ended"),
-    errors.KeyReused: ProblemType(409, "key-reused", "Idempotency key used with another request"),
-    errors.QueueFull: ProblemType(429, "queue-full", "Too many queued jobs"),
-    errors.NotAuthenticated: ProblemType(401, "not-let-in", "Authentication required"),
-    errors.Forbidden: ProblemType(403, "not-allowed", "Permission denied"),
-    errors.RateLimited: ProblemType(429, "too-often", "Too many requests"),
-    errors.TooManyStreams: ProblemType(429, "too-many-streams", "Too many event streams"),
-    errors.QuotaExceeded: ProblemType(507, "quota-used-up", "Storage quota exceeded"),
-    errors.RangeNotSatisfiable: ProblemType(416, "no-such-part", "Range not satisfiable"),
-    errors.NoAnimation: ProblemType(409, "no-animation", "No animation"),
-    errors.NoPreview: ProblemType(409, "no-preview", "No preview"),
-    errors.StorageFull: ProblemType(507, "storage-full", "Disk full"),
-    errors.StorageUnavailable: ProblemType(503, "storage-away", "Storage unavailable"),
-    errors.DatabaseUnavailable: ProblemType(503, "database-away", "Database unavailable"),
-    errors.NoBucket: ProblemType(409, "no-bucket", "No bucket for direct uploads"),
-    errors.NoSignIn: ProblemType(404, "no-sign-in", "No sign-in"),
-    errors.ProviderUnavailable: ProblemType(503, "provider-away", "Sign-in unavailable"),
-    errors.Busy: ProblemType(503, "busy", "No worker available in time"),
-    errors.NotReady: ProblemType(503, "not-ready", "Service not ready"),
-}
 # Temporary problems; the response has Retry-After.
 LATER = (
     errors.Busy,
@@ -115,7 +70,7 @@ def make_problem(kind: ProblemType, detail: str, faults: Sequence[Fault] = (), *
 
 def problem_of(error: InvalidInput, instance: str | None = None) -> Problem:
     """The problem for an :class:`InvalidInput` or a refusal."""
-    kind = next(PROBLEMS[cls] for cls in type(error).__mro__ if cls in PROBLEMS)
+    kind = error.problem if isinstance(error, errors.Refusal) else errors.INVALID
     fault = Fault(field=error.field, found=error.value, accepted=error.accepted)
     return make_problem(kind, str(error), [fault], instance=instance)
 
@@ -124,7 +79,7 @@ def problems(*statuses: int | str) -> dict[int | str, dict[str, Any]]:
     """The error responses of a route, for the OpenAPI description."""
     content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     titles: dict[int | str, list[str]] = {"default": ["A problem"]}
-    for kind in (*EDGE, *PROBLEMS.values(), INVALID_REQUEST, UNREADABLE):
+    for kind in (*EDGE, *PROBLEMS, INVALID_REQUEST, UNREADABLE):
         titles.setdefault(kind.status, []).append(kind.title)
     words = {status: "; or: ".join(dict.fromkeys(said)) for status, said in titles.items()}
     return {status: {"description": words[status], "content": content} for status in statuses}
@@ -219,9 +174,7 @@ def _system_error(request: Request, error: Exception) -> Response:
 def _not_ready(request: Request, error: Exception) -> Response:
     assert isinstance(error, errors.NotReady)
     faults = [Fault(field=part, found=found, accepted=needed) for part, found, needed in error.faults]
-    problem = make_problem(
-        PROBLEMS[errors.NotReady], str(error), faults, errors=faults, instance=request.url.path
-    )
+    problem = make_problem(error.problem, str(error), faults, errors=faults, instance=request.url.path)
     return _respond(problem, {"Retry-After": "5"})
 
 

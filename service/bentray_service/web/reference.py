@@ -8,9 +8,10 @@ from typing import Any
 
 from fastapi import FastAPI
 
+from ..errors import PROBLEMS
 from .curl_examples import add_examples
 from .documents import document, table
-from .errors import EDGE, FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND, PROBLEMS
+from .errors import EDGE, FAILED, INTERNAL, INVALID_REQUEST, NOT_FOUND
 
 
 class OpenApiApp(FastAPI):
@@ -155,7 +156,7 @@ def _schema(name: str, schema: Node) -> str:
 
 
 def _problems() -> str:
-    kinds = [*PROBLEMS.values(), *EDGE, INVALID_REQUEST, NOT_FOUND, FAILED, INTERNAL]
+    kinds = [*PROBLEMS, *EDGE, INVALID_REQUEST, NOT_FOUND, FAILED, INTERNAL]
     return table(
         ("Type", "Status", "Title"), [(f"/problems/{k.slug}", str(k.status), k.title) for k in kinds]
     )

@@ -15,8 +15,9 @@ import pytest
 import uvicorn
 
 from bentray_service.app import create_app
+from bentray_service.errors import PROBLEMS
 from bentray_service.settings import ServiceSettings
-from bentray_service.web.errors import EDGE, PROBLEMS
+from bentray_service.web.errors import EDGE
 from bentray_service.web.server import configuration, listen
 
 from ...edge import CONFIGURATION, SKIPPED, edge, program
@@ -179,7 +180,7 @@ def test_invalid_headers_get_a_problem(front, sent, status, slug):
 
 
 def test_every_problem_of_the_file_is_known():
-    kinds = {(kind.status, kind.slug, kind.title) for kind in (*EDGE, *PROBLEMS.values())}
+    kinds = {(kind.status, kind.slug, kind.title) for kind in (*EDGE, *PROBLEMS)}
     texts = re.findall(r"^ +\d+ '(\{.*\})';$", CONFIGURATION.read_text(), re.M)
     problems = [json.loads(text) for text in texts]
     result = {(entry["status"], entry["type"].rpartition("/")[2], entry["title"]) for entry in problems}

@@ -117,7 +117,7 @@ def complete_direct_upload(upload_id: str, context: Context) -> DirectUploadReco
 def _direct(context: RequestContext) -> DirectUploads:
     direct = context.stores.files.store.direct_uploads
     if direct is None:
-        raise NoBucket()
+        raise NoBucket("storage", "no bucket", "a resumable upload (/v1/uploads)")
     return direct
 
 
