@@ -24,13 +24,11 @@ from .compute import Cluster, Compute
 from .files.bucket_store import open_store
 from .files.checked_store import CheckedStore
 from .files.data_folder import Files, installation_of, lock
-from .files.deletion import Deletion
 from .files.disk import private_files
 from .files.folder_database import check_authentication, open_folder_database
 from .files.orphans import Orphans
 from .guard import Guard
 from .housekeeping import Housekeeper
-from .ingest.canonical import IngestLimits
 from .ingest.fair_queue import FairQueue, readers_at_once
 from .ingest.upload_ingest import UploadIngest
 from .jobs.feed import EventFeed
@@ -39,7 +37,7 @@ from .jobs.runner import Runner
 from .jobs.traces import telemetry_from
 from .metrics import Metrics
 from .pictures import Pictures
-from .readiness import Readiness, Threaded
+from .readiness import Readiness
 from .routes import (
     access,
     batches,
@@ -56,17 +54,8 @@ from .routes import (
 )
 from .routes.uploads import direct_uploads, tus
 from .rows.accounts import Accounts
-from .rows.ages import ExpiryMarks, ObservedTime
-from .rows.batches import Batches
 from .rows.checksums import Checksums
-from .rows.claims import ClaimedTenants
 from .rows.job_queue import Queue
-from .rows.jobs import Jobs
-from .rows.keys import Keys
-from .rows.projects import Projects
-from .rows.sessions import Sessions
-from .rows.stored_tables import Datasets, GeometryFields, Meshes, UploadedTable, UploadedVolumes, Volumes
-from .rows.uploads import Uploads
 from .settings import ServiceSettings
 from .web import errors
 from .web.middleware import identify, speak_tus
@@ -189,17 +178,10 @@ def _open(
     orphans.begin()
     quota = Quota(database, settings.max_tenant_bytes)
     quota.begin(files, alone=settings.database_url is None)
-    tenant_projects, accounts = Projects(database), Accounts(database)
-    access_control = SignIn(
-        settings,
-        Keys(database),
-        Sessions(database),
-        tenant_projects,
-        accounts,
-        ClaimedTenants(database),
-    )
-    stack.callback(access_control.close)
-    check_authentication(files.root, required=access_control.required())
+    accounts = Accounts(database)
+    sign_in = SignIn(settings, database, accounts)
+    stack.callback(sign_in.close)
+    check_authentication(files.root, required=sign_in.required())
     if cluster is None:
         cluster = stack.enter_context(
             open_cluster(
@@ -212,84 +194,24 @@ def _open(
             )
         )
     queue, compute = Queue(database, installation_of(locked)), Compute(cluster, store.fetch)
-    runner = Runner(
-        queue,
-        accounts,
-        files,
-        compute,
-        settings.jobs_at_once,
-        settings.tenants_at_once,
-        settings.min_free_bytes,
-    )
-    runner.start()
-    stack.callback(runner.stop)
-    pieces, deletion = Uploads(database), Deletion(database, files)
-    stores: dict[str, UploadedTable[Any]] = {
-        "dataset": Datasets(database),
-        "volume": UploadedVolumes(database),
-        "mesh": Meshes(database),
-    }
-    limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, files.scratch)
+    runner = Runner(queue, accounts, files, compute, settings)
     ingest_queue = FairQueue(readers_at_once(settings.ingest_memory_bytes), accounts)
-    ingest_queue.start()
-    stack.callback(ingest_queue.stop)
-    upload_ingest = UploadIngest(
-        pieces,
-        files,
-        stores,
-        limits,
-        settings.upload_keep_s,
-        ingest_queue,
-        accounts,
-        quota,
-        store.direct_uploads,
-    )
-    upload_ingest.start()
-    stack.callback(upload_ingest.stop)
+    ingest = UploadIngest(settings, database, files, ingest_queue, accounts, quota)
     audit = Audit(files.audit)
-    housekeeper = Housekeeper(
-        pieces,
-        files,
-        deletion,
-        upload_ingest.locks,
-        quota,
-        ExpiryMarks(database),
-        ObservedTime(database),
-        orphans,
-        settings.keep_days,
-        settings.upload_keep_s,
-        audit=audit,
-        audit_keep_days=settings.audit_keep_days,
-        direct=store.direct_uploads,
-    )
-    housekeeper.start()
-    stack.callback(housekeeper.stop)
+    housekeeper = Housekeeper(settings, database, files, quota, ingest.locks, orphans, audit)
     pictures = Pictures(cluster, accounts, files)
     stack.callback(pictures.stop)
-    upload_ingest.on_stored = pictures.examine
-    webhooks = Webhooks(database, settings, alone=settings.database_url is None)
-    webhooks.start()
-    stack.callback(webhooks.stop)
-    threads: dict[str, Threaded] = {
-        "runner": runner,
-        "ingest": upload_ingest,
-        "housekeeping": housekeeper,
-        "webhooks": webhooks,
-    }
+    ingest.on_stored = pictures.examine
+    webhooks = Webhooks(database, settings)
+    ingest_queue.start()
+    stack.callback(ingest_queue.stop)
+    threads = {"runner": runner, "ingest": ingest, "housekeeping": housekeeper, "webhooks": webhooks}
+    for part in threads.values():
+        part.start()
+        stack.callback(part.stop)
     readiness = Readiness(database, files, compute, threads, settings.min_free_bytes)
     stack.callback(readiness.stop)
-    store_parts = StoreParts(
-        database,
-        files,
-        quota,
-        deletion,
-        Datasets(database),
-        Volumes(database),
-        Meshes(database),
-        GeometryFields(database),
-        Jobs(database),
-        Batches(database),
-    )
-    feed = EventFeed(store_parts.jobs, accounts, leaving.is_set)
-    background = BackgroundParts(runner, pictures, upload_ingest, housekeeper, webhooks, feed, readiness)
-    return store_parts, background, AccessParts(settings, access_control, audit)
+    stores = StoreParts(database, files, quota)
+    feed = EventFeed(stores.jobs, accounts, leaving.is_set)
+    background = BackgroundParts(runner, pictures, ingest, housekeeper, webhooks, feed, readiness)
+    return stores, background, AccessParts(settings, sign_in, audit)

@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 import logging
-import threading
 import time
 from collections.abc import Callable
 
-from sqlalchemy.exc import SQLAlchemyError
-
 from .access.audit import Audit
 from .access.quota import Quota
-from .errors import DatabaseUnavailable, InUse, Locked, StorageUnavailable, UnknownId
+from .background import BackgroundThread
+from .errors import InUse, Locked, UnknownId
 from .files.data_folder import Files
-from .files.deletion import Deletion, StoredItem
-from .files.direct_uploads import DirectUploads
+from .files.deletion import Deletion
 from .files.orphans import Orphans
 from .ingest.append import UploadLocks, remove
-from .rows.ages import ExpiredItem, ExpiryMarks, ObservedTime
+from .rows.ages import ExpiryMarks, ObservedTime, StoredItem
+from .rows.database import Database
 from .rows.ids import Tenant
 from .rows.tables import UploadRow
 from .rows.uploads import Uploads
+from .settings import ServiceSettings
 
 log = logging.getLogger("bentray.housekeeping")
 
-INTERVAL_SECONDS = 60.0
 # Interval between clean-ups of the store, s.
 TIDY_SECONDS = 3600.0
-# Longest wait for a file operation when the service stops, s.
-STOP_SECONDS = 30.0
 DAY_S = 86400.0
 # Time for which an item must be found expired before it is deleted, s.
 AGE_SECONDS = DAY_S
@@ -40,112 +36,77 @@ UPLOAD, AUDIT = "upload", "audit"
 NOBODY = Tenant("")
 
 
-class Housekeeper:
-    """Deletes expired items every ``INTERVAL_SECONDS``.
+class Housekeeper(BackgroundThread):
+    """Deletes expired items every minute.
 
     An item is deleted only after it has been found expired for ``AGE_SECONDS`` of observed time (an upload
     for its keeping time), since the system clock may have been wrong for a while.
     """
 
+    idle_s, failure = 60.0, "old data could not be deleted"
+
     def __init__(
         self,
-        uploads: Uploads,
+        settings: ServiceSettings,
+        database: Database,
         files: Files,
-        deletion: Deletion,
-        hold: UploadLocks,
         quota: Quota,
-        ages: ExpiryMarks,
-        observed: ObservedTime,
+        hold: UploadLocks,
         orphans: Orphans,
-        keep_days: float | None,
-        upload_keep_s: float,
+        audit: Audit,
         clocks: Callable[[], tuple[float, float]] = lambda: (time.time(), time.monotonic()),
-        audit: Audit | None = None,
-        audit_keep_days: float | None = None,
-        direct: DirectUploads | None = None,
     ) -> None:
         """Args:
-        uploads, files, deletion, orphans: to clean up.
-        hold: locks of uploads.
+        settings: how long what is kept.
+        database, files, orphans, audit: to clean up.
         quota: its reservations are renewed while this process lives.
-        ages, observed: marks of expired items, and the observed time.
-        keep_days: maximum age of datasets, volumes, meshes and jobs without them; None: unlimited.
-        upload_keep_s: keeping time of uploads, s.
+        hold: locks of uploads.
         clocks: s since 1970, and monotonic seconds.
-        audit, audit_keep_days: the audit log, and the maximum age of its days; None: unlimited.
-        direct: uploads in the bucket, if there is one.
         """
-        self._uploads = uploads
-        self._files = files
-        self._deletion = deletion
-        self._hold = hold
-        self._quota = quota
-        self._ages = ages
-        self._observed = observed
-        self._orphans = orphans
-        self._keep_days = keep_days
-        self._direct = direct
-        self._upload_wait_s = min(upload_keep_s, AGE_SECONDS)
+        super().__init__("housekeeping")
+        self._settings, self._uploads, self._files = settings, Uploads(database), files
+        self._deletion, self._quota, self._hold = Deletion(database, files), quota, hold
+        self._ages = ExpiryMarks(database)
+        self._observed = ObservedTime(database, lambda: clocks()[1])
+        self._orphans, self._audit = orphans, audit
+        self._upload_wait_s = min(settings.upload_keep_s, AGE_SECONDS)
         self._clocks = clocks
-        self._audit, self._audit_keep_days = audit, audit_keep_days
         self._last: tuple[float, float] | None = None
-        self._leaving = threading.Event()
-        self._thread = threading.Thread(target=self._loop, name="housekeeping", daemon=True)
+        self._tidied = -TIDY_SECONDS
 
-    def start(self) -> None:
-        self._thread.start()
-
-    def alive(self) -> bool:
-        """Whether the thread is alive."""
-        return self._thread.is_alive()
-
-    def stop(self) -> None:
-        self._leaving.set()
-        self._thread.join(STOP_SECONDS)
-
-    def _loop(self) -> None:
-        tidied = -TIDY_SECONDS
-        while True:
-            try:
-                self._quota.renew()
-                self.sweep()
-                if time.monotonic() - tidied >= TIDY_SECONDS:
-                    self._files.store.tidy(self._leaving.is_set)
-                    if self._direct is not None:
-                        self._direct.tidy(self._uploads.ids)
-                    self._orphans.sweep(self._leaving.is_set)
-                    tidied = time.monotonic()
-            except DatabaseUnavailable as error:
-                log.warning("deletion of old data pauses: %s", error)
-            except (SQLAlchemyError, OSError, StorageUnavailable):
-                log.exception("old data could not be deleted; next attempt in %g s", INTERVAL_SECONDS)
-            if self._leaving.wait(INTERVAL_SECONDS):
-                return
+    def _step(self) -> bool:
+        self._quota.renew()
+        self.sweep()
+        if time.monotonic() - self._tidied >= TIDY_SECONDS:
+            self._files.store.tidy(self._leaving.is_set)
+            if self._files.store.direct_uploads is not None:
+                self._files.store.direct_uploads.tidy(self._uploads.ids)
+            self._orphans.sweep(self._leaving.is_set)
+            self._tidied = time.monotonic()
+        return False
 
     def sweep(self) -> None:
         """Mark expired items, and delete those that have been expired for long enough."""
         now = self._now()
-        uploads = {ExpiredItem(row.tenant, UPLOAD, row.id): row for row in self._uploads.expired(now)}
-        stored: dict[ExpiredItem, StoredItem] = {}
-        if self._keep_days is not None:
-            old = self._deletion.older_than(now - DAY_S * self._keep_days)
-            stored = {ExpiredItem(one.tenant, one.what, one.id): one for one in old}
-        days: set[ExpiredItem] = set()
-        if self._audit is not None and self._audit_keep_days is not None:
-            old_days = self._audit.days_before(now, self._audit_keep_days)
-            days = {ExpiredItem(NOBODY, AUDIT, day) for day in old_days}
-        for aged, seconds in self._ages.mark({*uploads, *stored, *days}, self._observed.count()).items():
+        keep_days, audit_days = self._settings.keep_days, self._settings.audit_keep_days
+        uploads = {StoredItem(row.tenant, UPLOAD, row.id): row for row in self._uploads.expired(now)}
+        old = set(uploads)
+        if keep_days is not None:
+            old |= set(self._deletion.older_than(now - DAY_S * keep_days))
+        if audit_days is not None:
+            old |= {StoredItem(NOBODY, AUDIT, day) for day in self._audit.days_before(now, audit_days)}
+        for aged, seconds in self._ages.mark(old, self._observed.count()).items():
             if aged.what == UPLOAD and seconds >= self._upload_wait_s:
                 try:
                     with self._hold(aged.id):
                         self.forget(uploads[aged])
                 except Locked:
                     continue
-            elif aged.what == AUDIT and seconds >= AGE_SECONDS and self._audit is not None:
+            elif aged.what == AUDIT and seconds >= AGE_SECONDS:
                 self._audit.remove(aged.id)
                 log.info("deleted the audit log of %s after its keeping time", aged.id)
-            elif aged in stored and seconds >= AGE_SECONDS:
-                self._delete(stored[aged])
+            elif aged.what != UPLOAD and seconds >= AGE_SECONDS:
+                self._delete(aged)
 
     def _now(self) -> float:
         """The system time, s since 1970; detects corrections of the clock."""
@@ -178,7 +139,8 @@ class Housekeeper:
         """
         if row.state == "reading":
             raise InUse("upload", f"{row.id}, which is being read", "an upload that is not being read")
-        if row.multipart_id is not None and self._direct is not None:
-            self._direct.drop(row)
+        direct = self._files.store.direct_uploads
+        if row.multipart_id is not None and direct is not None:
+            direct.drop(row)
         remove(self._files.of(row.tenant).upload(row.id))
         self._uploads.remove(row.id)

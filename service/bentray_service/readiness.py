@@ -7,12 +7,12 @@ import shutil
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.errors import InvalidInput
 
+from .background import BackgroundThread
 from .compute import Compute
 from .errors import NotReady
 from .files.data_folder import Files
@@ -20,13 +20,6 @@ from .rows.database import Database
 
 # Time limit of the check, s.
 WITHIN_S = 3.0
-
-
-class Threaded(Protocol):
-    """A part with threads of its own."""
-
-    def alive(self) -> bool:
-        """Whether all of them are alive."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +45,7 @@ class Readiness:
         database: Database,
         files: Files,
         compute: Compute,
-        threads: Mapping[str, Threaded],
+        threads: Mapping[str, BackgroundThread],
         min_free_bytes: int,
     ) -> None:
         """Args:

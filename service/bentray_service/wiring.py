@@ -18,6 +18,7 @@ from .files.deletion import Deletion
 from .housekeeping import Housekeeper
 from .ingest.upload_ingest import UploadIngest
 from .jobs.feed import EventFeed
+from .jobs.kind import Sources
 from .jobs.runner import Runner
 from .pictures import Pictures
 from .readiness import Readiness
@@ -25,26 +26,20 @@ from .rows.batches import Batches
 from .rows.database import Database
 from .rows.ids import Tenant
 from .rows.jobs import Jobs, Submission
-from .rows.stored_tables import Datasets, GeometryFields, Meshes, Volumes
+from .rows.stored_tables import GeometryFields
 from .rows.tables import DatasetRow, FieldRow, VolumeRow
 from .settings import ServiceSettings
 from .webhooks.sender import Webhooks
 
 
-@dataclass(frozen=True)
-class StoreParts:
+class StoreParts(Sources):
     """Rows and files, with what limits and deletes them."""
 
-    database: Database
-    files: Files
-    quota: Quota
-    deletion: Deletion
-    datasets: Datasets
-    volumes: Volumes
-    meshes: Meshes
-    geometry_fields: GeometryFields
-    jobs: Jobs
-    batches: Batches
+    def __init__(self, database: Database, files: Files, quota: Quota) -> None:
+        super().__init__(database, files)
+        self.database, self.quota, self.deletion = database, quota, Deletion(database, files)
+        self.geometry_fields, self.jobs = GeometryFields(database), Jobs(database)
+        self.batches = Batches(database)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from bentray_kernels.errors import InvalidInput
 from ..errors import Forbidden, NotAuthenticated, RateLimited
 from ..rows.accounts import Accounts
 from ..rows.claims import ClaimedTenants
+from ..rows.database import Database
 from ..rows.ids import LOCAL, Tenant
 from ..rows.keys import PREFIX, ApiKey, Keys
 from ..rows.projects import ROLES, Projects, membership
@@ -61,33 +62,27 @@ class SignIn:
         browsers: sessions of users who signed in at the OpenID provider; None without one.
     """
 
-    def __init__(
-        self,
-        settings: ServiceSettings,
-        keys: Keys,
-        sessions: Sessions,
-        projects: Projects,
-        accounts: Accounts,
-        claimed: ClaimedTenants,
-    ) -> None:
+    def __init__(self, settings: ServiceSettings, database: Database, accounts: Accounts) -> None:
         """Raises:
         InvalidInput: if the service would be open to other machines, or for an invalid setting.
         """
-        self._keys, self.projects = keys, projects
-        self.watch = KeyWatch(keys, sessions, projects)
-        self._accounts, self._claimed = accounts, claimed
+        self._keys, sessions, self.projects = Keys(database), Sessions(database), Projects(database)
+        self.watch = KeyWatch(self._keys, sessions, self.projects)
+        self._accounts, self._claimed = accounts, ClaimedTenants(database)
         self._trusted = networks(settings.trusted_proxies or "")
         self._forwarding = networks(settings.behind_proxy or "", "BENTRAY_BEHIND_PROXY")
         self._user_header = settings.proxy_user_header
-        self.browsers = None if settings.oidc_issuer is None else BrowserSessions(settings, sessions, claimed)
+        self.browsers = None
+        if settings.oidc_issuer is not None:
+            self.browsers = BrowserSessions(settings, sessions, self._claimed)
         self._guarded = bool(self._trusted) or self.browsers is not None
         self._sign_ins = RateLimits(SIGN_INS_PER_MINUTE)
         self._requests = RateLimits(settings.requests_per_minute)
         self._renders = RateLimits(settings.renders_per_minute)
         self._no_keys_until = -math.inf
-        if settings.first_key_file is not None and not keys.any():
+        if settings.first_key_file is not None and not self._keys.any():
             self._create_first_key(settings)
-        if not self._guarded and not keys.any():
+        if not self._guarded and not self._keys.any():
             if self._forwarding or not is_loopback(settings.host):
                 where = f"{settings.host} behind a proxy" if self._forwarding else settings.host
                 raise InvalidInput("host", f"{where}, reachable by others, without any key", ACCEPTED_HOSTS)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Collection, Iterator
-from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, and_, delete, or_, select, update
 from sqlalchemy.orm import Session
 
 from ..errors import DatabaseUnavailable, InUse, StorageUnavailable, UnknownId
 from ..rows import usage
+from ..rows.ages import StoredItem
 from ..rows.checksums import deletion_of
 from ..rows.database import Database
 from ..rows.ids import Tenant, checked
@@ -36,14 +36,6 @@ log = logging.getLogger("bentray.storage")
 Deletable = DatasetRow | ResultVolumeRow | UploadedVolumeRow | MeshRow | JobRow
 
 
-class StoredItem(NamedTuple):
-    """An item to delete; ``what`` is ``dataset``, ``volume``, ``mesh`` or ``job``."""
-
-    tenant: Tenant
-    what: str
-    id: str
-
-
 class Deletion:
     """Deletes datasets, volumes, meshes and jobs of a tenant.
 
@@ -59,7 +51,7 @@ class Deletion:
         self._files = files
 
     def delete(self, stored: StoredItem) -> None:
-        """Delete an item and everything derived from it.
+        """Delete a dataset, volume, mesh or job, and everything derived from it.
 
         Raises:
             UnknownId: when the tenant has no such item.

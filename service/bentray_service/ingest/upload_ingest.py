@@ -9,7 +9,7 @@ import secrets
 import signal
 import threading
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
@@ -20,15 +20,17 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from ..access.quota import Quota
+from ..background import BackgroundThread
 from ..errors import StorageFull, StorageUnavailable, UnknownId
 from ..files.data_folder import Files
-from ..files.direct_uploads import DirectUploads
 from ..files.disk import digest_of
 from ..rows.accounts import Account, Accounts
+from ..rows.database import Database
 from ..rows.ids import Tenant
-from ..rows.stored_tables import UploadedTable
+from ..rows.stored_tables import Datasets, Meshes, UploadedTable, UploadedVolumes
 from ..rows.tables import UploadRow
 from ..rows.uploads import Uploads
+from ..settings import ServiceSettings
 from ..web.errors import INTERNAL, make_problem, problem_of
 from ..web.problem import Problem
 from .append import UploadLocks, discard_unverified, received_bytes
@@ -38,14 +40,11 @@ from .upload_limits import UploadLimits
 
 log = logging.getLogger("bentray.ingest")
 
-# Interval between polls, s; a complete upload wakes the thread at once.
-IDLE_SECONDS = 5.0
 # Delay after a full disk or an unavailable database or store, s.
 PATIENCE_SECONDS = 30.0
-STOP_SECONDS = 30.0
 
 
-class UploadIngest:
+class UploadIngest(BackgroundThread):
     """Submits complete uploads to the ingest queue, oldest first, with a limit for each account.
 
     Uploads that a dead service was reading are read again.
@@ -54,37 +53,33 @@ class UploadIngest:
         limits: of an ingest process.
     """
 
+    idle_s, failure = 5.0, "complete uploads could not be queued"
+
     def __init__(
         self,
-        uploads: Uploads,
+        settings: ServiceSettings,
+        database: Database,
         files: Files,
-        stores: Mapping[str, UploadedTable[Any]],
-        limits: IngestLimits,
-        keep_s: float,
         queue: FairQueue,
         accounts: Accounts,
         quota: Quota,
-        direct: DirectUploads | None,
     ) -> None:
         """Args:
-        uploads: the table of uploads.
+        settings: limits of an ingest process, and how long the row of a completed upload is kept.
+        database: with the uploads and their results.
         files: the data folder.
-        stores: tables of the results by type.
-        keep_s: how long the row of a completed upload is kept, s.
         queue: the ingest queue.
         accounts: whose queued uploads are counted.
         quota: of the tenants.
-        direct: uploads in the bucket, if there is one.
         """
-        self.uploads, self.queue = uploads, queue
+        super().__init__("ingest")
+        self.uploads, self.queue = Uploads(database), queue
         self.locks, self.upload_limits = UploadLocks(), UploadLimits(accounts)
-        self._direct = direct
-        self._files = files
-        self._stores = stores
-        self.limits = limits
-        self._keep_s = keep_s
-        self._accounts = accounts
-        self._quota = quota
+        self.limits = IngestLimits(settings.ingest_memory_bytes, settings.ingest_seconds, files.scratch)
+        kinds: tuple[type[UploadedTable[Any]], ...] = (Datasets, UploadedVolumes, Meshes)
+        self._stores = {kind.what: kind(database) for kind in kinds}
+        self._files, self._accounts, self._quota = files, accounts, quota
+        self._keep_s = settings.upload_keep_s
         self._lock = threading.Lock()
         # Called with each new row.
         self.on_stored: Callable[[Any], None] = lambda row: None
@@ -92,9 +87,6 @@ class UploadIngest:
         self.queued: dict[str, Account] = {}
         self._children: dict[str, int] = {}
         self._put_off = False
-        self._wake = threading.Event()
-        self._leaving = threading.Event()
-        self._thread = threading.Thread(target=self._loop, name="uploads", daemon=True)
 
     def start(self) -> None:
         """Continue the uploads of a dead service, then start the thread."""
@@ -104,38 +96,27 @@ class UploadIngest:
             # The service died before it marked the upload as complete.
             if received_bytes(path) == row.length:
                 self.uploads.mark_complete(row.id)
-        self._thread.start()
-
-    def notify(self) -> None:
-        """Wake the thread after an upload was completed."""
-        self._wake.set()
-
-    def alive(self) -> bool:
-        """Whether the thread is alive."""
-        return self._thread.is_alive()
+        super().start()
 
     def stop(self) -> None:
         """End the thread and the ingest processes; their uploads are read again at the next start."""
         self._leaving.set()
-        self._wake.set()
         with self._lock:
             children = list(self._children.values())
         for child in children:
             _end(child)
-        self._thread.join(STOP_SECONDS)
+        super().stop()
 
-    def _loop(self) -> None:
-        while not self._leaving.is_set():
-            self._wake.clear()
-            try:
-                self._submit()
-            except SQLAlchemyError as error:
-                self._wait(error)
-            if self._put_off:
-                self._put_off = False
-                self._leaving.wait(PATIENCE_SECONDS)
-            else:
-                self._wake.wait(IDLE_SECONDS)
+    def _step(self) -> bool:
+        try:
+            self._submit()
+        except SQLAlchemyError as error:
+            self._wait(error)
+        if not self._put_off:
+            return False
+        self._put_off = False
+        self._leaving.wait(PATIENCE_SECONDS)
+        return True
 
     def _submit(self) -> None:
         """Queue complete uploads, at most ``FairQueue.share`` of each account."""
@@ -190,17 +171,19 @@ class UploadIngest:
 
     def _drop(self, row: UploadRow) -> None:
         """Delete what is in the bucket, before the row says so; the file here is still complete."""
-        if row.multipart_id is not None and self._direct is not None:
-            self._direct.drop_later(row)
+        direct = self._files.store.direct_uploads
+        if row.multipart_id is not None and direct is not None:
+            direct.drop_later(row)
 
     def _fetch(self, row: UploadRow, path: Path) -> None:
         """Get the data of a direct upload from the bucket, unless that was done before."""
         if row.multipart_id is None or path.stat().st_size == row.length:
             return
-        if self._direct is None:
+        direct = self._files.store.direct_uploads
+        if direct is None:
             raise StorageUnavailable("no bucket; BENTRAY_STORAGE_URL named one before")
         try:
-            self._direct.fetch(row, path)
+            direct.fetch(row, path)
         except FileNotFoundError:
             raise InvalidInput("upload", "no data in the bucket", "a new upload") from None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from fastapi.openapi.models import Example
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
@@ -16,6 +16,7 @@ from bentray_workers.cluster.task_pool import JobControl
 from ..compute import Compute
 from ..files.data_folder import Files
 from ..files.tenant_files import TenantFiles
+from ..rows.database import Database
 from ..rows.ids import Tenant
 from ..rows.jobs import NewJob
 from ..rows.stored_tables import Datasets, Meshes, Volumes
@@ -52,20 +53,12 @@ class JobRequest(BaseModel):
 R = TypeVar("R", bound=JobRequest)
 
 
-class Sources(Protocol):
-    """Stored items and workers, as used for planning."""
+class Sources:
+    """The stored inputs of jobs."""
 
-    @property
-    def datasets(self) -> Datasets: ...
-
-    @property
-    def volumes(self) -> Volumes: ...
-
-    @property
-    def meshes(self) -> Meshes: ...
-
-    @property
-    def files(self) -> Files: ...
+    def __init__(self, database: Database, files: Files) -> None:
+        self.files = files
+        self.datasets, self.volumes, self.meshes = Datasets(database), Volumes(database), Meshes(database)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from bentray_workers.cluster.fair_shares import Shares
 from bentray_workers.cluster.short_lane import SHORT_LANE, is_short
 from bentray_workers.cluster.task_pool import JobControl
 
+from ..background import BackgroundThread
 from ..compute import Compute
 from ..errors import Damaged, DatabaseFull, DatabaseUnavailable, StorageUnavailable
 from ..files.data_folder import Files
@@ -32,6 +33,7 @@ from ..logs import about
 from ..rows.accounts import Accounts
 from ..rows.job_queue import LEASE_S, Queue
 from ..rows.tables import ENDED, JobRow, Plain
+from ..settings import ServiceSettings
 from .estimate import estimate
 from .job_metrics import JobMetrics
 from .kind import JobRun, Kind
@@ -41,10 +43,6 @@ from .traces import JobTraces
 
 log = logging.getLogger("bentray.jobs")
 
-# Interval between polls of an idle runner, s; a new job wakes it at once.
-IDLE_SECONDS = 1.0
-# Time for running jobs to stop when the service stops, s.
-STOP_SECONDS = 30.0
 # Attempts to store the outcome of a job against errors of the database.
 REFUSALS = 3
 # Interval between attempts to store a result, s.
@@ -64,7 +62,7 @@ UNAVAILABLE = (
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
-class Runner:
+class Runner(BackgroundThread):
     """Runs up to ``at_once`` jobs at the same time, and one job of every further tenant up to ``tenants``.
 
     The last job of more than one is always that of a further tenant, so that none holds all. One job that is
@@ -76,44 +74,35 @@ class Runner:
         metrics: durations and retries of jobs.
     """
 
+    idle_s, failure = 1.0, "no job could be claimed"
+
     def __init__(
-        self,
-        queue: Queue,
-        accounts: Accounts,
-        files: Files,
-        compute: Compute,
-        at_once: int,
-        tenants: int,
-        min_free_bytes: int,
+        self, queue: Queue, accounts: Accounts, files: Files, compute: Compute, settings: ServiceSettings
     ) -> None:
         """Args:
-        at_once: maximum number of running jobs.
-        tenants: the same including one job of each tenant without another.
+        settings: ``jobs_at_once``, ``tenants_at_once`` and ``min_free_bytes``.
         """
+        super().__init__("jobs")
         self.metrics, self._traces = JobMetrics(), JobTraces()
         self.queue, self._accounts = queue, accounts
         self._files = files
         self.compute = compute
-        self._min_free_bytes = min_free_bytes
-        self._most = max(at_once, tenants)
-        self._at_once = max(1, min(at_once, self._most - 1))
+        self._min_free_bytes = settings.min_free_bytes
+        self._most = max(settings.jobs_at_once, settings.tenants_at_once)
+        self._at_once = max(1, min(settings.jobs_at_once, self._most - 1))
         self._shares = Shares()
-        self._wake, self._leaving = threading.Event(), threading.Event()
         # The job of each thread. A released job may be claimed again before its thread has ended.
         self._running: dict[threading.Thread, str] = {}
         # The short job that runs beside ``at_once`` others.
         self._extra = ""
-        self._threads = [
-            threading.Thread(target=self._take, name="jobs", daemon=True),
-            threading.Thread(target=self._keep_leases, name="leases", daemon=True),
-        ]
+        self._leases = threading.Thread(target=self._keep_leases, name="leases", daemon=True)
 
     def start(self) -> None:
         """Take over jobs of a dead service, then start the threads."""
         self._recover()
         self._files.keep_work(self.queue.unfinished())
-        for thread in self._threads:
-            thread.start()
+        super().start()
+        self._leases.start()
 
     def _recover(self) -> None:
         crashed = CRASHED.model_dump(exclude_none=True)
@@ -149,34 +138,18 @@ class Runner:
 
     def alive(self) -> bool:
         """Whether the threads of the runner are alive."""
-        return all(thread.is_alive() for thread in self._threads)
+        return super().alive() and self._leases.is_alive()
 
     def stop(self) -> None:
         """Stop the running jobs, queue them again and end the threads."""
         self._leaving.set()
         self._wake.set()
-        _join(self._threads)
+        _join([self._thread, self._leases], self.stop_s)
         # A job may have begun until they ended.
-        _join(tuple(self._running))
+        _join(tuple(self._running), self.stop_s)
 
-    def _take(self) -> None:
-        """Claim jobs and start each in its own thread."""
-        while not self._leaving.is_set():
-            # Before the query: a job queued later wakes this thread again.
-            self._wake.clear()
-            try:
-                if self._start_next():
-                    continue
-            except DatabaseUnavailable:
-                # Already logged; the thread continues.
-                pass
-            except Exception:
-                # An unexpected error must not stop the runner.
-                log.exception("no job could be claimed; next attempt in %g s", IDLE_SECONDS)
-            self._wake.wait(IDLE_SECONDS)
-
-    def _start_next(self) -> bool:
-        """Start the next job, if any; returns whether one was started."""
+    def _step(self) -> bool:
+        """Start the next job, if any, in a thread of its own; returns whether one was started."""
         held = self._held()
         if len(held) >= self._most or not self._has_free_space() or self._files.store.fault() is not None:
             return False
@@ -258,7 +231,7 @@ class Runner:
             reason = f"no answer from the {away}; the job continues when available"
             self._requeue(job_id, reason, error)
             self.metrics.count_retries(away)
-            self._leaving.wait(IDLE_SECONDS)
+            self._leaving.wait(self.idle_s)
         except Exception as error:
             if isinstance(error, OSError) and error.errno in FULL and not self._has_free_space():
                 self._requeue(job_id, "the disk is full; the job continues once there is space", error)
@@ -349,7 +322,7 @@ class Runner:
             try:
                 return write_the_end()
             except (DatabaseUnavailable, DatabaseFull):
-                if self._leaving.wait(IDLE_SECONDS):
+                if self._leaving.wait(self.idle_s):
                     raise
             except SQLAlchemyError as error:
                 refused += 1
@@ -358,7 +331,7 @@ class Runner:
                     problem = explain(job_id, error).model_dump(exclude_none=True)
                     self.queue.fail(job_id, problem)
                     return None
-                if self._leaving.wait(IDLE_SECONDS):
+                if self._leaving.wait(self.idle_s):
                     raise
 
 
@@ -368,12 +341,9 @@ def _seconds(plan: Plain) -> float | None:
     return None if minutes is None else 60.0 * minutes
 
 
-def _join(threads: Iterable[threading.Thread]) -> None:
+def _join(threads: Iterable[threading.Thread], seconds: float) -> None:
+    words = "%s did not stop in %g s; its job will be repeated after the next start"
     for thread in threads:
-        thread.join(STOP_SECONDS)
+        thread.join(seconds)
         if thread.is_alive():
-            log.warning(
-                "%s did not stop in %g s; its job will be repeated after the next start",
-                thread.name,
-                STOP_SECONDS,
-            )
+            log.warning(words, thread.name, seconds)

@@ -11,8 +11,8 @@ from fastapi.openapi.models import Example
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import InUse
-from ..files.deletion import StoredItem
 from ..jobs.kinds import KINDS, ReconstructionRequest
+from ..rows.ages import StoredItem
 from ..rows.tables import ENDED
 from ..web.errors import problems
 from ..wiring import Context

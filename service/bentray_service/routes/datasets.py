@@ -16,8 +16,8 @@ from bentray_kernels.requests.names import DEFAULT_PICKER, PickerName
 from bentray_workers.files.dataset.correct import Correction
 from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
 
-from ..files.deletion import StoredItem
 from ..ingest.canonical import add_corrected
+from ..rows.ages import StoredItem
 from ..rows.ids import new_id
 from ..rows.stored_tables import RequestKey
 from ..rows.tables import DatasetRow

@@ -12,9 +12,9 @@ from fastapi.openapi.models import Example
 from bentray_workers.reconstruction.preview import checkpoint_image
 
 from ..errors import NoAnimation, NoPreview
-from ..files.deletion import StoredItem
 from ..jobs.estimate import READ, estimate
 from ..jobs.kinds import KINDS
+from ..rows.ages import StoredItem
 from ..rows.ids import checked
 from ..rows.jobs import NewJob
 from ..rows.tables import ENDED, JobRow

@@ -13,8 +13,8 @@ from bentray_kernels.errors import InvalidInput
 from bentray_workers.rendering.isosurface_mesh import MAX_STEP, check_nodes, largest_bytes
 
 from ..compute import check_renderable
-from ..files.deletion import StoredItem
 from ..files.disk import digest_of
+from ..rows.ages import StoredItem
 from ..rows.ids import new_id
 from ..rows.tables import MeshRow
 from ..web.errors import problems

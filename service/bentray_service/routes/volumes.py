@@ -34,7 +34,7 @@ from bentray_workers.rendering.refraction_view import RefractionView
 from .. import __version__
 from ..compute import check_renderable
 from ..errors import UnknownId
-from ..files.deletion import StoredItem
+from ..rows.ages import StoredItem
 from ..rows.tables import DatasetRow, VolumeRow
 from ..view_parameters import ViewParameters
 from ..web.errors import problems

@@ -13,8 +13,8 @@ from .ids import Tenant
 from .tables import About, ExpiredRow
 
 
-class ExpiredItem(NamedTuple):
-    """An expired item; ``what`` is ``dataset``, ``volume``, ``mesh``, ``job`` or ``upload``."""
+class StoredItem(NamedTuple):
+    """An item to delete; ``what`` is ``dataset``, ``volume``, ``mesh``, ``job`` or ``upload``."""
 
     tenant: Tenant
     what: str
@@ -28,7 +28,7 @@ class ExpiryMarks(Repository):
     if it was found expired repeatedly over a period of observed time.
     """
 
-    def mark(self, expired: Collection[ExpiredItem], observed_s: float) -> dict[ExpiredItem, float]:
+    def mark(self, expired: Collection[StoredItem], observed_s: float) -> dict[StoredItem, float]:
         """Mark all items that are expired now, and remove the marks of items that are not.
 
         Args:
@@ -41,7 +41,7 @@ class ExpiryMarks(Repository):
         now = set(expired)
         with self._database.write() as session:
             rows = {
-                ExpiredItem(row.tenant, row.what, row.id): row for row in session.scalars(select(ExpiredRow))
+                StoredItem(row.tenant, row.what, row.id): row for row in session.scalars(select(ExpiredRow))
             }
             for item in rows.keys() - now:
                 session.delete(rows[item])

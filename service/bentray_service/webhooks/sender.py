@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from bentray_kernels.errors import InvalidInput
 
 from .. import __version__
-from ..errors import DatabaseUnavailable
+from ..background import BackgroundThread
 from ..rows.database import Database
 from ..rows.deliveries import Deliveries, WebhookSecrets
 from ..rows.ids import Tenant
@@ -29,39 +29,32 @@ log = logging.getLogger("bentray.webhooks")
 PAUSES_S = (5.0, 60.0, 300.0, 1800.0, 7200.0, 21600.0, 43200.0)
 # Pauses differ by this share, so that a receiver that was away is not called by all at once.
 JITTER = 0.1
-# Messages under way at once, and the interval between queries for further ones, s.
+# Messages under way at once.
 AT_ONCE = 4
-IDLE_SECONDS = 2.0
-STOP_SECONDS = 20.0
 # The receiver wants no further messages.
 GONE = 410
 
 
-class Webhooks:
+class Webhooks(BackgroundThread):
     """Accepts webhooks of jobs, and sends their messages."""
 
-    def __init__(
-        self,
-        database: Database,
-        settings: ServiceSettings,
-        *,
-        alone: bool,
-    ) -> None:
+    idle_s, stop_s, failure = 2.0, 20.0, "no message could be sent"
+
+    def __init__(self, database: Database, settings: ServiceSettings) -> None:
         """Args:
         database: with the messages.
         settings: ``webhooks`` and ``webhook_networks``.
-        alone: whether no other service uses the database.
 
         Raises:
             InvalidInput: for invalid networks.
         """
+        super().__init__("webhooks")
         self.deliveries, self._secrets = Deliveries(database), WebhookSecrets(database)
-        self._on, self._alone = settings.webhooks, alone
+        # No other service uses a database in the data folder.
+        self._on, self._alone = settings.webhooks, settings.database_url is None
         self._permitted = networks(settings.webhook_networks or "", "BENTRAY_WEBHOOK_NETWORKS")
-        self._leaving = threading.Event()
         self._free = threading.Semaphore(AT_ONCE)
         self._pool = ThreadPoolExecutor(AT_ONCE, "webhooks")
-        self._thread = threading.Thread(target=self._loop, name="webhooks", daemon=True)
 
     def check(self, tenant: Tenant, url: str | None) -> None:
         """Check the webhook of a request.
@@ -84,33 +77,18 @@ class Webhooks:
         """Begin to send, also what a service that died has left."""
         if self._alone:
             self.deliveries.take_over()
-        self._thread.start()
-
-    def alive(self) -> bool:
-        """Whether the thread is alive."""
-        return self._thread.is_alive()
+        super().start()
 
     def stop(self) -> None:
         """End the threads; attempts under way end first."""
-        self._leaving.set()
-        self._thread.join(STOP_SECONDS)
+        super().stop()
         self._pool.shutdown(wait=True, cancel_futures=True)
 
-    def _loop(self) -> None:
-        while not self._leaving.is_set():
-            try:
-                if self._on and self._begin():
-                    continue
-            except DatabaseUnavailable:
-                # Already logged.
-                pass
-            except Exception:
-                log.exception("no message could be sent; next attempt in %g s", IDLE_SECONDS)
-            self._leaving.wait(IDLE_SECONDS)
-
-    def _begin(self) -> bool:
+    def _step(self) -> bool:
         """Start the next attempt, if any is due; returns whether one was started."""
-        if not self._free.acquire(timeout=IDLE_SECONDS):
+        if not self._on:
+            return False
+        if not self._free.acquire(timeout=self.idle_s):
             return True
         delivery = None
         try:

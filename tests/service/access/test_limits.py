@@ -23,15 +23,12 @@ from bentray_service.picture_queue import MAX_PER_ACCOUNT
 from bentray_service.pictures import Pictures
 from bentray_service.rows import deliveries as messages
 from bentray_service.rows.accounts import Accounts
-from bentray_service.rows.claims import ClaimedTenants
 from bentray_service.rows.database import Database, open_database
 from bentray_service.rows.deliveries import Deliveries
 from bentray_service.rows.ids import Tenant, new_id
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs, NewJob, Submission
-from bentray_service.rows.keys import Keys
 from bentray_service.rows.projects import Projects
-from bentray_service.rows.sessions import Sessions
 from bentray_service.rows.tables import DatasetRow
 from bentray_service.rows.uploads import MAX_INCOMPLETE, Uploads
 from bentray_service.rows.usage import reserve
@@ -58,8 +55,7 @@ class World:
 
     def sign_in(self) -> SignIn:
         settings = ServiceSettings(requests_per_minute=7, renders_per_minute=5)
-        rows = Keys(self.database), Sessions(self.database), Projects(self.database)
-        return SignIn(settings, *rows, self.accounts, ClaimedTenants(self.database))
+        return SignIn(settings, self.database, self.accounts)
 
     def caller(self, tenant: Tenant) -> Caller:
         return Caller(tenant, "key", "0", frozenset(("read", "write")))
@@ -139,7 +135,8 @@ def queued_jobs(world: World) -> tuple[int, Use]:
 
 def running_jobs(world: World, at_once: int = 2) -> tuple[int, Use]:
     """Up to four run, two of them of any tenant: the projects of one do not count as further tenants."""
-    runner = Runner(Queue(world.database), world.accounts, None, None, at_once, 4, 0)  # type: ignore[arg-type]
+    settings = ServiceSettings(jobs_at_once=at_once, tenants_at_once=4)
+    runner = Runner(Queue(world.database), world.accounts, None, None, settings)  # type: ignore[arg-type]
     rows, running = Jobs(world.database), []
 
     def run(tenant: Tenant) -> None:

@@ -7,12 +7,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_service.access.sign_in import SignIn
 from bentray_service.errors import Forbidden, NotAuthenticated, RateLimited
 from bentray_service.rows.accounts import Accounts
-from bentray_service.rows.claims import ClaimedTenants
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, Tenant
 from bentray_service.rows.keys import ApiKey, Keys
-from bentray_service.rows.projects import Projects
-from bentray_service.rows.sessions import Sessions
 from bentray_service.settings import ServiceSettings
 
 NEAR, FAR = "127.0.0.1", "192.0.2.7"
@@ -28,13 +25,9 @@ def keys(tmp_path):
 
 @pytest.fixture
 def sign_in(keys, tmp_path):
+    database = keys._database
     return lambda **settings: SignIn(
-        ServiceSettings(data_dir=tmp_path, **settings),
-        keys,
-        Sessions(keys._database),
-        Projects(keys._database),
-        Accounts(keys._database),
-        ClaimedTenants(keys._database),
+        ServiceSettings(data_dir=tmp_path, **settings), database, Accounts(database)
     )
 
 

@@ -10,11 +10,11 @@ from bentray_service.access.audit import Audit
 from bentray_service.access.quota import Quota
 from bentray_service.errors import InUse, UnknownId
 from bentray_service.files.data_folder import Files
-from bentray_service.files.deletion import Deletion, StoredItem
+from bentray_service.files.deletion import Deletion
 from bentray_service.files.orphans import Orphans
 from bentray_service.housekeeping import DAY_S, Housekeeper
 from bentray_service.ingest.append import UploadLocks
-from bentray_service.rows.ages import ExpiryMarks, ObservedTime
+from bentray_service.rows.ages import StoredItem
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, Tenant, new_id, volume_of
 from bentray_service.rows.jobs import Jobs, NewJob
@@ -29,6 +29,7 @@ from bentray_service.rows.tables import (
     UploadedVolumeRow,
 )
 from bentray_service.rows.uploads import Uploads
+from bentray_service.settings import ServiceSettings
 
 from ..rows.conftest import SUMMARY, volume_row
 
@@ -317,7 +318,7 @@ def test_an_upload_that_ends_by_a_wrong_clock_stays(shelf):
     clocks = Clocks()
     uploads = Uploads(shelf.database)
     row = uploads.add(LOCAL, "dataset", 9, {}, "", DAY_S, 10**9)
-    keeper = housekeeper(shelf, clocks, None, uploads)
+    keeper = housekeeper(shelf, clocks, None)
     keeper.sweep()
     clocks.wall += 31 * DAY_S
     clocks.pass_by(60.0)
@@ -350,7 +351,7 @@ def test_the_audit_log_is_kept_as_long_as_it_is_said(shelf):
     for day in days:
         (folder / f"{day}.jsonl").write_text("{}\n")
     (folder / "2001-01-01.jsonl.gz").touch()
-    keeper = housekeeper(shelf, clocks, audit=Audit(folder), audit_keep_days=7.0)
+    keeper = housekeeper(shelf, clocks, audit_keep_days=7.0)
 
     def left():
         return sorted(path.name.partition(".")[0] for path in folder.glob("*.jsonl"))
@@ -367,20 +368,9 @@ def test_the_audit_log_is_kept_as_long_as_it_is_said(shelf):
     assert left() == sorted(days[:3])
 
 
-def housekeeper(shelf, clocks, keep_days=30.0, uploads=None, **how):
-    observed = ObservedTime(shelf.database, lambda: clocks.steady)
-    orphans = Orphans(shelf.files, shelf.database, is_store=True)
-    return Housekeeper(
-        uploads or Uploads(shelf.database),
-        shelf.files,
-        shelf.deletion,
-        UploadLocks(),
-        Quota(shelf.database, 10**9),
-        ExpiryMarks(shelf.database),
-        observed,
-        orphans,
-        keep_days,
-        DAY_S,
-        clocks,
-        **how,
-    )
+def housekeeper(shelf, clocks, keep_days=30.0, audit_keep_days=None):
+    root, database = shelf.files.root, shelf.database
+    settings = ServiceSettings(data_dir=root, keep_days=keep_days, audit_keep_days=audit_keep_days)
+    quota, orphans = Quota(database, 10**9), Orphans(shelf.files, database, is_store=True)
+    audit = Audit(shelf.files.audit)
+    return Housekeeper(settings, database, shelf.files, quota, UploadLocks(), orphans, audit, clocks)

@@ -9,13 +9,13 @@ from bentray_service.access.quota import Quota
 from bentray_service.errors import StorageFull, UnknownId
 from bentray_service.files.data_folder import Files
 from bentray_service.ingest import upload_ingest as reading
-from bentray_service.ingest.canonical import IngestLimits
 from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.upload_ingest import UploadIngest
 from bentray_service.rows.accounts import Accounts
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, Tenant
 from bentray_service.rows.uploads import Uploads
+from bentray_service.settings import ServiceSettings
 
 from ...waiting import wait_until
 
@@ -38,7 +38,7 @@ class Store(dict):
 @pytest.fixture
 def bench(tmp_path, monkeypatch):
     """Uploads, a reader of them, and ``answers``: what it meets, one after the other."""
-    monkeypatch.setattr(reading, "IDLE_SECONDS", 0.02)
+    monkeypatch.setattr(UploadIngest, "idle_s", 0.02)
     monkeypatch.setattr(reading, "PATIENCE_SECONDS", 0.02)
     database = open_database(f"sqlite:///{tmp_path / 'b.sqlite'}")
     made = Bench(database, tmp_path / "data")
@@ -55,12 +55,11 @@ class Bench:
         self.files.prepare()
         self.answers, self.read = [], []
         accounts = Accounts(database)
-        limits, self.queue = IngestLimits(2**30, 10.0, folder), FairQueue(1, accounts)
+        settings, self.queue = ServiceSettings(data_dir=folder), FairQueue(1, accounts)
         self.queue.start()
-        stores, quota = {"dataset": self.store}, Quota(database, 10**6)
-        self.reader = UploadIngest(
-            self.uploads, self.files, stores, limits, 60.0, self.queue, accounts, quota, None
-        )
+        quota = Quota(database, 10**6)
+        self.reader = UploadIngest(settings, database, self.files, self.queue, accounts, quota)
+        self.reader._stores["dataset"] = self.store
 
     def meet(self, what, source, result_id, files, limits, given, reserve, started):
         self.read.append(result_id)

@@ -95,7 +95,7 @@ def test_job_of_another_tenant_starts_during_long_jobs(start, uploaded, work):
 
 
 def test_new_job_starts_at_once(start, uploaded, submitted, until, work, monkeypatch):
-    monkeypatch.setattr("bentray_service.jobs.runner.IDLE_SECONDS", 600.0)
+    monkeypatch.setattr("bentray_service.jobs.runner.Runner.idle_s", 600.0)
     http = start(jobs_at_once=1)
     dataset = uploaded(http)
     time.sleep(0.1)  # by now it has looked and waits
@@ -250,7 +250,7 @@ def test_a_full_queue_is_a_429(start, running, submitted, work):
 
 
 def test_unrecordable_result_fails_the_job(start, uploaded, submitted, until, work, monkeypatch):
-    monkeypatch.setattr("bentray_service.jobs.runner.IDLE_SECONDS", 0.05)
+    monkeypatch.setattr("bentray_service.jobs.runner.Runner.idle_s", 0.05)
     http = start(jobs_at_once=1)
 
     def refused(*given):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from bentray_service.files.deletion import StoredItem
+from bentray_service.rows.ages import StoredItem
 from bentray_service.rows.ids import LOCAL, new_id
 from bentray_workers.files.export.registry import FORMATS
 from bentray_workers.files.volume import Volume, write_volume

@@ -6,8 +6,9 @@ import pytest
 
 from bentray_service.errors import InUse, JobFinished, KeyReused, UnknownId
 from bentray_service.files.data_folder import Files
-from bentray_service.files.deletion import Deletion, StoredItem
+from bentray_service.files.deletion import Deletion
 from bentray_service.rows import database as admission
+from bentray_service.rows.ages import StoredItem
 from bentray_service.rows.ids import LOCAL
 from bentray_service.rows.jobs import NewJob, Submission
 from bentray_service.rows.tables import JobRow

@@ -9,9 +9,10 @@ from sqlalchemy import insert
 from bentray_service.access.quota import LEASE_S, Quota
 from bentray_service.errors import DatabaseUnavailable, QuotaExceeded, RateLimited
 from bentray_service.files.data_folder import Files
-from bentray_service.files.deletion import Deletion, StoredItem
+from bentray_service.files.deletion import Deletion
 from bentray_service.rows import uploads as uploading
 from bentray_service.rows import usage
+from bentray_service.rows.ages import StoredItem
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, Tenant, new_id, volume_of
 from bentray_service.rows.jobs import NewJob, Submission

@@ -30,7 +30,7 @@ NETWORKS = {"webhook_networks": "127.0.0.0/8"}
 @pytest.fixture(autouse=True)
 def quickly(monkeypatch):
     monkeypatch.setattr(sender, "PAUSES_S", (0.02, 0.02))
-    monkeypatch.setattr(sender, "IDLE_SECONDS", 0.02)
+    monkeypatch.setattr(sender.Webhooks, "idle_s", 0.02)
 
 
 @pytest.fixture
