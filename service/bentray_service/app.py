@@ -14,13 +14,13 @@ from fastapi.staticfiles import StaticFiles
 from starlette.concurrency import run_in_threadpool
 from starlette.routing import BaseRoute
 
-from bentray_workers.cluster.connection import open_cluster
+from bentray_workers.cluster.connection import Cluster, open_cluster
 
 from . import __version__
 from .access.audit import Audit
 from .access.quota import Quota
 from .access.sign_in import SignIn
-from .compute import Cluster, Compute
+from .compute import Compute
 from .files.bucket_store import open_store
 from .files.checked_store import CheckedStore
 from .files.data_folder import Files, installation_of, lock

@@ -5,11 +5,12 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, TypeVar
 
 from bentray_kernels.tomography.settings import Settings
 from bentray_workers.cluster.capacities import WorkerCapacity, capacities_of, probed_capacities
 from bentray_workers.cluster.connected import connected_workers
+from bentray_workers.cluster.connection import Cluster
 from bentray_workers.cluster.scheduler_load import SchedulerLoad, load_of
 from bentray_workers.cluster.worker_health import WorkerHealth, health_of
 from bentray_workers.files.dataset.counts import DatasetCounts
@@ -24,6 +25,8 @@ from bentray_workers.simulation.request import PhantomScan
 
 from .rows.tables import VolumeRow
 
+Answer = TypeVar("Answer")
+
 
 def check_renderable(volume: VolumeRow) -> None:
     """Reject a volume that cannot be rendered: not 3-D, non-uniform spacing, or too large for any worker.
@@ -33,15 +36,6 @@ def check_renderable(volume: VolumeRow) -> None:
     """
     check_even(tuple(volume.shape), tuple(volume.spacing_m))
     check_size(tuple(volume.shape))
-
-
-class Cluster(Protocol):
-    """The interface of :func:`bentray_workers.cluster.connection.open_cluster`."""
-
-    @property
-    def client(self) -> Any: ...
-
-    def describe(self) -> dict[str, Any]: ...
 
 
 class Compute:
@@ -65,36 +59,24 @@ class Compute:
 
     def workers(self) -> int:
         """Number of connected workers; 0 without scheduler."""
-        try:
-            return int(self._cluster.describe()["workers"])
-        except (OSError, TimeoutError):
-            return 0
+        return self._asked(lambda client: len(connected_workers(client)), 0)
 
     def health(self) -> tuple[WorkerHealth, ...]:
         """The health of the connected workers; none without scheduler."""
-        try:
-            return health_of(self.client)
-        except (OSError, TimeoutError):
-            return ()
+        return self._asked(health_of, ())
 
     def lost_workers(self) -> int:
         """Workers that have left since the first call: a worker that restarts has a new address."""
         with self._changing:
-            try:
-                present = set(connected_workers(self.client))
-            except (OSError, TimeoutError):
-                # Without a scheduler nothing is known about them.
-                return self._lost
+            # Without a scheduler nothing is known about them.
+            present = self._asked(lambda client: set(connected_workers(client)), self._addresses)
             self._lost += len(self._addresses - present)
             self._addresses = present
             return self._lost
 
     def scheduler_load(self) -> SchedulerLoad | None:
         """The load of the scheduler; None if it does not answer."""
-        try:
-            return load_of(self.client)
-        except (OSError, TimeoutError):
-            return None
+        return self._asked(load_of, None)
 
     def plan(self, counts: dict[str, Any] | None, path: Path, settings: Settings) -> dict[str, Any]:
         """Plan the reconstruction of a dataset on the connected workers.
@@ -108,7 +90,8 @@ class Compute:
         Raises:
             InvalidInput: when no worker has enough memory or the required resource.
         """
-        capacities = self._known(lambda client: probed_capacities(client, settings))
+        nothing: tuple[WorkerCapacity, ...] = ()
+        capacities = self._asked(lambda client: probed_capacities(client, settings), nothing)
         stored = None if counts is None else DatasetCounts(**counts)
         if stored is None or (stored.samples and stored.frequency_hz is None):
             stored = counts_in(self._fetch(path))
@@ -123,12 +106,12 @@ class Compute:
         return turntable_planning.plan_turntable(shape, turntable, self.capacities()).to_dict()
 
     def capacities(self) -> tuple[WorkerCapacity, ...]:
-        """Capacities of the connected workers; none without scheduler."""
-        return self._known(capacities_of)
-
-    def _known(self, capacities: Callable[[Any], tuple[WorkerCapacity, ...]]) -> tuple[WorkerCapacity, ...]:
         """Capacities of the connected workers; none without scheduler, for which a job waits."""
+        return self._asked(capacities_of, ())
+
+    def _asked(self, question: Callable[[Any], Answer], otherwise: Answer) -> Answer:
+        """What the scheduler answers; ``otherwise`` without a scheduler."""
         try:
-            return capacities(self.client)
+            return question(self.client)
         except (OSError, TimeoutError):
-            return ()
+            return otherwise

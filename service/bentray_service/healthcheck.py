@@ -22,7 +22,8 @@ import socket
 import ssl
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -36,17 +37,8 @@ PROCESSES = Path("/proc")
 INITS = ("tini", "docker-init", "catatonit")
 
 
-def check_alive(url: str) -> str | None:
-    """None if the service at ``url`` answers, else the reason."""
-    return _check_service(url, "live")
-
-
-def check_ready(url: str) -> str | None:
-    """None if the service at ``url`` can process uploads and jobs, else the reason."""
-    return _check_service(url, "ready")
-
-
-def _check_service(url: str, question: str) -> str | None:
+def check_service(url: str, question: str = "live") -> str | None:
+    """None if the service at ``url`` answers, or with ``ready`` can process jobs, else the reason."""
     try:
         address = urlsplit(url)
         kind = http.client.HTTPSConnection if address.scheme == "https" else http.client.HTTPConnection
@@ -151,16 +143,11 @@ def _fields(process: Path) -> list[str]:
         return [""] * 50
 
 
-CHECKS: dict[tuple[str, ...], Callable[[str], str | None]] = {
-    ("http",): check_alive,
-    ("https",): check_alive,
-    ("http", "ready"): check_ready,
-    ("https", "ready"): check_ready,
-    ("tcp",): check_scheduler,
-    ("tls",): check_scheduler,
-    ("tcp", "worker"): check_worker,
-    ("tls", "worker"): check_worker,
-}
+# By what is asked about an address of a service, and about that of a scheduler.
+Checks = Mapping[tuple[str, ...], Callable[[str], str | None]]
+SERVICE: Checks = {(): check_service, ("ready",): partial(check_service, question="ready")}
+SCHEDULER: Checks = {(): check_scheduler, ("worker",): check_worker}
+CHECKS = {"http": SERVICE, "https": SERVICE, "tcp": SCHEDULER, "tls": SCHEDULER}
 
 
 def main(words: list[str]) -> None:
@@ -169,7 +156,7 @@ def main(words: list[str]) -> None:
     if words[:1] == ["--restart-after"]:
         most, words = int(words[1]) if words[1:] and words[1].isdigit() else -1, words[2:]
     address, *check = words or ["http://127.0.0.1:8000"]
-    chosen = CHECKS.get((address.partition("://")[0], *check))
+    chosen = CHECKS.get(address.partition("://")[0], {}).get(tuple(check))
     if chosen is None or most < 0:
         sys.stderr.write((__doc__ or "").splitlines()[2] + "\n")
         sys.exit(2)

@@ -8,18 +8,19 @@ import hashlib
 import json
 import logging
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from distributed import KilledWorker
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.names import DEFAULT_PICKER
 from bentray_workers.cluster.capacities import WorkerCapacity, capacities_by_address
+from bentray_workers.cluster.connection import Cluster
 from bentray_workers.cluster.resources import PICTURE_PRIORITY
 from bentray_workers.files import volume_export
 from bentray_workers.files.atomic import write_bytes
@@ -39,7 +40,6 @@ from bentray_workers.rendering.refraction_view import RefractionView
 from bentray_workers.rendering.tiles import PictureTasks
 
 from . import __version__
-from .compute import Cluster
 from .errors import Busy, StorageFull
 from .files.data_folder import Files
 from .picture_queue import LONG_S, PictureQueue
@@ -164,35 +164,26 @@ class Pictures:
 
     async def quality(self, dataset: DatasetRow, picker: str) -> dict[str, Any]:
         """The quality report of a dataset, see ``bentray_workers.reconstruction.quality_report``."""
-
-        async def make() -> bytes:
-            how = {"picker": picker, **_water(dataset)}
-            return json.dumps(await self._one(dataset, cost, quality_report, how)).encode()
-
-        cost = picture_cost.quality_cost(dataset.values())
-        return dict(json.loads(await self._report(dataset, f"{picker}.json", make)))
+        return dict(json.loads(await self._report(dataset, picker, "json")))
 
     async def quality_png(self, dataset: DatasetRow, picker: str) -> bytes:
         """The quality report of a dataset as an image."""
+        return await self._report(dataset, picker, "png")
 
-        async def make() -> bytes:
-            how = {"picker": picker, **_water(dataset)}
-            return bytes(await self._one(dataset, cost, quality_page, how))
-
-        cost = picture_cost.quality_cost(dataset.values())
-        return await self._report(dataset, f"{picker}.png", make)
-
-    async def _report(self, dataset: DatasetRow, kind: str, make: Callable[[], Awaitable[bytes]]) -> bytes:
+    async def _report(self, dataset: DatasetRow, picker: str, form: Literal["json", "png"]) -> bytes:
         """A kept report, or a new one, which all who request it share and which outlives their requests."""
         stated = repr((__version__, dataset.water_temperature_c))
-        name = f"{hashlib.sha256(stated.encode()).hexdigest()[:16]}-{kind}"
+        name = f"{hashlib.sha256(stated.encode()).hexdigest()[:16]}-{picker}.{form}"
         path = self._files.of(dataset.tenant).report(dataset.id, name)
         with suppress(FileNotFoundError):
             return await self._in_thread(path.read_bytes)
 
         async def keep() -> bytes:
+            task: Callable[..., Any] = quality_page if form == "png" else quality_report
             try:
-                content = await make()
+                cost, how = picture_cost.quality_cost(dataset.values()), {"picker": picker, **_water(dataset)}
+                made = await self._one(dataset, cost, task, how)
+                content = bytes(made) if form == "png" else json.dumps(made).encode()
                 with suppress(OSError):
                     await self._in_thread(lambda: write_bytes(path, content))
                 return content

@@ -15,9 +15,8 @@ import pytest
 
 from bentray_service import healthcheck
 from bentray_service.healthcheck import (
-    check_alive,
-    check_ready,
     check_scheduler,
+    check_service,
     check_worker,
     main,
 )
@@ -28,14 +27,14 @@ from ..waiting import wait_until
 
 def test_a_service_without_workers_is_alive_and_not_ready(serve, cluster):
     url = serve()
-    assert (check_alive(url), check_ready(url)) == (None, None)
+    assert (check_service(url), check_service(url, "ready")) == (None, None)
     cluster.workers = 0
-    assert check_alive(url) is None
-    assert "workers" in check_ready(url)
+    assert check_service(url) is None
+    assert "workers" in check_service(url, "ready")
 
 
 def test_unreachable_service_is_reported():
-    assert "no answer from a service at http://127.0.0.1:9" in check_alive("http://127.0.0.1:9")
+    assert "no answer from a service at http://127.0.0.1:9" in check_service("http://127.0.0.1:9")
 
 
 @pytest.fixture

@@ -90,12 +90,12 @@ class UploadIngest(BackgroundThread):
 
     def start(self) -> None:
         """Continue the uploads of a dead service, then start the thread."""
-        for row in self.uploads.receiving():
+        for row in self.uploads.in_state("receiving"):
             path = self._files.of(row.tenant).upload(row.id)
             discard_unverified(path)
             # The service died before it marked the upload as complete.
             if received_bytes(path) == row.length:
-                self.uploads.mark_complete(row.id)
+                self.uploads.change(row.id, state="reading")
         super().start()
 
     def stop(self) -> None:
@@ -123,7 +123,7 @@ class UploadIngest(BackgroundThread):
         with self._lock:
             queued = set(self.queued)
             room = Counter({account: -count for account, count in Counter(self.queued.values()).items()})
-        for row in self.uploads.unread():
+        for row in self.uploads.in_state("reading"):
             account = self._accounts.of(row.tenant)
             if row.id in queued or room[account] + self.queue.share <= 0 or not self._is_local(row):
                 continue
@@ -162,11 +162,12 @@ class UploadIngest(BackgroundThread):
             if problem is not None:
                 if not self._leaving.is_set():
                     self._drop(row)
-                    self.uploads.mark_rejected(row.id, problem.model_dump(exclude_none=True), self._keep_s)
+                    said = problem.model_dump(exclude_none=True)
+                    self.uploads.keep(row.id, self._keep_s, state="refused", problem=said)
                     path.unlink(missing_ok=True)
                 return
         self._drop(row)
-        self.uploads.mark_done(row.id, self._keep_s)
+        self.uploads.keep(row.id, self._keep_s, state="done")
         path.unlink(missing_ok=True)
 
     def _drop(self, row: UploadRow) -> None:

@@ -6,7 +6,8 @@ import errno
 import logging
 import secrets
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
 
@@ -76,13 +77,18 @@ class Reporter:
         wait = INTERVAL_SECONDS * (1.0 + min(len(self._pending.history), MAX_SWEEPS) / 100.0)
         if self._clock() - self._written < wait:
             return
-        try:
+        with self._tolerant("the progress of %s could not be stored: %s"):
             self.flush()
+
+    @contextmanager
+    def _tolerant(self, failure: str) -> Iterator[None]:
+        """The job continues while the database is unavailable; the next report is complete."""
+        try:
+            yield
         except DatabaseUnavailable:
-            # The job continues while the database is unavailable; the next report is complete.
             pass
         except SQLAlchemyError as error:
-            log.warning("the progress of %s could not be stored: %s", self._job_id, error)
+            log.warning(failure, self._job_id, error)
 
     def flush(self) -> None:
         """Store the last progress; called at the end, too."""
@@ -99,17 +105,13 @@ class Reporter:
 
     def saved(self) -> None:
         """Reset the attempts after the first checkpoint, and measure the disk usage now and then."""
-        try:
+        with self._tolerant("a checkpoint of %s could not be recorded: %s"):
             if not self._further:
                 self._queue.reset_attempts(self._job_id)
                 self._further = True
             if self._clock() - self._measured >= MEASURE_SECONDS:
                 self._measured = self._clock()
                 self._queue.record_size(self._job_id, self._taken())
-        except DatabaseUnavailable:
-            pass
-        except SQLAlchemyError as error:
-            log.warning("a checkpoint of %s could not be recorded: %s", self._job_id, error)
 
     def stop(self) -> bool:
         """Whether to stop: after a cancellation or takeover, or when this service stops."""
@@ -119,14 +121,10 @@ class Reporter:
         self._store()
         if self._clock() - self._asked >= INTERVAL_SECONDS:
             self._asked = self._clock()
-            try:
+            with self._tolerant("the state of %s could not be read: %s"):
                 state = self._queue.held_state(self._job_id)
                 self.lost = state is None
                 self._stopped = state != "running"
-            except DatabaseUnavailable:
-                pass
-            except SQLAlchemyError as error:
-                log.warning("the state of %s could not be read: %s", self._job_id, error)
         return self._stopped
 
 

@@ -57,14 +57,19 @@ class Batches(Repository):
         Raises:
             UnknownId: when the tenant has no such batch.
         """
-        found = self._read(tenant, 1, checked("batch", name))
+        found = self.newest(tenant, 1, checked("batch", name))
         if not found:
             raise UnknownId("batch", name)
         return found[0]
 
-    def newest(self, tenant: Tenant, limit: int) -> list[BatchRow]:
-        """Up to ``limit`` batches of this tenant, newest first."""
-        return self._read(tenant, limit)
+    def newest(self, tenant: Tenant, limit: int, name: str | None = None) -> list[BatchRow]:
+        """Up to ``limit`` batches of this tenant, newest first; only the one with an id."""
+        query = select(BatchRow).where(BatchRow.tenant == tenant)
+        if name is not None:
+            query = query.where(BatchRow.id == name)
+        columns = JobRow.id, JobRow.dataset_id, JobRow.state, JobRow.done, JobRow.total, JobRow.phase
+        read = selectinload(BatchRow.jobs).load_only(*columns, JobRow.started, JobRow.finished)
+        return self._database.rows(query.options(read).order_by(BatchRow.number.desc()).limit(limit))
 
     def request_cancel(self, tenant: Tenant, name: str) -> BatchRow:
         """Cancel all jobs that have not ended.
@@ -83,11 +88,3 @@ class Batches(Repository):
                 change(session, job_id, ("queued",), "cancelled", finished=time.time())
                 change(session, job_id, ("running",), "cancelling")
         return self.get(tenant, name)
-
-    def _read(self, tenant: Tenant, limit: int, name: str | None = None) -> list[BatchRow]:
-        query = select(BatchRow).where(BatchRow.tenant == tenant)
-        if name is not None:
-            query = query.where(BatchRow.id == name)
-        columns = JobRow.id, JobRow.dataset_id, JobRow.state, JobRow.done, JobRow.total, JobRow.phase
-        read = selectinload(BatchRow.jobs).load_only(*columns, JobRow.started, JobRow.finished)
-        return self._database.rows(query.options(read).order_by(BatchRow.number.desc()).limit(limit))

@@ -122,7 +122,10 @@ class Keys(Repository):
         if row.expires is not None and row.expires <= now:
             return None
         if row.used is None or now - row.used > USED_S:
-            self._note(token.id, now)
+            try:
+                self._database.change(update(KeyRow).where(KeyRow.id == token.id).values(used=now))
+            except SQLAlchemyError as error:
+                log.warning("the last use of key %s could not be stored: %s", token.id, error)
         return row
 
     def ended(self, key_ids: Sequence[str]) -> list[str]:
@@ -160,9 +163,3 @@ class Keys(Repository):
 
     def _find(self, key_id: str) -> KeyRow | None:
         return self._database.row(select(KeyRow).where(KeyRow.id == key_id))
-
-    def _note(self, key_id: str, now: float) -> None:
-        try:
-            self._database.change(update(KeyRow).where(KeyRow.id == key_id).values(used=now))
-        except SQLAlchemyError as error:
-            log.warning("the last use of key %s could not be stored: %s", key_id, error)

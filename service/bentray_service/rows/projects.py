@@ -64,14 +64,22 @@ class Projects(Repository):
         Raises:
             UnknownId: when the tenant has no such project, or the member is none of it.
         """
-        found = self._read(tenant, member, checked("project", name))
+        found = self.all(tenant, member, checked("project", name))
         if not found:
             raise UnknownId("project", name)
         return found[0]
 
-    def all(self, tenant: Tenant, member: str | None) -> list[ProjectRow]:
-        """The projects of this tenant that the member belongs to, by name."""
-        return self._read(tenant, member)
+    def all(self, tenant: Tenant, member: str | None, name: str | None = None) -> list[ProjectRow]:
+        """The projects of this tenant that the member belongs to, by name; only the one with an id."""
+        query = select(ProjectRow).where(ProjectRow.tenant == tenant)
+        if name is not None:
+            query = query.where(ProjectRow.id == name)
+        role: SQLColumnExpression[str] = literal(OWNER)
+        if member is not None:
+            query = query.join(MemberRow, MemberRow.project_id == ProjectRow.id)
+            query, role = query.where(MemberRow.member == member), MemberRow.role
+        query = query.options(with_expression(ProjectRow.role, role))
+        return self._database.rows(query.order_by(ProjectRow.name))
 
     def members(self, project: ProjectRow) -> list[MemberRow]:
         """The members of a project, the first first."""
@@ -136,17 +144,6 @@ class Projects(Repository):
         rows = self._database.rows(select(MemberRow).where(MemberRow.project_id.in_(ids)))
         left = {membership(row.project_id, row.member) for row in rows}
         return [one for one in asked if one not in left]
-
-    def _read(self, tenant: Tenant, member: str | None, name: str | None = None) -> list[ProjectRow]:
-        query = select(ProjectRow).where(ProjectRow.tenant == tenant)
-        if name is not None:
-            query = query.where(ProjectRow.id == name)
-        role: SQLColumnExpression[str] = literal(OWNER)
-        if member is not None:
-            query = query.join(MemberRow, MemberRow.project_id == ProjectRow.id)
-            query, role = query.where(MemberRow.member == member), MemberRow.role
-        query = query.options(with_expression(ProjectRow.role, role))
-        return self._database.rows(query.order_by(ProjectRow.name))
 
 
 def membership(project_id: str, member: str) -> str:

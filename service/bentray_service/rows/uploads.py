@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy import delete as delete_from
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from ..errors import RateLimited
@@ -80,23 +80,13 @@ class Uploads(TenantTable[UploadRow]):
             )
         return self.get(tenant, upload_id)
 
-    def set_direct(self, row: UploadRow) -> UploadRow:
-        """Note that the parts of an upload go to the bucket."""
-        self._change(row.id, multipart_id=DIRECT)
-        row.multipart_id = DIRECT
-        return row
-
-    def unread(self) -> list[UploadRow]:
-        """Complete uploads of all tenants that wait for ingestion, oldest first."""
-        return self._where(UploadRow.state == "reading")
+    def in_state(self, state: str) -> list[UploadRow]:
+        """Uploads of all tenants in a state, oldest first."""
+        return self._database.rows(select(UploadRow).filter_by(state=state).order_by(UploadRow.number))
 
     def ids(self) -> set[str]:
         """The ids of the uploads of all tenants."""
         return set(self._database.rows(select(UploadRow.id)))
-
-    def receiving(self) -> list[UploadRow]:
-        """Incomplete uploads of all tenants."""
-        return self._where(UploadRow.state == "receiving")
 
     def expired(self, now: float) -> list[UploadRow]:
         """Expired uploads of all tenants, except those being read.
@@ -104,40 +94,27 @@ class Uploads(TenantTable[UploadRow]):
         Args:
             now: s since 1970.
         """
-        return self._where(UploadRow.state != "reading", UploadRow.expires < now)
+        expired = UploadRow.state != "reading", UploadRow.expires < now
+        return self._database.rows(select(UploadRow).where(*expired).order_by(UploadRow.number))
 
-    def keep(self, upload_id: str, keep_s: float) -> float:
-        """Extend the expiry after data was received; returns the new expiry, s since 1970."""
+    def keep(self, upload_id: str, keep_s: float, **values: Any) -> float:
+        """Change columns after data was received or read; returns the new expiry, s since 1970."""
         expires = time.time() + keep_s
-        self._change(upload_id, expires=expires)
+        self.change(upload_id, expires=expires, **values)
         return expires
 
-    def mark_complete(self, upload_id: str) -> None:
-        """Mark an upload as complete."""
-        self._change(upload_id, state="reading")
-
-    def mark_done(self, upload_id: str, keep_s: float) -> None:
-        """Mark an upload as ingested."""
-        self._change(upload_id, state="done", expires=time.time() + keep_s)
-
-    def mark_rejected(self, upload_id: str, problem: Plain, keep_s: float) -> None:
-        """Mark an upload as refused."""
-        self._change(upload_id, released=True, state="refused", problem=problem, expires=time.time() + keep_s)
+    def change(self, upload_id: str, **values: Any) -> None:
+        """Change columns of an upload; a refused one releases its reservation."""
+        with self._database.write() as session:
+            if values.get("state") == "refused":
+                _release(session, upload_id)
+            session.execute(update(UploadRow).where(UploadRow.id == upload_id).values(**values))
 
     def remove(self, upload_id: str) -> None:
         """Delete an upload."""
         with self._database.write() as session:
             _release(session, upload_id)
             session.execute(delete_from(UploadRow).where(UploadRow.id == upload_id))
-
-    def _where(self, *conditions: ColumnElement[bool]) -> list[UploadRow]:
-        return self._database.rows(select(UploadRow).where(*conditions).order_by(UploadRow.number))
-
-    def _change(self, upload_id: str, *, released: bool = False, **values: Any) -> None:
-        with self._database.write() as session:
-            if released:
-                _release(session, upload_id)
-            session.execute(update(UploadRow).where(UploadRow.id == upload_id).values(**values))
 
 
 def _check_begun(session: Session, tenant: Tenant) -> None:

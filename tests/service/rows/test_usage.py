@@ -50,7 +50,7 @@ def test_of_many_at_once_as_many_are_allowed_as_fit(database, address):
 def test_of_many_uploads_begun_at_once_as_many_are_allowed_as_fit(database):
     uploads = Uploads(database)
     assert allowed(lambda n: uploads.add(LOCAL, "dataset", 15, {}, "", 60.0, 100)) == 6
-    assert len(uploads.receiving()) == 6
+    assert len(uploads.in_state("receiving")) == 6
     assert Quota(database, 100).of(LOCAL) == Usage(0, 90)
 
 
@@ -62,7 +62,7 @@ def test_simultaneous_uploads_stay_within_the_limit(database, monkeypatch):
         uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)
     assert refused.value.wait_s > 0.0
     uploads.add(OTHER, "dataset", 1, {}, "", 60.0, 100)
-    uploads.remove(uploads.receiving()[0].id)
+    uploads.remove(uploads.in_state("receiving")[0].id)
     uploads.add(LOCAL, "dataset", 1, {}, "", 60.0, 100)
 
 
@@ -128,10 +128,10 @@ def test_an_upload_has_its_room_until_it_is_forgotten_refused_or_stored(database
     forgotten, refused, stored = (uploads.add(LOCAL, "dataset", 20, {}, "", 60.0, 100) for _ in range(3))
     assert quota.of(LOCAL) == Usage(0, 60)
     uploads.remove(forgotten.id)
-    uploads.mark_rejected(refused.id, {"detail": "no scan"}, 60.0)
+    uploads.keep(refused.id, 60.0, state="refused", problem={"detail": "no scan"})
     quota.resize(LOCAL, stored.result_id, 70)
     Datasets(database).add(LOCAL, stored.result_id, size=20, sha256="0" * 64, summary=SUMMARY)
-    uploads.mark_done(stored.id, 60.0)
+    uploads.keep(stored.id, 60.0, state="done")
     # Its row goes, and what it has become stays.
     for one in (refused, stored):
         uploads.remove(one.id)

@@ -13,6 +13,7 @@ from bentray_kernels.errors import InvalidInput
 from ...errors import NoBucket, WrongOffset
 from ...files.direct_uploads import DirectUploads, part_sizes
 from ...rows.tables import UploadRow
+from ...rows.uploads import DIRECT
 from ...web.errors import problems
 from ...wiring import Context, RequestContext
 from ..bodies import SmallBody, accept_media_types
@@ -58,7 +59,9 @@ def create_direct_upload(
     what, given = read_metadata(header)
     check_length("length", upload.length, context)
     row = add_upload(context, what, upload.length, given, header)
-    record = _record(context.background.ingest.uploads.set_direct(row))
+    uploads = context.background.ingest.uploads
+    uploads.change(row.id, multipart_id=DIRECT)
+    record = _record(uploads.get(context.tenant, row.id))
     response.headers["Location"] = record.links["self"]
     return record
 
@@ -109,7 +112,7 @@ def complete_direct_upload(upload_id: str, context: Context) -> DirectUploadReco
                 raise WrongOffset("parts", f"{len(found)} parts, {sum(found)} bytes", accepted)
             # The mark of this service, which ingests it.
             context.stores.files.of(tenant).upload(upload_id).touch()
-            ingest.uploads.mark_complete(upload_id)
+            ingest.uploads.change(upload_id, state="reading")
             ingest.notify()
         return _record(ingest.uploads.get(tenant, upload_id))
 

@@ -169,7 +169,7 @@ async def append_upload(
                 keep_s = context.access.settings.upload_keep_s
                 expires = await run_in_threadpool(ingest.uploads.keep, upload_id, keep_s)
             if offset == length:
-                await run_in_threadpool(ingest.uploads.mark_complete, upload_id)
+                await run_in_threadpool(ingest.uploads.change, upload_id, state="reading")
                 ingest.notify()
     headers = {"Upload-Offset": str(offset), "Upload-Expires": http_date(expires)}
     return Response(status_code=status.HTTP_204_NO_CONTENT, headers=headers)

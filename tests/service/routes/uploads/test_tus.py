@@ -282,13 +282,13 @@ def test_complete_uploads_are_ingested_at_the_next_start(start, scan, state):
     content = scan().read_bytes()
     http = start()
     location = begin(http, len(content))
-    row = http.app.state.background.ingest.uploads.receiving()[0]
+    row = http.app.state.background.ingest.uploads.in_state("receiving")[0]
     files = http.app.state.stores.files.of("local")
     http.app.state.background.ingest.stop()
     files.upload(row.id).write_bytes(content)
     files.candidate(row.result_id).write_bytes(content[:500])
     if state == "reading":
-        http.app.state.background.ingest.uploads.mark_complete(row.id)
+        http.app.state.background.ingest.uploads.change(row.id, state="reading")
     http.__exit__()
     http = start()
     assert settled(http, location)["result"] == row.result_id
@@ -305,7 +305,7 @@ def test_stored_uploads_are_not_ingested_twice(start, scan):
     upload = location.rpartition("/")[2]
     http.__exit__()
     http = start()
-    http.app.state.background.ingest.uploads.mark_complete(upload)
+    http.app.state.background.ingest.uploads.change(upload, state="reading")
     http.app.state.background.ingest.notify()
     assert settled(http, location)["result"] == done["result"]
     assert len(http.get("/v1/datasets").json()["datasets"]) == 1
