@@ -115,7 +115,6 @@ def create_app(settings: ServiceSettings, cluster: Cluster | None = None) -> Fas
     app.add_middleware(Guard)
     app.add_middleware(identify)
     app.state.metrics = Metrics()
-    app.add_middleware(app.state.metrics.middleware)
     app.mount("/static", StaticFiles(directory=pages.WEB / "static"), name="static")
     return app
 

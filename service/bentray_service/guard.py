@@ -1,4 +1,4 @@
-"""Middleware that authenticates and logs every request, and refuses packed bodies."""
+"""Middleware that authenticates, logs and counts every request, and refuses packed bodies."""
 
 from __future__ import annotations
 
@@ -53,6 +53,7 @@ class Guard:
             return
         seen = _RequestLog(scope)
         caller = None
+        scope["app"].state.metrics.in_flight.inc()
         try:
             if not _public(scope["path"]):
                 caller = await run_in_threadpool(_authenticate, scope, seen)
@@ -67,6 +68,7 @@ class Guard:
             else:
                 await self.app(*arguments)
         finally:
+            scope["app"].state.metrics.in_flight.dec()
             seen.log_request()
 
 
@@ -124,7 +126,7 @@ class _RequestLog:
         return counted
 
     def log_request(self) -> None:
-        """Write a log line, and an entry of the audit log for an authenticated request."""
+        """Write a log line, and an entry of the audit log for an authenticated request; count it."""
         figures: dict[str, Any] = {
             "method": self._scope["method"],
             "route": route_of(self._scope),
@@ -139,8 +141,9 @@ class _RequestLog:
             figures |= who | ({"project": self.caller.project} if self.caller.project else {})
             number = self._scope["state"]["request_id"]
             access_of(self._scope).audit.append({"request": number, **figures, "ids": self._ids()})
-        seconds = round(time.perf_counter() - self._begun, 4)
-        words = "%s %s %d in %.3f s"
+        took = time.perf_counter() - self._begun
+        self._scope["app"].state.metrics.observe_request(self._scope, self.status, self.received, took)
+        seconds, words = round(took, 4), "%s %s %d in %.3f s"
         log.info(
             words,
             self._scope["method"],

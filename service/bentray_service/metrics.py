@@ -18,13 +18,14 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 from sqlalchemy.exc import SQLAlchemyError
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import Scope
 
 from .backup.archive import newest_backup
 from .rows import usage
 from .rows.checksums import Checksums
 from .rows.keys import Keys
 from .rows.tables import STATES
+from .web.errors import METHODS
 from .web.middleware import route_of
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ class Metrics:
 
     Attributes:
         registry: of all metrics.
+        in_flight: requests in progress.
     """
 
     def __init__(self) -> None:
@@ -60,7 +62,7 @@ class Metrics:
         self._received = Counter(
             "bentray_http_received_bytes_total", "Bytes of request bodies.", labels, registry=self.registry
         )
-        self._in_flight = Gauge(
+        self.in_flight = Gauge(
             "bentray_http_requests_in_flight", "Requests in progress.", registry=self.registry
         )
         # Memory, processor time and open files of this process; empty except on Linux.
@@ -70,43 +72,12 @@ class Metrics:
         """Add metrics of an open service, collected on request."""
         self.registry.register(_ServiceCollector(stores, background, access))
 
-    def middleware(self, app: ASGIApp) -> ASGIApp:
-        """ASGI middleware that counts and times requests."""
-
-        async def counted(scope: Scope, receive: Receive, send: Send) -> None:
-            if scope["type"] != "http":
-                await app(scope, receive, send)
-                return
-            status, received, begun = 500, 0, time.perf_counter()
-
-            async def receive_counted() -> Message:
-                nonlocal received
-                message = await receive()
-                received += len(message.get("body", b""))
-                return message
-
-            async def send_seen(message: Message) -> None:
-                nonlocal status
-                if message["type"] == "http.response.start":
-                    status = message["status"]
-                await send(message)
-
-            self._in_flight.inc()
-            try:
-                await app(scope, receive_counted, send_seen)
-            finally:
-                self._in_flight.dec()
-                method, route = _method(scope), route_of(scope)
-                self._requests.labels(method, route, str(status)).inc()
-                self._seconds.labels(method, route).observe(time.perf_counter() - begun)
-                self._received.labels(method, route).inc(received)
-
-        return counted
-
-
-def _method(scope: Scope) -> str:
-    known = {"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"}
-    return scope["method"] if scope["method"] in known else "other"
+    def observe_request(self, scope: Scope, status: int, received: int, seconds: float) -> None:
+        """Count a request whose response has ended; ``received``: bytes of its body."""
+        method, route = scope["method"] if scope["method"] in METHODS else "other", route_of(scope)
+        self._requests.labels(method, route, str(status)).inc()
+        self._seconds.labels(method, route).observe(seconds)
+        self._received.labels(method, route).inc(received)
 
 
 class _ServiceCollector(Collector):

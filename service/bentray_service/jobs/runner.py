@@ -7,7 +7,7 @@ import logging
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +16,8 @@ from typing import Any
 from distributed.client import FutureCancelledError
 from distributed.comm import CommClosedError
 from distributed.scheduler import NoValidWorkerError, NoWorkerError
+from prometheus_client import Counter, Histogram
+from prometheus_client.metrics_core import Metric
 from sqlalchemy.exc import SQLAlchemyError
 
 from bentray_kernels.task_graph import Cancelled
@@ -35,7 +37,6 @@ from ..rows.job_queue import LEASE_S, Queue
 from ..rows.tables import ENDED, JobRow, Plain
 from ..settings import ServiceSettings
 from .estimate import estimate
-from .job_metrics import JobMetrics
 from .kind import JobRun, Kind
 from .kinds import KINDS
 from .reporter import CRASHED, Reporter, explain
@@ -60,6 +61,46 @@ UNAVAILABLE = (
     NoValidWorkerError,
 )
 FULL = (errno.ENOSPC, errno.EDQUOT)
+
+# From a picture-sized job to a night.
+BUCKETS_S = (1.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0, 14400.0, 43200.0)
+
+# What ended or failed under a running job that is queued again.
+REASONS = ("service", "workers", "database", "storage", "disk")
+
+
+class JobMetrics:
+    """Durations of attempts that ended, and attempts that are repeated."""
+
+    def __init__(self) -> None:
+        self._seconds = Histogram(
+            "bentray_job_duration_seconds",
+            "Time from the start of the last attempt of a job to its end.",
+            ("kind", "state"),
+            buckets=BUCKETS_S,
+            registry=None,
+        )
+        self._retries = Counter(
+            "bentray_job_retries_total",
+            "Running jobs that were queued again, by what was not available.",
+            ("reason",),
+            registry=None,
+        )
+        for reason in REASONS:
+            self._retries.labels(reason)
+
+    def observe_end(self, kind: str, state: str, seconds: float) -> None:
+        """Count an ended job."""
+        self._seconds.labels(kind, state).observe(max(seconds, 0.0))
+
+    def count_retries(self, reason: str, number: int = 1) -> None:
+        """Count jobs that were queued again."""
+        self._retries.labels(reason).inc(number)
+
+    def collect(self) -> Iterator[Metric]:
+        """The metrics, for a collector."""
+        yield from self._seconds.collect()
+        yield from self._retries.collect()
 
 
 class Runner(BackgroundThread):

@@ -107,13 +107,10 @@ class Jobs(NamedTable[JobRow]):
         request = RequestKey.from_header(how.key, content)
         with self._database.write() as session:
             before = request.earlier(session, JobRow, tenant)
-            if before is None:
-                job_id = insert_jobs(session, tenant, [new], how, request=request)[0]
-            else:
-                job_id = before.id
-        row = self.get(tenant, job_id)
-        row.replayed = before is not None
-        return row
+            if before is not None:
+                return before
+            job_id = insert_jobs(session, tenant, [new], how, request=request)[0]
+        return self.get(tenant, job_id)
 
     def search(
         self,
