@@ -23,9 +23,8 @@ from .access.sign_in import SignIn
 from .compute import Compute
 from .files.bucket_store import open_store
 from .files.checked_store import CheckedStore
-from .files.data_folder import Files, installation_of, lock
+from .files.data_folder import Files, check_authentication, installation_of, lock, open_folder_database
 from .files.disk import private_files
-from .files.folder_database import check_authentication, open_folder_database
 from .files.orphans import Orphans
 from .guard import Guard
 from .housekeeping import Housekeeper

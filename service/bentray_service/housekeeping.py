@@ -13,7 +13,7 @@ from .errors import InUse, Locked, UnknownId
 from .files.data_folder import Files
 from .files.deletion import Deletion
 from .files.orphans import Orphans
-from .ingest.append import UploadLocks, remove
+from .ingest.receive import UploadLocks, remove
 from .rows.ages import ExpiryMarks, ObservedTime, StoredItem
 from .rows.database import Database
 from .rows.ids import Tenant

@@ -7,7 +7,7 @@ from typing import Any, get_args
 import pytest
 from fastapi.params import Query
 
-from bentray_service.view_parameters import view_dependency
+from bentray_service.routes.pictures import view_dependency
 from bentray_workers.rendering.field_view import FieldView
 from bentray_workers.rendering.refraction_view import RefractionView
 

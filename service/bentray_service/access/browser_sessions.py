@@ -14,13 +14,11 @@ from starlette.requests import HTTPConnection
 from bentray_kernels.errors import InvalidInput
 
 from ..errors import Forbidden, NotAuthenticated
-from ..rows.claims import ClaimedTenants
-from ..rows.sessions import PENDING_S, PendingSignIn, Sessions
+from ..rows.keys import PENDING_S, ClaimedTenants, PendingSignIn, Sessions
 from ..settings import ServiceSettings
 from ..web.addresses import names_loopback
 from .caller import Caller
-from .openid_claims import ClaimMapping
-from .openid_provider import Provider
+from .openid import ClaimMapping, Provider
 
 log = logging.getLogger("bentray.access")
 

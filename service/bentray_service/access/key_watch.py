@@ -12,9 +12,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ..errors import DatabaseUnavailable, NotAuthenticated
-from ..rows.keys import Keys
+from ..rows.keys import Keys, Sessions
 from ..rows.projects import Projects
-from ..rows.sessions import Sessions
 from ..web.errors import problem_response
 
 log = logging.getLogger("bentray.access")

@@ -13,18 +13,16 @@ from bentray_kernels.errors import InvalidInput
 
 from ..errors import Forbidden, NotAuthenticated, RateLimited
 from ..rows.accounts import Accounts
-from ..rows.claims import ClaimedTenants
 from ..rows.database import Database
 from ..rows.ids import LOCAL, Tenant
-from ..rows.keys import PREFIX, ApiKey, Keys
+from ..rows.keys import PREFIX, ApiKey, ClaimedTenants, Keys, Sessions
 from ..rows.projects import ROLES, Projects, membership
-from ..rows.sessions import Sessions
 from ..settings import ServiceSettings, read_secret
 from ..web.addresses import is_loopback, names_loopback, networks, within
 from .browser_sessions import BrowserSessions
 from .caller import ANYONE, SCOPES, USUAL, Caller, scope_of
 from .key_watch import KeyWatch
-from .openid_claims import LONGEST_USER
+from .openid import LONGEST_USER
 from .rate_limits import RateLimits
 
 log = logging.getLogger("bentray.access")

@@ -20,9 +20,8 @@ from bentray_workers.files.atomic import sync, write_bytes
 
 from ..errors import Damaged
 from ..files.bucket_store import open_store
-from ..files.data_folder import RESTORING, Files, lock
+from ..files.data_folder import RESTORING, Files, lock, write_stamp
 from ..files.disk import private_files, sha256_of
-from ..files.folder_database import write_stamp
 from ..files.tenant_files import KEPT
 from ..rows.database import Database, new_mark, open_database
 from ..rows.table_copies import copy_to, has_tables, remove_database, snapshot

@@ -57,7 +57,7 @@ def create(
     Example:  bentray keys create --tenant clinic --name scanner --expires 90d
     """
     from ..access.caller import checked_scopes
-    from ..files.folder_database import remember_authentication
+    from ..files.data_folder import remember_authentication
     from ..rows.ids import checked_tenant
     from ..rows.keys import ApiKey, Keys
 
@@ -121,9 +121,8 @@ def revoke(
 @contextmanager
 def opened_database(data: Path | None) -> Iterator[Database]:
     """The database of the service with this data folder, which may be running."""
-    from ..files.data_folder import Files
+    from ..files.data_folder import Files, open_folder_database
     from ..files.disk import private_files
-    from ..files.folder_database import open_folder_database
 
     settings = service_settings(data)
     with private_files():

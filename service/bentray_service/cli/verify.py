@@ -33,8 +33,7 @@ def verify(
     """
     from ..files.bucket_store import open_store
     from ..files.checked_store import CheckedStore, scrub
-    from ..files.data_folder import Files, lock
-    from ..files.folder_database import open_folder_database
+    from ..files.data_folder import Files, lock, open_folder_database
     from ..files.orphans import Orphans
     from ..rows.checksums import Checksums
 

@@ -12,8 +12,7 @@ from sqlalchemy import select
 from ..rows.database import Database
 from ..rows.stored_tables import LiveIds
 from ..rows.tables import About
-from .data_folder import Files
-from .folder_database import read_stamp, write_stamp
+from .data_folder import Files, read_stamp, write_stamp
 from .tenant_files import KEPT, owner_of, stored_files
 
 log = logging.getLogger("bentray.storage")

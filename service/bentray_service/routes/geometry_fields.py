@@ -6,7 +6,7 @@ from functools import partial
 
 from fastapi import APIRouter, Response
 
-from ..view_parameters import FieldViewParameters
+from ..routes.pictures import FieldViewParameters
 from ..web.errors import problems
 from ..wiring import Context, RequestContext
 from .bodies import Limit

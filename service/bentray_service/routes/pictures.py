@@ -1,15 +1,22 @@
-"""Rendered PNG images with an ETag and rate limit; rendering stops when the client disconnects."""
+"""Rendered images with ETag and rate limit, until the client disconnects; views from query parameters."""
 
 from __future__ import annotations
 
 import asyncio
 import hashlib
+import inspect
 import math
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any, TypeVar
+from dataclasses import fields
+from typing import Annotated, Any, TypeVar, get_type_hints
 
-from fastapi import Request, Response
+from fastapi import Depends, Query, Request, Response
 from starlette.requests import ClientDisconnect
+
+from bentray_kernels.errors import InvalidInput
+from bentray_kernels.requests.request_fields import check_used
+from bentray_workers.rendering.field_view import FieldView
+from bentray_workers.rendering.refraction_view import RefractionView
 
 from .. import __version__
 from ..rows.tables import StoredRow
@@ -29,6 +36,8 @@ PICTURE: dict[int | str, dict[str, Any]] = {
     304: {"description": "Not modified."},
     **problems(404, 422, 429, 503),
 }
+
+View = TypeVar("View")
 
 
 async def picture(
@@ -97,3 +106,52 @@ async def while_connected(request: Request, work: Awaitable[Made]) -> Made:
 async def _left(request: Request) -> None:
     while (await request.receive())["type"] != "http.disconnect":
         """The empty body of the request."""
+
+
+def view_dependency(kind: type[View]) -> Callable[..., View]:
+    """A dependency that builds a view from the query.
+
+    It raises InvalidInput for parameters that are unknown or have no effect beside the others.
+
+    Args:
+        kind: a dataclass whose fields have a ``description`` in their metadata.
+    """
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+
+    def view_of(request: Request, **values: Any) -> View:
+        for name in request.query_params:
+            if name not in names:
+                raise InvalidInput(name, repr(request.query_params[name])[:80], "one of " + ", ".join(names))
+        view = kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
+        checked: View = check_used(view)
+        return checked
+
+    view_of.__signature__ = _signature(kind)  # type: ignore[attr-defined]
+    return view_of
+
+
+def _signature(kind: type[Any]) -> inspect.Signature:
+    """The signature for FastAPI: the fields of the view with their descriptions."""
+    types = get_type_hints(kind)
+    parameters = [inspect.Parameter("request", inspect.Parameter.KEYWORD_ONLY, annotation=Request)]
+    for field in fields(kind):
+        default: Any = field.default
+        several = isinstance(default, tuple)
+        annotation: Any = list[float] if several else types[field.name]
+        query = Query(
+            description=field.metadata["description"] + (" May be repeated." if several else ""),
+            json_schema_extra=field.metadata.get("json_schema_extra"),
+        )
+        parameters.append(
+            inspect.Parameter(
+                field.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=list(default) if several else default,
+                annotation=Annotated[annotation, query],
+            )
+        )
+    return inspect.Signature(parameters)
+
+
+ViewParameters = Annotated[RefractionView, Depends(view_dependency(RefractionView))]
+FieldViewParameters = Annotated[FieldView, Depends(view_dependency(FieldView))]

@@ -34,9 +34,9 @@ from bentray_workers.rendering.refraction_view import RefractionView
 from .. import __version__
 from ..compute import check_renderable
 from ..errors import UnknownId
+from ..routes.pictures import ViewParameters
 from ..rows.ages import StoredItem
 from ..rows.tables import DatasetRow, VolumeRow
-from ..view_parameters import ViewParameters
 from ..web.errors import problems
 from ..wiring import Context, StoreParts
 from .bodies import Limit, accept_upload

@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import text
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.access import openid_provider
+from bentray_service.access import openid
 from bentray_service.access.audit import entries
 from bentray_service.app import create_app
 from bentray_service.settings import ServiceSettings
@@ -88,7 +88,7 @@ def http(app, monkeypatch):
     """A browser without cookies."""
     app.cookies.clear()
     app.app.state.access.sign_in._sign_ins._buckets.clear()
-    monkeypatch.setattr(openid_provider, "ROTATION_S", 0.0)
+    monkeypatch.setattr(openid, "ROTATION_S", 0.0)
     return app
 
 
@@ -325,7 +325,7 @@ def test_keys_rotate(http, provider, monkeypatch):
     provider.rotate()
     signed_in(http, provider)
     # Invented keys do not make the service ask without end.
-    monkeypatch.setattr(openid_provider, "ROTATION_S", 30.0)
+    monkeypatch.setattr(openid, "ROTATION_S", 30.0)
     provider.tamper = head(kid="invented")
     before = provider.requests.count("/jwks")
     for _ in range(3):

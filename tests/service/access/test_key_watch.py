@@ -10,9 +10,8 @@ import pytest
 from bentray_service.access import key_watch
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL
-from bentray_service.rows.keys import ApiKey, Keys
+from bentray_service.rows.keys import ApiKey, Keys, Sessions
 from bentray_service.rows.projects import Projects
-from bentray_service.rows.sessions import Sessions
 
 PATIENCE_S = 60.0
 

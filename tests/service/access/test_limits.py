@@ -16,7 +16,7 @@ from bentray_service.access.sign_in import SignIn
 from bentray_service.errors import QueueFull, QuotaExceeded, RateLimited, TooManyStreams
 from bentray_service.files.data_folder import Files
 from bentray_service.ingest.fair_queue import FairQueue
-from bentray_service.ingest.upload_limits import UploadLimits
+from bentray_service.ingest.upload_ingest import UploadLimits
 from bentray_service.jobs.feed import OF_ACCOUNT, EventFeed
 from bentray_service.jobs.runner import Runner
 from bentray_service.picture_queue import MAX_PER_ACCOUNT

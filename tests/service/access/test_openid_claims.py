@@ -4,12 +4,11 @@ import json
 
 import pytest
 
-from bentray_service.access.openid_claims import ClaimMapping, values_of
+from bentray_service.access.openid import ClaimMapping, values_of
 from bentray_service.errors import Forbidden
-from bentray_service.rows.claims import ClaimedTenants
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import Tenant
-from bentray_service.rows.keys import ApiKey, Keys
+from bentray_service.rows.keys import ApiKey, ClaimedTenants, Keys
 from bentray_service.settings import ServiceSettings
 
 ISSUER = "https://id.example"

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bentray_service.files.folder_database import GUARDED
+from bentray_service.files.data_folder import GUARDED
 from bentray_service.rows.keys import ApiKey
 
 from .conftest import Run

@@ -14,8 +14,7 @@ from bentray_service.errors import StorageUnavailable
 from bentray_service.files import bucket as bucket_module
 from bentray_service.files import bucket_store
 from bentray_service.files.bucket import Bucket
-from bentray_service.files.bucket_store import FORGOTTEN_S, LEFT_S, MARK, BucketStore, open_store
-from bentray_service.files.cache import RECENT_S
+from bentray_service.files.bucket_store import FORGOTTEN_S, LEFT_S, MARK, RECENT_S, BucketStore, open_store
 from bentray_service.files.data_folder import Files
 from bentray_service.files.store import Store
 from bentray_service.rows.database import open_database

@@ -13,7 +13,7 @@ from bentray_service.files.data_folder import Files
 from bentray_service.files.deletion import Deletion
 from bentray_service.files.orphans import Orphans
 from bentray_service.housekeeping import DAY_S, Housekeeper
-from bentray_service.ingest.append import UploadLocks
+from bentray_service.ingest.receive import UploadLocks
 from bentray_service.rows.ages import StoredItem
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, Tenant, new_id, volume_of

@@ -8,8 +8,7 @@ import pytest
 
 from bentray_kernels.errors import InvalidInput
 from bentray_service.app import create_app
-from bentray_service.files.data_folder import Files
-from bentray_service.files.folder_database import GUARDED, STAMP, open_folder_database
+from bentray_service.files.data_folder import GUARDED, STAMP, Files, open_folder_database
 from bentray_service.rows.ids import LOCAL
 from bentray_service.rows.keys import ApiKey, Keys
 from bentray_service.settings import ServiceSettings

@@ -4,8 +4,7 @@ import shutil
 
 import pytest
 
-from bentray_service.files.data_folder import Files
-from bentray_service.files.folder_database import STAMP
+from bentray_service.files.data_folder import STAMP, Files
 from bentray_service.files.orphans import SAFE_S, Orphans
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, new_id

@@ -12,7 +12,7 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_service.errors import Locked, TooLarge, UnknownChecksum, WrongChecksum
 from bentray_service.ingest import receive as receiving
-from bentray_service.ingest.append import Checksum, UploadLocks, append, discard_unverified, received_bytes
+from bentray_service.ingest.receive import Checksum, UploadLocks, append, discard_unverified, received_bytes
 
 BEGIN = b"begin "
 
@@ -99,7 +99,7 @@ def test_one_writer_at_a_time_also_after_a_failure():
 DIES = """
 import asyncio, os, sys
 from pathlib import Path
-from bentray_service.ingest.append import Checksum, append
+from bentray_service.ingest.receive import Checksum, append
 
 async def stream():
     yield b"unverified"

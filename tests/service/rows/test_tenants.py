@@ -6,10 +6,9 @@ from hypothesis import strategies as st
 from sqlalchemy import insert
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.rows.claims import ClaimedTenants, former_tenant
 from bentray_service.rows.database import open_database
 from bentray_service.rows.ids import LOCAL, TENANT_PATTERN, Tenant, checked_tenant
-from bentray_service.rows.keys import ApiKey, Keys
+from bentray_service.rows.keys import ApiKey, ClaimedTenants, Keys, former_tenant
 from bentray_service.rows.tables import ClaimedTenantRow
 
 HERE, THERE = "https://id.example", "https://id.example.org"

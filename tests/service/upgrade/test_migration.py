@@ -10,11 +10,11 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import MetaData, create_engine, insert, inspect, select, text
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.rows.claims import ClaimedTenants
 from bentray_service.rows.database import SQLITE_PRAGMAS, engine_of, open_database, version_of
 from bentray_service.rows.ids import Tenant
 from bentray_service.rows.job_queue import Queue
 from bentray_service.rows.jobs import Jobs
+from bentray_service.rows.keys import ClaimedTenants
 from bentray_service.rows.projects import Projects
 from bentray_service.rows.tables import VERSION, About, Base, ClaimedTenantRow
 

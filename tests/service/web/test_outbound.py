@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_service.access.openid_provider import Provider
+from bentray_service.access.openid import Provider
 from bentray_service.client import AsyncClient, Client, ClientError
 from bentray_service.errors import ProviderUnavailable
 from bentray_service.settings import ServiceSettings

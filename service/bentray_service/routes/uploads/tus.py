@@ -15,7 +15,7 @@ from fastapi import APIRouter, Depends, Header, Response, status
 from starlette.concurrency import run_in_threadpool
 
 from ...errors import StorageFull, TooLarge, WrongOffset, WrongProtocol
-from ...ingest.append import ALGORITHMS, CHECKSUM, Checksum, append, received_bytes
+from ...ingest.receive import ALGORITHMS, CHECKSUM, Checksum, append, received_bytes
 from ...rows.tables import UploadRow
 from ...web.errors import problems
 from ...web.middleware import TUS_PLACE, TUS_VERSION

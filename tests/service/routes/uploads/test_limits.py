@@ -16,7 +16,7 @@ from bentray_kernels.requests.limits import ELEMENTS, EMISSIONS, SAMPLES, SLICES
 from bentray_service.errors import Busy
 from bentray_service.ingest.fair_queue import FairQueue
 from bentray_service.ingest.ingest_process import convert_upload
-from bentray_service.ingest.upload_limits import MAX_PER_ACCOUNT
+from bentray_service.ingest.upload_ingest import MAX_PER_ACCOUNT
 from bentray_service.routes.uploads import one_shot_uploads
 from bentray_service.routes.uploads.one_shot_uploads import run_in_turn
 from bentray_service.rows.ids import LOCAL, Tenant

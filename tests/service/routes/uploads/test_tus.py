@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import update
 
-from bentray_service.ingest.upload_limits import UploadLimits
+from bentray_service.ingest.upload_ingest import UploadLimits
 from bentray_service.rows.tables import ExpiredRow, UploadRow
 
 from ...conftest import NoProjects, npy
