@@ -22,7 +22,7 @@ import socket
 import ssl
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -143,11 +143,12 @@ def _fields(process: Path) -> list[str]:
         return [""] * 50
 
 
-# By what is asked about an address of a service, and about that of a scheduler.
-Checks = Mapping[tuple[str, ...], Callable[[str], str | None]]
-SERVICE: Checks = {(): check_service, ("ready",): partial(check_service, question="ready")}
-SCHEDULER: Checks = {(): check_scheduler, ("worker",): check_worker}
-CHECKS = {"http": SERVICE, "https": SERVICE, "tcp": SCHEDULER, "tls": SCHEDULER}
+CHECKS: dict[tuple[str, ...], Callable[[str], str | None]] = {
+    **dict.fromkeys((("http",), ("https",)), check_service),
+    **dict.fromkeys((("http", "ready"), ("https", "ready")), partial(check_service, question="ready")),
+    **dict.fromkeys((("tcp",), ("tls",)), check_scheduler),
+    **dict.fromkeys((("tcp", "worker"), ("tls", "worker")), check_worker),
+}
 
 
 def main(words: list[str]) -> None:
@@ -156,7 +157,7 @@ def main(words: list[str]) -> None:
     if words[:1] == ["--restart-after"]:
         most, words = int(words[1]) if words[1:] and words[1].isdigit() else -1, words[2:]
     address, *check = words or ["http://127.0.0.1:8000"]
-    chosen = CHECKS.get(address.partition("://")[0], {}).get(tuple(check))
+    chosen = CHECKS.get((address.partition("://")[0], *check))
     if chosen is None or most < 0:
         sys.stderr.write((__doc__ or "").splitlines()[2] + "\n")
         sys.exit(2)
