@@ -22,6 +22,7 @@ from .jobs.kind import Sources
 from .jobs.runner import Runner
 from .pictures import Pictures
 from .readiness import Readiness
+from .rows.ages import StoredItem
 from .rows.batches import Batches
 from .rows.database import Database
 from .rows.ids import Tenant
@@ -100,6 +101,10 @@ class RequestContext:
     def check_render(self, share: float = 1.0) -> None:
         """Check the rate limit of the caller, see ``SignIn.check_render``."""
         self.access.sign_in.check_render(self.caller, share)
+
+    def delete(self, what: str, item: str) -> None:
+        """Delete an item of the caller, see ``Deletion.delete``."""
+        self.stores.deletion.delete(StoredItem(self.tenant, what, item))
 
     def submission(self, idempotency_key: str | None, webhook: str | None) -> Submission:
         """Properties of the jobs that the request starts."""

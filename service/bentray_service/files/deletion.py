@@ -65,7 +65,7 @@ class Deletion:
         with self._database.write() as session:
             if not any(_has(session, table, stored.tenant, name) for table in _TABLES[stored.what]):
                 raise UnknownId(stored.what, stored.id)
-            gone = _JOBS[stored.what](session, stored.tenant, name)
+            gone = _of(session, stored.tenant, _JOBS[stored.what](name))
             made = select(ResultVolumeRow.id).where(ResultVolumeRow.job_id.in_(gone))
             results = set(session.scalars(made))
             gone |= _of(session, stored.tenant, JobRow.volume_id.in_(results))
@@ -107,14 +107,9 @@ def _of(session: Session, tenant: Tenant, condition: ColumnElement[bool]) -> set
     return set(session.scalars(select(JobRow.id).where(JobRow.tenant == tenant, condition)))
 
 
-def _of_dataset(session: Session, tenant: Tenant, name: str) -> set[str]:
-    made_it = select(DatasetRow.job_id).where(DatasetRow.id == name)
-    return _of(session, tenant, or_(JobRow.dataset_id == name, JobRow.id.in_(made_it)))
-
-
-def _of_volume(session: Session, tenant: Tenant, name: str) -> set[str]:
-    made_it = select(ResultVolumeRow.job_id).where(ResultVolumeRow.id == name)
-    return _of(session, tenant, or_(JobRow.volume_id == name, JobRow.id.in_(made_it)))
+def _made(table: type[DatasetRow | ResultVolumeRow], name: str) -> ColumnElement[bool]:
+    """Whether a job has made an item."""
+    return JobRow.id.in_(select(table.job_id).where(table.id == name))
 
 
 def _ended_without_result(time: float) -> ColumnElement[bool]:
@@ -173,9 +168,10 @@ _TABLES: dict[str, tuple[type[Deletable], ...]] = {
     "mesh": (MeshRow,),
     "job": (JobRow,),
 }
-_JOBS: dict[str, Callable[[Session, Tenant, str], set[str]]] = {
-    "dataset": _of_dataset,
-    "volume": _of_volume,
-    "mesh": lambda session, tenant, name: _of(session, tenant, JobRow.mesh_id == name),
-    "job": lambda session, tenant, name: {name},
+# The jobs that are deleted with an item.
+_JOBS: dict[str, Callable[[str], ColumnElement[bool]]] = {
+    "dataset": lambda name: or_(JobRow.dataset_id == name, _made(DatasetRow, name)),
+    "volume": lambda name: or_(JobRow.volume_id == name, _made(ResultVolumeRow, name)),
+    "mesh": lambda name: JobRow.mesh_id == name,
+    "job": lambda name: JobRow.id == name,
 }

@@ -12,7 +12,6 @@ from bentray_kernels.errors import InvalidInput
 
 from ..errors import InUse
 from ..jobs.kinds import KINDS, ReconstructionRequest
-from ..rows.ages import StoredItem
 from ..rows.tables import ENDED
 from ..web.errors import problems
 from ..wiring import Context
@@ -99,4 +98,4 @@ def delete_batch(batch_id: str, context: Context) -> None:
     if busy is not None:
         raise InUse("batch", f"{batch.id} with {busy.id} ({busy.state})", "a batch that has ended")
     for job in batch.jobs:
-        context.stores.deletion.delete(StoredItem(context.tenant, "job", job.id))
+        context.delete("job", job.id)

@@ -17,7 +17,6 @@ from bentray_workers.files.dataset.correct import Correction
 from bentray_workers.foreign_scans.scan_metadata import FIELDS, UNITS
 
 from ..ingest.canonical import add_corrected
-from ..rows.ages import StoredItem
 from ..rows.ids import new_id
 from ..rows.stored_tables import RequestKey
 from ..rows.tables import DatasetRow
@@ -153,7 +152,7 @@ def dataset_file(dataset_id: str, context: Context) -> Response:
 @router.delete("/{dataset_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
 def delete_dataset(dataset_id: str, context: Context) -> None:
     """Delete a scan with its jobs and their volumes; rejected while an unfinished job needs it."""
-    context.stores.deletion.delete(StoredItem(context.tenant, "dataset", dataset_id))
+    context.delete("dataset", dataset_id)
 
 
 @router.get(

@@ -14,7 +14,6 @@ from bentray_workers.reconstruction.preview import checkpoint_image
 from ..errors import NoAnimation, NoPreview
 from ..jobs.estimate import READ, estimate
 from ..jobs.kinds import KINDS
-from ..rows.ages import StoredItem
 from ..rows.ids import checked
 from ..rows.jobs import NewJob
 from ..rows.tables import ENDED, JobRow
@@ -149,7 +148,7 @@ def delete_job(job_id: str, context: Context) -> None:
 
     A simulated scan stays, and so does a geometry field that another job made too.
     """
-    context.stores.deletion.delete(StoredItem(context.tenant, "job", job_id))
+    context.delete("job", job_id)
 
 
 @router.patch("/{job_id}", dependencies=JSON, responses=problems(400, 404, 413, 415, 422))

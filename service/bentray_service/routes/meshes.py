@@ -14,7 +14,6 @@ from bentray_workers.rendering.isosurface_mesh import MAX_STEP, check_nodes, lar
 
 from ..compute import check_renderable
 from ..files.disk import digest_of
-from ..rows.ages import StoredItem
 from ..rows.ids import new_id
 from ..rows.tables import MeshRow
 from ..web.errors import problems
@@ -70,7 +69,7 @@ def show_mesh(mesh_id: str, context: Context) -> MeshRecord:
 @router.delete("/meshes/{mesh_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
 def delete_mesh(mesh_id: str, context: Context) -> None:
     """Delete a mesh with its geometry fields and their jobs; rejected while an unfinished job needs it."""
-    context.stores.deletion.delete(StoredItem(context.tenant, "mesh", mesh_id))
+    context.delete("mesh", mesh_id)
 
 
 @router.post(

@@ -35,7 +35,6 @@ from .. import __version__
 from ..compute import check_renderable
 from ..errors import UnknownId
 from ..routes.pictures import ViewParameters
-from ..rows.ages import StoredItem
 from ..rows.tables import DatasetRow, VolumeRow
 from ..web.errors import problems
 from ..wiring import Context, StoreParts
@@ -330,7 +329,7 @@ def show_volume(volume_id: str, context: Context) -> VolumeRecord:
 @router.delete("/{volume_id}", status_code=status.HTTP_204_NO_CONTENT, responses=problems(404, 409, 503))
 def delete_volume(volume_id: str, context: Context) -> None:
     """Delete a volume with its job and turntables; rejected while an unfinished job needs it."""
-    context.stores.deletion.delete(StoredItem(context.tenant, "volume", volume_id))
+    context.delete("volume", volume_id)
 
 
 @router.get(

@@ -102,6 +102,14 @@ class About(Base):
     begun: Mapped[int] = mapped_column(server_default="0")
 
 
+class Owned:
+    """What a tenant has under an id."""
+
+    number: Mapped[Number]
+    id: Mapped[UniqueId]
+    tenant: Mapped[Owner]
+
+
 class Uploaded:
     """The columns of a table of uploaded items, or of files created by a job or from a volume."""
 
@@ -155,7 +163,7 @@ class DatasetRow(MadeOnce, Uploaded, Base):
     request_sha256: Mapped[RequestSha256]
 
 
-class JobRow(MadeOnce, Base):
+class JobRow(MadeOnce, Owned, Base):
     """A job."""
 
     __tablename__ = "jobs"
@@ -168,9 +176,6 @@ class JobRow(MadeOnce, Base):
         Index("jobs_by_batch", "batch_id"),
     )
 
-    number: Mapped[Number]
-    id: Mapped[UniqueId]
-    tenant: Mapped[Owner]
     kind: Mapped[Id]
     # Input: a reconstruction has a dataset, a refraction a volume of either table, a geometry field a mesh.
     dataset_id: Mapped[Id | None] = mapped_column(ForeignKey("datasets.id"))
@@ -216,7 +221,7 @@ class JobRow(MadeOnce, Base):
         return min(1.0, self.done / self.total)
 
 
-class BatchRow(MadeOnce, Base):
+class BatchRow(MadeOnce, Owned, Base):
     """Reconstructions of many scans that were started together; state and progress are those of the jobs."""
 
     __tablename__ = "batches"
@@ -225,9 +230,6 @@ class BatchRow(MadeOnce, Base):
         Index("batches_by_key", "tenant", "idempotency_key", unique=True),
     )
 
-    number: Mapped[Number]
-    id: Mapped[UniqueId]
-    tenant: Mapped[Owner]
     name: Mapped[Text200]
     settings: Mapped[Plain]
     # Number of jobs at first.
@@ -278,15 +280,12 @@ class BatchRow(MadeOnce, Base):
         return max((job.finished or 0.0 for job in self.jobs), default=None)
 
 
-class ProjectRow(Base):
+class ProjectRow(Owned, Base):
     """A project inside a tenant; its items have the id of the project as tenant."""
 
     __tablename__ = "projects"
     __table_args__ = (Index("projects_by_tenant", "tenant"),)
 
-    number: Mapped[Number]
-    id: Mapped[UniqueId]
-    tenant: Mapped[Owner]
     # Not unique, so that nobody learns the names of projects of others.
     name: Mapped[Text200]
     created: Mapped[Time]
@@ -320,7 +319,7 @@ class EventRow(Base):
     note: Mapped[str] = mapped_column(String(500), default="")
 
 
-class DeliveryRow(Base):
+class DeliveryRow(Owned, Base):
     """A message to the webhook of a job that has ended.
 
     It is sent until its receiver accepts it or its attempts are used up; ``log`` has the outcome of each.
@@ -329,9 +328,6 @@ class DeliveryRow(Base):
     __tablename__ = "deliveries"
     __table_args__ = (Index("deliveries_by_due", "state", "due"),)
 
-    number: Mapped[Number]
-    id: Mapped[UniqueId]
-    tenant: Mapped[Owner]
     job_id: Mapped[UniqueId] = mapped_column(ForeignKey("jobs.id"))
     url: Mapped[str] = mapped_column(String(2000))
     # As it is sent, byte for byte in UTF-8.
@@ -473,15 +469,12 @@ WITH_FILES = (*get_args(StoredRow), JobRow)
 ResultRow = ResultVolumeRow | DatasetRow | FieldRow
 
 
-class UploadRow(Base):
+class UploadRow(Owned, Base):
     """A resumable upload; its offset is the size of the file."""
 
     __tablename__ = "uploads"
     __table_args__ = (Index("uploads_by_state", "state", "number"),)
 
-    number: Mapped[Number]
-    id: Mapped[UniqueId]
-    tenant: Mapped[Owner]
     # Type of the result, and its id.
     what: Mapped[Literal["dataset", "volume", "mesh"]] = mapped_column(String(16))
     result_id: Mapped[Id]
@@ -499,14 +492,11 @@ class UploadRow(Base):
     expires: Mapped[Time]
 
 
-class KeyRow(Base):
+class KeyRow(Owned, Base):
     """An API key; only the digest of its secret is stored."""
 
     __tablename__ = "keys"
 
-    number: Mapped[Number]
-    id: Mapped[UniqueId]
-    tenant: Mapped[Owner]
     name: Mapped[str] = mapped_column(String(100))
     sha256: Mapped[Sha256]
     scopes: Mapped[list[str]]
@@ -532,14 +522,11 @@ class ClaimedTenantRow(Base):
     value: Mapped[str] = mapped_column(String(255))
 
 
-class SessionRow(Base):
+class SessionRow(Owned, Base):
     """The session of a browser whose user signed in at an OpenID provider; without its secret."""
 
     __tablename__ = "sessions"
 
-    number: Mapped[Number]
-    id: Mapped[UniqueId]
-    tenant: Mapped[Owner]
     who: Mapped[Text200]
     sha256: Mapped[Sha256] = mapped_column(unique=True)
     scopes: Mapped[list[str]]

@@ -204,7 +204,7 @@ from bentray_service.rows.database import open_database
 from bentray_service.settings import ServiceSettings
 from bentray_service.webhooks.sender import Webhooks
 settings = ServiceSettings(data_dir=Path(sys.argv[1]), webhook_networks="127.0.0.0/8")
-Webhooks(open_database(settings.database), settings, alone=True).start()
+Webhooks(open_database(settings.database), settings).start()
 time.sleep(600)
 """
 
@@ -225,7 +225,7 @@ def test_killed_while_it_sends(called, receiver, monkeypatch):
         process.wait()
     receiver.hold.set()
     with closing(open_database(settings.database)) as database:
-        again = sender.Webhooks(database, settings, alone=True)
+        again = sender.Webhooks(database, settings)
         again.start()
         webhook = settled(http, job)
         again.stop()
@@ -269,4 +269,4 @@ def test_wrong_networks_are_refused_at_the_start(tmp_path):
     settings = ServiceSettings(data_dir=tmp_path, webhook_networks="10.0.0.0/33")
     refused = pytest.raises(bentray.InvalidInput, match="BENTRAY_WEBHOOK_NETWORKS")
     with closing(open_database(settings.database)) as database, refused:
-        sender.Webhooks(database, settings, alone=True)
+        sender.Webhooks(database, settings)
