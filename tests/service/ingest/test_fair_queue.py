@@ -8,7 +8,7 @@ import pytest
 from bentray_service.errors import Busy, RateLimited
 from bentray_service.ingest import fair_queue
 from bentray_service.ingest.fair_queue import FairQueue, readers_at_once
-from bentray_service.ingest.upload_limits import UploadLimits
+from bentray_service.ingest.upload_ingest import UploadLimits
 from bentray_service.rows.ids import Tenant
 
 from ..conftest import NoProjects
