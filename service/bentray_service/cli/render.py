@@ -89,6 +89,7 @@ def render(
         raise InvalidInput("--map", placed, "no --map with --mode shaded, which has no backdrop")
 
     from bentray_workers.files.atomic import write_bytes
+    from bentray_workers.files.geometry_field_folder import write_array
     from bentray_workers.files.volume_formats import VolumeMetadata, import_volume
     from bentray_workers.images.png import png_of, read_picture
     from bentray_workers.rendering.drawing_device import devices_of
@@ -114,7 +115,7 @@ def render(
     device = devices_of([strip.drawn for strip in strips])
     write_bytes(png, png_of(image, device))
     if placed is not None:
-        _save(placed, position)
+        write_array(placed, position)
     _show(volume, view, png, placed, device, (built - started, seconds), as_json=as_json)
 
 
@@ -186,15 +187,6 @@ def _joined(strips: list[Tile]) -> tuple[Colours, Any]:
     positions = [strip.position_m for strip in strips if strip.position_m is not None]
     image = np.concatenate([strip.image for strip in strips])
     return image, np.concatenate(positions) if positions else None
-
-
-def _save(path: Path, position_m: Any) -> None:
-    import numpy as np
-
-    from bentray_workers.files.atomic import atomic_replace
-
-    with atomic_replace(path) as partial, partial.open("wb") as file:
-        np.save(file, position_m, allow_pickle=False)
 
 
 def _show(

@@ -14,9 +14,7 @@ from bentray_kernels.geometry_field.layout.parameterisation import parameterise
 from bentray_kernels.meshes.example_surfaces import sphere
 from bentray_workers.files.geometry_image import (
     GeometryMaps,
-    colour_png,
-    normal_png,
-    position_png,
+    map_png,
     read_geometry_image,
     write_geometry_image,
 )
@@ -86,9 +84,9 @@ def pixels_of(png):
 def test_pictures_have_u_to_the_right_and_v_up(maps):
     i, j = np.argwhere(maps.valid)[7]
     for png, expected in (
-        (position_png(maps), maps.positions[i, j]),
-        (normal_png(maps), 0.5 * (maps.normals[i, j] + 1.0)),
-        (colour_png(maps), maps.colours[i, j]),
+        (map_png(maps, "positions"), maps.positions[i, j]),
+        (map_png(maps, "normals"), 0.5 * (maps.normals[i, j] + 1.0)),
+        (map_png(maps, "colours"), maps.colours[i, j]),
     ):
         pixels = pixels_of(png)
         assert pixels.shape == (32, 32, 4)
@@ -99,4 +97,4 @@ def test_pictures_have_u_to_the_right_and_v_up(maps):
 
 def test_no_colours_no_picture(maps):
     with pytest.raises(InvalidInput, match="colours: found none"):
-        colour_png(replace(maps, colours=None))
+        map_png(replace(maps, colours=None), "colours")

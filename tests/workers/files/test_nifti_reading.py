@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.nifti_reading import read_nifti
+from bentray_workers.files.nifti_reading import nifti_image
+from bentray_workers.files.volume import Volume
 from bentray_workers.files.volume_formats import import_volume
 
 from ...effort import effort
@@ -168,6 +169,6 @@ def test_a_damaged_header_is_read_or_refused_and_nothing_else(tmp_path, changes)
 def test_a_stream_is_read_as_a_volume():
     values = np.arange(24, dtype=np.uint8).reshape(4, 3, 2)
     image = nibabel.Nifti1Image(values, np.diag((1.0, 2.0, 3.0, 1.0)))
-    volume = read_nifti(io.BytesIO(image.to_bytes()))
+    volume = Volume.from_image(nifti_image(io.BytesIO(image.to_bytes())))
     assert volume.spacing_m == pytest.approx((1e-3, 2e-3, 3e-3))
     assert np.array_equal(volume.values, values)

@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.nrrd_reading import read_nrrd
+from bentray_workers.files.nrrd_reading import nrrd_image
+from bentray_workers.files.volume import Volume
 from bentray_workers.files.volume_formats import import_volume
 
 from ...effort import effort
@@ -225,6 +226,6 @@ def test_a_stream_is_read_as_a_volume():
     header = b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 3 2\naxis mins: 0 0 0\naxis maxs: 3 4 3\n"
     header += b"centerings: node node node\nencoding: raw\n\n"
     values = np.arange(24, dtype=np.uint8)
-    volume = read_nrrd(io.BytesIO(header + values.tobytes()))
+    volume = Volume.from_image(nrrd_image(io.BytesIO(header + values.tobytes())))
     assert volume.spacing_m == pytest.approx((1e-3, 2e-3, 3e-3))
     assert np.array_equal(volume.values, values.reshape((4, 3, 2), order="F"))

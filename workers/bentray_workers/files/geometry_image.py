@@ -99,30 +99,23 @@ def _map(reader: Reader, name: str) -> Pixels:
     return values.astype(np.float32)
 
 
-def position_png(maps: GeometryMaps) -> bytes:
-    """The positions as red, green and blue, u to the right and v up; transparent where not valid."""
-    return _png(maps.positions, maps.valid)
+def map_png(maps: GeometryMaps, quantity: str) -> bytes:
+    """An array as red, green and blue, u to the right and v up; transparent where not valid.
 
-
-def normal_png(maps: GeometryMaps) -> bytes:
-    """The normals likewise, −1 to 1 from dark to bright."""
-    return _png(0.5 * (maps.normals + 1.0), maps.valid)
-
-
-def colour_png(maps: GeometryMaps) -> bytes:
-    """The colours likewise.
+    Args:
+        maps: of the image.
+        quantity: "positions"; "normals", −1 to 1 from dark to bright; or "colours".
 
     Raises:
-        InvalidInput: for an image without colours.
+        InvalidInput: for the colours of an image without them.
     """
-    if maps.colours is None:
+    values = getattr(maps, quantity)
+    if values is None:
         raise InvalidInput("colours", "none", "the image of a mesh with colours")
-    return _png(maps.colours, maps.valid)
-
-
-def _png(values: Pixels, valid: Flags) -> bytes:
-    shades = np.rint(np.clip(np.where(valid[..., np.newaxis], values, 0.0), 0.0, 1.0) * 255.0)
-    pixels = np.dstack((shades, 255.0 * valid)).astype(np.uint8)
+    if quantity == "normals":
+        values = 0.5 * (values + 1.0)
+    shades = np.rint(np.clip(np.where(maps.valid[..., np.newaxis], values, 0.0), 0.0, 1.0) * 255.0)
+    pixels = np.dstack((shades, 255.0 * maps.valid)).astype(np.uint8)
     # Images have their rows from top to bottom.
     upright = np.ascontiguousarray(pixels.transpose(1, 0, 2)[::-1])
     buffer = io.BytesIO()

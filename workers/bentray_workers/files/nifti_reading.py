@@ -22,16 +22,10 @@ from .bounded_reading import (
 )
 from .damage import rejecting_damage
 from .npy_headers import LONGEST_HEADER
-from .volume import Volume
 from .volume_axes import PositionedImage, reorient
 
 # Discards messages of nibabel about a header: the exception has the same text.
 _silent = logging.Logger("nibabel checks, silent", logging.CRITICAL + 1)
-
-
-def read_nifti(file: Any, check: ShapeCheck = any_shape) -> Volume:
-    """The volume in an open, uncompressed file; see ``nifti_image``."""
-    return Volume.from_image(nifti_image(file, check))
 
 
 def nifti_image(file: Any, check: ShapeCheck = any_shape, least: int = 2) -> PositionedImage:

@@ -17,7 +17,6 @@ from bentray_kernels.errors import InvalidInput
 from .bounded_reading import UNITS_M, ShapeCheck, any_shape, at_end, declared, whole
 from .damage import rejecting_damage
 from .npy_headers import LONGEST_HEADER
-from .volume import Volume
 from .volume_axes import PositionedImage, reorient
 
 NRRD_TYPES = {
@@ -54,11 +53,6 @@ SPACES = {
 SHORT = {"ras": "right-anterior-superior", "las": "left-anterior-superior", "lps": "left-posterior-superior"}
 # Of a spacing: two statements that differ by more contradict each other.
 AGREE = 1e-3
-
-
-def read_nrrd(file: IO[bytes], check: ShapeCheck = any_shape) -> Volume:
-    """The volume in an NRRD file with attached values; see ``nrrd_image``."""
-    return Volume.from_image(nrrd_image(file, check))
 
 
 def nrrd_image(file: IO[bytes], check: ShapeCheck = any_shape, least: int = 2) -> PositionedImage:

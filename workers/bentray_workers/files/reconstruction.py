@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ from .hdf5_reading import Reader, opened
 from .hdf5_writing import atomic_hdf5
 from .quantities import IMAGES, REFLECTION
 from .reconstruction_format import FORMAT, VERSION
+
+Record = TypeVar("Record")
 
 HISTORY = {
     "slice": np.int64,
@@ -241,32 +244,34 @@ def _residuals(reader: Reader) -> NDArray[np.int64] | None:
 
 
 def _trials(reader: Reader) -> tuple[Candidate, ...]:
-    try:
-        trials = json.loads(reader.text("", "trials") or "[]")
-        return tuple(
-            Candidate(
-                dict(trial["settings"]),
-                float(trial["held_out_rms_s"]),
-                float(trial["shown_rms_s"]),
-                None if trial.get("held_out_mean_s") is None else float(trial["held_out_mean_s"]),
-            )
-            for trial in trials
-        )
-    except (ValueError, TypeError, KeyError, RecursionError):
-        accepted = "a JSON list of trials by this version"
-        raise InvalidInput("@trials", repr((reader.text("", "trials") or "")[:60]), accepted) from None
+    return _records(
+        reader,
+        "trials",
+        lambda trial: Candidate(
+            dict(trial["settings"]),
+            float(trial["held_out_rms_s"]),
+            float(trial["shown_rms_s"]),
+            None if trial.get("held_out_mean_s") is None else float(trial["held_out_mean_s"]),
+        ),
+    )
 
 
 def _cautions(reader: Reader, earlier: str) -> tuple[Caution, ...]:
     """The cautions; before there was a list, the one about the uncertainty was in the provenance."""
     if not reader.text("", "cautions"):
         return (Caution("uncertainty", earlier),) if earlier else ()
+    return _records(
+        reader, "cautions", lambda c: Caution(str(c["code"]), str(c["text"]), bool(c["doubtful"]))
+    )
+
+
+def _records(reader: Reader, name: str, make: Callable[[Any], Record]) -> tuple[Record, ...]:
+    """Records of a JSON list, each made of its values; none where the list is absent."""
+    text = reader.text("", name) or "[]"
     try:
-        cautions = json.loads(reader.text("", "cautions") or "")
-        return tuple(Caution(str(c["code"]), str(c["text"]), bool(c["doubtful"])) for c in cautions)
+        return tuple(make(values) for values in json.loads(text))
     except (ValueError, TypeError, KeyError, RecursionError):
-        accepted = "a JSON list of cautions by this version"
-        raise InvalidInput("@cautions", repr((reader.text("", "cautions") or "")[:60]), accepted) from None
+        raise InvalidInput(f"@{name}", repr(text[:60]), f"a JSON list of {name} by this version") from None
 
 
 def _json(reader: Reader, name: str) -> dict[str, Any]:

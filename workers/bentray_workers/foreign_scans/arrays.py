@@ -91,25 +91,28 @@ class StreamedScan:
 
     Attributes:
         kind: of file, in words.
-        small: arrays by their path in the upload format; numbers have no axes.
+        small: arrays by their path in the upload format; numbers have no axes, and None is left out.
         traces: of ``waveform/object`` and ``waveform/water``.
     """
 
     kind: str
-    small: Mapping[str, NDArray[Any]]
+    small: Mapping[str, NDArray[Any] | float | None]
     traces: Mapping[str, Traces] = field(default_factory=dict)
     reversed_axes: bool = False
 
+    def __post_init__(self) -> None:
+        self._small = {path: np.asarray(value) for path, value in self.small.items() if value is not None}
+
     def names(self) -> tuple[str, ...]:
-        return (*self.small, *self.traces)
+        return (*self._small, *self.traces)
 
     def declared(self, name: str) -> tuple[tuple[int, ...], np.dtype[Any]] | None:
         if name in self.traces:
             return self.traces[name].shape, self.traces[name].dtype
-        return None if name not in self.small else (self.small[name].shape, self.small[name].dtype)
+        return None if name not in self._small else (self._small[name].shape, self._small[name].dtype)
 
     def whole(self, name: str) -> NDArray[Any]:
-        return self.small[name]
+        return self._small[name]
 
     def rows(self, name: str) -> Iterator[NDArray[Any]]:
         traces = self.traces[name]

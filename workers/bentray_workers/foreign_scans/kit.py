@@ -163,9 +163,7 @@ class Measurement:
 
     def _temperature(self, position: int) -> float | None:
         for leaf in TEMPERATURES:
-            name = f"{self._root}{leaf}"
-            named = self._files.description(name, ("TASTemperature",)) if name in self._files.names else {}
-            values = named.get("TASTemperature")
+            values = self._described(leaf, "TASTemperature").get("TASTemperature")
             if values is not None and values.dtype.kind == "f" and values.size:
                 here = values[..., min(position, values.shape[-1]) - 1] if values.ndim == 3 else values
                 finite = here[np.isfinite(here)]
@@ -174,26 +172,25 @@ class Measurement:
 
     def _code(self) -> NDArray[np.float64] | None:
         """The coded excitation at ``RATE_HZ``: measured, or as defined; None if there is none."""
-        measured = f"{self._root}CEMeasured.mat"
-        if measured in self._files.names:
-            code = self._files.description(measured, ("CEMeasured",)).get("CEMeasured")
-            if code is not None and code.dtype.kind in "iuf" and code.ndim == 2:
-                columns = code if code.shape[0] > 1 else code.T
-                is_float = _text(self._info, "AScanDatatype") == "float16" and columns.dtype.kind in "iu"
-                values = decode_float16(columns) if is_float else columns
-                rows = np.asarray(values, dtype=np.float64).T
-                rows = reconstruct_undersampled(rows) if self._undersampled else rows
-                return np.asarray(rows.mean(axis=0)[:MAX_SAMPLES])
-        defined = f"{self._root}CE.mat"
-        if defined not in self._files.names:
-            return None
-        variables = self._files.description(defined, ("CE", "CE_SF"))
+        code = self._described("CEMeasured.mat", "CEMeasured").get("CEMeasured")
+        if code is not None and code.dtype.kind in "iuf" and code.ndim == 2:
+            columns = code if code.shape[0] > 1 else code.T
+            is_float = _text(self._info, "AScanDatatype") == "float16" and columns.dtype.kind in "iu"
+            values = decode_float16(columns) if is_float else columns
+            rows = np.asarray(values, dtype=np.float64).T
+            rows = reconstruct_undersampled(rows) if self._undersampled else rows
+            return np.asarray(rows.mean(axis=0)[:MAX_SAMPLES])
+        variables = self._described("CE.mat", "CE", "CE_SF")
         code, rate = variables.get("CE"), _number(variables, "CE_SF")
         if code is None or code.dtype.kind not in "iuf" or not code.size or rate is None or rate <= 0.0:
             return None
         code = np.asarray(code, dtype=np.float64).ravel()[: MAX_SAMPLES * 16]
         at = np.arange(0.0, (len(code) - 1) / rate, 1.0 / RATE_HZ)[:MAX_SAMPLES]
         return np.asarray(np.interp(at, np.arange(len(code)) / rate, code))
+
+    def _described(self, leaf: str, *variables: str) -> dict[str, Any]:
+        """Variables of a file of this measurement; see ``MeasurementFolder.description``."""
+        return self._files.description(f"{self._root}{leaf}", variables)
 
     def _columns(self, emission: _Emission) -> tuple[NDArray[np.int64], int]:
         """Elements of the columns of an emission, and its number of samples."""
@@ -296,17 +293,16 @@ def _read(scan: OpenScan) -> StreamedScan:
             raise InvalidInput(empty.rstrip("/"), given, accepted)
         traces["waveform/water"] = Traces(shape, np.dtype(np.float32), water.traces)
         record.valid &= water.valid
-    small = {
+    small: dict[str, Any] = {
         "geometry/element_position_m": record.position,
         "acquisition/tx": record.tx,
         "acquisition/rx": record.rx,
-        "acquisition/sampling_rate_hz": np.array(RATE_HZ),
-        "acquisition/center_frequency_hz": np.array(CENTER_HZ),
-        "acquisition/t0_s": np.array(DELAY_S),
+        "acquisition/sampling_rate_hz": RATE_HZ,
+        "acquisition/center_frequency_hz": CENTER_HZ,
+        "acquisition/t0_s": DELAY_S,
         "mask/valid": record.valid,
+        "water/temperature_c": record.temperature_c,
     }
-    if record.temperature_c is not None:
-        small["water/temperature_c"] = np.array(record.temperature_c)
     several = f", aperture position 1 of {record.positions}" if record.positions > 1 else ""
     return StreamedScan(f"KIT 3D USCT{several}", small, traces)
 

@@ -47,9 +47,14 @@ class MeasurementFolder:
             yield Matlab5(path)
 
     def description(self, name: str, variables: tuple[str, ...]) -> dict[str, Any]:
-        """Some variables of a small file, also texts and structures; absent ones are left out."""
+        """Some variables of a small file, also texts and structures; absent ones are left out.
+
+        Of an absent file these are all.
+        """
         from scipy.io import loadmat
 
+        if name not in self.names:
+            return {}
         with self._path(name, LARGEST_DESCRIPTION) as path, rejecting_damage(name, "a MATLAB 5 file"):
             loaded = loadmat(path, variable_names=list(variables), appendmat=False, chars_as_strings=True)
         return {variable: loaded[variable] for variable in variables if variable in loaded}

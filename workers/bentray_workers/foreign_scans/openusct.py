@@ -54,14 +54,6 @@ def _read(scan: OpenScan) -> StreamedScan:
     rate = reader.number("acquisition", "sample_rate_hz", "Hz")
     if rate is None:
         raise InvalidInput("acquisition@sample_rate_hz", "nothing", "a rate in Hz")
-    # The speed of the medium between the array and the object, with which openUSCT images are made.
-    numbers = {
-        "acquisition/sampling_rate_hz": rate,
-        "acquisition/center_frequency_hz": reader.number("acquisition", "tx_centre_freq_hz", "Hz")
-        or reader.number("geometry", "centre_freq_hz", "Hz"),
-        "water/sound_speed_mps": reader.number("acquisition", "nominal_speed_m_s", "m/s"),
-        "geometry/radius_m": reader.number("geometry", "radius_m", "m"),
-    }
 
     def traces() -> Iterator[NDArray[Any]]:
         for emission in rows_of(data, DATA):
@@ -73,7 +65,12 @@ def _read(scan: OpenScan) -> StreamedScan:
             "geometry/element_position_m": position,
             "acquisition/tx": np.arange(emissions) if emitters is None else emitters,
             "acquisition/rx": np.arange(receivers),
-            **{path: np.array(number) for path, number in numbers.items() if number is not None},
+            "acquisition/sampling_rate_hz": rate,
+            "acquisition/center_frequency_hz": reader.number("acquisition", "tx_centre_freq_hz", "Hz")
+            or reader.number("geometry", "centre_freq_hz", "Hz"),
+            # That of the medium between the array and the object, with which openUSCT images are made.
+            "water/sound_speed_mps": reader.number("acquisition", "nominal_speed_m_s", "m/s"),
+            "geometry/radius_m": reader.number("geometry", "radius_m", "m"),
         },
         {"waveform/object": Traces((emissions, receivers, samples), data.dtype, traces)},
     )

@@ -70,12 +70,6 @@ def _read(scan: OpenScan) -> StreamedScan:
         raise InvalidInput(f"{track}scan/initial_times", given, "the same time for every emission")
     speed = field.optional("sound_speed", "m/s")
     frequency = field.optional("center_frequency", "Hz", of_emissions=emissions)
-    numbers = {
-        "acquisition/sampling_rate_hz": rate,
-        "acquisition/t0_s": float(first[0]),
-        "acquisition/center_frequency_hz": frequency,
-        "water/sound_speed_mps": speed,
-    }
 
     def traces() -> Iterator[NDArray[Any]]:
         for emission in rows_of(raw, track + RAW, (0,)):
@@ -87,7 +81,10 @@ def _read(scan: OpenScan) -> StreamedScan:
             "geometry/element_position_m": _in_plane(position),
             "acquisition/tx": emitters,
             "acquisition/rx": np.arange(elements),
-            **{path: np.array(number) for path, number in numbers.items() if number is not None},
+            "acquisition/sampling_rate_hz": rate,
+            "acquisition/t0_s": float(first[0]),
+            "acquisition/center_frequency_hz": frequency,
+            "water/sound_speed_mps": speed,
         },
         {"waveform/object": Traces((emissions, elements, samples), raw.dtype, traces)},
     )

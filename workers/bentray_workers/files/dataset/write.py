@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import fields
 from pathlib import Path
@@ -73,36 +74,33 @@ def _write(file: h5py.File, dataset: Dataset, pieces: Pieces | None) -> None:
     file.attrs["dimension"] = dataset.element_position_m.shape[1]
     for name in TEXTS:
         file.attrs[name] = printable(getattr(dataset, name))
-    geometry = file.create_group("geometry")
-    geometry.attrs["array_type"] = dataset.array_type
-    write_array(geometry, "element_position_m", dataset.element_position_m)
-    if dataset.element_normal is not None:
-        write_array(geometry, "element_normal", dataset.element_normal)
-    acquisition = file.create_group("acquisition")
-    acquisition.attrs["t0_s"] = dataset.t0_s
-    write_array(acquisition, "tx", dataset.tx)
-    write_array(acquisition, "rx", dataset.rx)
-    if dataset.wavelet is not None:
-        write_array(acquisition, "wavelet", dataset.wavelet)
-    water = file.create_group("water")
-    water.attrs["sound_speed_mps"] = dataset.water_speed_mps
-    if dataset.water_temperature_c is not None:
-        water.attrs["temperature_c"] = dataset.water_temperature_c
-    if dataset.water_temperature_assumed:
-        water.attrs["temperature_assumed"] = 1
-    for path, name in PAIR_ARRAYS.items():
-        if getattr(dataset, name) is not None:
-            group, leaf = path.split("/")
-            write_array(file.require_group(group), leaf, getattr(dataset, name))
-    if dataset.picker:
-        file.require_group("traveltime").attrs["picker"] = printable(dataset.picker)
-    if dataset.impossible_times:
-        file.require_group("traveltime").attrs[IMPOSSIBLE] = json.dumps(dict(dataset.impossible_times))
-    for leaf, array in (("valid", dataset.valid), ("roi", dataset.roi)):
-        if array is not None:
-            write_array(file.require_group("mask"), leaf, array)
-    if dataset.slice_z_m is not None:
-        write_array(file.create_group("slice"), "z_m", dataset.slice_z_m)
+    # By place, in the order of the file.
+    values: dict[str, Any] = {
+        "geometry@array_type": dataset.array_type,
+        "geometry/element_position_m": dataset.element_position_m,
+        "geometry/element_normal": dataset.element_normal,
+        "acquisition@t0_s": dataset.t0_s,
+        "acquisition/tx": dataset.tx,
+        "acquisition/rx": dataset.rx,
+        "acquisition/wavelet": dataset.wavelet,
+        "water@sound_speed_mps": dataset.water_speed_mps,
+        "water@temperature_c": dataset.water_temperature_c,
+        "water@temperature_assumed": 1 if dataset.water_temperature_assumed else None,
+        **{path: getattr(dataset, name) for path, name in PAIR_ARRAYS.items()},
+        "traveltime@picker": printable(dataset.picker) if dataset.picker else None,
+        f"traveltime@{IMPOSSIBLE}": (
+            json.dumps(dict(dataset.impossible_times)) if dataset.impossible_times else None
+        ),
+        "mask/valid": dataset.valid,
+        "mask/roi": dataset.roi,
+        "slice/z_m": dataset.slice_z_m,
+    }
+    for place, value in values.items():
+        group, mark, name = re.split("([@/])", place)
+        if value is not None and mark == "@":
+            file.require_group(group).attrs[name] = value
+        elif value is not None:
+            write_array(file.require_group(group), name, value)
     if dataset.waveform is not None:
         _write_waveform(file.create_group("waveform"), dataset.waveform, pieces)
     if dataset.truth is not None:
