@@ -10,10 +10,9 @@ if TYPE_CHECKING:
     from bentray_service import __version__
     from bentray_service.client import AsyncClient, Client, ClientError
     from bentray_service.interactive.comparison import Comparison
-    from bentray_service.interactive.reconstruction import reconstruct
+    from bentray_service.interactive.reconstruction import reconstruct, simulate
     from bentray_service.interactive.result import Result, load
     from bentray_service.interactive.scan import Scan, read
-    from bentray_service.interactive.simulation import simulate
     from bentray_service.webhooks.signature import verify_webhook
 else:
     # Where each name is defined.
@@ -29,7 +28,7 @@ else:
         "load": "bentray_service.interactive.result",
         "read": "bentray_service.interactive.scan",
         "reconstruct": "bentray_service.interactive.reconstruction",
-        "simulate": "bentray_service.interactive.simulation",
+        "simulate": "bentray_service.interactive.reconstruction",
         "verify_webhook": "bentray_service.webhooks.signature",
     }
 

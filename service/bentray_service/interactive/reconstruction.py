@@ -1,24 +1,33 @@
-"""Reconstruction of a scan in this process, by the pipeline of the service."""
+"""Reconstruction of a scan and simulation of one in this process, by the pipelines of the service."""
 
 from __future__ import annotations
 
 import os
+import threading
 import time
 import warnings
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, TypeVar, Unpack
 
-from bentray_kernels.tomography.result import Reconstruction
+from bentray_kernels.tomography.result import Progress, Reconstruction
 
-from .interruption import OnProgress, Stop, run_interruptibly
 from .progress_bar import progress_bar, progress_shown
 from .result import Result, result_of
-from .scan import Scan, read
+from .scan import Scan, read, temporary_scan
 
 if TYPE_CHECKING:
-    from .setting_types import Method, ReconstructionSettings
+    from .setting_types import Method, PhantomName, ReconstructionSettings, SimulationSettings
 
 MOST_THREADS = 1024
+# Between two looks at the progress, and between two calls of ``show`` without a new one, s.
+LOOK_S, SHOW_S = 0.1, 1.0
+
+T = TypeVar("T")
+OnProgress = Callable[[Progress], None]
+Stop = Callable[[], bool]
 
 
 class DoubtfulWarning(UserWarning):
@@ -82,3 +91,90 @@ def reconstruct(
     told = {"title": source.title, "scan": source.name, "seconds": f"{time.perf_counter() - begun:.2f}"}
     given = {name: text for name, text in told.items() if text}
     return result_of(image, given, truth=source.truth, roi=source.dataset.roi)
+
+
+def run_interruptibly(work: Callable[[OnProgress, Stop], T], show: OnProgress) -> T:
+    """Run ``work`` in a thread, so that an interruption never breaks into its files and tasks.
+
+    Args:
+        work: called with a function that reports progress, and one that it polls several times a second;
+            once this is true it raises ``Cancelled``.
+        show: called with the latest progress in the calling thread, where notebooks expect output; at least
+            once a second, so that a clock moves.
+
+    Returns:
+        The result of ``work``.
+
+    Raises:
+        KeyboardInterrupt: after ``work`` has stopped; a second Ctrl-C does not wait for it.
+        BaseException: what ``work`` raises.
+    """
+    stop, reported, result = threading.Event(), deque[Progress](maxlen=1), Future[T]()
+
+    def run() -> None:
+        try:
+            result.set_result(work(reported.append, stop.is_set))
+        except BaseException as error:
+            result.set_exception(error)
+
+    # Of a daemon nobody waits for the end, unlike of the threads of an executor.
+    running = threading.Thread(target=run, name="bentray", daemon=True)
+    running.start()
+    shown, at = Progress(0, 0), time.monotonic()
+    try:
+        while running.is_alive():
+            running.join(LOOK_S)
+            newest = reported[-1] if reported else shown
+            if newest is not shown or (running.is_alive() and time.monotonic() - at >= SHOW_S):
+                shown, at = newest, time.monotonic()
+                show(shown)
+    except KeyboardInterrupt:
+        stop.set()
+        running.join()
+        raise
+    return result.result()
+
+
+def simulate(
+    phantom: PhantomName = "table6", *, progress: bool = True, **settings: Unpack[SimulationSettings]
+) -> Scan:
+    """Simulate travel times or traces of a phantom; the scan includes the truth.
+
+    Args:
+        phantom: ``table6``: 2-D breast (Li 2008, Table 6); ``table6-vertical``: its vertical slice;
+            ``detailed``: 2-D with skin and glandular texture; ``breast``: the same with large lesions;
+            ``table7``: 3-D breast (Li 2008, Table 7).
+        progress: show a progress bar.
+        settings: ``nodes`` along a side of the truth (128), ``elements`` of the ring (256), ``coupling_mps``,
+            the speed of the water (1500), ``snr``, a ratio of amplitudes (no noise), ``seed``,
+            ``attenuation`` (record amplitudes too), ``noise_s``, the standard deviation of the times, s;
+            ``waveform`` (traces in place of times) with ``frequency_hz`` of the pulse, ``emissions``, the
+            number of emitting elements, and ``side_m`` of the simulated square, m; of table7 ``slices``,
+            ``array`` and ``three_d``.
+
+    Returns:
+        The scan, with times or traces over (emitters, receivers) and the truth (nx, ny[, nz]), in SI units.
+
+    Raises:
+        InvalidInput: naming the setting, its value and what is accepted; for an unknown name the one that is
+            spelt most like it.
+        KeyboardInterrupt: once the tasks have stopped.
+    """
+    from bentray_workers.compilation.cache_misses import announce
+    from bentray_workers.simulation.request import PhantomScan
+    from bentray_workers.simulation.simulation_run import simulate_to_file
+
+    from ..settings_request import plain_numbers, record_of
+
+    request = record_of(PhantomScan, plain_numbers({"phantom": phantom, **settings})).chosen()
+    announce()
+
+    def write(target: Path) -> None:
+        with progress_bar("Simulating", shown=progress) as step:
+
+            def work(report: OnProgress, stop: Stop) -> None:
+                simulate_to_file(None, request, target, on_progress=report, stop=stop)
+
+            run_interruptibly(work, lambda now: step(now.done, now.total, "tasks"))
+
+    return temporary_scan(phantom, write)

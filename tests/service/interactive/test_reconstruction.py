@@ -15,7 +15,7 @@ from bentray_kernels.task_graph import Cancelled
 from bentray_kernels.tomography.result import Progress
 from bentray_kernels.tomography.settings import Settings
 from bentray_service.interactive import reconstruction
-from bentray_service.interactive.interruption import OnProgress, Stop, run_interruptibly
+from bentray_service.interactive.reconstruction import OnProgress, Stop, run_interruptibly
 from bentray_workers.compilation import cache_misses
 from bentray_workers.reconstruction import reconstruction_run
 

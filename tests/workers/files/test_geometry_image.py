@@ -12,9 +12,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.image.geometry_image import geometry_image
 from bentray_kernels.geometry_field.layout.parameterisation import parameterise
 from bentray_kernels.meshes.example_surfaces import sphere
-from bentray_workers.files.geometry_image import (
+from bentray_workers.files.geometry_field_folder import (
     GeometryMaps,
-    map_png,
+    quantity_png,
     read_geometry_image,
     write_geometry_image,
 )
@@ -84,9 +84,9 @@ def pixels_of(png):
 def test_pictures_have_u_to_the_right_and_v_up(maps):
     i, j = np.argwhere(maps.valid)[7]
     for png, expected in (
-        (map_png(maps, "positions"), maps.positions[i, j]),
-        (map_png(maps, "normals"), 0.5 * (maps.normals[i, j] + 1.0)),
-        (map_png(maps, "colours"), maps.colours[i, j]),
+        (quantity_png(maps, "positions"), maps.positions[i, j]),
+        (quantity_png(maps, "normals"), 0.5 * (maps.normals[i, j] + 1.0)),
+        (quantity_png(maps, "colours"), maps.colours[i, j]),
     ):
         pixels = pixels_of(png)
         assert pixels.shape == (32, 32, 4)
@@ -97,4 +97,4 @@ def test_pictures_have_u_to_the_right_and_v_up(maps):
 
 def test_no_colours_no_picture(maps):
     with pytest.raises(InvalidInput, match="colours: found none"):
-        map_png(replace(maps, colours=None), "colours")
+        quantity_png(replace(maps, colours=None), "colours")

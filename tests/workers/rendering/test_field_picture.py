@@ -10,7 +10,11 @@ from PIL import Image
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
 from bentray_kernels.requests.request_fields import choices_of
-from bentray_workers.files.geometry_image import GeometryMaps, read_geometry_image, write_geometry_image
+from bentray_workers.files.geometry_field_folder import (
+    GeometryMaps,
+    read_geometry_image,
+    write_geometry_image,
+)
 from bentray_workers.rendering import field_cache, tiles
 from bentray_workers.rendering.field_cache import world_at
 from bentray_workers.rendering.field_picture import map_png, picture_png, tasks_of, tile_image

@@ -27,8 +27,7 @@ from bentray_kernels.tomography.stored_settings import from_stored
 from .dataset.write import write_array
 from .hdf5_reading import Reader, opened
 from .hdf5_writing import atomic_hdf5
-from .quantities import IMAGES, REFLECTION
-from .reconstruction_format import FORMAT, VERSION
+from .quantities import FORMAT, IMAGES, REFLECTION, VERSION
 
 Record = TypeVar("Record")
 

@@ -14,11 +14,11 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Reconstruction
 
 from .damage import rejecting_damage
-from .dataset.format import FORMAT as DATASET
+from .dataset.read import FORMAT as DATASET
 from .dataset.read import dataset_of
 from .hdf5_reading import SIGNATURE, opened
+from .quantities import FORMAT as RECONSTRUCTION
 from .reconstruction import reconstruction_in
-from .reconstruction_format import FORMAT as RECONSTRUCTION
 from .volume import check_shape
 from .volume_axes import PositionedImage, check_aligned
 from .volume_formats import import_volume, positioned_image

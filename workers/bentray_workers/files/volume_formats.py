@@ -21,7 +21,7 @@ from .npy_headers import read_header
 from .npz import START as NPZ
 from .npz import WHOLE, Npz
 from .nrrd_reading import nrrd_image
-from .reconstruction_format import FORMAT as RECONSTRUCTION
+from .quantities import FORMAT as RECONSTRUCTION
 from .volume import FORMAT, Volume, volume_in
 from .volume_axes import PositionedImage
 

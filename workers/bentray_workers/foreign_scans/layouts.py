@@ -14,8 +14,7 @@ from bentray_kernels.acquisition.plausibility import check_plausible
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.requests.limits import check_size
 
-from ..files.dataset.format import NUMBERS, PAIR_ARRAYS
-from ..files.dataset.read import trace_type
+from ..files.dataset.read import NUMBERS, PAIR_ARRAYS, trace_type
 from .arrays import Arrays, read_small
 from .open_scan import OpenScan
 from .scan_reader import Layout, ScanReader, Variable

@@ -15,7 +15,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..files import npz
 from ..files.damage import first_bytes, rejecting_damage
-from ..files.dataset.format import FORMAT
+from ..files.dataset.read import FORMAT
 from ..files.hdf5_reading import SIGNATURE, Reader, opened
 from . import matlab5
 from .arrays import Arrays

@@ -28,7 +28,7 @@ from ..cluster.capacities import MIB, REAL, Lane, WorkerCapacity, resource_of, w
 from ..cluster.checkpoints import KEPT
 from ..cluster.task_words import task_in_words
 from ..files.dataset.counts import Summary
-from ..files.dataset.format import PAIR_ARRAYS
+from ..files.dataset.read import PAIR_ARRAYS
 from ..files.quantities import IMAGES
 from .blocks.block_choice import fitting_blocks
 from .memory.block_memory import block_files_bytes

@@ -19,8 +19,7 @@ from bentray_kernels.geometry_field.tracing.scene import Shape
 from bentray_kernels.meshes.surface import surface_of
 
 from ..cluster.memory_cache import MemoryCache
-from ..files.geometry_field_folder import FieldFiles, mapped, read_chart, read_json
-from ..files.geometry_image import read_geometry_image
+from ..files.geometry_field_folder import FieldFiles, mapped, read_chart, read_geometry_image, read_json
 from .field_scenes import scene_of
 from .field_tasks import FACE_BYTES
 from .field_view import FieldView

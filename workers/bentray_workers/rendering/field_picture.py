@@ -9,9 +9,7 @@ from bentray_kernels.opencl import check_available
 from bentray_kernels.refraction.supersampling import averaged
 
 from ..cluster.task_cancellation import cancellation_check
-from ..files import geometry_image
-from ..files.geometry_field_folder import FieldFiles
-from ..files.geometry_image import read_geometry_image
+from ..files.geometry_field_folder import FieldFiles, quantity_png, read_geometry_image
 from ..images.png import png_of
 from . import tiles
 from .drawing_device import Drawn, drawn_by, name_of, tracer_for
@@ -83,4 +81,4 @@ def map_png(folder: Path, quantity: str) -> bytes:
     Raises:
         InvalidInput: for colours of a mesh without any.
     """
-    return geometry_image.map_png(read_geometry_image(FieldFiles(folder).image), quantity)
+    return quantity_png(read_geometry_image(FieldFiles(folder).image), quantity)

@@ -22,6 +22,7 @@ from bentray_kernels.meshes.surface import Surface, surface_of
 from ..cluster.memory_cache import MemoryCache
 from ..files.geometry_field_folder import (
     FieldFiles,
+    GeometryMaps,
     fill_rows,
     make_table,
     mapped,
@@ -29,9 +30,9 @@ from ..files.geometry_field_folder import (
     read_json,
     write_array,
     write_chart,
+    write_geometry_image,
     write_json,
 )
-from ..files.geometry_image import GeometryMaps, write_geometry_image
 from ..files.mesh import load_mesh
 from .field_accuracy import accuracy
 from .field_settings import FieldSettings, check_faces

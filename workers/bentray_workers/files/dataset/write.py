@@ -18,7 +18,7 @@ from bentray_kernels.errors import InvalidInput
 
 from ..hdf5_reading import printable
 from ..hdf5_writing import atomic_hdf5
-from .format import FORMAT, IMPOSSIBLE, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
+from .read import FORMAT, IMPOSSIBLE, NUMBERS, PAIR_ARRAYS, TEXTS, VERSION
 
 # Below this many bytes chunks take more than compression saves.
 PACK_FROM_BYTES = 4096
