@@ -22,13 +22,16 @@ from bentray_kernels.wave.time_blocks import no_poll
 from .emissions_scan import (
     EMISSIONS,
     EMITTERS,
+    PLANE,
     RECEIVERS,
+    SPACE,
     STEPS,
     VALID,
     WAVELET,
     change,
     compare,
     medium,
+    slope,
     windows,
 )
 
@@ -37,6 +40,10 @@ ENGINES = ("compiled", "opencl")
 
 def gradients(host, misfit, engine, every=1, by="speed", **options):
     return list(misfit_gradients(host, EMISSIONS, misfit, every, by, engine=engine, **options))
+
+
+def energy(_, traces):
+    return 0.5 * float((traces**2).sum()), traces
 
 
 def off(computed, expected):
@@ -49,22 +56,28 @@ def recorded():
 
 
 @pytest.mark.opencl
+@pytest.mark.parametrize("case", [PLANE, SPACE], ids=["2d", "3d"])
 @pytest.mark.parametrize(("dtype", "bound"), [(np.float64, 1e-12), (np.float32, 1e-5)])
-def test_traces_are_those_of_the_compiled_engine(dtype, bound):
-    host = medium(dtype)
-    computed = list(simulate_emissions(host, EMISSIONS, engine="opencl"))
-    assert len(computed) == len(EMITTERS)
-    for k, traces in enumerate(computed):
-        expected = simulate(host, EMITTERS[k], RECEIVERS[VALID[k]], WAVELET)
+def test_traces_are_those_of_the_compiled_engine(dtype, bound, case):
+    host, emissions = case.medium(dtype), case.emissions
+    computed = list(simulate_emissions(host, emissions, engine="opencl"))
+    assert len(computed) == len(emissions.emitters)
+    for traces, expected in zip(computed, simulate_emissions(host, emissions), strict=True):
         assert traces.dtype == dtype
         assert traces.shape == expected.shape
         assert off(traces, expected) < bound
 
 
-def test_compiled_engine_gives_the_traces_of_single_emissions():
-    host = medium()
-    for k, traces in enumerate(simulate_emissions(host, EMISSIONS)):
-        assert np.array_equal(traces, simulate(host, EMITTERS[k], RECEIVERS[VALID[k]], WAVELET))
+@pytest.mark.parametrize("case", [PLANE, SPACE], ids=["2d", "3d"])
+def test_compiled_engine_gives_the_traces_of_single_emissions(case):
+    host, (emitters, receivers, valid, wavelet) = case.medium(), case.emissions[:4]
+    for k, traces in enumerate(simulate_emissions(host, case.emissions)):
+        assert np.array_equal(traces, simulate(host, emitters[k], receivers[valid[k]], wavelet))
+
+
+def test_compiled_code_has_no_gradient_in_3d():
+    with pytest.raises(InvalidInput, match="speed"):
+        list(misfit_gradients(SPACE.medium(), SPACE.emissions, energy))
 
 
 @pytest.mark.opencl
@@ -86,13 +99,31 @@ def test_gradient_is_that_of_finite_differences(by, dtype, small, bound, recorde
     misfit, way = compare(recorded), change(2)
 
     def value(factor):
-        host = medium(dtype, by=(by, factor * small * way))
-        traces = simulate_emissions(host, EMISSIONS, engine="opencl")
+        traces = simulate_emissions(medium(dtype, by=(by, factor * way)), EMISSIONS, engine="opencl")
         return sum(misfit(k, trace)[0] for k, trace in enumerate(traces))
 
     result = sum((shot.gradient * way).sum() for shot in gradients(medium(dtype), misfit, "opencl", by=by))
-    near, far = ((value(k) - value(-k)) / (2.0 * k * small) for k in (1, 2))
-    assert result == pytest.approx((4.0 * near - far) / 3.0, rel=bound)
+    assert result == pytest.approx(slope(value, small), rel=bound)
+
+
+@pytest.mark.opencl
+@pytest.mark.parametrize("by", ["speed", "attenuation"])
+def test_gradient_in_space_is_that_of_finite_differences(by):
+    way = change(2, SPACE.shape)
+
+    def value(factor):
+        host = SPACE.medium(np.float64, by=(by, factor * way))
+        return sum(
+            energy(0, trace)[0] for trace in simulate_emissions(host, SPACE.emissions, engine="opencl")
+        )
+
+    parts, cheap = (
+        list(misfit_gradients(SPACE.medium(dtype), SPACE.emissions, energy, by=by, engine="opencl"))
+        for dtype in (np.float64, np.float32)
+    )
+    assert sum((part.gradient * way).sum() for part in parts) == pytest.approx(slope(value, 0.1), rel=1e-6)
+    for first, other in zip(cheap, parts, strict=True):
+        assert off(first.gradient, other.gradient) < 1e-4
 
 
 @pytest.mark.opencl
@@ -102,18 +133,18 @@ def test_scattering_and_the_gradient_are_transposes(dtype, bound):
     # code in float64, by finite differences of the fourth order.
     rng = np.random.default_rng(3)
     residual = [rng.standard_normal((len(valid), STEPS)) for valid in VALID]
-    way, small = change(4), 0.1
+    way = change(4)
 
     def correlated(k, traces):
         return float((traces * residual[k]).sum()), residual[k]
 
-    def traces(factor):
-        return list(simulate_emissions(medium(np.float64, by=("speed", factor * small * way)), EMISSIONS))
+    for k, shot in enumerate(gradients(medium(dtype), correlated, "opencl")):
 
-    runs = {factor: traces(factor) for factor in (-2, -1, 1, 2)}
-    result = gradients(medium(dtype), correlated, "opencl")
-    for k, shot in enumerate(result):
-        born = (8.0 * (runs[1][k] - runs[-1][k]) - (runs[2][k] - runs[-2][k])) / (12.0 * small)
+        def traces(factor, k=k):
+            host = medium(np.float64, by=("speed", factor * way))
+            return simulate(host, EMITTERS[k], RECEIVERS[VALID[k]], WAVELET)
+
+        born = slope(traces, 0.1)
         size = np.linalg.norm(born) * np.linalg.norm(residual[k])
         assert abs((born * residual[k]).sum() - (shot.gradient * way).sum()) < max(bound, 1e-8) * size
 
@@ -162,38 +193,41 @@ def test_every_run_every_tile_and_every_checkpoint_give_the_same_bits(recorded):
             assert np.array_equal(first.illumination, other.illumination)
 
 
+def simulated(host, scan, sources, wavelet, group=None, segments=1):
+    """Traces of a batch, and its gradient and illumination with the traces as the residuals."""
+    waves = DeviceWaves(session_or_warning(""), host, scan, group)
+    batch = ShotBatch(waves, sources, wavelet / np.abs(wavelet).max(), segments, no_poll)
+    batch.forward()
+    return batch.traces(), *batch.backward()
+
+
 @pytest.mark.opencl
-@pytest.mark.parametrize("every", [1, 3, 7])
-@pytest.mark.parametrize("segments", [2, 3, 10])
-def test_divided_time_loops_give_the_bits_of_whole_ones(every, segments):
-    host = medium()
-    waves = DeviceWaves(
-        session_or_warning(""), host, Scan(place_elements(host, RECEIVERS), STEPS, every, "attenuation")
-    )
-    results = []
-    for number in (1, segments):
-        batch = ShotBatch(waves, place_elements(host, EMITTERS[:2]), WAVELET / 3e4, number, no_poll)
-        # The traces are the residuals.
-        batch.forward()
-        results.append((batch.traces(), *batch.backward()))
-    for whole, divided in zip(*results, strict=True):
-        assert np.array_equal(whole, divided)
+@pytest.mark.parametrize(
+    ("case", "by", "every", "segments", "group"),
+    [
+        *((PLANE, "attenuation", every, n, None) for every in (1, 3, 7) for n in (2, 3, 10)),
+        *((SPACE, "speed", 3, n, OTHER_GROUP) for n in (2, 5)),
+    ],
+)
+def test_divided_time_loops_give_the_bits_of_whole_ones(case, by, every, segments, group):
+    host, (emitters, receivers, _, wavelet) = case.medium(), case.emissions[:4]
+    scan = Scan(place_elements(host, receivers), wavelet.size, every, by)
+    sources = place_elements(host, emitters[:2])
+    whole = simulated(host, scan, sources, wavelet)
+    for one, divided in zip(whole, simulated(host, scan, sources, wavelet, group, segments), strict=True):
+        assert one.any()
+        assert np.array_equal(one, divided)
 
 
 @pytest.mark.opencl
 @pytest.mark.parametrize("by", ["speed", "attenuation"])
 def test_groups_of_a_processor_and_of_a_gpu_give_the_same_bits(by):
-    session, host = session_or_warning(""), medium()
-    scan = Scan(place_elements(host, RECEIVERS), STEPS, 3, by)
-    sources = place_elements(host, EMITTERS)
-    computed = []
-    for group, tile in itertools.product((PROCESSOR_GROUPS[0], OTHER_GROUP), (slice(0, 5), slice(0, 2))):
-        waves = DeviceWaves(session, host, scan, group)
-        some = Points(sources.first[tile], sources.weights[tile])
-        batch = ShotBatch(waves, some, WAVELET / np.abs(WAVELET).max(), 1, no_poll)
-        # The traces are the residuals.
-        batch.forward()
-        computed.append((batch.traces(), *batch.backward()))
+    host = medium()
+    scan, sources = Scan(place_elements(host, RECEIVERS), STEPS, 3, by), place_elements(host, EMITTERS)
+    computed = [
+        simulated(host, scan, Points(sources.first[tile], sources.weights[tile]), WAVELET, group)
+        for group, tile in itertools.product((PROCESSOR_GROUPS[0], OTHER_GROUP), (slice(0, 5), slice(0, 2)))
+    ]
     for others in computed[1:]:
         for expected, other in zip(computed[0], others, strict=True):
             assert other.any()

@@ -24,22 +24,15 @@ from bentray_kernels.wave.stencil import (
 )
 
 
-@pytest.mark.parametrize("degree", range(10))
-def test_polynomials_up_to_degree_nine_are_differentiated_exactly(degree):
-    offsets = np.arange(-HALO, HALO + 1)
-    both = weights()[np.abs(offsets)]
-    expected = 2.0 if degree == 2 else 0.0
-    assert (both * offsets.astype(float) ** degree).sum() == pytest.approx(expected, abs=1e-9)
-
-
-@pytest.mark.parametrize("order", [2, 4, 6])
-def test_lower_orders_are_exact_as_far_as_they_say(order):
+@pytest.mark.parametrize("order", [2, 4, 6, 8])
+def test_polynomials_are_differentiated_exactly_as_far_as_the_order_says(order):
     offsets = np.arange(-HALO, HALO + 1).astype(float)
     both = weights(order)[np.abs(offsets).astype(int)]
     for degree in range(order + 2):
         assert (both * offsets**degree).sum() == pytest.approx(2.0 if degree == 2 else 0.0, abs=1e-9)
     assert abs((both * offsets ** (order + 2)).sum()) > 0.1
     assert not weights(order)[order // 2 + 1 :].any()
+    np.testing.assert_array_equal(weights(), weights(8))
 
 
 @pytest.mark.parametrize("order", [5, 0, 10, "best", 8.0])
@@ -65,11 +58,6 @@ def test_optimised_weights_have_the_least_largest_error():
     errors = [phase_error(points, order=OPTIMISED) for points in np.linspace(OPTIMISED_NODES, 30.0, 400)]
     assert np.abs(errors).max() == pytest.approx(0.5 * optimum.x[HALO], rel=0.01)
     assert np.abs(errors).max() < 0.04 * abs(phase_error(OPTIMISED_NODES))
-
-
-def test_degree_ten_is_not():
-    offsets = np.arange(-HALO, HALO + 1)
-    assert abs((weights()[np.abs(offsets)] * offsets.astype(float) ** 10).sum()) > 1.0
 
 
 @given(st.floats(0.0, math.pi))
