@@ -17,6 +17,7 @@ from ...table6 import table6_scan
 
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
 PHANTOM = table6(WATER)
+TRUTH, INSIDE = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
 RING = Ring(64, 0.09)
 
 
@@ -31,29 +32,26 @@ def plan(method="gauss-newton", **changes):
 
 @pytest.mark.parametrize("method", [pytest.param("sart", marks=pytest.mark.nightly), "gauss-newton"])
 def test_line_integrals_give_it_back(scan, method):
-    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     result = reconstruct(scan, plan(method))
     assert result.attenuation.min() >= 0.0
-    assert rmse(result.attenuation, truth, inside) < 0.16 * (truth.max() - truth.min())
+    assert rmse(result.attenuation, TRUTH, INSIDE) < 0.16 * (TRUTH.max() - TRUTH.min())
 
 
 def test_sart_gives_it_back_too(scan):
-    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     sart = plan("sart", attenuation_solver="sart")
     result = reconstruct(scan, sart)
-    results = rmse(result.attenuation, truth, inside)
-    constant = truth[inside].std()
+    results = rmse(result.attenuation, TRUTH, INSIDE)
+    constant = TRUTH[INSIDE].std()
     assert result.attenuation.min() >= 0.0
     assert results < 0.6 * constant
-    assert rmse(reconstruct(scan, sart.changed(iterations=1)).attenuation, truth, inside) > results
+    assert rmse(reconstruct(scan, sart.changed(iterations=1)).attenuation, TRUTH, INSIDE) > results
     # The order of the emitters alone depends on the seed.
     again, other = (reconstruct(scan, sart.changed(seed=seed)).attenuation for seed in (0, 1))
     np.testing.assert_array_equal(again, result.attenuation)
-    assert 0.0 < np.abs(other - again).max() < 0.5 * truth.max()
+    assert 0.0 < np.abs(other - again).max() < 0.5 * TRUTH.max()
 
 
 def test_ratios_from_traces_are_smoothed_more(scan):
-    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     rng = np.random.default_rng(3)
     shape = scan.log_ratio_np.shape
     # As waves have it: larger than the absorption, and here and there far more.
@@ -62,11 +60,11 @@ def test_ratios_from_traces_are_smoothed_more(scan):
     loud = replace(scan, log_ratio_np=scan.log_ratio_np + noise, amplitude_frequency_hz=5e5)
     quick = plan("sart", rays="straight", iterations=1)
     recorded, read = (
-        rmse(reconstruct(loud, quick.changed(amplitudes=way)).attenuation, truth, inside)
+        rmse(reconstruct(loud, quick.changed(amplitudes=way)).attenuation, TRUTH, INSIDE)
         for way in ("recorded", "spectrum")
     )
     assert read < 0.7 * recorded
-    assert read < 0.2 * (truth.max() - truth.min())
+    assert read < 0.2 * (TRUTH.max() - TRUTH.min())
 
 
 @pytest.mark.nightly
@@ -88,25 +86,19 @@ def test_smoothing_of_trace_ratios_does_not_depend_on_the_grid(scan, rays):
     assert apart.mean() < 0.03 * there.max()
 
 
-def test_amplitudes_from_traces_need_a_frequency(scan):
-    with pytest.raises(InvalidInput, match=r"^amplitude@frequency_hz: found"):
-        reconstruct(scan, plan("sart", rays="straight", iterations=1, amplitudes="ratio"))
-
-
 def inside_ring(scan):
     """Pairs of different elements."""
     return scan.tx[:, None] != scan.rx[None, :]
 
 
 def test_amplitudes_far_off_count_less(scan):
-    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     rng = np.random.default_rng(7)
     wrong = rng.random(scan.log_ratio_np.shape) < 0.05
     bad = replace(
         scan, log_ratio_np=scan.log_ratio_np + np.where(wrong, rng.normal(0.0, 3.0, wrong.shape), 0.0)
     )
     plain, robust = (
-        rmse(reconstruct(bad, plan(huber_scale=spreads)).attenuation, truth, inside) for spreads in (0.0, 3.0)
+        rmse(reconstruct(bad, plan(huber_scale=spreads)).attenuation, TRUTH, INSIDE) for spreads in (0.0, 3.0)
     )
     assert robust < 0.8 * plain
 
@@ -123,9 +115,8 @@ def test_a_slice_without_amplitudes_has_that_of_the_water(scan):
 
 @pytest.mark.nightly
 def test_along_straight_rays_it_is_worse(scan):
-    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     bent, straight = (reconstruct(scan, plan(rays=rays)).attenuation for rays in ("curved", "straight"))
-    assert rmse(bent, truth, inside) < 0.9 * rmse(straight, truth, inside)
+    assert rmse(bent, TRUTH, INSIDE) < 0.9 * rmse(straight, TRUTH, INSIDE)
 
 
 def test_a_medium_like_its_water_is_found_to_be_so(scan):
@@ -141,12 +132,11 @@ def test_a_medium_like_its_water_is_found_to_be_so(scan):
 
 @pytest.mark.nightly
 def test_gaps_in_the_amplitudes_are_only_gaps(scan):
-    truth, inside = PHANTOM.attenuation(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     kept = np.random.default_rng(1).random(scan.log_ratio_np.shape) < 0.2
     gaps = replace(scan, log_ratio_np=np.where(kept, scan.log_ratio_np, np.nan))
     result = reconstruct(gaps, plan())
     assert np.array_equal(result.speed, reconstruct(scan, plan()).speed)
-    assert rmse(result.attenuation, truth, inside) < 0.25 * (truth.max() - truth.min())
+    assert rmse(result.attenuation, TRUTH, INSIDE) < 0.25 * (TRUTH.max() - TRUTH.min())
 
 
 def test_attenuation_is_optional(scan):
@@ -201,6 +191,7 @@ def test_a_pair_of_one_element_is_ignored(scan):
     assert np.array_equal(plain.attenuation, own.attenuation)
 
 
-def test_focusing_needs_a_frequency(scan):
+@pytest.mark.parametrize("needing", [{"rays": "straight", "amplitudes": "ratio"}, {"focusing": True}])
+def test_amplitudes_from_traces_and_focusing_need_a_frequency(scan, needing):
     with pytest.raises(InvalidInput, match=r"^amplitude@frequency_hz: found"):
-        reconstruct(scan, plan("sart", iterations=1, focusing=True))
+        reconstruct(scan, plan("sart", iterations=1, **needing))

@@ -2,20 +2,14 @@
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
 
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.attenuation_sart import solve
-from bentray_kernels.tomography.gauss_newton.linearisation import Rows
+
+from .gauss_newton.test_linear_problem import rows_of
 
 SHAPE, BOUNDS = (6, 5), (0.0, 9.0)
 EVERYWHERE = np.ones(SHAPE, bool)
-
-
-def rows_of(matrix, residual, counts):
-    sparse = csr_array(np.asarray(matrix, np.float32))
-    pointers, columns = sparse.indptr.astype(np.int64), sparse.indices.astype(np.int32)
-    return Rows(pointers, columns, sparse.data, np.asarray(residual, float), np.asarray(counts))
 
 
 def plan(**changes):

@@ -7,8 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Problem, Settings, reconstruct, rmse
 from bentray_kernels.tomography.finite_frequency import (
@@ -20,16 +18,15 @@ from bentray_kernels.tomography.finite_frequency import (
 )
 from bentray_kernels.tomography.gauss_newton import gauss_newton_step
 
+from ..straight_scans import ring_scan
+
 WATER = 1500.0
-RING = Ring(32, 0.08)
 WIDTH = 0.009
 PLAN = Settings.from_values(method="gauss-newton", nodes=40, ray_width_m=WIDTH)
 
 
 def scan(delta=None):
-    every = np.arange(RING.elements)
-    delta = np.zeros((RING.elements, RING.elements)) if delta is None else delta
-    return Dataset(RING.positions(), every, every, WATER, delta_tof_s=delta)
+    return ring_scan(32, 0.08, delta, WATER)
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 6.0))

@@ -6,6 +6,7 @@ from scipy.ndimage import gaussian_filter
 
 from bentray_kernels import eikonal, rays
 from bentray_kernels.acquisition.simulation.fine_medium import log_ratios
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
 from bentray_kernels.tomography.focusing import FRESNEL_PART, focusing
@@ -15,8 +16,7 @@ MIDDLE = 0.5 * (NODES - 1) * SPACING
 
 
 def ring(elements, radius=0.055):
-    angle = 2.0 * np.pi * np.arange(elements) / elements
-    return MIDDLE + radius * np.column_stack((np.cos(angle), np.sin(angle)))
+    return MIDDLE + Ring(elements, radius).positions()
 
 
 def lens(change_mps, width=0.012):

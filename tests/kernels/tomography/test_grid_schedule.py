@@ -5,22 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Problem, Settings, reconstruct
 from bentray_kernels.tomography.grid_schedule import initial_slowness, stages
 from bentray_kernels.tomography.stage_graphs import next_batch
 
 from ...table6 import table6_scan
+from ..straight_scans import ring_scan
 
 WATER = 1375.0
-RING = Ring(32, 0.09)
 PLAN = Settings(method="sart", nodes=48, iterations=2)
 
 
 @pytest.fixture(scope="module")
 def scan():
-    return table6_scan(RING.elements, 48)
+    return table6_scan(32, 48)
 
 
 def test_default_has_one_stage(scan):
@@ -41,7 +39,7 @@ def test_each_stage_is_in_the_history_and_better_than_water(scan, method):
     assert [(s.stage, s.sweep) for s in result.history] == [(0, 1), (0, 2), (1, 1), (1, 2)]
     first = {s.stage: s.residual_rms_s for s in result.history if s.sweep == 1}
     assert first[1] < 0.5 * first[0]
-    assert seen[-1].done == seen[-1].total == 4 * RING.elements
+    assert seen[-1].done == seen[-1].total == 4 * 32
     assert result.speed.shape == (48, 48)
     assert result.residual_rms_s == min(s.residual_rms_s for s in result.history if s.stage == 1)
 
@@ -60,9 +58,8 @@ def test_a_finer_grid_begins_with_the_same_image(scan):
 
 def test_a_finer_grid_of_a_volume_begins_with_the_same_image_at_the_same_heights():
     """Heights that no grid's spacing divides, so that every grid ends elsewhere."""
-    heights, everyone = np.array([-0.01, 0.0, 0.0137]), np.arange(RING.elements)
-    delta = np.zeros((3, RING.elements, RING.elements))
-    scan = Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=delta, slice_z_m=heights)
+    heights = np.array([-0.01, 0.0, 0.0137])
+    scan = ring_scan(32, 0.09, np.zeros((3, 32, 32)), WATER, slice_z_m=heights)
     plan = replace(PLAN, decomposition="volume", side_m=0.2)
     coarse, fine = (Problem.from_dataset(scan, replace(plan, nodes=n)) for n in (25, 48))
 

@@ -7,19 +7,16 @@ from hypothesis import strategies as st
 
 from bentray_kernels.acquisition import Dataset
 from bentray_kernels.acquisition.simulation.array_shapes import arc, facing_lines
-from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography.held_out import part_of
+
+from ..straight_scans import ring_scan
 
 PARTS = ("shown", "held-out", "views")
 SPARSE = ("shown-sparse", "views-sparse")
 
 
-def ring(elements, tx=None):
-    every = np.arange(elements)
-    tx = every if tx is None else tx
-    return Dataset(
-        Ring(elements, 0.1).positions(), tx, every, 1500.0, delta_tof_s=np.zeros((len(tx), elements))
-    )
+def ring(elements):
+    return ring_scan(elements, 0.1)
 
 
 @pytest.mark.parametrize("parts", [PARTS, SPARSE], ids=["pairs and views", "sparse"])
@@ -69,6 +66,12 @@ def test_views_of_an_open_array_hold_as_many_pairs_as_those_of_a_ring(array):
     assert held.sum() == 6 * 64
     # Each element loses at most the eighth that faces it.
     assert set(held.sum(axis=0)) == {0, 8}
+
+
+def test_held_out_pairs_are_a_tenth_and_of_all_elements():
+    held = np.isfinite(part_of(ring(48), "held-out").differential_tof())
+    assert 0.05 < held.sum() / (48 * 47) < 0.2
+    assert held.sum(axis=1).max() < 0.4 * 48
 
 
 def test_all_is_the_scan_itself():

@@ -1,12 +1,11 @@
 """Automatic nodes: half a pitch or half a wavelength apart, fewer for noisy times, within limits."""
 
-import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.image_grid import MAX_NODES, MAX_NODES_3D, MIN_NODES, automatic_nodes
+
+from ..straight_scans import ring_scan
 
 RING = 0.22, 0.0027  # width and pitch of 256 elements, m
 
@@ -35,7 +34,5 @@ def test_nodes_follow_the_finest_detail_that_the_data_hold(
 
 
 def test_the_result_states_the_nodes_that_were_used():
-    everyone = np.arange(16)
-    water = Dataset(Ring(16, 0.05).positions(), everyone, everyone, 1500.0, delta_tof_s=np.zeros((16, 16)))
-    result = reconstruct(water, Settings(method="sart", iterations=1))
+    result = reconstruct(ring_scan(16, 0.05), Settings(method="sart", iterations=1))
     assert result.settings.nodes == len(result.speed) == MIN_NODES

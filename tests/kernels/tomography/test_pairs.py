@@ -12,14 +12,15 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.pairs import count, from_dataset, heights
 from bentray_kernels.tomography.problem import Problem
 
+from ..straight_scans import ring_scan
+
 RING, Z, WATER = Ring(6, 0.05), np.array([-0.004, 0.0, 0.004]), 1500.0
 SLICES, VOLUME = (Settings(method="sart", decomposition=way) for way in ("slices", "volume"))
 
 
 def moved():
-    everyone = np.arange(RING.elements)
     delta = np.random.default_rng(0).normal(0.0, 1e-7, (3, 6, 6))
-    return Dataset(RING.positions(), everyone, everyone, WATER, delta_tof_s=delta, slice_z_m=Z)
+    return ring_scan(6, 0.05, delta, slice_z_m=Z)
 
 
 def rings():
@@ -33,11 +34,10 @@ def rings():
 
 
 def test_noise_is_measured_where_pairs_were_measured_both_ways():
-    ring, random = Ring(64, 0.05), np.random.default_rng(2)
-    everyone = np.arange(64)
+    random, everyone = np.random.default_rng(2), np.arange(64)
     one_way = random.normal(0.0, 1e-6, (64, 64))
     delta = one_way + one_way.T + random.normal(0.0, 1e-8, (64, 64))
-    both = Dataset(ring.positions(), everyone, everyone, WATER, delta_tof_s=delta)
+    both = ring_scan(64, 0.05, delta)
     assert from_dataset(both, SLICES, 0).noise_s == pytest.approx(1e-8, rel=0.05)
     once = replace(both, delta_tof_s=np.where(everyone[:, None] < everyone, delta, np.nan))
     assert from_dataset(once, SLICES, 0).noise_s == 0.0

@@ -8,14 +8,20 @@ import pytest
 from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TABLE6_SIDE_M, table6
-from bentray_kernels.tomography import Settings, mean_absolute_error, reconstruct, rmse
+from bentray_kernels.tomography import (
+    Iteration,
+    Reconstruction,
+    Settings,
+    mean_absolute_error,
+    reconstruct,
+    rmse,
+)
 
 from ...table6 import table6_scan
 
 METHODS = ("sart", "gauss-newton")
-METHODS = ("sart", "gauss-newton")
 NODES, SIDE, WATER = 64, TABLE6_SIDE_M, 1375.0
-PHANTOM = table6(WATER)
+TRUTH, INSIDE = table6(WATER).speed(NODES, SIDE), table6(WATER).inside(NODES, SIDE)
 RING = Ring(64, 0.09)
 
 
@@ -33,12 +39,22 @@ def plan(method, **changes):
     return Settings.from_values(method=method, nodes=NODES, side_m=SIDE, **changes)
 
 
+def error(dataset, method):
+    """Rms error inside the phantom, m/s."""
+    return rmse(reconstruct(dataset, plan(method)).speed, TRUTH, INSIDE)
+
+
+@pytest.fixture(scope="module")
+def whole(scan):
+    """Error of each method given every pair, m/s."""
+    return {method: error(scan, method) for method in METHODS}
+
+
 def test_bent_rays_beat_straight_ones(scan, method):
-    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     bent = reconstruct(scan, plan(method))
     straight = reconstruct(scan, plan(method, rays="straight"))
-    assert rmse(bent.speed, truth, inside) < 0.7 * rmse(straight.speed, truth, inside)
-    assert mean_absolute_error(bent.speed, truth, inside, 185.0) < 0.08
+    assert rmse(bent.speed, TRUTH, INSIDE) < 0.7 * rmse(straight.speed, TRUTH, INSIDE)
+    assert mean_absolute_error(bent.speed, TRUTH, INSIDE, 185.0) < 0.08
     rms = [sweep.residual_rms_s for sweep in bent.history]
     assert rms[-1] < 0.2 * rms[0]
 
@@ -68,20 +84,15 @@ def test_numbering_of_the_elements_does_not_matter(scan, method):
     assert rmse(a.speed, b.speed, np.ones_like(a.speed, bool)) < 1.0
 
 
-def test_half_a_matrix_is_enough_with_reciprocity(scan, method):
-    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+def test_half_a_matrix_is_enough_with_reciprocity(scan, method, whole):
     upper = np.where(np.triu(np.ones(scan.delta_tof_s.shape, bool), 1), scan.delta_tof_s, np.nan)
-    half = replace(scan, delta_tof_s=upper)
-    whole = rmse(reconstruct(scan, plan(method)).speed, truth, inside)
-    assert rmse(reconstruct(half, plan(method)).speed, truth, inside) < 1.1 * whole
+    assert error(replace(scan, delta_tof_s=upper), method) < 1.1 * whole[method]
 
 
 def test_missing_data_degrade_gracefully(scan, method):
-    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
     kept = np.random.default_rng(1).random(scan.delta_tof_s.shape) < 0.1
-    sparse = replace(scan, valid=kept)
-    nothing = rmse(np.full_like(truth, WATER), truth, inside)
-    assert rmse(reconstruct(sparse, plan(method)).speed, truth, inside) < 0.6 * nothing
+    nothing = rmse(np.full_like(TRUTH, WATER), TRUTH, INSIDE)
+    assert error(replace(scan, valid=kept), method) < 0.6 * nothing
 
 
 def test_water_outside_the_ring_stays_water(scan, method):
@@ -195,24 +206,36 @@ def test_repeated_run_gives_the_same_bits(scan, method):
     assert a.history == b.history
 
 
-def test_a_dead_element_leaves_the_rest(scan, method):
-    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+def test_a_dead_element_leaves_the_rest(scan, method, whole):
     deaf = scan.delta_tof_s.copy()
     deaf[7, :] = deaf[:, 7] = np.nan
-    whole = rmse(reconstruct(scan, plan(method)).speed, truth, inside)
-    assert (
-        rmse(reconstruct(replace(scan, delta_tof_s=deaf), plan(method)).speed, truth, inside) < 1.15 * whole
-    )
+    assert error(replace(scan, delta_tof_s=deaf), method) < 1.15 * whole[method]
 
 
-def test_coincident_elements_are_accepted(scan, method):
-    truth, inside = PHANTOM.speed(NODES, SIDE), PHANTOM.inside(NODES, SIDE)
+def test_coincident_elements_are_accepted(scan, method, whole):
     position, delta = scan.element_position_m.copy(), scan.delta_tof_s.copy()
     position[8] = position[7]
     delta[8], delta[:, 8] = delta[7], delta[:, 7]
     delta[8, 7] = delta[7, 8] = 0.0
-    twice = replace(scan, element_position_m=position, delta_tof_s=delta)
-    result = reconstruct(twice, plan(method))
-    assert np.isfinite(result.speed).all()
-    whole = rmse(reconstruct(scan, plan(method)).speed, truth, inside)
-    assert rmse(result.speed, truth, inside) < 1.15 * whole
+    assert error(replace(scan, element_position_m=position, delta_tof_s=delta), method) < 1.15 * whole[method]
+
+
+def residual(*history):
+    """Of a result with this history, s."""
+    image, grid = np.full((4, 4), 1500.0), ((1e-3, 1e-3), (0.0, 0.0))
+    return Reconstruction(image, image, *grid, 1500.0, Settings(), history=history).residual_rms_s
+
+
+@pytest.mark.parametrize(
+    ("given", "first"), [((0, 1, 1, 1), 3e-7), ((0, 1, 1, 0), 2e-7), ((1, 1, 0, 0), 4e-7)]
+)
+def test_residual_of_slices_that_ended_at_different_sweeps(given, first):
+    passes = ((0, 1, 4e-7), (1, 1, 1e-7), (0, 2, 2e-7), (0, 3, 3e-7))
+    history = (Iteration(*one, 8, given=bool(flag)) for one, flag in zip(passes, given, strict=True))
+    assert residual(*history) == pytest.approx(np.sqrt((first**2 + 1e-14) / 2))
+
+
+def test_the_residual_is_that_of_the_last_stage_which_gives_the_image():
+    last = Iteration(0, 1, 3e-7, 8, stage=1), Iteration(0, 2, 2e-7, 8, stage=1, given=False)
+    assert residual(Iteration(0, 1, 1e-7, 8), *last) == pytest.approx(3e-7)
+    assert residual() is None

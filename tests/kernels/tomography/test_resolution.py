@@ -5,24 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings, reconstruct
 
-RING, WATER = Ring(96, 0.08), 1500.0
+from ..straight_scans import ring_scan
+
 PLAN = Settings(method="sart", nodes=48, iterations=1, rays="straight", resolution_check=True)
 
 
-def scan(keep=None):
-    everyone = np.arange(RING.elements)
-    delta = np.zeros((RING.elements, RING.elements))
-    return Dataset(
-        RING.positions(),
-        everyone,
-        everyone,
-        WATER,
-        delta_tof_s=delta if keep is None else np.where(keep, delta, np.nan),
-    )
+def scan(keep=True):
+    return ring_scan(96, 0.08, np.where(keep, np.zeros((96, 96)), np.nan))
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +31,7 @@ def test_many_rays_bring_most_of_it_back(everywhere):
 
 
 def test_few_rays_bring_little_back(everywhere):
-    few = np.zeros((RING.elements, RING.elements), bool)
+    few = np.zeros((96, 96), bool)
     few[::16, ::16] = True
     sparse = reconstruct(scan(few), PLAN).recovery
     assert sparse[18:30, 18:30].mean() < 0.5 * everywhere.recovery[18:30, 18:30].mean()
@@ -48,7 +39,7 @@ def test_few_rays_bring_little_back(everywhere):
 
 def test_recovery_is_zero_without_rays():
     """Emitters and receivers on the left half only: the right rim is never crossed."""
-    left = RING.positions()[:, 0] < -0.01
+    left = scan().element_position_m[:, 0] < -0.01
     recovery = reconstruct(scan(left[:, None] & left[None, :]), PLAN).recovery
     assert np.abs(recovery[38:44, 20:28]).max() < 0.05
     assert recovery[10:14, 20:28].mean() > 0.25
@@ -61,6 +52,6 @@ def test_recovery_is_computed_only_on_request(everywhere):
 
 
 def test_residuals_are_counted(everywhere):
-    assert everywhere.residuals.sum() == RING.elements * (RING.elements - 1)
+    assert everywhere.residuals.sum() == 96 * (96 - 1)
     middle = len(everywhere.residuals) // 2
     assert everywhere.residuals[middle] == everywhere.residuals.sum()

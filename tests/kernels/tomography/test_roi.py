@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from bentray_kernels.acquisition import Dataset, Truth
-from bentray_kernels.acquisition.simulation.ring_scan import Ring
+from bentray_kernels.acquisition import Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, reconstruct
 
-RING, WATER = Ring(12, 0.05), 1500.0
+from ..straight_scans import ring_scan
+
+WATER = 1500.0
 PLAN = Settings.from_values(
     method="sart", nodes=24, iterations=2, roi=True, resolution_check=True, edge_mps=5.0
 )
@@ -20,21 +21,11 @@ WAYS = [
 
 
 def scan(roi, slices=None):
-    everyone = np.arange(RING.elements)
-    shape = (RING.elements,) * 2 if slices is None else (len(slices), RING.elements, RING.elements)
-    speed = np.full(roi.shape, WATER)
+    shape = (12, 12) if slices is None else (len(slices), 12, 12)
     names = "x,y,z"[: 2 * roi.ndim - 1]
-    return Dataset(
-        RING.positions(),
-        everyone,
-        everyone,
-        WATER,
-        delta_tof_s=np.full(shape, -1e-7),
-        log_ratio_np=np.full(shape, 0.1),
-        slice_z_m=slices,
-        roi=roi,
-        truth=Truth(speed, (0.01,) * roi.ndim, (-0.05,) * roi.ndim, axes=names),
-    )
+    truth = Truth(np.full(roi.shape, WATER), (0.01,) * roi.ndim, (-0.05,) * roi.ndim, axes=names)
+    measured = {"log_ratio_np": np.full(shape, 0.1), "slice_z_m": slices}
+    return ring_scan(12, 0.05, np.full(shape, -1e-7), WATER, roi=roi, truth=truth, **measured)
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -6,23 +6,21 @@ import numpy as np
 import pytest
 
 from bentray_kernels.acquisition import Dataset
-from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography import Settings, reconstruct
 from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.settled import settled
 
+from ..straight_scans import ring_scan
 from .waveform.scans import scan as wave_scan
 
-EVERY = np.arange(16)
-POSITION = Ring(16, 0.05).positions()
-WATER = Dataset(POSITION, EVERY, EVERY, 1500.0, delta_tof_s=np.zeros((16, 16)))
+WATER = ring_scan(16, 0.05)
 SART = Settings(method="sart", iterations=1)
 
 
 def stacked(heights):
     """Rings of 16 elements at some heights."""
-    position = np.vstack([np.column_stack((POSITION, np.full(16, z))) for z in heights])
+    position = np.vstack([np.column_stack((WATER.element_position_m, np.full(16, z))) for z in heights])
     every = np.arange(len(position))
     return Dataset(position, every, every, 1500.0, delta_tof_s=np.zeros((len(position),) * 2))
 

@@ -65,13 +65,23 @@ def rows(residual):
     )
 
 
-def test_step_that_increases_the_misfit_is_halved_then_rejected():
-    of = problem(np.zeros((8, 8)))
+@pytest.fixture(scope="module")
+def of():
+    return problem(np.zeros((8, 8)))
+
+
+def states_after(of, misfits, **changes):
+    """The first state, and those after passes with these misfits; all but the last are not done."""
     states = [gauss_newton_step.begin(initial_slowness(of, None))]
-    misfits = [4e-7, 2e-7, 6e-7, 5e-7, 4e-7, 3e-7]
     for misfit in misfits:
         assert not states[-1].done
-        states.append(gauss_newton_step.step(of, PLAN, states[-1], [rows(misfit)]))
+        states.append(gauss_newton_step.step(of, replace(PLAN, **changes), states[-1], [rows(misfit)]))
+    return states
+
+
+def test_step_that_increases_the_misfit_is_halved_then_rejected(of):
+    misfits = [4e-7, 2e-7, 6e-7, 5e-7, 4e-7, 3e-7]
+    states = states_after(of, misfits)
     assert states[-1].done
     # The misfit of 2e-7 was measured on what the first step gave.
     best, far = states[1].slowness, states[2].slowness
@@ -81,73 +91,50 @@ def test_step_that_increases_the_misfit_is_halved_then_rejected():
     assert [sweep.residual_rms_s for sweep in states[-1].history] == misfits
 
 
-def test_continues_after_a_successful_halved_step():
-    of = problem(np.zeros((8, 8)))
-    state = gauss_newton_step.begin(initial_slowness(of, None))
-    for misfit in (4e-7, 2e-7, 6e-7, 1e-7):
-        state = gauss_newton_step.step(of, PLAN, state, [rows(misfit)])
+def test_continues_after_a_successful_halved_step(of):
+    state = states_after(of, (4e-7, 2e-7, 6e-7, 1e-7))[-1]
     assert not state.done
     assert state.halvings == 0
     assert state.best.loss == pytest.approx(1e-7)
 
 
-def test_the_last_pass_measures_and_the_best_image_is_given():
-    of = problem(np.zeros((8, 8)))
-    plan = replace(PLAN, iterations=3)
-    states = [gauss_newton_step.begin(initial_slowness(of, None))]
-    for misfit in (4e-7, 2e-7, 1e-7):
-        states.append(gauss_newton_step.step(of, plan, states[-1], [rows(misfit)]))
-    assert [state.done for state in states] == [False, False, False, True]
+def test_the_last_pass_measures_and_the_best_image_is_given(of):
+    states = states_after(of, (4e-7, 2e-7, 1e-7), iterations=3)
+    assert states[-1].done
     assert np.array_equal(states[-1].slowness, states[2].slowness)
     # Which one is known at the end.
     assert [sweep.given for sweep in states[2].history] == [False, False]
     assert [sweep.given for sweep in states[-1].history] == [False, False, True]
     assert states[-1].best.loss == pytest.approx(1e-7)
-    once = gauss_newton_step.step(of, replace(PLAN, iterations=1), states[0], [rows(4e-7)])
+    start, once = states_after(of, [4e-7], iterations=1)
     assert once.done
-    assert not np.array_equal(once.slowness, states[0].slowness)
+    assert not np.array_equal(once.slowness, start.slowness)
 
 
 @pytest.mark.parametrize(("misfit", "given"), [(2.03e-7, 3), (2.05e-7, 2)])
-def test_of_images_that_miss_alike_the_last_is_given(misfit, given):
-    of = problem(np.zeros((8, 8)))
-    state = gauss_newton_step.begin(initial_slowness(of, None))
-    for missed in (4e-7, 2e-7, misfit):
-        before, state = state, gauss_newton_step.step(of, replace(PLAN, iterations=3), state, [rows(missed)])
+def test_of_images_that_miss_alike_the_last_is_given(of, misfit, given):
+    *_, before, state = states_after(of, (4e-7, 2e-7, misfit), iterations=3)
     assert [sweep.sweep for sweep in state.history if sweep.given] == [given]
     assert np.array_equal(state.slowness, before.slowness) == (given == 3)
 
 
-def test_no_ray_through_the_image_leaves_water():
-    of = problem(np.zeros((8, 8)))
-    outside = Rows(
-        np.array([0, 1]), np.array([0], np.int32), np.ones(1, np.float32), np.array([1e-7]), np.array([1])
-    )
+def test_no_ray_through_the_image_leaves_water(of):
+    outside = replace(rows(1e-7), columns=np.array([0], np.int32))
     state = gauss_newton_step.step(of, PLAN, gauss_newton_step.begin(initial_slowness(of, None)), [outside])
     assert np.allclose(state.slowness, 1.0 / WATER)
 
 
-def test_stops_without_improvement():
-    of = problem(np.zeros((8, 8)))
-    state = gauss_newton_step.begin(initial_slowness(of, None))
-    for misfit in (4e-7, 2e-7, 1.99e-7, 1.98e-7):
-        assert not state.done
-        state = gauss_newton_step.step(of, PLAN, state, [rows(misfit)])
-    assert state.done
+def test_stops_without_improvement(of):
+    assert states_after(of, (4e-7, 2e-7, 1.99e-7, 1.98e-7))[-1].done
 
 
-def test_one_image_without_improvement_does_not_stop_the_search():
+def test_one_image_without_improvement_does_not_stop_the_search(of):
     """Bent rays did so on waves of 1 MHz: far less was missed after an image that missed as much."""
-    of = problem(np.zeros((8, 8)))
-    state = gauss_newton_step.begin(initial_slowness(of, None))
     # One that grows is halved, and counts for nothing.
-    for misfit, idle in ((4e-7, 0), (2e-7, 0), (1.99e-7, 1), (2.1e-7, 1), (1.5e-7, 0), (1.49e-7, 1)):
-        state = gauss_newton_step.step(of, PLAN, state, [rows(misfit)])
-        assert not state.done
-        assert state.idle == idle
-    state = gauss_newton_step.step(of, PLAN, state, [rows(1.48e-7)])
-    assert state.done
-    assert [sweep.sweep for sweep in state.history if sweep.given] == [7]
+    states = states_after(of, (4e-7, 2e-7, 1.99e-7, 2.1e-7, 1.5e-7, 1.49e-7, 1.48e-7))
+    assert [state.idle for state in states[1:-1]] == [0, 0, 1, 1, 0, 1]
+    assert states[-1].done
+    assert [sweep.sweep for sweep in states[-1].history if sweep.given] == [7]
 
 
 def test_flat_parts_come_back_sharper_when_edges_are_cheap():
@@ -162,7 +149,7 @@ def test_flat_parts_come_back_sharper_when_edges_are_cheap():
 
 @pytest.mark.parametrize(("penalty", "scale"), [("laplacian", 1.0), ("total-variation", 3e-7)])
 def test_quadratic_penalties_are_relative_to_the_data_and_the_total_variation_to_the_misfit(
-    monkeypatch, penalty, scale
+    monkeypatch, of, penalty, scale
 ):
     strengths = []
 
@@ -172,7 +159,7 @@ def test_quadratic_penalties_are_relative_to_the_data_and_the_total_variation_to
             super().__init__(*values)
 
     monkeypatch.setattr(gauss_newton_step, "Linearised", Recorded)
-    of, plan = problem(np.zeros((8, 8))), PLAN.changed(penalty=penalty, penalty_strength=0.25)
+    plan = PLAN.changed(penalty=penalty, penalty_strength=0.25)
     gauss_newton_step.step(of, plan, gauss_newton_step.begin(initial_slowness(of, None)), [rows(3e-7)])
     assert strengths == [pytest.approx(0.25 * scale)]
 

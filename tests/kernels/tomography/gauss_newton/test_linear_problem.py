@@ -24,14 +24,13 @@ from bentray_kernels.tomography.gauss_newton.ray_matrix import (
 from ....effort import effort
 
 
-def rows_of(matrix, residual):
+def rows_of(matrix, residual, counts=None):
+    """Rows of a matrix with their residuals, of one emitter unless their numbers are given."""
     sparse = csr_array(matrix)
+    pointers, columns = sparse.indptr.astype(np.int64), sparse.indices.astype(np.int32)
+    counts = [len(residual)] if counts is None else counts
     return Rows(
-        sparse.indptr.astype(np.int64),
-        sparse.indices.astype(np.int32),
-        sparse.data,
-        residual,
-        np.array([len(residual)]),
+        pointers, columns, sparse.data.astype(np.float32), np.asarray(residual, float), np.array(counts)
     )
 
 

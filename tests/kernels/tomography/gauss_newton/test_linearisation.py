@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bentray_kernels import eikonal, rays
+from bentray_kernels.acquisition.simulation.ring_scan import Ring
 from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.gauss_newton.linearisation import linearise
 from bentray_kernels.tomography.problem import Problem
@@ -22,9 +23,7 @@ def medium(bump_mps=60.0):
 @pytest.fixture
 def problem():
     """A ring of 12 elements around ``medium``, its times along bent rays."""
-    angle = 2.0 * np.pi * np.arange(12) / 12
-    centre = 0.5 * (NODES - 1) * SPACING
-    ring = centre + 0.04 * np.column_stack((np.cos(angle), np.sin(angle)))
+    ring = 0.5 * (NODES - 1) * SPACING + Ring(12, 0.04).positions()
     slowness = medium()
     delta = np.full((12, 12), np.nan)
     for k, source in enumerate(ring):
@@ -97,11 +96,8 @@ def test_pairs_without_data_have_no_row(problem):
 
 def test_rays_of_a_ring_in_a_volume_stay_at_its_height():
     """Straight rays between elements of one height, as far below the top of the volume as above its floor."""
-    centre, nodes, heights = 0.5 * 15 * SPACING, 16, 13
-    angle = 2.0 * np.pi * np.arange(6) / 6
-    ring = np.column_stack(
-        (centre + 0.012 * np.cos(angle), centre + 0.012 * np.sin(angle), np.full(6, 7 * SPACING))
-    )
+    nodes, heights = 16, 13
+    ring = np.column_stack((7.5 * SPACING + Ring(6, 0.012).positions(), np.full(6, 7 * SPACING)))
     delta = np.where(np.eye(6, dtype=bool), np.nan, 0.0)
     region = np.ones((nodes, nodes, heights), dtype=bool)
     volume = Problem(

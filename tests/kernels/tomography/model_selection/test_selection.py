@@ -40,18 +40,6 @@ def scan():
     return table6_scan(RING.elements, 48)
 
 
-def test_the_parts_are_the_whole_and_share_no_pair(scan):
-    shown, held, views = (
-        np.isfinite(part_of(scan, part).differential_tof()) for part in ("shown", "held-out", "views")
-    )
-    whole = np.isfinite(scan.differential_tof())
-    assert np.array_equal(shown.astype(int) + held + views, whole)
-    assert np.array_equal(held, held.T)
-    assert 0.05 < held.sum() / whole.sum() < 0.2
-    # No element loses more than a few of its pairs.
-    assert held.sum(axis=1).max() < 0.4 * RING.elements
-
-
 def test_invalid_pairs_stay_so(scan):
     valid = np.random.default_rng(0).random(scan.delta_tof_s.shape) < 0.5
     held = part_of(replace(scan, valid=valid), "held-out").valid

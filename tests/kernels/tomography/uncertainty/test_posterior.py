@@ -8,11 +8,12 @@ from scipy.sparse import random_array
 
 from bentray_kernels.tomography.finite_frequency import blurred
 from bentray_kernels.tomography.gauss_newton import linearisation
-from bentray_kernels.tomography.gauss_newton.linearisation import Rows
 from bentray_kernels.tomography.gauss_newton.ray_matrix import RayMatrix
 from bentray_kernels.tomography.uncertainty import posterior as module
 from bentray_kernels.tomography.uncertainty.posterior import Posterior
 from bentray_kernels.tomography.uncertainty.probe_product import LANES, back_projections, normal_products
+
+from ..gauss_newton.test_linear_problem import rows_of
 
 SHAPE, RAYS = (7, 6), 25
 NODES = SHAPE[0] * SHAPE[1]
@@ -24,9 +25,7 @@ def problem(width):
     parts, weights = [], []
     for rays in (RAYS, 5):
         matrix = random_array((rays, NODES), density=0.3, rng=random, format="csr")
-        rows = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int32)
-        residual = random.standard_normal(rays)
-        parts.append(Rows(*rows, matrix.data.astype(np.float32), residual, np.array([rays])))
+        parts.append(rows_of(matrix, random.standard_normal(rays)))
         weights.append(random.uniform(0.5, 2.0, rays))
     deviation = random.uniform(0.5, 2.0, SHAPE)
     deviation[0, 0] = 0.0
