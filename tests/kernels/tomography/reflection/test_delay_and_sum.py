@@ -17,6 +17,7 @@ SPACING, NODES, FACTOR = 2e-3, 37, 2
 # Of the pixels, in the coordinates of the ring; the point is on one.
 FIRST, STEP, COUNT = np.array([-0.004, -0.012]), 5e-4, (37, 35)
 POINT = FIRST + STEP * np.array([17, 18])
+EVERYONE = np.arange(24)
 
 
 def made(points=(POINT,)):
@@ -34,10 +35,13 @@ def made(points=(POINT,)):
     return signals, times, Pixels((FIRST - corner) / SPACING, STEP / SPACING, inside)
 
 
-def summed(signals, times, pixels, emissions, angle=90.0):
-    everyone = np.arange(signals.parts.shape[1])
+def arguments(signals, times, pixels, emissions=EVERYONE, angle=90.0):
     some = Signals(signals.parts[emissions], signals.used[emissions], signals.first_s, signals.rate_hz)
-    return sum_echoes(some, times, SPACING, everyone[emissions], everyone, pixels, angle)
+    return some, times, SPACING, EVERYONE[emissions], EVERYONE, pixels, angle
+
+
+def summed(*given):
+    return sum_echoes(*arguments(*given))
 
 
 def reference(signals, pixels, angle):
@@ -68,14 +72,14 @@ def reference(signals, pixels, angle):
 @pytest.mark.parametrize("angle", [90.0, 180.0, 40.0])
 def test_sums_equal_those_of_the_equation(angle):
     signals, times, pixels = made()
-    found = summed(signals, times, pixels, np.arange(24), angle)
+    found = summed(signals, times, pixels, EVERYONE, angle)
     for one, expected in zip(found, reference(signals, pixels, angle), strict=True):
         assert np.abs(one - expected).max() < 2e-3 * np.abs(expected).max()
 
 
 def test_a_point_is_imaged_where_it_is():
     signals, times, pixels = made()
-    image = envelope_of(summed(signals, times, pixels, np.arange(24)), 24)
+    image = envelope_of(summed(signals, times, pixels), 24)
     assert np.unravel_index(image.argmax(), image.shape) == (17, 18)
     # A mean of coherent echoes of size 1, read by linear interpolation.
     assert 0.9 < image.max() <= 1.001
@@ -83,7 +87,7 @@ def test_a_point_is_imaged_where_it_is():
 
 def test_any_split_of_the_emissions_has_the_same_bits():
     signals, times, pixels = made()
-    whole = summed(signals, times, pixels, np.arange(24))
+    whole = summed(signals, times, pixels)
     for each in (1, 7):
         parts = [summed(signals, times, pixels, np.arange(k, min(k + each, 24))) for k in range(0, 24, each)]
         total = parts[0]
@@ -104,14 +108,6 @@ def test_coherence_factor_is_one_for_equal_echoes_and_small_for_random_ones():
     assert np.allclose(envelope_of(equal, 64), 1.0)
     factor = envelope_of(random, 64) / (np.abs(random.echo) / weight)
     assert factor.mean() == pytest.approx(1.0 / 64.0, rel=0.1)
-
-
-EVERYONE = np.arange(24)
-
-
-def arguments(signals, times, pixels, emissions=EVERYONE, angle=90.0):
-    some = Signals(signals.parts[emissions], signals.used[emissions], signals.first_s, signals.rate_hz)
-    return some, times, SPACING, EVERYONE[emissions], EVERYONE, pixels, angle
 
 
 def assert_equal(found, expected, part=1e-4):

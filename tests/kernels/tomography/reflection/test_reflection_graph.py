@@ -101,11 +101,16 @@ def test_reconstruction_has_an_image_of_the_point_on_its_own_grid():
     assert result.settings.reflection.enabled
 
 
+def from_the_point(image):
+    """Distance of each pixel, m."""
+    x, y = (image.origin_m[k] + image.spacing_m[k] * np.arange(image.db.shape[k]) for k in (0, 1))
+    return np.hypot(x[:, None] - POINT[0], y[None, :] - POINT[1])
+
+
 def test_transmitted_waves_are_muted():
     # 30 times as strong as the echo, they would outshine it.
     image = reconstruct(scan(), SETTINGS).reflection
-    x, y = (image.origin_m[k] + image.spacing_m[k] * np.arange(image.db.shape[k]) for k in (0, 1))
-    away = np.hypot(x[:, None] - POINT[0], y[None, :] - POINT[1])
+    away = from_the_point(image)
     assert image.db[away > 0.008].max() < -8.0
 
 
@@ -121,8 +126,7 @@ def test_slow_tails_of_transmitted_waves_leave_no_energy_in_the_image():
         for water in (alone.astype(np.float32), None)
     ]
     for image in images:
-        x, y = (image.origin_m[k] + image.spacing_m[k] * np.arange(image.db.shape[k]) for k in (0, 1))
-        away = np.hypot(x[:, None] - POINT[0], y[None, :] - POINT[1])
+        away = from_the_point(image)
         assert away.flat[image.db.argmax()] <= PIXEL
         # Without the high pass it has -7 dB.
         assert image.db[away > 0.008].max() < -18.0

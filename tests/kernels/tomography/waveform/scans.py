@@ -82,10 +82,21 @@ def scan(seed=0, noise=0.0, loss=False, rim=False):
     )
 
 
+def nodes_of(image):
+    """Coordinates of the nodes of an image, m."""
+    lines = (o + image.spacing * np.arange(n) for o, n in zip(image.origin, image.speed.shape, strict=True))
+    return np.meshgrid(*lines, indexing="ij")
+
+
+def true_image(spacing=1e-3, half=28):
+    """The blob on so many nodes to each side."""
+    line = spacing * np.arange(-half, half + 1)
+    return Image(blob(*np.meshgrid(line, line, indexing="ij")), spacing, (line[0], line[0]))
+
+
 def error(image):
     """Rms error of an image inside 15 mm, m/s."""
-    lines = [o + image.spacing * np.arange(n) for o, n in zip(image.origin, image.speed.shape, strict=True)]
-    x, y = np.meshgrid(*lines, indexing="ij")
+    x, y = nodes_of(image)
     return float(np.sqrt(((image.speed - blob(x, y))[np.hypot(x, y) < 0.015] ** 2).mean()))
 
 

@@ -8,11 +8,10 @@ import pytest
 from bentray_kernels.acquisition import Waveform
 from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform.band_inversion import Model, emitters, evaluate
-from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_kernels.tomography.waveform.refinement_graph import starting_models
 from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 
-from .scans import SETTINGS, blob, error, lossy, refine, refined, scan, water
+from .scans import SETTINGS, error, lossy, nodes_of, refine, refined, scan, true_image, water
 
 
 def test_the_blob_is_found():
@@ -29,23 +28,16 @@ def test_it_is_found_through_noise():
     assert error(refine(scan(noise=0.05), SETTINGS, water()).image) < 0.6 * error(water())
 
 
-def true_speed():
-    """True speeds that refined ones approach, on a grid of their own."""
-    line = 1e-3 * np.arange(-28, 29)
-    return Image(blob(*np.meshgrid(line, line, indexing="ij")), 1e-3, (line[0], line[0]))
-
-
 def losses(image):
     """Attenuation found and true inside 12 mm, Np/m."""
-    lines = [o + image.spacing * np.arange(n) for o, n in zip(image.origin, image.speed.shape, strict=True)]
-    x, y = np.meshgrid(*lines, indexing="ij")
+    x, y = nodes_of(image)
     inside = np.hypot(x, y) < 0.012
     return image.attenuation[inside], lossy(x, y)[inside]
 
 
 def test_the_loss_is_found_and_the_speed_stays():
     plan = replace(SETTINGS, bands=(replace(SETTINGS.bands[2], iterations=6),))
-    start = true_speed()
+    start = true_image()
     result = refine(scan(loss=True), plan, start)
     assert result.image.speed is start.speed
     image, true = losses(result.image)
@@ -62,7 +54,7 @@ def test_element_gains_are_not_attributed_to_attenuation():
     traces = (data.waveform.object, data.waveform.water)
     uneven = Waveform(*(gain[:, :, None] * part for part in traces))
     images = [
-        refine(replace(data, waveform=waves), plan, true_speed()).image.attenuation
+        refine(replace(data, waveform=waves), plan, true_image()).image.attenuation
         for waves in (data.waveform, uneven)
     ]
     assert np.abs(images[1] - images[0]).max() < 0.05 * images[0].max()

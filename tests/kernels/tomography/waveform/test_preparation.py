@@ -9,14 +9,13 @@ from bentray_kernels.acquisition.emissions import Emissions
 from bentray_kernels.acquisition.simulation.phantom_truth import Truth
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.tomography.waveform.band_inversion import Model, evaluate
-from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_kernels.tomography.waveform.preparation import prepare
 from bentray_kernels.tomography.waveform.refinement_graph import start_band, starting_models
 from bentray_kernels.tomography.waveform.source_estimation import estimate_source
 from bentray_kernels.tomography.waveform.waveform_settings import Band, WaveSettings
 from bentray_kernels.wave.simulation import simulate
 
-from .scans import SPACING, blob, scan
+from .scans import SPACING, scan, true_image
 
 SETTINGS = WaveSettings(
     (Band(8e4, 2.5e5, 1.3e-3, emitters=6), Band(8e4, 2.5e5, 1.5e-3, emitters=6)), nearest_m=0.012, held_out=3
@@ -158,8 +157,7 @@ ONE_BAND = WaveSettings((Band(8e4, 2.5e5, 1.3e-3, emitters=6),), nearest_m=0.012
 
 @pytest.fixture(scope="module")
 def truth():
-    axis = SPACING * np.arange(-56, 57)
-    return Image(blob(*np.meshgrid(axis, axis, indexing="ij")), SPACING, (axis[0], axis[0]))
+    return true_image(SPACING, 56)
 
 
 @pytest.fixture(scope="module")

@@ -1,13 +1,17 @@
-"""Task graph of a refinement: the same bits in any order of completion, and after a restart."""
+"""Task graph of a refinement: the same bits in any order of completion and from any checkpoint."""
 
+import functools
 import random
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from bentray_kernels.task_graph import Task
 from bentray_kernels.tomography import Iteration
+from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform.band_inversion import Evaluation
 from bentray_kernels.tomography.waveform.inversion_state import Image
@@ -18,13 +22,20 @@ from bentray_kernels.tomography.waveform.refinement_graph import (
     update_image,
 )
 from bentray_kernels.tomography.waveform.wave_scan import WaveScan
+from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
-from ..graph_runs import run_in_random_order
-from .scans import RIM_MPS, SETTINGS, WATER, refined, scan, water, within_rim
+from ....effort import effort
+from ..graph_runs import run, run_in_random_order
+from .scans import RIM_MPS, SETTINGS, WATER, nodes_of, refined, scan, water, within_rim
+
+
+@functools.cache
+def memory_scan():
+    return WaveScan(MemorySource(scan()), SETTINGS)
 
 
 def begun():
-    return RefinementGraph(WaveScan(MemorySource(scan()), SETTINGS), water())
+    return RefinementGraph(memory_scan(), water())
 
 
 def test_tasks_may_finish_in_any_order():
@@ -36,7 +47,7 @@ def test_tasks_may_finish_in_any_order():
 
 def test_progress_is_monotonic_and_history_records_the_bands():
     graph = RefinementGraph(
-        WaveScan(MemorySource(scan()), SETTINGS),
+        memory_scan(),
         water(),
         2,
         (Iteration(2, 1, 1e-7, 24), Iteration(2, 1, 1e-7, 24, 1)),
@@ -130,10 +141,10 @@ def test_after_a_stop_bands_of_the_speed_are_left_out_and_the_loss_is_not():
 def test_near_the_array_the_band_begins_with_what_explains_the_scan(slow):
     """Oil of 1420 m/s that reaches the array, or an artefact of the rays in the place of water."""
     scan_of = WaveScan(MemorySource(scan(rim=slow)), SETTINGS)
-    rim = np.where(within_rim(*_nodes(water())), RIM_MPS, WATER)
+    rim = np.where(within_rim(*nodes_of(water())), RIM_MPS, WATER)
     problem, band = scan_of.problem(0), start_band(scan_of, 0, replace(water(), speed=rim))
     grid = Image(problem.region, problem.band.spacing_m, problem.origin)
-    fixed = ~problem.region & within_rim(*_nodes(grid))
+    fixed = ~problem.region & within_rim(*nodes_of(grid))
     assert fixed.sum() > 20
     found = band.state.image
     if slow:
@@ -142,14 +153,8 @@ def test_near_the_array_the_band_begins_with_what_explains_the_scan(slow):
         assert (found[~problem.region] == WATER).all()
 
 
-def _nodes(image):
-    """Coordinates of the nodes, m."""
-    x, y = (o + image.spacing * np.arange(n) for o, n in zip(image.origin, image.speed.shape, strict=True))
-    return np.meshgrid(x, y, indexing="ij")
-
-
 def test_a_finer_grid_keeps_an_image():
-    problem = WaveScan(MemorySource(scan()), SETTINGS).problem(1)
+    problem = memory_scan().problem(1)
     x = np.linspace(-0.03, 0.03, 60)
     image = replace(water(), speed=1500.0 + 20.0 * np.sin(200.0 * x)[:, None] * np.cos(150.0 * x)[None])
     there = problem.origin[0] + problem.band.spacing_m * np.arange(problem.region.shape[0])
@@ -157,3 +162,24 @@ def test_a_finer_grid_keeps_an_image():
     assert (
         np.abs((starting_models(image, problem, SETTINGS)[0].speed - expected)[problem.region]).max() < 0.05
     )
+
+
+@settings(max_examples=effort(2, 12), deadline=None)
+@given(cuts=st.sets(st.integers(0, 140), min_size=1, max_size=5))
+def test_a_refinement_cut_off_anywhere_ends_with_the_same_bits(cuts):
+    (resumed, _), expected = run(begun, cuts, TYPES), refined()
+    assert resumed.over
+    assert resumed.done == resumed.total
+    assert np.array_equal(resumed.image.speed, expected.image.speed)
+    assert np.array_equal(resumed.image.attenuation, expected.image.attenuation)
+    assert resumed.image.origin == expected.image.origin
+    for end, other in zip(resumed.ends, expected.ends, strict=True):
+        assert np.array_equal(end.image.speed, other.image.speed)
+        assert (end.history, end.skipped) == (other.history, other.skipped)
+
+
+def test_its_records_are_not_those_of_rays():
+    graph, _ = run(begun)
+    tree, arrays = pack(graph.checkpoint)
+    with pytest.raises(KeyError):
+        unpack(tree, arrays)

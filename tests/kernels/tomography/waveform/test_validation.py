@@ -9,7 +9,6 @@ from bentray_kernels.tomography import Settings
 from bentray_kernels.tomography.checkpoint import pack, unpack
 from bentray_kernels.tomography.scan import MemorySource
 from bentray_kernels.tomography.waveform.automatic_settings import scale_of, wave_settings
-from bentray_kernels.tomography.waveform.inversion_state import Image
 from bentray_kernels.tomography.waveform.validation import (
     MIN_VALID_CORRELATION,
     SHOTS,
@@ -22,15 +21,14 @@ from bentray_kernels.tomography.waveform.validation import (
 from bentray_kernels.tomography.waveform.wave_scan import WaveScan
 from bentray_kernels.tomography.waveform.waveform_checkpoint import TYPES
 
-from .scans import WATER, blob, scan
+from .scans import WATER, scan, true_image
 
 
 def images():
     """The truth, half of it, water and the truth upside down."""
-    axis = 1e-3 * np.arange(-30, 31)
-    truth = blob(*np.meshgrid(axis, axis, indexing="ij"))
-    parts = truth, 0.5 * (WATER + truth), np.full_like(truth, WATER), 2.0 * WATER - truth
-    return [Image(part, 1e-3, (-0.03, -0.03)) for part in parts]
+    true = true_image(half=30)
+    parts = true.speed, 0.5 * (WATER + true.speed), np.full_like(true.speed, WATER), 2.0 * WATER - true.speed
+    return [replace(true, speed=part) for part in parts]
 
 
 def plan_for(data):
