@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import json
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from datetime import date
@@ -15,7 +14,7 @@ from typing import Annotated
 import typer
 
 from bentray_kernels.errors import InvalidInput
-from bentray_workers.files.atomic import write_bytes
+from bentray_workers.files.atomic import write_json
 
 from .output.benchmark_context import BenchmarkContext
 from .output.benchmark_row import Row
@@ -111,8 +110,7 @@ def bench(
     with progress_bar(f"Measuring {name}") as step:
         rows = list(measure(BenchmarkContext(quick, step, pictures, scheduler, tls, data=data)))
     measured = {"measured": date.today().isoformat()}
-    text = json.dumps(without_nan([row.to_dict() | measured for row in rows]), indent=2, allow_nan=False)
-    write_bytes(json_file, (text + "\n").encode())
+    write_json(json_file, without_nan([row.to_dict() | measured for row in rows]))
     columns = ("target", "value", "", "goal", "unit", "met", "detail")
     print_table(
         f"{name}, quick" if quick else name, columns, [_cells(row) for row in rows], ("value", "goal")

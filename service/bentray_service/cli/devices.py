@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import platform
+import shutil
+import sys
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -14,15 +19,6 @@ from .output.terminal import AsJson, print_json, print_lines, print_table, progr
 if TYPE_CHECKING:
     from bentray_kernels.device_engines import Comparison
     from bentray_kernels.opencl import Device, DeviceBenchmark, DeviceSelection, SelfTestResult
-import os
-import platform
-import shutil
-import sys
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from bentray_kernels.opencl import DeviceSelection
 
 
 def devices(

@@ -44,7 +44,7 @@ def geometry_field(
 
     with progress_bar("Building the field") as step:
         from bentray_service.rows.ids import field_of as field_name
-        from bentray_workers.files.geometry_field_folder import write_json
+        from bentray_workers.files.atomic import write_json
         from bentray_workers.files.mesh import StoredMesh, summary_of, write_mesh
         from bentray_workers.files.mesh_formats import read_mesh
         from bentray_workers.rendering.field_settings import check_faces

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -50,7 +49,7 @@ def quality(
     source, folder = input_scan(file), output_folder(output)
     given = metadata_of(scan_options)
 
-    from bentray_workers.files.atomic import write_bytes
+    from bentray_workers.files.atomic import write_bytes, write_json
     from bentray_workers.files.dataset import write_dataset
     from bentray_workers.reconstruction.quality_report import calibrate_file, examine_file
 
@@ -69,15 +68,14 @@ def quality(
         write_dataset(paths["h5"], report.picked)
     if calibration is not None:
         paths["calibration"] = folder / "calibration.json"
-        fitted = json.dumps(calibration.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_bytes(paths["calibration"], fitted.encode())
+        write_json(paths["calibration"], calibration.to_dict())
     summary: dict[str, Any] = {
         "file": str(source),
         **report.report,
         "outputs": {kind: str(path) for kind, path in paths.items()},
     }
     write_bytes(paths["png"], report.page)
-    write_bytes(paths["json"], (json.dumps(summary, indent=2, allow_nan=False) + "\n").encode())
+    write_json(paths["json"], summary)
     if as_json:
         print_json(summary)
     else:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from bentray_kernels.tomography import comparison
 
 from ..html_tables import figures_html, picture_html
-from .plotting import draw_plane, new_axes
+from .plotting import draw_plane, figure_png, new_axes
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -70,12 +70,7 @@ class Comparison(comparison.Comparison):
 
     def to_png(self) -> bytes:
         """Both images and their difference as a PNG file; of a volume the middle slice."""
-        from bentray_workers.images.canvas import drawing, new_figure, to_png
-
-        with drawing():
-            figure = new_figure(13.0, 3.9)
-            self._draw(figure.subplots(1, 3), "z", None)
-            return to_png(figure)
+        return figure_png(13.0, 3.9, 3, lambda axes: self._draw(axes, "z", None))
 
     def _repr_html_(self) -> str:
         rows = [

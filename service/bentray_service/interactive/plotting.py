@@ -41,14 +41,9 @@ def draw_plane(axes: Axes, plane: Plane, limits: Limits, *, colormap: str, title
     draw_bar([shown], label)
 
 
-# Of one image in the picture of a notebook, inches.
-WIDTH_IN, HEIGHT_IN = 4.6, 3.7
-
-
-def pictures_png(names: Sequence[str], draw: Callable[[Axes, str], None]) -> bytes:
-    """Images side by side as PNG; ``draw`` draws one of them."""
+def figure_png(width: float, height: float, count: int, draw: Callable[[Sequence[Axes]], None]) -> bytes:
+    """Axes side by side in a figure of inches, drawn by ``draw``, as PNG."""
     with drawing():
-        figure = new_figure(WIDTH_IN * len(names), HEIGHT_IN)
-        for axes, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
-            draw(axes, name)
+        figure = new_figure(width, height)
+        draw(figure.subplots(1, count, squeeze=False)[0])
         return to_png(figure)

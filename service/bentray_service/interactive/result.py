@@ -45,6 +45,8 @@ Bools = NDArray[np.bool_]
 REFLECTION_AXES = ("reflection_x", "reflection_y")
 # Name of the only array of an uploaded volume.
 VALUE = "value"
+# Of one image in the picture of a notebook, inches.
+WIDTH_IN, HEIGHT_IN = 4.6, 3.7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -329,10 +331,15 @@ class Result:
     def _repr_html_(self) -> str:
         from bentray_workers.images.captions import facts
 
-        from .plotting import pictures_png
+        from .plotting import figure_png
 
         shown = list(self.values)[:1] + [name for name in ("attenuation",) if name in self.values]
-        png = pictures_png(shown, lambda axes, name: self._draw(axes, name, ("z", None), (None, None)))
+
+        def draw(axes: Sequence[Axes]) -> None:
+            for one, name in zip(axes, shown, strict=True):
+                self._draw(one, name, ("z", None), (None, None))
+
+        png = figure_png(WIDTH_IN * len(shown), HEIGHT_IN, len(shown), draw)
         rows = [
             (f"{name} ({self.units[name]})", f"{np.nanmin(array):.6g} to {np.nanmax(array):.6g}")
             for name, array in self.values.items()

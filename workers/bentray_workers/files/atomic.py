@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import secrets
 from collections.abc import Iterator
@@ -36,6 +37,11 @@ def write_bytes(target: Path, content: bytes) -> None:
     """Write ``content`` to ``target`` atomically."""
     with atomic_replace(target) as partial:
         partial.write_bytes(content)
+
+
+def write_json(target: Path, content: object) -> None:
+    """Write plain values to ``target`` atomically, as indented JSON."""
+    write_bytes(target, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
 
 def sync(path: Path) -> None:

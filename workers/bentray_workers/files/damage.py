@@ -13,11 +13,12 @@ from bentray_kernels.errors import InvalidInput
 
 @contextmanager
 def rejecting_damage(
-    field: str, accepted: str, errors: tuple[type[Exception], ...] = (Exception,)
+    field: str, accepted: str, errors: tuple[type[Exception], ...] = (Exception,), given: str = ""
 ) -> Iterator[None]:
     """Convert these exceptions of readers on damaged data to InvalidInput for this field.
 
-    By default all but MemoryError: readers raise exceptions of any type on a damaged header.
+    By default all but MemoryError: readers raise exceptions of any type on a damaged header. The message says
+    ``given`` of the data; empty: the text of the exception.
     """
     try:
         yield
@@ -27,7 +28,7 @@ def rejecting_damage(
         if isinstance(error, MemoryError) and MemoryError not in errors:
             raise
         reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise InvalidInput(field, f"damaged data ({reason[:120]})", accepted) from None
+        raise InvalidInput(field, given or f"damaged data ({reason[:120]})", accepted) from None
 
 
 def first_bytes(data: bytes) -> str:

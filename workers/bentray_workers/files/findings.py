@@ -106,18 +106,13 @@ def _plain(finding: Finding) -> dict[str, Any]:
         packed = base64.b64encode(np.packbits(finding.pairs).tobytes()).decode()
         pairs = {"shape": finding.pairs.shape, "bits": packed}
     value = finding.value if math.isfinite(finding.value) else None
-    return {**{name: getattr(finding, name) for name in _NAMES}, "value": value, "pairs": pairs}
+    return {**vars(finding), "value": value, "pairs": pairs}
 
 
 def _finding(plain: dict[str, Any]) -> Finding:
     value = math.nan if plain["value"] is None else plain["value"]
-    fields = {name: plain[name] for name in _NAMES}
-    return Finding(
-        **{**fields, "elements": tuple(fields["elements"])}, value=value, pairs=_pairs(plain["pairs"])
-    )
-
-
-_NAMES = ("check", "found", "accepted", "action", "elements", "role", "unit", "slice")
+    elements, pairs = tuple(plain["elements"]), _pairs(plain["pairs"])
+    return Finding(**{**plain, "elements": elements, "value": value, "pairs": pairs})
 
 
 def _pairs(plain: dict[str, Any] | None) -> Flags | None:

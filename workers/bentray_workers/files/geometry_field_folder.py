@@ -18,9 +18,9 @@ from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.image.geometry_image import GeometryImage
 from bentray_kernels.meshes.mesh import Chart, TriangleMesh
 
-from .atomic import atomic_replace, write_bytes
+from .atomic import atomic_replace
 from .hdf5_reading import Reader, opened
-from .hdf5_writing import atomic_hdf5
+from .hdf5_writing import atomic_hdf5, write_packed
 from .npy_headers import PARSING, read_header
 
 # Of geometry images.
@@ -103,11 +103,6 @@ def fill_rows(path: Path, first: int, rows: NDArray[Any]) -> None:
         os.fsync(file.fileno())
 
 
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write figures; ``path`` is replaced atomically."""
-    write_bytes(path, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
-
-
 def read_json(path: Path) -> dict[str, Any]:
     """Read figures."""
     content: dict[str, Any] = json.loads(path.read_text())
@@ -147,18 +142,14 @@ def write_geometry_image(path: Path, maps: GeometryMaps) -> None:
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with atomic_hdf5(path) as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = VERSION
+    with atomic_hdf5(path, FORMAT, VERSION) as file:
         arrays = {
             "positions": maps.positions,
             "normals": maps.normals,
             "valid": maps.valid.astype(np.uint8),
             "colours": maps.colours,
         }
-        for name, values in arrays.items():
-            if values is not None:
-                file.create_dataset(name, data=values, compression="gzip", shuffle=True, track_times=False)
+        write_packed(file, arrays)
 
 
 def read_geometry_image(path: Path) -> GeometryMaps:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
@@ -15,8 +15,12 @@ from .atomic import atomic_replace
 
 
 @contextmanager
-def atomic_hdf5(target: Path) -> Iterator[h5py.File]:
+def atomic_hdf5(target: Path, name: str = "", version: str = "") -> Iterator[h5py.File]:
     """A new HDF5 file that atomically replaces the target at the end of the context.
+
+    Args:
+        target: path of the file.
+        name, version: of its format, as ``Reader.check_format`` finds them; empty: none.
 
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
@@ -25,11 +29,20 @@ def atomic_hdf5(target: Path) -> Iterator[h5py.File]:
         sink = _Sink(raw)
         try:
             with h5py.File(sink, "w") as file:
+                if name:
+                    file.attrs["format"], file.attrs["format_version"] = name, version
                 yield file
         finally:
             if sink.failure is not None:
                 # The cause of any further error of HDF5.
                 raise OSError(sink.failure.errno, sink.failure.strerror, str(target)) from sink.failure
+
+
+def write_packed(file: h5py.File, arrays: Mapping[str, Any]) -> None:
+    """Write arrays compressed; None is left out."""
+    for name, values in arrays.items():
+        if values is not None:
+            file.create_dataset(name, data=values, compression="gzip", shuffle=True, track_times=False)
 
 
 class _Sink(io.RawIOBase):

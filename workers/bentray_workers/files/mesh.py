@@ -14,7 +14,7 @@ from bentray_kernels.meshes.defects import SoundMesh
 from bentray_kernels.meshes.mesh import TriangleMesh
 
 from .hdf5_reading import opened
-from .hdf5_writing import atomic_hdf5
+from .hdf5_writing import atomic_hdf5, write_packed
 
 FORMAT = "bentray-mesh"
 VERSION = "1.0"
@@ -85,13 +85,9 @@ def write_mesh(path: Path, stored: StoredMesh) -> None:
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with atomic_hdf5(path) as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = VERSION
+    with atomic_hdf5(path, FORMAT, VERSION) as file:
         arrays = {"vertices": stored.mesh.vertices, "faces": stored.mesh.faces, "colours": stored.colours}
-        for name, values in arrays.items():
-            if values is not None:
-                file.create_dataset(name, data=values, compression="gzip", shuffle=True, track_times=False)
+        write_packed(file, arrays)
 
 
 def load_mesh(path: Path) -> StoredMesh:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import io
 import re
 import struct
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +59,8 @@ def read_mesh(data: bytes) -> ReadMesh:
         raise InvalidInput("file", f"{len(data)} bytes", f"at most {LARGEST_BYTES} bytes")
     data = data.removeprefix(BYTE_ORDER_MARK)
     kind = _kind(data)
-    with _whole(kind):
+    given = f"{kind.upper()} data that are truncated, damaged, or inconsistent with the header"
+    with rejecting_damage("file", f"a whole {kind.upper()} file", given=given):
         if kind in ("gltf", "glb"):
             check_gltf(data, kind)
         elif kind == "off":
@@ -106,19 +105,6 @@ def _kind(data: bytes) -> str:
     elif as_stl and not text:
         content += f"; or a binary STL of {len(data)} bytes, where its header means {as_stl}"
     raise InvalidInput("file", content, ACCEPTED)
-
-
-@contextmanager
-def _whole(kind: str) -> Iterator[None]:
-    """Convert errors of trimesh on damaged data to messages about the file."""
-    try:
-        with rejecting_damage("file", f"a whole {kind.upper()} file"):
-            yield
-    except InvalidInput as error:
-        if not error.value.startswith("damaged data"):
-            raise
-        given = f"{kind.upper()} data that are truncated, damaged, or inconsistent with the header"
-        raise InvalidInput("file", given, error.accepted) from None
 
 
 def _colours(mesh: trimesh.Trimesh, surface: SoundMesh) -> Floats | None:

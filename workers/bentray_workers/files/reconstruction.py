@@ -57,9 +57,7 @@ def write_reconstruction(path: Path, reconstruction: Reconstruction) -> None:
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with atomic_hdf5(Path(path)) as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = VERSION
+    with atomic_hdf5(Path(path), FORMAT, VERSION) as file:
         file.attrs["axes"] = "x,y" if reconstruction.speed.ndim == 2 else "x,y,z"
         file.attrs["spacing_m"] = reconstruction.spacing_m
         file.attrs["origin_m"] = reconstruction.origin_m

@@ -162,9 +162,7 @@ def write_volume(path: Path, volume: Volume) -> None:
     Raises:
         OSError: where the folder cannot be written to or the disk is full.
     """
-    with atomic_hdf5(Path(path)) as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = VERSION
+    with atomic_hdf5(Path(path), FORMAT, VERSION) as file:
         file.attrs["spacing_m"] = volume.spacing_m
         file.attrs["origin_m"] = volume.origin_m
         file.attrs["direction"] = volume.direction.ravel()

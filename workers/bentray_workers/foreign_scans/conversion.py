@@ -93,7 +93,8 @@ def _read(scan: OpenScan, given: ScanMetadata) -> tuple[Arrays, Layout]:
         reads: Callable[[Arrays], Layout] = named_layout
         own = scan.arrays
         if isinstance(own, Matlab73) and not scan.is_matlab and not _of_matlab(scan, given):
-            own.in_python_order()
+            # No MATLAB wrote the variables that the user names.
+            own.reversed_axes = False
     else:
         reader = reader_of(scan)
         reads, own = reader.layout, reader.read(scan)

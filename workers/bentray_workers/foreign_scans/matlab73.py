@@ -54,10 +54,6 @@ class Matlab73:
         check_row(name, stored.shape, stored.dtype)
         yield from rows_of(stored, name)
 
-    def in_python_order(self) -> None:
-        """Treat the axes as stored: of a file that no MATLAB wrote, whose variables the user names."""
-        self.reversed_axes = False
-
 
 def rows_of(stored: h5py.Dataset, name: str, before: tuple[int, ...] = ()) -> Iterator[NDArray[Any]]:
     """The rows of an array along one axis, in blocks, so that a chunk is decompressed once or few times.

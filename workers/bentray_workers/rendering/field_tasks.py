@@ -20,6 +20,7 @@ from bentray_kernels.meshes.mesh import Chart
 from bentray_kernels.meshes.surface import Surface, surface_of
 
 from ..cluster.memory_cache import MemoryCache
+from ..files.atomic import write_json
 from ..files.geometry_field_folder import (
     FieldFiles,
     GeometryMaps,
@@ -31,7 +32,6 @@ from ..files.geometry_field_folder import (
     write_array,
     write_chart,
     write_geometry_image,
-    write_json,
 )
 from ..files.mesh import load_mesh
 from .field_accuracy import accuracy

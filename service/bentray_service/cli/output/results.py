@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bentray_workers.files.atomic import write_bytes
+from bentray_workers.files.atomic import write_bytes, write_json
 
 from .terminal import print_json, print_lines, print_table, without_nan
 
@@ -45,7 +44,7 @@ def write_results(
     write_reconstruction(paths["h5"], result)
     png = report_png(result, dataset.truth, dataset.roi) if draw is None else draw()
     write_bytes(paths["png"], png)
-    write_bytes(paths["json"], (json.dumps(without_nan(facts), indent=2, allow_nan=False) + "\n").encode())
+    write_json(paths["json"], without_nan(facts))
     return facts
 
 

@@ -44,7 +44,7 @@ def write_dataset(path: Path, dataset: Dataset, pieces: Pieces | None = None) ->
     """
     if not dataset.picked and dataset.waveform is None:
         raise InvalidInput("traveltime", "neither travel times nor traces", "at least one of the two")
-    with atomic_hdf5(Path(path)) as file:
+    with atomic_hdf5(Path(path), FORMAT, VERSION) as file:
         _write(file, dataset, pieces)
 
 
@@ -69,8 +69,6 @@ def _packing(array: NDArray[Any], chunks: tuple[int, ...] | bool) -> dict[str, A
 
 
 def _write(file: h5py.File, dataset: Dataset, pieces: Pieces | None) -> None:
-    file.attrs["format"] = FORMAT
-    file.attrs["format_version"] = VERSION
     file.attrs["dimension"] = dataset.element_position_m.shape[1]
     for name in TEXTS:
         file.attrs[name] = printable(getattr(dataset, name))
