@@ -1,4 +1,4 @@
-"""The pixels of a PNG, for comparisons."""
+"""The pixels of a PNG, and where one colour is."""
 
 import io
 
@@ -10,3 +10,7 @@ def pixels_of(png: bytes) -> np.ndarray:
     """(rows, columns, 3) 8-bit RGB."""
     with Image.open(io.BytesIO(png), formats=["PNG"]) as image:
         return np.asarray(image.convert("RGB"))
+
+
+def near(picture: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
+    return (np.abs(picture.astype(int) - colour).sum(axis=-1) < 12).nonzero()

@@ -65,9 +65,8 @@ LOOPBACK = (ip_network("127.0.0.0/8"),)
     ],
 )
 def test_refused_addresses(url):
-    with pytest.raises(InvalidInput) as refused:
+    with pytest.raises(InvalidInput, match=r"^webhook: "):
         check_url(url, ())
-    assert refused.value.field == "webhook"
 
 
 @pytest.mark.parametrize(

@@ -53,9 +53,8 @@ def test_what_was_changed_is_refused(change, field):
     headers = signed_headers([SECRET], MESSAGE, TIME, BODY)
     given = {"body": BODY, "secret": SECRET, "now": TIME, **headers, **change}
     left = {name: given[name] for name in headers if given[name] is not None}
-    with pytest.raises(InvalidInput) as refused:
+    with pytest.raises(InvalidInput, match=f"^{field}: "):
         bentray.verify_webhook(given["body"], left, given["secret"], now=given["now"])
-    assert refused.value.field == field
 
 
 def test_the_signature_is_that_of_a_few_lines():

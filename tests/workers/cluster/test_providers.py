@@ -129,9 +129,8 @@ def test_the_command_of_its_workers_is_one_of_ours() -> None:
 def test_names_invalid_input(
     managers: list[FakeManager], kind: str, wanted: ClusterRequest, field: str
 ) -> None:
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=f"^{field}: "):
         deploy(kind, wanted)
-    assert refusal.value.field == field
 
 
 @pytest.mark.parametrize("text", ["- a list", "nonsense: 1", "{"])

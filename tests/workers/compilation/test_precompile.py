@@ -1,5 +1,6 @@
 """Precompilation: jobs on other scans compile nothing more, and compilation is logged."""
 
+import logging
 import os
 import subprocess
 import sys
@@ -7,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from bentray_kernels.compilation.compile_events import Compilation
+from bentray_workers.compilation import cache_misses
 from bentray_workers.compilation.precompile import WAVES, digitised
 from bentray_workers.simulation.simulation_run import simulate
 
@@ -73,3 +76,19 @@ def test_jobs_find_every_kernel_compiled(tmp_path: Path) -> None:
     done = subprocess.run(later, env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
     assert done.stderr == ""
+
+
+def test_a_log_has_the_first_kernel_and_the_counts(monkeypatch, caplog):
+    counts = Compilation(31, 120, active=True)
+    monkeypatch.setattr(cache_misses, "compilation", lambda: counts)
+    monkeypatch.setattr(cache_misses, "LINE_S", 0.0)
+    caplog.set_level(logging.WARNING, "bentray.compiling")
+    with_bar, of_worker = (cache_misses.Announcer(counts=counts) for counts in (False, True))
+    for announcer in (with_bar, of_worker):
+        announcer.on_start(None)
+        announcer.on_end(None)
+        announcer.on_start(None)
+    first, alone, line = (record.getMessage() for record in caplog.records)
+    assert first == alone
+    assert first.startswith("Compiling kernels for this processor (")
+    assert line == "Compiling kernels: 31 of 120"

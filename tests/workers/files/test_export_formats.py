@@ -83,6 +83,8 @@ def test_matlab_has_all_images(stored, result, tmp_path):
     arrays = loadmat(exported(stored, tmp_path, "mat", DB))
     np.testing.assert_array_equal(arrays["speed_mps"], result.speed)
     np.testing.assert_allclose(arrays["attenuation_db_cm_mhz"], in_db(result))
+    np.testing.assert_array_equal(arrays["spacing_m"], [result.spacing_m])
+    assert arrays["axes"].item() == "x,y,z"[: 2 * result.speed.ndim - 1]
     assert "attenuation_np_m" not in arrays
 
 
@@ -208,9 +210,10 @@ def test_rejects_unsupported_exports(tmp_path, monkeypatch):
         with pytest.raises(InvalidInput):
             Selection(**wrong)
     write_reconstruction(tmp_path / "uneven.h5", made(nodes=6, slices=2))
-    for name in ("nrrd", "vti", "ome-zarr", "dicom"):
-        with pytest.raises(InvalidInput, match="hdf5 holds any"):
+    for name in ("nifti", "metaimage", "nrrd", "vti", "ome-zarr", "dicom"):
+        with pytest.raises(InvalidInput, match=r"^volume: .*hdf5 holds any"):
             exported(tmp_path / "uneven.h5", tmp_path, name)
+        assert not list(tmp_path.glob("volume.*"))
 
     def missing(name):
         raise ImportError(name)

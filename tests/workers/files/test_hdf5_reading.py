@@ -1,10 +1,14 @@
-"""HDF5 files: data elsewhere are not read, and limits hold; most hostile files: ``hostile_datasets``."""
+"""Bounds on foreign files; data elsewhere in HDF5 are not read; most hostile files: ``hostile_datasets``."""
+
+import io
 
 import h5py
 import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
+from bentray_workers.files.bounded_reading import LARGEST_BYTES, declared, whole
+from bentray_workers.files.damage import rejecting_damage
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.files.dataset.read import dataset_of, waveform_in
 from bentray_workers.files.hdf5_reading import Limits, opened
@@ -71,9 +75,8 @@ def test_unknown_members_are_not_opened(tmp_path):
 def test_the_limits_are_the_callers(tmp_path, limits, field):
     path = tmp_path / "d.h5"
     write_dataset(path, small())
-    with pytest.raises(InvalidInput) as refused, opened(path, limits) as reader:
+    with pytest.raises(InvalidInput, match=f"^{field}: "), opened(path, limits) as reader:
         dataset_of(reader, waveform_in)
-    assert refused.value.field == field
 
 
 def test_text_is_made_printable(tmp_path):
@@ -108,3 +111,47 @@ def test_a_file_that_is_deleted_while_it_is_opened_is_rejected(tmp_path, monkeyp
     monkeypatch.setattr(h5py, "File", delete_first)
     with pytest.raises(InvalidInput, match="accepted: a whole HDF5 file"), opened(path):
         pass
+
+
+class Endless(io.RawIOBase):
+    """Zeros without end, as a packed file may hold; counts what was asked of it."""
+
+    def __init__(self):
+        self.read_bytes = 0
+
+    def read(self, count=-1):
+        assert count >= 0, "all of it"
+        self.read_bytes += count
+        return b"\0" * count
+
+
+def test_no_more_is_read_than_was_declared():
+    endless = Endless()
+    assert whole(endless, 1000) == b"\0" * 1000
+    assert endless.read_bytes == 1000
+
+
+def test_a_file_that_ends_early_says_where():
+    with pytest.raises(InvalidInput, match="3 bytes of values; accepted: 4"):
+        whole(io.BytesIO(b"abc"), 4)
+
+
+def test_bytes_of_a_declared_volume():
+    assert declared("sizes", (2, 3, 4), np.dtype("<f8")) == 192
+    side = round((LARGEST_BYTES) ** (1 / 3))
+    declared("sizes", (side, side, side), np.dtype("u1"))
+    with pytest.raises(InvalidInput, match="sizes: found shape"):
+        declared("sizes", (side, side, side), np.dtype("u2"))
+
+
+@pytest.mark.parametrize("error", [StopIteration, ZeroDivisionError, UnicodeError, EOFError, RecursionError])
+def test_reader_errors_become_damage(error):
+    with pytest.raises(InvalidInput, match="damaged"), rejecting_damage("file", "a whole one"):
+        raise error("odd")
+
+
+@pytest.mark.parametrize("error", [MemoryError(), InvalidInput("a", "b", "c")])
+def test_specific_errors_are_passed_on(error):
+    with pytest.raises(type(error)) as caught, rejecting_damage("file", "a whole one"):
+        raise error
+    assert caught.value is error

@@ -1,16 +1,22 @@
-"""Reconstruction files: exact round trips, the promised names, and refusals."""
+"""Reconstruction files: exact round trips, the promised names, and refusals; every list of quantities."""
 
 import json
-from dataclasses import replace
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import get_args
 
 import h5py
 import numpy as np
 import pytest
 
 from bentray_kernels.errors import InvalidInput
-from bentray_kernels.tomography import Iteration, Settings
+from bentray_kernels.tomography import Iteration, Reconstruction, Settings
 from bentray_kernels.tomography.numerics import recorded
+from bentray_service.interactive.result import Result
+from bentray_workers.files.quantities import QUANTITIES, QuantityName
 from bentray_workers.files.reconstruction import read_reconstruction, write_reconstruction
+from bentray_workers.images.report import COLORMAPS
 
 from .reconstructions import made
 from .test_dataset_files import assert_same
@@ -128,9 +134,8 @@ def test_a_wrong_field_is_named(tmp_path, field, change):
     write_reconstruction(tmp_path / "r.h5", made())
     with h5py.File(tmp_path / "r.h5", "a") as file:
         change(file)
-    with pytest.raises(InvalidInput) as refused:
+    with pytest.raises(InvalidInput, match=f"^{field}: "):
         read_reconstruction(tmp_path / "r.h5")
-    assert refused.value.field == field
 
 
 def test_a_file_cut_short_is_rejected(tmp_path):
@@ -140,3 +145,19 @@ def test_a_file_cut_short_is_rejected(tmp_path):
         (tmp_path / "r.h5").write_bytes(whole[:length])
         with pytest.raises(InvalidInput):
             read_reconstruction(tmp_path / "r.h5")
+
+
+PAGE = Path(__file__).resolve().parents[3] / "service" / "bentray_service" / "web" / "static"
+
+
+def test_names_are_those_of_requests_and_results() -> None:
+    assert get_args(QuantityName) == tuple(QUANTITIES)
+    assert set(QUANTITIES) <= {field.name for field in fields(Reconstruction)}
+    assert set(QUANTITIES) <= set(dir(Result))
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+def test_each_has_colours_and_is_on_the_page(name: str) -> None:
+    assert name == "speed" or name in COLORMAPS
+    for script in ("viewer/quantities.js", "parts/export_menu.js"):
+        assert re.search(rf"\b{name}: ", (PAGE / script).read_text()), script

@@ -20,11 +20,6 @@ def stored(tmp_path: Path) -> Path:
     return tmp_path / "volume.h5"
 
 
-def test_an_export_is_written(stored: Path, tmp_path: Path) -> None:
-    export_volume(stored, target=tmp_path / "volume.npy", name="npy")
-    assert np.load(tmp_path / "volume.npy").shape == (3, 4, 5)
-
-
 def test_a_volume_deleted_during_its_export_is_named(
     stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,10 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
+
+from bentray_kernels.errors import InvalidInput
+from bentray_workers.foreign_scans import convert_dataset
 
 ELEMENTS = 8
 SAMPLES = 20
@@ -48,3 +52,12 @@ def write_matlab73(path: Path, variables: dict[str, np.ndarray], *, header: bool
     if header:
         with path.open("r+b") as raw:
             raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
+def refused(source: Path, match: str = ": found ") -> InvalidInput:
+    """The refusal of a scan, which leaves no file."""
+    target = source.with_name("canonical.h5")
+    with pytest.raises(InvalidInput, match=match) as caught:
+        convert_dataset(source, target)
+    assert not target.exists()
+    return caught.value

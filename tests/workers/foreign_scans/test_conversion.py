@@ -27,6 +27,7 @@ from .scans import (
     T0_S,
     delta_tof,
     positions,
+    refused,
     traces,
     travel_times,
     waveforms,
@@ -206,11 +207,9 @@ def test_the_upload_format_itself_is_copied(tmp_path):
 )  # fmt: skip
 def test_names_missing_or_invalid_input(tmp_path, write, variables, field):
     write(tmp_path / "scan.bin", variables())
-    with pytest.raises(InvalidInput) as refused:
-        convert_dataset(tmp_path / "scan.bin", tmp_path / "canonical.h5")
-    assert refused.value.field == field
-    assert refused.value.accepted
-    assert not (tmp_path / "canonical.h5").exists()
+    error = refused(tmp_path / "scan.bin")
+    assert error.field == field
+    assert error.accepted
 
 
 @pytest.mark.parametrize(
@@ -225,8 +224,7 @@ def test_names_missing_or_invalid_input(tmp_path, write, variables, field):
 @pytest.mark.parametrize("packed", [False, True])
 def test_non_numeric_arrays_are_rejected_only_when_used(tmp_path, value, what, packed):
     savemat(tmp_path / "scan.mat", travel_times() | {"delta_tof": value}, do_compression=packed)
-    with pytest.raises(InvalidInput, match=f"delta_tof: found {what}"):
-        convert_dataset(tmp_path / "scan.mat", tmp_path / "canonical.h5")
+    refused(tmp_path / "scan.mat", f"delta_tof: found {what}")
     savemat(tmp_path / "scan.mat", travel_times() | {"notes": value}, do_compression=packed)
     assert convert_dataset(tmp_path / "scan.mat", tmp_path / "canonical.h5").picked
 
@@ -245,8 +243,7 @@ def test_pickles_in_archives_are_never_loaded(tmp_path):
     with zipfile.ZipFile(tmp_path / "other.npz", "w") as archive:
         archive.writestr("geometry/element_position_m.npy", pickle.dumps(Trap()))
     for name in ("scan.npz", "other.npz"):
-        with pytest.raises(InvalidInput):
-            convert_dataset(tmp_path / name, tmp_path / "canonical.h5")
+        refused(tmp_path / name)
     assert opened == []
 
 
@@ -291,8 +288,7 @@ def test_bombs_are_not_unpacked(tmp_path):
 def _refused_in_little_memory(tmp_path: Path, name: str) -> int:
     tracemalloc.start()
     try:
-        with pytest.raises(InvalidInput):
-            convert_dataset(tmp_path / name, tmp_path / "canonical.h5")
+        refused(tmp_path / name)
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -306,8 +302,7 @@ def test_flipped_bit_in_an_archive_fails_its_checksum(tmp_path):
         traces_at = archive.getinfo("waveform/object.npy")
         content[traces_at.header_offset + traces_at.compress_size // 2] ^= 1
     (tmp_path / "scan.npz").write_bytes(content)
-    with pytest.raises(InvalidInput, match=r"waveform/object: found damaged data .*CRC"):
-        convert_dataset(tmp_path / "scan.npz", tmp_path / "canonical.h5")
+    refused(tmp_path / "scan.npz", r"waveform/object: found damaged data .*CRC")
 
 
 @pytest.mark.parametrize("byte", [-1, -4])
@@ -375,14 +370,11 @@ def test_an_external_link_is_not_followed(tmp_path):
     write_matlab73(tmp_path / "scan.mat", {"element_positions": positions()}, header=False)
     with h5py.File(tmp_path / "scan.mat", "r+") as file:
         file["delta_tof"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "delta_tof")
-    with pytest.raises(InvalidInput, match="delta_tof: found a soft or external link"):
-        convert_dataset(tmp_path / "scan.mat", tmp_path / "canonical.h5")
+    refused(tmp_path / "scan.mat", "delta_tof: found a soft or external link")
 
 
 def test_rejects_unknown_formats(tmp_path):
     np.savez(tmp_path / "scan.npz", something=np.arange(3))
-    with pytest.raises(InvalidInput, match="a NumPy archive with the arrays something"):
-        convert_dataset(tmp_path / "scan.npz", tmp_path / "canonical.h5")
+    refused(tmp_path / "scan.npz", "a NumPy archive with the arrays something")
     (tmp_path / "scan.txt").write_text("no scan")
-    with pytest.raises(InvalidInput, match=r"not HDF5.*accepted: a scan in HDF5, MATLAB or NumPy"):
-        convert_dataset(tmp_path / "scan.txt", tmp_path / "canonical.h5")
+    refused(tmp_path / "scan.txt", r"not HDF5.*accepted: a scan in HDF5, MATLAB or NumPy")

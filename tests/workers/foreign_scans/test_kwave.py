@@ -8,11 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
-from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset
 from bentray_workers.foreign_scans import convert_dataset
 
-from .scans import ELEMENTS, RATE_HZ, SAMPLES, positions
+from .scans import ELEMENTS, RATE_HZ, SAMPLES, positions, refused
 
 EMITTERS = (1, 4, 6)
 RECEIVERS = (5, 0, 3, 2)
@@ -103,7 +102,5 @@ def test_the_water_may_be_left_out(tmp_path):
 )
 def test_names_missing_or_invalid_input(tmp_path, change, field):
     result = {name: content for name, content in (members() | change).items() if content is not None}
-    with pytest.raises(InvalidInput) as refused:
-        convert_dataset(written(tmp_path, result), tmp_path / "canonical.h5")
-    assert refused.value.field == field
+    refused(written(tmp_path, result), f"^{field}: ")
     assert [path.name for path in tmp_path.iterdir()] == ["scan.zip"]

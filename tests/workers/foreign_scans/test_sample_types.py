@@ -14,7 +14,7 @@ from bentray_workers.files.hdf5_reading import opened
 from bentray_workers.foreign_scans import convert_dataset
 
 from .hdf5_scans import EMITTERS, openusct_fields, write_fields, zea_fields
-from .scans import ELEMENTS, RATE_HZ, positions, traces, waveforms, write_matlab73
+from .scans import ELEMENTS, RATE_HZ, positions, refused, traces, waveforms, write_matlab73
 
 INTEGERS = [
     order + kind + size for kind in "iu" for size in "1248" for order in ("<" if size == "1" else "<>")
@@ -103,14 +103,12 @@ def test_complex_traces_are_named_with_what_to_do(
     tmp_path: Path, write: Callable[[Path, np.ndarray], None], dtype: str
 ):
     write(tmp_path / "scan", samples("f8").astype(dtype))
-    with pytest.raises(InvalidInput, match=r"found complex numbers.*of complex traces the real part"):
-        convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5")
+    refused(tmp_path / "scan", r"found complex numbers.*of complex traces the real part")
 
 
 def test_two_channels_of_zea_are_named_as_iq_data(tmp_path: Path):
     write_fields(tmp_path / "scan", zea_fields(**{"data/raw_data": np.zeros((1, 3, 4, 8, 2), np.float32)}))
-    with pytest.raises(InvalidInput, match=r"2 channels.*of IQ data the real part after modulation"):
-        convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5")
+    refused(tmp_path / "scan", r"2 channels.*of IQ data the real part after modulation")
 
 
 @pytest.mark.parametrize(
@@ -132,6 +130,4 @@ def test_complex_numbers_in_hdf5_are_no_records(tmp_path: Path, names: tuple[str
 @pytest.mark.parametrize("count", [-ELEMENTS, 0, ELEMENTS + 1, ELEMENTS + 0.5, np.nan, "eight"])
 def test_a_count_of_elements_must_be_that_of_the_arrays(tmp_path: Path, count: object):
     write_fields(tmp_path / "scan", openusct_fields(**{"geometry@n_elements": count}))
-    with pytest.raises(InvalidInput) as refused:
-        convert_dataset(tmp_path / "scan", tmp_path / "canonical.h5")
-    assert refused.value.field == "geometry@n_elements"
+    refused(tmp_path / "scan", r"^geometry@n_elements: ")

@@ -8,12 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from bentray_kernels.errors import InvalidInput
 from bentray_workers.images.plane import plane_of
 from bentray_workers.images.plane_picture import MAX_WIDTH_FRACTION, plane_png, scale_of
 from bentray_workers.images.slice_style import SliceStyle
 
-from .pixels import near, pixels
+from ..pixels import near, pixels_of
 
 RAMP = np.arange(60.0).reshape(3, 4, 5)
 PLANE = plane_of(RAMP, (1e-2, 1e-2, 2e-2), (0.0, 0.0, 0.0), "x", 1)
@@ -57,7 +56,7 @@ def test_the_bare_image_has_a_pixel_a_node_to_scale():
 
 
 def test_bare_image_contains_only_values():
-    picture = pixels(drawn_with(frame=False, size=400, colormap="gray"))
+    picture = pixels_of(drawn_with(frame=False, size=400, colormap="gray"))
     middles = [int(400 * (k + 0.5) / 5) for k in range(5)], [int(160 * (k + 0.5) / 4) for k in range(4)]
     computed = picture[np.ix_(*middles)][..., 0].astype(float)
     # Rows run down, z runs up.
@@ -66,7 +65,7 @@ def test_bare_image_contains_only_values():
 
 
 def test_the_scale_bar_is_as_long_as_it_says():
-    plain, barred = (pixels(drawn_with(frame=False, size=1000, scale_bar=bar)) for bar in (False, True))
+    plain, barred = (pixels_of(drawn_with(frame=False, size=1000, scale_bar=bar)) for bar in (False, True))
     assert near(plain, WHITE)[0].size == 0
     rows, columns = near(barred, WHITE)
     counts = np.bincount(rows)
@@ -82,19 +81,3 @@ def test_scales_are_round_and_short_enough(width):
     assert scale <= MAX_WIDTH_FRACTION * width
     assert scale > 0.39 * MAX_WIDTH_FRACTION * width
     assert float(f"{scale:.1e}"[0]) in (1.0, 2.0, 5.0)
-
-
-@pytest.mark.parametrize(
-    ("how", "field"),
-    [
-        ({"size": 199}, "size"),
-        ({"size": 31, "frame": False}, "size"),
-        ({"size": 4097}, "size"),
-        ({"colormap": "jet"}, "colormap"),
-        ({"interpolation": "linear"}, "interpolation"),
-    ],
-)
-def test_refusals(how, field):
-    with pytest.raises(InvalidInput) as caught:
-        SliceStyle(**how)
-    assert caught.value.field == field

@@ -12,7 +12,7 @@ from bentray_kernels.tomography.model_selection.selection import explain_candida
 from bentray_workers.images.report import report_png
 
 from ..files.reconstructions import SPACING_M, made, truth
-from .pixels import pixels
+from ..pixels import pixels_of
 
 
 def panels(undrawn) -> list[str]:
@@ -154,7 +154,7 @@ def test_a_middle_slice_without_a_node_in_the_region_is_drawn(empty):
     solid = Truth(np.full((24, 24, 3), 1500.0), volume().spacing_m, volume().origin_m, axes="x,y,z")
     roi = np.zeros((24, 24, 3), bool)
     roi[5:9, 5:9, 0 if empty else 1] = True
-    assert pixels(report_png(volume(), solid, roi)).shape[0] > 500
+    assert pixels_of(report_png(volume(), solid, roi)).shape[0] > 500
 
 
 def test_many_even_slices_are_shown_from_the_side_too(undrawn):
@@ -180,5 +180,5 @@ def test_few_or_uneven_slices_are_not(undrawn, slices):
 
 
 def test_a_plain_report_is_drawn_with_every_panel():
-    height, width, _ = pixels(report_png(made())).shape
+    height, width, _ = pixels_of(report_png(made())).shape
     assert width > height > 900

@@ -183,14 +183,12 @@ def test_waves_are_planned_for():
     found = plan(heard, asked, [LARGE])
     assert {"start_band", "evaluate_emitter", "update_image"} < set(found.call_bytes)
     assert found.tasks > plan(heard, replace(asked, method="auto"), [LARGE]).tasks
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^minutes: "):
         plan(heard, replace(asked, nodes=32), [WorkerCapacity(160 * MIB, BOTH)])
-    assert refusal.value.field == "minutes"
     # ``auto`` judges by waves; in space by times alone.
     tried = replace(asked, method="auto", nodes=32)
-    with pytest.raises(InvalidInput) as refusal:
+    with pytest.raises(InvalidInput, match=r"^method: "):
         plan(heard, tried, [WorkerCapacity(100 * MIB, BOTH)])
-    assert refusal.value.field == "method"
     assert "validate_image" not in plan(replace(heard, in_space=True, height_m=0.1), tried, []).call_bytes
 
 

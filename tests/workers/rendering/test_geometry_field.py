@@ -1,4 +1,6 @@
-"""Geometry fields by tasks: as the kernels make them, cancelled, resumed, and one per content."""
+"""Geometry fields: settings and views are checked; made by tasks as by the kernels, resumed, once each."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,12 +8,14 @@ import pytest
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.geometry_field.tables.inner_field import build_inner_rows, inner_field, spread_points
 from bentray_kernels.geometry_field.tables.outer_field import build_rows, outer_field
+from bentray_kernels.geometry_field.tracing.lookup_scene import WAYS
 from bentray_kernels.meshes.example_surfaces import bumpy_ball, torus
 from bentray_kernels.meshes.surface import surface_of
 from bentray_kernels.task_graph import Cancelled
 from bentray_workers.files.geometry_field_folder import FieldFiles, mapped, read_chart
 from bentray_workers.rendering import field_tasks, geometry_field
-from bentray_workers.rendering.field_settings import FieldSettings
+from bentray_workers.rendering.field_settings import MAX_FACES, FieldSettings, check_faces
+from bentray_workers.rendering.field_view import LOOKUPS, FieldView
 from bentray_workers.rendering.geometry_field import build_field, bytes_of
 
 from .field_folders import SMALL, stored
@@ -158,3 +162,53 @@ def test_tasks_that_run_again_change_nothing(path, tmp_path, small_batches):
     field_tasks.outer_rows(files.layout.parent, 6, 0, 32, done / "outer-00000.json")
     field_tasks.inner_rows(files.layout.parent, 4, 0, 32, done / "inner-00000.json")
     assert [table.read_bytes() for table in (*files.outer, files.inner)] == before
+
+
+OTHER = {"samples": 12, "inner_samples": 8, "divisions": 4, "image_size": 129, "image_threshold": 1e-3}
+
+
+def test_every_setting_and_the_mesh_name_the_field():
+    plain = FieldSettings()
+    assert set(OTHER) == set(plain.plain())
+    names = {replace(plain, **{name: value}).content("a") for name, value in OTHER.items()}
+    names |= {plain.content("a"), plain.content("b")}
+    assert len(names) == len(OTHER) + 2
+    assert FieldSettings().content("a") == plain.content("a")
+
+
+def test_a_mesh_that_is_too_large():
+    check_faces(MAX_FACES)
+    with pytest.raises(InvalidInput, match="mesh"):
+        check_faces(MAX_FACES + 1)
+
+
+def test_published_lookups_have_a_largest_number_of_samples():
+    FieldView().check_samples(48)
+    FieldView(eye="uv-linear").check_samples(24)
+    for name in ("lookup", "eye"):
+        with pytest.raises(InvalidInput, match="samples"):
+            FieldView(**{name: "uv-nearest"}).check_samples(25)
+    assert set(LOOKUPS.values()) <= set(WAYS)
+
+
+@pytest.mark.parametrize(
+    ("scene", "places", "accepted"),
+    [
+        ("object", (0.0, 0.0), "none: this scene has one object"),
+        ("two-mirrors", (1.0, 2.0), "none, or 4: x and y of each object"),
+        ("mirror-ball", (0.0,) * 4, "none, or 6: x and y of each object"),
+        ("two-mirrors", (0.0, 0.0, 0.0, 5.1), "a number from -5 to 5 m"),
+        ("two-mirrors", (0.0, 0.0, 0.0, float("nan")), "a number from -5 to 5 m"),
+    ],
+)
+def test_positions_are_those_of_the_objects(scene, places, accepted):
+    with pytest.raises(InvalidInput, match="positions_m") as caught:
+        FieldView(scene=scene, positions_m=places)
+    assert caught.value.accepted == accepted
+    view = FieldView(scene="two-mirrors", positions_m=(0.0, 1.0, 2.0, 3.0))
+    assert view.plain()["positions_m"] == [0.0, 1.0, 2.0, 3.0]
+
+
+def test_too_many_rays():
+    with pytest.raises(InvalidInput, match="rays"):
+        FieldView(width=4096, height=4096, rays=2)

@@ -1,9 +1,13 @@
 """Pictures through volumes: straight where nothing refracts, the same in tiles and on a cluster."""
 
 from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bentray_kernels.phantoms import ONE_HOLE, FringeSphere, sampled
 from bentray_workers.files.volume import Volume, write_volume
@@ -12,7 +16,7 @@ from bentray_workers.rendering import refraction
 from bentray_workers.rendering.refraction import draw_tile, frame_of, picture_png, tile_image
 from bentray_workers.rendering.refraction_view import RefractionView
 from bentray_workers.rendering.scene_cache import scene_at
-from bentray_workers.rendering.tiles import stack_png, tile_rows
+from bentray_workers.rendering.tiles import TASK_RAYS, stack_png, tile_rows
 
 from ..pixels import pixels_of
 
@@ -152,3 +156,18 @@ def test_a_picture_of_ones_own(path):
 def test_a_task_has_about_a_second_of_work(view, rows):
     assert [last - first for first, last in tile_rows(view)] == rows
     assert tile_rows(view)[-1][1] == view.height
+
+
+SIDES = st.integers(1, 4096)
+
+
+@given(SIDES, SIDES, st.integers(1, 8))
+def test_every_row_is_in_exactly_one_tile(width, height, times):
+    parts = tile_rows(SimpleNamespace(width=width, height=height, times=times))
+    assert [row for first, last in parts for row in range(first, last)] == list(range(height))
+    rays = [(last - first) * width * times**2 for first, last in parts]
+    assert all(
+        count <= TASK_RAYS or last - first == 1 for count, (first, last) in zip(rays, parts, strict=True)
+    )
+    # No strip could take the rows of the next one too.
+    assert all(one + other > TASK_RAYS for one, other in pairwise(rays[:-1]))

@@ -1,19 +1,25 @@
-"""Turntables: every picture once, from all sides, in one file; stopped in between."""
+"""Turntables: every picture once, from all sides, in one file; stopped in between; planned."""
 
+import json
 import struct
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from PIL import Image
 
 from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import TWO_HOLES, sampled
 from bentray_kernels.task_graph import Cancelled
+from bentray_workers.cluster.capacities import MIB, WorkerCapacity
 from bentray_workers.files.volume import Volume, write_volume
 from bentray_workers.rendering.refraction import picture_png
 from bentray_workers.rendering.refraction_view import RefractionView
-from bentray_workers.rendering.turntable import Turntable, draw_turntable
+from bentray_workers.rendering.turntable import Turntable, TurntableGraph, draw_turntable
+from bentray_workers.rendering.turntable_planning import plan_turntable
 
 from ..pixels import pixels_of
 
@@ -41,16 +47,9 @@ def test_frames_go_round():
     assert Turntable(azimuth_deg=10.0, turn_deg=-40.0, frames=2).frame(1).azimuth_deg == 350.0
 
 
-@pytest.mark.parametrize(
-    ("given", "field"),
-    [
-        ({"frames": 720, "width": 1024}, "frames"),
-    ],
-)
-def test_rejects_invalid_input(given, field):
-    with pytest.raises(InvalidInput) as caught:
-        Turntable(**given)
-    assert caught.value.field == field
+def test_too_many_pixels_are_refused():
+    with pytest.raises(InvalidInput, match=r"^frames: "):
+        Turntable(frames=720, width=1024)
 
 
 def test_a_zip_holds_each_picture(cluster, path, folder, tmp_path):
@@ -101,3 +100,46 @@ def test_it_stops_between_pictures(cluster, path, folder, tmp_path):
         )
     assert told[-1].done < 200
     assert not list(tmp_path.glob("t.zip*"))
+
+
+WORKER = WorkerCapacity(1024 * MIB, ("recon", "render"))
+
+
+SHAPE = (64, 48, 32)
+
+
+@given(st.sampled_from(["frames", "width", "height", "depth"]), st.integers(1, 64))
+def test_more_of_anything_is_more_work(field, by):
+    asked = Turntable(frames=10, width=200, height=300)
+    more = replace(asked, **{field: getattr(asked, field) + by})
+    before, after = (plan_turntable(SHAPE, one, [WORKER]) for one in (asked, more))
+    assert after.work_s > before.work_s
+    assert after.tasks >= before.tasks
+    assert plan_turntable(SHAPE, asked, [WORKER] * 4).work_s < before.work_s
+    assert json.loads(json.dumps(before.to_dict()))["largest_bytes"] == max(before.call_bytes.values())
+
+
+def test_rays_cost_as_the_picture_has_them():
+    whole, half, lit = (
+        plan_turntable(SHAPE, Turntable(**one), [WORKER])
+        for one in ({"ray_spacing": 1}, {"ray_spacing": 2}, {"mode": "shaded"})
+    )
+    assert whole.work_s / half.work_s == pytest.approx(4.0, rel=0.05)
+    assert lit.work_class != whole.work_class == half.work_class
+    assert lit.work_s < whole.work_s
+
+
+def test_the_tasks_are_those_of_the_graph(tmp_path):
+    asked = Turntable(frames=5, width=1024, height=1024)
+    graph = TurntableGraph(tmp_path / "volume.h5", asked, tmp_path / "target", tmp_path)
+    drawing = graph.first()
+    # Each frame is written after its tiles, and the file after all frames.
+    assert plan_turntable(SHAPE, asked, ()).tasks == len(drawing) + asked.frames + 1
+
+
+def test_too_little_memory_is_refused():
+    small = WorkerCapacity(300 * MIB, ("recon", "render"))
+    with pytest.raises(InvalidInput, match="volume") as refusal:
+        plan_turntable((512, 512, 512), Turntable(), [small])
+    assert "bytes" in str(refusal.value)
+    assert plan_turntable((512, 512, 512), Turntable(), ()).workers == 0

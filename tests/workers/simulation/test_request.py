@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bentray_kernels.errors import InvalidInput
 from bentray_kernels.phantoms import DETAILED_SIDE_M
 from bentray_workers.simulation.plane import SimulationSettings, plane_phantom
 from bentray_workers.simulation.request import SAMPLE, PhantomScan
@@ -54,6 +55,24 @@ def test_request_selects_the_phantom():
     assert PhantomScan(phantom="table6-vertical").chosen() == SimulationSettings(phantom="table6-vertical")
     in_space = PhantomScan(phantom="table7", waveform=True, nodes=256, elements=128).chosen()
     assert in_space == VolumeWaveSettings()
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes", "field"),
+    [
+        (SimulationSettings, {"snr": 10.0, "noise_s": 1e-8}, "snr"),
+        (VolumeSimulationSettings, {"refinement": 2}, "refinement"),
+        (VolumeSimulationSettings, {"array": "rings"}, "array"),
+        (VolumeSimulationSettings, {"array": "spiral"}, "array"),
+        (WaveSimulationSettings, {"frequency_hz": 9e6, "side_m": 1.0}, "frequency_hz"),
+        (WaveSimulationSettings, {"emissions": 200}, "emissions"),
+        (VolumeWaveSettings, {"frequency_hz": 2e6}, "frequency_hz"),
+        (VolumeWaveSettings, {"frequency_hz": 3e5, "side_m": 0.6}, "frequency_hz"),
+    ],
+)
+def test_settings_that_do_not_go_together_are_refused(kind, changes, field):
+    with pytest.raises(InvalidInput, match=f"^{field}: "):
+        kind(**changes)
 
 
 @pytest.mark.parametrize("phantom", ["detailed", "breast"])

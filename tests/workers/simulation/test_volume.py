@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentray_kernels.errors import InvalidInput
 from bentray_workers.files.dataset import read_dataset, write_dataset
 from bentray_workers.simulation.simulation_run import simulate
 from bentray_workers.simulation.volume import VolumeSimulationSettings
@@ -70,17 +69,3 @@ def test_noise_has_the_requested_ratio(moved):
 
 def test_amplitudes_are_simulated_only_on_request():
     assert simulate(replace(SMALL, attenuation=False, slices=2)).log_ratio_np is None
-
-
-@pytest.mark.parametrize(
-    ("change", "field"),
-    [
-        ({"refinement": 2}, "refinement"),
-        ({"array": "rings"}, "array"),
-        ({"array": "spiral"}, "array"),
-    ],
-)
-def test_bad_settings_are_named(change, field):
-    with pytest.raises(InvalidInput) as refusal:
-        replace(SMALL, **change)
-    assert refusal.value.field == field

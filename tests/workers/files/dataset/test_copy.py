@@ -81,9 +81,8 @@ def test_damaged_traces_are_named_and_leave_nothing(tmp_path):
     middle = position.byte_offset + position.size // 2
     content[middle : middle + 20] = bytes(20)
     path.write_bytes(content)
-    with pytest.raises(InvalidInput) as refused:
+    with pytest.raises(InvalidInput, match=r"^waveform/object: "):
         copy_dataset(path, tmp_path / "t.h5")
-    assert refused.value.field == "waveform/object"
     assert [left.name for left in tmp_path.iterdir()] == ["s.h5"]
 
 
