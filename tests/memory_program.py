@@ -1,4 +1,4 @@
-"""Figures of a program of the tests that measures memory, and those that a plan states wrongly."""
+"""Memory that a module of the tests measures in a process of its own, and what a plan states wrongly."""
 
 import json
 import os
@@ -10,16 +10,18 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 
 
-def measured(program: Path, *arguments: object) -> Any:
-    """What the program prints as JSON; freed arrays go back at once, so that a fork's peak is its own."""
+def measured(module: str, *arguments: object) -> Any:
+    """What ``main`` of a module returns in a new process, in which freed arrays go back at once: a fork's
+    peak is its own.
+    """
     environment = {
         **os.environ,
-        "PYTHONPATH": os.pathsep.join((str(ROOT), str(program.parent))),
+        "PYTHONPATH": str(ROOT),
         "MALLOC_MMAP_THRESHOLD_": "65536",
         "MALLOC_TRIM_THRESHOLD_": "65536",
     }
-    words = [each if isinstance(each, str) else json.dumps(each) for each in arguments]
-    command = [sys.executable, program, *words]
+    code = f"import json, sys, {module} as module; print(json.dumps(module.main(*json.loads(sys.argv[1]))))"
+    command = [sys.executable, "-c", code, json.dumps(arguments)]
     return json.loads(subprocess.run(command, env=environment, capture_output=True, check=True).stdout)
 
 

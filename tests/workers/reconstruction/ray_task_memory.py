@@ -1,13 +1,9 @@
-"""Peak memory of the calls of a reconstruction, in processes of their own: prints bytes by task as JSON.
+"""Peak memory of the calls of a reconstruction, in processes of their own.
 
-Called as ``ray_task_memory.py SETTINGS ELEMENTS HEIGHTS``, the settings as JSON, with the repository on the
-path; 0 heights for one slice. As in ``benchmarks/shared/_peak_memory.py`` each task runs in a fork of a warm
-process, less a fork that does nothing; the bytes of what was there before are added: dataset, problem and
-arguments.
+As in ``benchmarks/shared/_peak_memory.py`` each task runs in a fork of a warm process, less a fork that does
+nothing; the bytes of what was there before are added: dataset, problem and arguments.
 """
 
-import json
-import sys
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -83,14 +79,11 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     return {name: max(most for (one, _), most in found.items() if one == name) for name, _ in found}
 
 
-def main(settings: dict[str, Any], elements: int, heights: int) -> None:
+def main(settings: dict[str, Any], elements: int, heights: int) -> dict[str, int]:
+    """Bytes by task; 0 heights for one slice."""
     asked = Settings.from_values(**{"method": "sart", **settings})
     # Loading compiled code takes memory too, here and not in the forks.
     small = Settings.from_values(**{"method": "sart", **settings, "nodes": 16})
     for _ in range(2):
         bytes_of(scan(8, heights and 2), small)
-    sys.stdout.write(json.dumps(bytes_of(scan(elements, heights), asked)) + "\n")
-
-
-if __name__ == "__main__":
-    main(json.loads(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
+    return bytes_of(scan(elements, heights), asked)

@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +22,6 @@ from bentray_workers.reconstruction.planning import plan
 
 from ...memory_program import measured, wrong
 
-PROGRAM = Path(__file__).with_name("ray_task_memory.py")
 RING = Summary(256, 256, 256 * 256, 1, False, 0.0, 0.16, 0, True)
 BOTH = ("recon", "render")
 LARGE, SMALL = WorkerCapacity(8 * 1024 * MIB, BOTH), WorkerCapacity(560 * MIB, BOTH)
@@ -60,7 +58,7 @@ def ring(elements, heights):
 )
 def test_tasks_stay_within_the_planned_memory(asked, elements, heights):
     settings = {**asked, "iterations": 2}
-    taken = measured(PROGRAM, settings, elements, heights)
+    taken = measured(f"{__package__}.ray_task_memory", settings, elements, heights)
     parts = ray_task_parts(ring(elements, heights), Settings.from_values(**{"method": "sart", **settings}))
     # What freed arrays leave in a worker is not measured here.
     told = {name: sum(sizes.values()) - sizes.get("freed arrays", 0) for name, sizes in parts.items()}

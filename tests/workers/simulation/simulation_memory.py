@@ -1,11 +1,8 @@
-"""Peak memory of the tasks of simulated scans, in processes of their own; see ``ray_task_memory``.
+"""Peak memory of the tasks of simulated scans, each in a process; see ``ray_task_memory``.
 
-Called as ``simulation_memory.py SCANS``, a list of settings as JSON; prints for each scan bytes by task, as
-JSON. Parts are made up for the task that writes the file.
+Parts are made up for the task that writes the file.
 """
 
-import json
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -42,7 +39,8 @@ def bytes_of(settings: Simulated, folder: Path) -> dict[str, int]:
     return found
 
 
-def main(scans: list[dict[str, Any]]) -> None:
+def main(scans: list[dict[str, Any]]) -> list[dict[str, int]]:
+    """Bytes by task for each of the settings."""
     with tempfile.TemporaryDirectory() as outer:
         found = []
         for k, scan in enumerate([*TINY, *scans]):
@@ -55,8 +53,4 @@ def main(scans: list[dict[str, Any]]) -> None:
                 write_scan(settings, folder, folder / "scan.h5")
             else:
                 found.append(bytes_of(settings, folder))
-        sys.stdout.write(json.dumps(found) + "\n")
-
-
-if __name__ == "__main__":
-    main(json.loads(sys.argv[1]))
+        return found

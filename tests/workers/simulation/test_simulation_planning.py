@@ -1,7 +1,6 @@
 """Plans of simulations: what does not fit is refused by name, and more of anything takes more."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -17,7 +16,6 @@ from bentray_workers.simulation.simulation_planning import plan_simulation
 
 from ...memory_program import measured, wrong
 
-PROGRAM = Path(__file__).with_name("simulation_memory.py")
 WORKER = WorkerCapacity(1024 * MIB, ("recon", "render"))
 WAVES = PhantomScan(waveform=True)
 
@@ -98,5 +96,5 @@ def test_tasks_stay_within_the_planned_memory():
         {"nodes": 100, "elements": 300, "snr": 10.0},
         {"waveform": True, "frequency_hz": 3e5, "emissions": 2, "elements": 256, "snr": 9.0},
     ]
-    for scan, taken in zip(scans, measured(PROGRAM, scans), strict=True):
+    for scan, taken in zip(scans, measured(f"{__package__}.simulation_memory", scans), strict=True):
         assert not wrong(task_bytes(PhantomScan(**scan).chosen()), taken, 2.2, 24 * MIB), scan

@@ -1,11 +1,5 @@
-"""Peak memory of the calls that examine and pick a scan, in processes of their own; see ``ray_task_memory``.
+"""Peak memory of the calls that examine and pick a scan, each in a process; see ``ray_task_memory``."""
 
-Called as ``picking_task_memory.py FOLDER PICKER ELEMENTS SAMPLES WATER``; prints bytes by task as JSON, and
-those of the traces. FOLDER is for the file of the scan, WATER is ``water`` or ``object``.
-"""
-
-import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -59,14 +53,12 @@ def bytes_of(path: Path, picker: str) -> dict[str, int]:
     return found
 
 
-def main(folder: Path, picker: str, elements: int, samples: int, water: bool) -> None:
+def main(place: str, picker: str, elements: int, samples: int, water: bool) -> dict[str, int]:
+    """Bytes by task, and those of the traces; the files of scans are in the folder ``place``."""
+    folder = Path(place)
     # Loading compiled code takes memory too, here and not in the forks.
     write_dataset(folder / "small.h5", scan(12 if water else 48, 700, water))
     bytes_of(folder / "small.h5", picker)
     write_dataset(folder / "scan.h5", scan(elements, samples, water))
     found = bytes_of(folder / "scan.h5", picker)
-    sys.stdout.write(json.dumps({**found, "traces": (4 if water else 2) * elements**2 * samples}) + "\n")
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), sys.argv[5] == "water")
+    return {**found, "traces": (4 if water else 2) * elements**2 * samples}

@@ -1,7 +1,6 @@
 """The planned memory of a waveform refinement is what its tasks use; it grows with the scan."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,7 +25,6 @@ from bentray_workers.reconstruction.memory.waveform_memory import wave_task_byte
 from ....kernels.tomography.waveform.scans import CENTRE_HZ, ELEMENTS, RADIUS, RATE_HZ, WATER, scan
 from ....memory_program import measured, wrong
 
-PROGRAM = Path(__file__).with_name("wave_task_memory.py")
 SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
 
 
@@ -42,7 +40,7 @@ SCAN = Traces(128, 128, 300, 4, 2.5e6, 2.5e5, 1500.0)
     ],
 )
 def test_tasks_stay_within_the_planned_memory(asked, elements, samples):
-    taken = measured(PROGRAM, asked, elements, samples)
+    taken = measured(f"{__package__}.wave_task_memory", asked, elements, samples)
     traces = replace(SCAN, emissions=elements, receivers=elements, samples=samples)
     told = wave_task_bytes(traces, 0.1, Settings.from_values(method="waveform", **asked))
     assert not wrong(told, taken, 1.5, 4 * MIB)

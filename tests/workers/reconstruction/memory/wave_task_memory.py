@@ -1,11 +1,5 @@
-"""Peak memory of the calls of a refinement by waveforms, in processes of their own; see ``ray_task_memory``.
+"""Peak memory of the calls of a refinement by waveforms, each in a process; see ``ray_task_memory``."""
 
-Called as ``wave_task_memory.py SETTINGS ELEMENTS SAMPLES``, the settings as JSON; prints bytes by call as
-JSON, of the last of the bands.
-"""
-
-import json
-import sys
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -108,12 +102,8 @@ def bytes_of(dataset: Dataset, settings: Settings) -> dict[str, int]:
     return found
 
 
-def main(settings: dict[str, Any], elements: int, samples: int) -> None:
+def main(settings: dict[str, Any], elements: int, samples: int) -> dict[str, int]:
     # Loading compiled code takes memory too, here and not in the forks.
     bytes_of(scan(16, 260), Settings.from_values(method="waveform", bands=2))
     asked = Settings.from_values(method="waveform", **settings)
-    sys.stdout.write(json.dumps(bytes_of(scan(elements, samples), asked)) + "\n")
-
-
-if __name__ == "__main__":
-    main(json.loads(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
+    return bytes_of(scan(elements, samples), asked)
