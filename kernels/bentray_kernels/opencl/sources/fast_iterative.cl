@@ -8,20 +8,19 @@
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #pragma OPENCL FP_CONTRACT OFF
 
+// Items of a work-group and points of a tile, a block with its border; distances of neighbours along each axis
+// in both. EACH(DO): DO(axis, place in the block, place of the block, blocks, entries between two) for all axes.
+#define RIM (EDGE + 2)
 #if DIMS == 2
 #define ITEMS (EDGE * EDGE)
-#define TILE ((EDGE + 2) * (EDGE + 2))
-#define ROW_X (EDGE + 2)
-#define STEP_X EDGE
-#define SIDES 4
+#define TILE (RIM * RIM)
+#define EACH(DO) DO(0, x, bx, blocks_x, blocks_y) DO(1, y, by, blocks_y, 1)
+constant const int row[DIMS] = {RIM, 1}, jump[DIMS] = {EDGE, 1};
 #else
 #define ITEMS (EDGE * EDGE * EDGE)
-#define TILE ((EDGE + 2) * (EDGE + 2) * (EDGE + 2))
-#define ROW_X ((EDGE + 2) * (EDGE + 2))
-#define ROW_Y (EDGE + 2)
-#define STEP_X (EDGE * EDGE)
-#define STEP_Y EDGE
-#define SIDES 6
+#define TILE (RIM * RIM * RIM)
+#define EACH(DO) DO(0, x, bx, blocks_x, blocks_y * blocks_z) DO(1, y, by, blocks_y, blocks_z) DO(2, z, bz, blocks_z, 1)
+constant const int row[DIMS] = {RIM * RIM, RIM, 1}, jump[DIMS] = {EDGE * EDGE, EDGE, 1};
 #endif
 #define LAST (EDGE - 1)
 #define LOWER(a, b) ((a) < (b) ? (a) : (b))
@@ -72,25 +71,20 @@ kernel void advance(global double *times, global const double *crossings, global
 {
     local double tile[TILE];
     local int falling[2];
-    local int woken[SIDES];
+    local int woken[2 * DIMS];
 
     const uint entry = active[get_group_id(0)];
     const uint blocks = blocks_x * blocks_y * blocks_z;
     const uint block = entry % blocks;
 #if DIMS == 2
     const uint y = get_local_id(0), x = get_local_id(1);
-    const uint item = x * STEP_X + y;
-    const uint here = (x + 1) * ROW_X + y + 1;
+    const uint item = x * jump[0] + y, here = (x + 1) * row[0] + y + 1, colour = (x + y) & 1;
     const uint by = block % blocks_y, bx = block / blocks_y;
-    const uint apart_x = blocks_y;
-    const uint colour = (x + y) & 1;
 #else
     const uint z = get_local_id(0), y = get_local_id(1), x = get_local_id(2);
-    const uint item = x * STEP_X + y * STEP_Y + z;
-    const uint here = (x + 1) * ROW_X + (y + 1) * ROW_Y + z + 1;
+    const uint item = x * jump[0] + y * jump[1] + z, colour = (x + y + z) & 1;
+    const uint here = (x + 1) * row[0] + (y + 1) * row[1] + z + 1;
     const uint bz = block % blocks_z, by = block / blocks_z % blocks_y, bx = block / blocks_z / blocks_y;
-    const uint apart_x = blocks_y * blocks_z, apart_y = blocks_z;
-    const uint colour = (x + y + z) & 1;
 #endif
     global double *own = times + (ulong)entry * ITEMS;
     const double crossing = crossings[(ulong)(shared ? block : entry) * ITEMS + item];
@@ -100,30 +94,17 @@ kernel void advance(global double *times, global const double *crossings, global
 
     tile[here] = now;
 #define BORDER(inside, apart, jump) ((inside) ? times[(ulong)(apart) * ITEMS + item + (jump)] : INFINITY)
-    if (x == 0)
-        tile[here - ROW_X] = BORDER(bx > 0, entry - apart_x, LAST * STEP_X);
-    if (x == LAST)
-        tile[here + ROW_X] = BORDER(bx + 1 < blocks_x, entry + apart_x, -LAST * STEP_X);
-#if DIMS == 2
-    if (y == 0)
-        tile[here - 1] = BORDER(by > 0, entry - 1, LAST);
-    if (y == LAST)
-        tile[here + 1] = BORDER(by + 1 < blocks_y, entry + 1, -LAST);
-#else
-    if (y == 0)
-        tile[here - ROW_Y] = BORDER(by > 0, entry - apart_y, LAST * STEP_Y);
-    if (y == LAST)
-        tile[here + ROW_Y] = BORDER(by + 1 < blocks_y, entry + apart_y, -LAST * STEP_Y);
-    if (z == 0)
-        tile[here - 1] = BORDER(bz > 0, entry - 1, LAST);
-    if (z == LAST)
-        tile[here + 1] = BORDER(bz + 1 < blocks_z, entry + 1, -LAST);
-#endif
+#define LOAD(axis, at, home, number, apart)                                                                    \
+    if (at == 0)                                                                                               \
+        tile[here - row[axis]] = BORDER(home > 0, entry - (apart), LAST * jump[axis]);                         \
+    if (at == LAST)                                                                                            \
+        tile[here + row[axis]] = BORDER(home + 1 < number, entry + (apart), -LAST * jump[axis]);
+    EACH(LOAD)
     const bool first = item == 0;
     if (first) {
         queued[entry] = 0;
         falling[0] = 0;
-        for (int side = 0; side < SIDES; ++side)
+        for (int side = 0; side < 2 * DIMS; ++side)
             woken[side] = 0;
         if (get_group_id(0) == 0)
             counts[(step + 2) % 3] = 0;
@@ -135,13 +116,12 @@ kernel void advance(global double *times, global const double *crossings, global
     for (uint turn = 0; going; ++turn) {
         for (uint phase = 0; phase < 2; ++phase) {
             if (colour == phase) {
-                const double a = LOWER(tile[here - ROW_X], tile[here + ROW_X]);
+                const double a = LOWER(tile[here - row[0]], tile[here + row[0]]);
+                const double b = LOWER(tile[here - row[1]], tile[here + row[1]]);
 #if DIMS == 2
-                const double b = LOWER(tile[here - 1], tile[here + 1]);
                 const double trial = first_order(a, b, crossing);
 #else
-                const double b = LOWER(tile[here - ROW_Y], tile[here + ROW_Y]);
-                const double c = LOWER(tile[here - 1], tile[here + 1]);
+                const double c = LOWER(tile[here - row[2]], tile[here + row[2]]);
                 const double trial = first_order(a, b, c, crossing);
 #endif
                 if (now - trial > enough)
@@ -159,36 +139,19 @@ kernel void advance(global double *times, global const double *crossings, global
     own[item] = now;
 
     // A neighbour's block is woken where a point at the common face can make it earlier.
+#define WAKE(axis, at, home, number, apart)                                                                    \
+    if (at == 0 && home > 0 && now < tile[here - row[axis]])                                                   \
+        woken[2 * axis] = 1;                                                                                   \
+    if (at == LAST && home + 1 < number && now < tile[here + row[axis]])                                       \
+        woken[2 * axis + 1] = 1;
     if (before - now > enough) {
-        if (x == 0 && bx > 0 && now < tile[here - ROW_X])
-            woken[0] = 1;
-        if (x == LAST && bx + 1 < blocks_x && now < tile[here + ROW_X])
-            woken[1] = 1;
-#if DIMS == 2
-        if (y == 0 && by > 0 && now < tile[here - 1])
-            woken[2] = 1;
-        if (y == LAST && by + 1 < blocks_y && now < tile[here + 1])
-            woken[3] = 1;
-#else
-        if (y == 0 && by > 0 && now < tile[here - ROW_Y])
-            woken[2] = 1;
-        if (y == LAST && by + 1 < blocks_y && now < tile[here + ROW_Y])
-            woken[3] = 1;
-        if (z == 0 && bz > 0 && now < tile[here - 1])
-            woken[4] = 1;
-        if (z == LAST && bz + 1 < blocks_z && now < tile[here + 1])
-            woken[5] = 1;
-#endif
+        EACH(WAKE)
     }
     barrier(CLK_LOCAL_MEM_FENCE);
+#define BESIDE(axis, at, home, number, apart) entry - (apart), entry + (apart),
     if (first) {
-#if DIMS == 2
-        const uint neighbours[SIDES] = {entry - apart_x, entry + apart_x, entry - 1, entry + 1};
-#else
-        const uint neighbours[SIDES] = {entry - apart_x, entry + apart_x, entry - apart_y,
-                                        entry + apart_y, entry - 1, entry + 1};
-#endif
-        for (int side = 0; side < SIDES; ++side)
+        const uint neighbours[2 * DIMS] = {EACH(BESIDE)};
+        for (int side = 0; side < 2 * DIMS; ++side)
             if (woken[side] && atomic_xchg(&queued[neighbours[side]], 1) == 0)
                 following[atomic_inc(&counts[(step + 1) % 3])] = neighbours[side];
     }

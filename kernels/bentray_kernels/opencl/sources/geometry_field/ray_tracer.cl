@@ -28,8 +28,6 @@ typedef struct {
     int own, left, within;
 } Leaving;
 
-Vector unit(Vector a) { return scaled(1 / sqrt(dot3(a, a)), a); }
-
 Vector place_in(global const REAL *m, Vector a, REAL place)
 {
     return (Vector){m[0] * a.x + m[1] * a.y + m[2] * a.z + place * m[3],
@@ -177,11 +175,6 @@ Vector colour_of(const World *world, Vector origin, Vector direction, int eye, i
 
 uchar level(REAL share) { return (uchar)lower(upper(255 * share + R(0.5), R(0)), R(255)); }
 
-Vector along(constant const REAL *views, REAL u, REAL v)
-{
-    return moved(moved(read3(views), read3(views + 3), u), read3(views + 6), v);
-}
-
 kernel void trace(global const float *triangles, global const int *links, global const float *nodes,
                   global const int *children, global const float *normals, global const float *uv,
                   global const long *shapes, global const int *faces, global const float *fractions,
@@ -211,7 +204,7 @@ kernel void trace(global const float *triangles, global const int *links, global
                          ground,
                          light};
     const REAL u = (k % columns + R(0.5)) / columns - R(0.5), v = (k / columns + R(0.5)) / rows - R(0.5);
-    const Vector colour = colour_of(&world, along(camera, u, v), unit(along(camera + 9, u, v)), eye, way, depth);
+    const Vector colour = colour_of(&world, affine(camera, u, v), unit(affine(camera + 9, u, v)), eye, way, depth);
     image[3 * k] = level(colour.x);
     image[3 * k + 1] = level(colour.y);
     image[3 * k + 2] = level(colour.z);

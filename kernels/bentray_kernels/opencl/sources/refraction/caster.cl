@@ -43,11 +43,6 @@ Ray in_nodes(Vector origin, Vector direction, Vector zero, Vector density)
     return (Ray){start, along, {1 / along.x, 1 / along.y, 1 / along.z}};
 }
 
-Vector affine(constant const REAL *basis, REAL u, REAL v)
-{
-    return moved(moved(read3(basis), read3(basis + 3), u), read3(basis + 6), v);
-}
-
 void store(global REAL *at, Vector a)
 {
     at[0] = a.x;
@@ -80,8 +75,7 @@ kernel void follow(global const SUM *coefficients, constant const SUM *tables, c
     const Vector zero = read3(frame), density = read3(frame + 3);
     const Vector low = read3(frame + 6), high = read3(frame + 9);
     Vector origin = affine(camera, places[2 * n], places[2 * n + 1]);
-    Vector direction = affine(camera + 9, places[2 * n], places[2 * n + 1]);
-    direction = scaled(1 / sqrt(dot3(direction, direction)), direction);
+    Vector direction = unit(affine(camera + 9, places[2 * n], places[2 * n + 1]));
 
     int crossed = 0, layer = around, fate = MISSED, halvings = MAX_HALVINGS;
     bool entered = false, leaving = false;

@@ -46,3 +46,9 @@ Vector moved(Vector a, Vector along, REAL s)
 }
 Vector read3(constant const REAL *at) { return (Vector){at[0], at[1], at[2]}; }
 Vector axis_of(int axis) { return (Vector){R(axis == 0), R(axis == 1), R(axis == 2)}; }
+Vector unit(Vector a) { return scaled(1 / sqrt(dot3(a, a)), a); }
+// Origin or direction of a ray, as of refraction/camera.py.
+Vector affine(constant const REAL *basis, REAL u, REAL v)
+{
+    return moved(moved(read3(basis), read3(basis + 3), u), read3(basis + 6), v);
+}
