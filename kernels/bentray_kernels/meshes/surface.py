@@ -11,6 +11,7 @@ from ..arrays import Float32s, Int32s, Ints
 from ..errors import InvalidInput
 from .hierarchy import build_hierarchy
 from .mesh import Chart
+from .topology import edges_of
 
 # 4-byte words of a triangle and of a node: a line of the cache each.
 WORDS = 16
@@ -80,12 +81,11 @@ def _lines(count: int) -> Float32s:
 
 def _neighbours(faces: NDArray[np.int32]) -> Ints:
     """(faces, 3) the face across each edge, −1 where there is none or more than one."""
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].astype(np.int64), axis=2).reshape(-1, 2)
-    _, edge, count = np.unique(edges[:, 0] << 32 | edges[:, 1], return_inverse=True, return_counts=True)
+    _, edge, count = edges_of(faces)
     sides = np.argsort(edge, kind="stable")
     first = np.concatenate([[0], np.cumsum(count)[:-1]])
     pair = count == 2
     a, b = sides[first[pair]], sides[first[pair] + 1]
-    across = np.full(len(edges), -1, dtype=np.int64)
+    across = np.full(len(edge), -1, dtype=np.int64)
     across[a], across[b] = b // 3, a // 3
     return across.reshape(-1, 3)

@@ -94,7 +94,6 @@ def side_end(side: int | Ints) -> int | Ints:
 
 def side_ends(faces: NDArray[np.integer]) -> tuple[Ints, Ints]:
     """(3·faces,) the vertex where each side starts, and the one where it ends."""
-    faces = np.asarray(faces, np.int64)
     corners: Ints = np.asarray(faces, np.int64)
     following: Ints = np.roll(corners, -1, axis=1)
     return corners.reshape(-1), following.reshape(-1)

@@ -7,7 +7,6 @@ the line.
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 import sys
@@ -53,40 +52,28 @@ def _fault_of_solve(session: Session) -> str:
 
 
 def reference(crossing: Floats, source: tuple[int, ...]) -> Floats:
-    """First-order travel time in plain Python, by iterations over all nodes until no time decreases."""
+    """First-order travel time in NumPy, by updates of all nodes until no time decreases.
+
+    T with Σ max(T − t, 0)² = crossing², from the earlier neighbour's time t along each axis.
+    """
     time: Floats = np.full(crossing.shape, math.inf)
     time[source] = 0.0
-    padded = np.pad(time, 1, constant_values=math.inf)
-    nodes = [tuple(i + 1 for i in node) for node in np.ndindex(crossing.shape)]
-    changed = True
-    while changed:
-        changed = False
-        for node in itertools.chain(nodes, reversed(nodes)):
-            earliest = sorted(_earlier(padded, node, axis) for axis in range(crossing.ndim))
-            new = _godunov(earliest, float(crossing[tuple(i - 1 for i in node)]))
-            if new < padded[node]:
-                padded[node] = new
-                changed = True
-    return padded[(slice(1, -1),) * crossing.ndim]
-
-
-def _earlier(padded: Floats, node: tuple[int, ...], axis: int) -> float:
-    before, after = list(node), list(node)
-    before[axis] -= 1
-    after[axis] += 1
-    return min(float(padded[tuple(before)]), float(padded[tuple(after)]))
-
-
-def _godunov(earliest: list[float], crossing: float) -> float:
-    """T with Σ max(T − t, 0)² = crossing², from the neighbours' times t in rising order."""
-    time = earliest[0] + crossing
-    for count in range(2, len(earliest) + 1):
-        if time <= earliest[count - 1]:
-            break
-        mean = sum(earliest[:count]) / count
-        spread = sum((t - mean) ** 2 for t in earliest[:count])
-        time = mean + math.sqrt((crossing**2 - spread) / count)
-    return time
+    while True:
+        padded = np.pad(time, 1, constant_values=math.inf)
+        beside = [
+            np.minimum(np.roll(padded, 1, axis), np.roll(padded, -1, axis)) for axis in range(time.ndim)
+        ]
+        earliest = np.sort([times[(slice(1, -1),) * time.ndim] for times in beside], axis=0)
+        new = earliest[0] + crossing
+        with np.errstate(invalid="ignore"):
+            for count in range(2, time.ndim + 1):
+                mean = earliest[:count].mean(axis=0)
+                spread = ((earliest[:count] - mean) ** 2).sum(axis=0)
+                joint = mean + np.sqrt((crossing**2 - spread) / count)
+                new = np.where(new > earliest[count - 1], joint, new)
+        if not (new < time).any():
+            return time
+        time = np.where(new < time, new, time)
 
 
 def main(arguments: list[str]) -> None:
