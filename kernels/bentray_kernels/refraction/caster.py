@@ -83,7 +83,6 @@ class Traced(NamedTuple):
         fate: (n,) ``MISSED``, ``REFRACTED`` or ``LOST``.
         crossed: (n,) number of interfaces.
         weight: (n,) share of unpolarised energy on this path.
-        vertices: (n, depth + 1, 3) intersections with them, m; (0, 0, 3) without paths.
     """
 
     point: Floats
@@ -91,7 +90,6 @@ class Traced(NamedTuple):
     fate: NDArray[np.uint8]
     crossed: NDArray[np.int16]
     weight: Floats
-    vertices: Floats
 
     def part(self, rays: slice) -> Traced:
         """A view of some of the rays."""
@@ -99,7 +97,7 @@ class Traced(NamedTuple):
         return Traced(*(array[rays] for array in every))
 
 
-def allocate_results(rays: int, depth: int, paths: bool) -> Traced:
+def allocate_results(rays: int) -> Traced:
     """Allocate the results of the caster."""
     return Traced(
         np.empty((rays, 3)),
@@ -107,7 +105,6 @@ def allocate_results(rays: int, depth: int, paths: bool) -> Traced:
         np.empty(rays, dtype=np.uint8),
         np.empty(rays, dtype=np.int16),
         np.empty(rays),
-        np.full((rays, depth + 1, 3) if paths else (0, 0, 3), np.nan),
     )
 
 
@@ -165,7 +162,6 @@ def _trace_ray(
                 ratio = medium.indices[medium.around] / medium.indices[layer]
                 direction, share, passed = refracted(direction, _axis(face_in), ratio)
                 weight, crossed, fate = weight * share, crossed + 1, REFRACTED
-                _record_vertex(traced, n, crossed, origin)
                 if not passed:
                     break
                 continue
@@ -198,7 +194,6 @@ def _trace_ray(
         ratio = medium.indices[layer] / medium.indices[behind]
         direction, share, passed = refracted(direction, normal, ratio)
         weight, crossed, fate = weight * share, crossed + 1, REFRACTED
-        _record_vertex(traced, n, crossed, origin)
         if passed:
             layer = behind
             if side == 0:
@@ -283,11 +278,3 @@ def unit_normal(gradient: Vector, direction: Vector) -> Vector:
 @kernel(inline="always")
 def _point_at(origin: Vector, direction: Vector, s: float) -> Vector:
     return origin[0] + s * direction[0], origin[1] + s * direction[1], origin[2] + s * direction[2]
-
-
-@kernel(inline="always")
-def _record_vertex(traced: Traced, n: int, crossed: int, place: Vector) -> None:
-    if crossed <= traced.vertices.shape[1]:
-        traced.vertices[n, crossed - 1, 0] = place[0]
-        traced.vertices[n, crossed - 1, 1] = place[1]
-        traced.vertices[n, crossed - 1, 2] = place[2]

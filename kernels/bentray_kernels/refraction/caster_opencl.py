@@ -46,7 +46,7 @@ TOLERANCES = {"float64": (1e-6, 0.02), "float32": (1e-2, 0.05)}
 
 
 # Arguments of the kernel that are ``Traced``.
-RESULTS = ("points", "directions", "fates", "crossings", "weights", "vertices")
+RESULTS = ("points", "directions", "fates", "crossings", "weights")
 
 
 class Rays(NamedTuple):
@@ -121,7 +121,7 @@ class OpenCLCaster(DeviceScene):
         far, allowed = TOLERANCES[self.precision]
 
         def off() -> Flags:
-            traced, expected = (allocate_results(TRIED, TRIED_DEPTH, False) for _ in range(2))
+            traced, expected = (allocate_results(TRIED) for _ in range(2))
             rays = Rays(medium, search, *_towards_the_object(self.scene), TRIED_DEPTH, traced)
             self.follow(rays)
             cast(*rays._replace(traced=expected))
@@ -133,8 +133,8 @@ class OpenCLCaster(DeviceScene):
 
     def follow(self, rays: Rays) -> None:
         """Like ``cast``, on the device, without self-test."""
-        # Place, point, direction, weight and the two whole numbers of a ray; its path.
-        at_once = max(1, self.session.doubles_at_once() // (10 + 3 * rays.traced.vertices.shape[1]))
+        # Place, point, direction, weight and the two whole numbers of a ray.
+        at_once = max(1, self.session.doubles_at_once() // 10)
         program = _program(self.precision, self._sum.name, self.scene.field.stencil, _way(rays.search))
         kernel = self.session.kernel(program, "follow")
         for start in range(0, len(rays.places), at_once):
@@ -153,9 +153,6 @@ class OpenCLCaster(DeviceScene):
         )
         filled: list[Any] = [*traced]
         there = [self._room_for(array) for array in filled]
-        # Vertices that no ray reaches stay as they are.
-        if traced.vertices.size:
-            there[-1] = session.upload(traced.vertices.astype(real))
         kernel.set(
             **self._arguments,
             top=np.int32(search.top),
@@ -168,7 +165,6 @@ class OpenCLCaster(DeviceScene):
             step=real(search.step),
             camera=views,
             depth=np.int32(depth),
-            kept=np.int32(traced.vertices.shape[1]),
             count=np.uint32(len(pixels)),
             places=at,
             **dict(zip(RESULTS, there, strict=True)),

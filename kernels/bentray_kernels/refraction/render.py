@@ -119,7 +119,7 @@ def render(
         # The last ray may lie beyond the edge of the picture.
         covered = np.array([columns / settings.columns, rows / settings.rows])
         pixels = (pixels + 0.5) * spacing * covered - 0.5
-    traced = allocate_results(rows * columns, settings.depth, False)
+    traced = allocate_results(rows * columns)
     plane, where = np.empty(rows * columns, dtype=np.int8), np.empty((rows * columns, 2))
     medium = medium_of(scene, settings.structure)
     search = scene.search(settings.structure, settings.roots, settings.step)

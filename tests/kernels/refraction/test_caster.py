@@ -29,13 +29,11 @@ def ball(index: float = 1.5) -> Scene:
     return scene(-squared(24), Layers((-(RADIUS**2),), (1.0, index)))
 
 
-def trace(
-    scene: Scene, starts, directions, depth=16, structure="octree", roots="certain", paths=False
-) -> Traced:
+def trace(scene: Scene, starts, directions, depth=16, structure="octree", roots="certain") -> Traced:
     """Rays with any start and direction: each is its own camera."""
     starts, directions = np.atleast_2d(starts).astype(float), np.atleast_2d(directions).astype(float)
     directions = directions / np.linalg.norm(directions, axis=1)[:, None]
-    traced = allocate_results(len(starts), depth, paths)
+    traced = allocate_results(len(starts))
     medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.05)
     for n, (start, ahead) in enumerate(zip(starts, directions, strict=True)):
         still = np.zeros((2, 3))
@@ -106,15 +104,16 @@ def test_paths_are_reversible():
     made = scene(-squared(20), Layers((-0.16, -0.09, -0.04), (1.0, 1.3, 1.1, 1.6)))
     random = np.random.default_rng(3)
     starts = np.column_stack([random.uniform(-0.35, 0.35, (60, 2)), np.full(60, -2.0)])
-    forth = trace(made, starts, random.normal([0, 0, 1], 0.05, (60, 3)), paths=True)
+    directions = random.normal([0, 0, 1], 0.05, (60, 3))
+    forth, entering = (trace(made, starts, directions, depth) for depth in (16, 1))
     refracted = forth.fate == REFRACTED
     assert refracted.sum() > 40
     ends = forth.point + 2.0 * forth.direction
-    back = trace(made, ends[refracted], -forth.direction[refracted], paths=True)
+    back = trace(made, ends[refracted], -forth.direction[refracted])
     np.testing.assert_array_equal(back.crossed, forth.crossed[refracted])
     np.testing.assert_allclose(back.weight, forth.weight[refracted], atol=1e-7)
     # The place where the way back leaves is where the way in began to bend.
-    np.testing.assert_allclose(back.point, forth.vertices[refracted, 0], atol=1e-6)
+    np.testing.assert_allclose(back.point, entering.point[refracted], atol=1e-6)
     assert len(set(forth.crossed[refracted])) >= 3
 
 
@@ -152,10 +151,11 @@ def test_an_object_cut_by_the_grid_has_flat_faces():
     volume[0, 0, 0] = 0.0
     made = Scene.build(Spline.from_volume(volume, "trilinear"), Layers((0.5,), (1.0, 1.5)), 1.0 / 7.0)
     tilt = 0.3
-    traced = trace(made, [[-0.5, 0.0, -2.0]], [[np.sin(tilt), 0.0, np.cos(tilt)]], paths=True)
+    ray = [[-0.5, 0.0, -2.0]], [[np.sin(tilt), 0.0, np.cos(tilt)]]
+    traced = trace(made, *ray)
     assert traced.crossed[0] == 2
     np.testing.assert_allclose(traced.direction[0], [np.sin(tilt), 0.0, np.cos(tilt)], atol=1e-12)
-    entry, leaving = traced.vertices[0, :2]
+    entry, leaving = trace(made, *ray, depth=1).point[0], traced.point[0]
     assert (entry[2], leaving[2]) == pytest.approx((-0.5, 0.5))
     assert leaving[0] - entry[0] == pytest.approx(np.tan(np.arcsin(np.sin(tilt) / 1.5)))
 

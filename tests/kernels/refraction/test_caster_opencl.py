@@ -46,11 +46,9 @@ def caster_of(scene: Scene, precision: str = "float64") -> OpenCLCaster:
 def cast_by_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lets the cases of ``test_caster`` ask the device; where it is not trusted its warning is an error."""
 
-    def trace(
-        scene, starts, directions, depth=16, structure="octree", roots="certain", paths=False
-    ) -> Traced:
+    def trace(scene, starts, directions, depth=16, structure="octree", roots="certain") -> Traced:
         starts, directions = np.atleast_2d(starts).astype(float), np.atleast_2d(directions).astype(float)
-        traced = allocate_results(len(starts), depth, paths)
+        traced = allocate_results(len(starts))
         medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.05)
         caster, still = caster_of(scene), np.zeros((2, 3))
         for n, (start, ahead) in enumerate(zip(starts, directions, strict=True)):
@@ -82,7 +80,6 @@ def both(
     structure="octree",
     roots="certain",
     depth=16,
-    paths=True,
     seed=0,
     compiled: Scene | None = None,
 ) -> tuple[Traced, Traced]:
@@ -95,7 +92,7 @@ def both(
     camera = perspective(eye, (0.0, 0.0, 0.0), random.normal(size=3), 14.0)
     points = random.uniform(-0.5, 0.5, (300, 2))
     medium, search = medium_of(scene, structure), scene.search(structure, roots, 0.1)
-    computed, expected = (allocate_results(300, depth, paths) for _ in range(2))
+    computed, expected = (allocate_results(300) for _ in range(2))
     views = camera.origin, camera.direction
     caster_of(scene, precision).follow(Rays(medium, search, views, points, depth, computed))
     if compiled is not None:
@@ -141,7 +138,9 @@ def test_rays_through_nested_surfaces_are_those_of_the_compiled_caster(roots):
     assert (expected.fate == REFRACTED).sum() > 50
     assert len(set(expected.crossed)) >= 4
     assert strays(computed, expected, 1e-9) == 0
-    np.testing.assert_allclose(computed.vertices, expected.vertices, atol=1e-9)
+    # With fewer interfaces a ray ends at the last one.
+    for depth in range(1, 5):
+        assert strays(*both(nested(), roots=roots, depth=depth), 1e-9) == 0
 
 
 @pytest.mark.parametrize(
@@ -176,7 +175,7 @@ def test_volumes_in_float32_are_summed_in_float32():
 
 def test_float32_finds_directions_to_a_thousandth():
     for scene in (nested(), rough(1, "bspline3"), rough(3, "trilinear")):
-        computed, expected = both(scene, "float32", depth=3, paths=False)
+        computed, expected = both(scene, "float32", depth=3)
         assert strays(computed, expected, 1e-9) > 0
         assert strays(computed, expected, 1e-3) <= 6
 
@@ -245,7 +244,7 @@ def test_many_rays_are_cast_in_parts(monkeypatch):
 
 
 def test_no_rays_give_empty_results():
-    scene, none = nested(), allocate_results(0, 4, True)
+    scene, none = nested(), allocate_results(0)
     view = CAMERAS["orthographic"]
     caster_of(scene).cast(
         medium_of(scene, "octree"), scene.search(), (view.origin, view.direction), np.empty((0, 2)), 4, none

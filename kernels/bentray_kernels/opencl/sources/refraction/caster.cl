@@ -56,15 +56,14 @@ void store(global REAL *at, Vector a)
 // frame                                 origin, density, low and high of the medium.
 // open                                  whether the object is cut by the grid's faces.
 // camera                                origin and direction, 3 rows each.
-// kept                                  how many places of a path are kept in vertices.
 kernel void follow(global const SUM *coefficients, constant const SUM *tables, const REAL shift,
                    const int counts_x, const int counts_y, const int counts_z, global const uchar *masks,
                    global const float *bend, constant const long *shapes, const int top,
                    constant const REAL *levels, constant const REAL *indices, const int layers,
                    const int around, constant const REAL *frame, const int open, const REAL step,
-                   constant const REAL *camera, const int depth, const int kept, const uint count,
+                   constant const REAL *camera, const int depth, const uint count,
                    global const REAL *places, global REAL *points, global REAL *directions,
-                   global uchar *fates, global short *crossings, global REAL *weights, global REAL *vertices)
+                   global uchar *fates, global short *crossings, global REAL *weights)
 {
     const size_t n = get_global_id(0);
     if (n >= count)
@@ -137,8 +136,6 @@ kernel void follow(global const SUM *coefficients, constant const SUM *tables, c
         const bool passed = refract(&direction, normal, indices[layer] / indices[behind], &weight);
         ++crossed;
         fate = REFRACTED;
-        if (crossed <= kept)
-            store(vertices + 3 * ((size_t)kept * n + crossed - 1), origin);
         if (passed)
             layer = behind;
         // What is mirrored at a face from within stays; what is mirrored at one from without has left.
